@@ -31,14 +31,10 @@ counted = $$(grep -o '^[a-z][^=]*' $(1) | sort -u | wc -l)
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) tests/workflow/test_results.py
 
-.PHONY: study article test test-lowest test-pythons check verify publish publish-overlays lint format bench bench-field report docs citation site notebook pinned lock clean
+.PHONY: study test test-lowest test-pythons check check-overlays verify publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
 
 study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
-
-# The study as an article, results/article.pdf; `make study` makes it, too.
-article: $(READY)
-	$(BIN)/biogrip run -j$(JOBS) article
 
 # One worker more than there are processors: some wait for the programs that they have started.
 test: $(TEST_READY)
@@ -75,6 +71,11 @@ verify: $(READY)
 check: $(READY)
 	$(BIN)/snakemake -j$(JOBS) check
 
+# The same for every overlay that is published, each as long as a study or longer: nightly, not in CI.
+check-overlays: $(READY)
+	overlays=$$($(BIN)/snakemake --list-rules | grep ^check_) && \
+	  $(BIN)/snakemake -j$(JOBS) --keep-going $$overlays
+
 publish: $(READY)
 	$(BIN)/snakemake -j$(JOBS) publish
 
@@ -94,14 +95,11 @@ format: $(TEST_READY)
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
 
-# All of it, or only what SECTIONS names, the rest of the report staying as it is.
 bench: $(BENCH_READY)
-	$(BENCH_BIN)/python -m pytest -q tests/test_benchmarks.py
-	$(BENCH_BIN)/python -m benchmarks $(SECTIONS)
+	$(BENCH_BIN)/python -m benchmarks
 
-# All of it, or with SECTIONS=measured only the measured traces, with SECTIONS=dish only the dish.
 bench-field: $(FIELD_READY)
-	$(FIELD_BIN)/python -m benchmarks.field $(SECTIONS)
+	$(FIELD_BIN)/python -m benchmarks.field
 
 report: $(READY)
 	$(BIN)/snakemake -j$(JOBS) --report report.html --report-metadata workflow/report/results.yaml
@@ -122,10 +120,6 @@ site: $(SITE_READY)
 	$(SITE_BIN)/cffconvert --format codemeta | cmp - codemeta.json
 	$(SITE_BIN)/cffconvert --format zenodo | cmp - .zenodo.json
 	NO_MKDOCS_2_WARNING=1 $(SITE_BIN)/mkdocs build --strict --clean
-
-# The notebook with what it puts out; look at it before committing it.
-notebook: $(TEST_READY)
-	$(BIN)/python -m tests.helpers.notebook
 
 # The pictures that figures are compared with; look at what has changed before committing them.
 pinned: $(TEST_READY)

@@ -1,1 +1,1 @@
-"""How fast and how good the study's methods are, against peers in the same run."""
+"""biogrip beside other libraries, timed."""

@@ -1,19 +1,24 @@
-"""Runs every benchmark, or those named, and writes `benchmarks/results`."""
+"""Runs all benchmarks and writes `benchmarks/results`."""
 
-import os
-import sys
+from pathlib import Path
 
-# One thread for every competitor. BLAS libraries read this once, while numpy is imported.
-for variable in (
-    "BLIS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-):
-    os.environ[variable] = "1"
+from benchmarks.one_thread import keep_to_one_thread
 
 if __name__ == "__main__":
-    from benchmarks.report import run
+    keep_to_one_thread()
+    from benchmarks.identification import IDENTIFICATION
+    from benchmarks.local_fits import LOCAL_FITS
+    from benchmarks.misfit import MISFIT
+    from benchmarks.report import Report
 
-    run(sys.argv[1:])
+    Report(
+        Path(__file__).parent / "results" / "benchmarks",
+        """\
+# Benchmarks
+
+Written by `make bench`, all of it in one run. All competitors run in one process on one thread and
+take turns, so that a slow moment strikes them all. Times are medians; ratios are taken turn by
+turn, and given as their median with the lowest and the highest.""",
+        (MISFIT, IDENTIFICATION, LOCAL_FITS),
+        ("deap", "lmfit", "pygad", "pymoo"),
+    ).run()

@@ -1,11 +1,8 @@
 """The paper's genetic algorithm in the libraries of others.
 
-Each in two ways. As documented: set up for integers as its documentation shows,
-with its own operators and defaults, at the paper's population and survivors. Lean:
-the operators of `biogrip.identify.genetic` as nearly as its interface allows, and as
-fast: truncation selection, random disjoint pairs, single-point crossover, and from
-`mutation_start` on one gene redrawn in half of the children. Either way it sees the
-same misfit of whole batches.
+Each has the operators of `biogrip.identify.genetic` as nearly as its interface allows, and as fast:
+truncation selection, random disjoint pairs, single-point crossover, and from `mutation_start` on
+one gene redrawn in half of the children. All see the same misfit of whole batches.
 """
 
 import random
@@ -20,9 +17,6 @@ from pymoo.algorithms.soo.nonconvex.ga import GA
 from pymoo.core.mutation import Mutation
 from pymoo.core.problem import Problem
 from pymoo.operators.crossover.pntx import SinglePointCrossover
-from pymoo.operators.mutation.pm import PM
-from pymoo.operators.repair.rounding import RoundingRepair
-from pymoo.operators.sampling.rnd import IntegerRandomSampling
 from pymoo.operators.selection.rnd import RandomSelection
 from pymoo.optimize import minimize
 
@@ -36,17 +30,7 @@ creator.create("Chromosome", list, fitness=creator.Misfit)
 
 @dataclass(frozen=True)
 class Task:
-    """What is to be minimised, and how.
-
-    Parameters
-    ----------
-    misfit
-        Of parameters of shape (n, n_parameters).
-    genome
-        What a chromosome may be.
-    settings
-        How the population evolves; it does so for ``max_generations``.
-    """
+    """What is to be minimised, and how; the population evolves for ``max_generations``."""
 
     misfit: Callable[[Array], Array]
     genome: Genome
@@ -57,17 +41,10 @@ class Task:
         return self.misfit(self.genome.decode(chromosomes))
 
 
-def by_deap(task: Task, seed: int, *, documented: bool) -> tuple[IntArray, float]:
-    """Run the loop of DEAP's overview, whose ``map`` evaluates a whole batch.
+def by_deap(task: Task, seed: int) -> float:
+    """Run the loop of DEAP's overview, whose ``map`` evaluates a whole batch; the lowest misfit.
 
-    Parameters
-    ----------
-    task, seed
-        What to do.
-    documented
-        Whether children start as deep copies, DEAP's default, and each gene is
-        redrawn by DEAP's own operator with its own probability, one a child on
-        average; or they start as new lists, and one gene is redrawn.
+    Children start as new lists, not as deep copies, which are slow.
     """
     settings, genome = task.settings, task.genome
     low, high = genome.low.tolist(), genome.high.tolist()
@@ -84,11 +61,8 @@ def by_deap(task: Task, seed: int, *, documented: bool) -> tuple[IntArray, float
     toolbox.register("map", lambda evaluate, batch: evaluate(batch))
     toolbox.register("select", tools.selBest, k=settings.survivors)
     toolbox.register("mate", tools.cxOnePoint)
-    if documented:
-        toolbox.register("mutate", tools.mutUniformInt, low=low, up=high, indpb=1 / len(low))
-    else:
-        toolbox.register("clone", creator.Chromosome)
-        toolbox.register("mutate", mutate)
+    toolbox.register("clone", creator.Chromosome)
+    toolbox.register("mutate", mutate)
 
     def evaluated(batch: list[Any]) -> list[Any]:
         for chromosome, value in zip(batch, toolbox.map(toolbox.evaluate, batch), strict=True):
@@ -107,24 +81,15 @@ def by_deap(task: Task, seed: int, *, documented: bool) -> tuple[IntArray, float
                 if random.random() < settings.mutation_probability:
                     toolbox.mutate(child)
         population = survivors + evaluated(children)
-    (best,) = tools.selBest(population, 1)
-    return np.array(best), best.fitness.values[0]
+    lowest: float = tools.selBest(population, 1)[0].fitness.values[0]
+    return lowest
 
 
-def by_pygad(task: Task, seed: int, *, documented: bool) -> tuple[IntArray, float]:
-    """Run PyGAD on batches.
+def by_pygad(task: Task, seed: int) -> float:
+    """Run PyGAD on batches, with callables on arrays; the lowest misfit.
 
-    Its crossover makes one child of each two parents that follow one another.
-    It does not evaluate a child that equals a parent.
-
-    Parameters
-    ----------
-    task, seed
-        What to do.
-    documented
-        Whether initial population, selection and mutation are PyGAD's own, which
-        mates neighbours in rank and mutates every child from the start; or
-        callables on arrays.
+    Its crossover makes one child of each two parents that follow one another. It does not evaluate
+    a child that equals a parent.
     """
     settings, genome = task.settings, task.genome
     rng = np.random.default_rng(seed)
@@ -138,20 +103,6 @@ def by_pygad(task: Task, seed: int, *, documented: bool) -> tuple[IntArray, floa
             _mutate(children, genome, rng, settings.mutation_probability)
         return children
 
-    how: dict[str, Any]
-    if documented:
-        how = {
-            "sol_per_pop": settings.population,
-            "num_genes": genome.genes,
-            "gene_space": [range(a, b + 1) for a, b in zip(genome.low, genome.high, strict=True)],
-            "mutation_num_genes": settings.mutated_genes,
-        }
-    else:
-        how = {
-            "initial_population": genome.draw(settings.population, rng),
-            "parent_selection_type": parents,
-            "mutation_type": mutated,
-        }
     run = pygad.GA(
         num_generations=settings.max_generations,
         num_parents_mating=settings.survivors,
@@ -159,54 +110,33 @@ def by_pygad(task: Task, seed: int, *, documented: bool) -> tuple[IntArray, floa
         gene_type=int,
         fitness_func=lambda run, chromosomes, indices: -task.of(chromosomes),
         fitness_batch_size=settings.population,
+        initial_population=genome.draw(settings.population, rng),
+        parent_selection_type=parents,
         crossover_type="single_point",
-        **how,
+        mutation_type=mutated,
         random_seed=seed,
         suppress_warnings=True,
     )
     run.run()
-    best, fitness, _ = run.best_solution(run.last_generation_fitness)
-    return best, -fitness
+    return -float(run.best_solution(run.last_generation_fitness)[1])
 
 
-def by_pymoo(task: Task, seed: int, *, documented: bool) -> tuple[IntArray, float]:
-    """Run pymoo's genetic algorithm.
-
-    Parameters
-    ----------
-    task, seed
-        What to do.
-    documented
-        Whether it is set up as pymoo's page on discrete variables shows, with
-        single-point crossover: tournaments, polynomial mutation of every child,
-        numbers rounded, and children that are there already replaced; or with the
-        paper's pairs and mutation on arrays, and such children kept.
-    """
+def by_pymoo(task: Task, seed: int) -> float:
+    """Run pymoo's genetic algorithm, and keep children that are there already; lowest misfit."""
     settings, genome = task.settings, task.genome
-    how: dict[str, Any]
-    if documented:
-        how = {
-            "sampling": IntegerRandomSampling(),
-            "crossover": SinglePointCrossover(prob=1.0, repair=RoundingRepair()),
-            "mutation": PM(prob=1.0, eta=3.0, vtype=float, repair=RoundingRepair()),
-            "eliminate_duplicates": True,
-        }
-    else:
-        how = {
-            "sampling": genome.draw(settings.population, np.random.default_rng(seed)),
-            "selection": _AmongSurvivors(settings.survivors),
-            "crossover": SinglePointCrossover(prob=1.0),
-            "mutation": _OneGene(genome, settings),
-            "eliminate_duplicates": False,
-            "advance_after_initial_infill": True,
-        }
     algorithm = GA(
-        pop_size=settings.survivors, n_offsprings=settings.population - settings.survivors, **how
+        pop_size=settings.survivors,
+        n_offsprings=settings.population - settings.survivors,
+        sampling=genome.draw(settings.population, np.random.default_rng(seed)),
+        selection=_AmongSurvivors(settings.survivors),
+        crossover=SinglePointCrossover(prob=1.0),
+        mutation=_OneGene(genome, settings),
+        eliminate_duplicates=False,
+        advance_after_initial_infill=True,
     )
     # pymoo counts the initial population as the first generation.
     generations = settings.max_generations + 1
-    found = minimize(_Minimised(task), algorithm, ("n_gen", generations), seed=seed)
-    return found.X, float(found.F[0])
+    return float(minimize(_Minimised(task), algorithm, ("n_gen", generations), seed=seed).F[0])
 
 
 class _Minimised(Problem):  # type: ignore[misc]

@@ -1,101 +1,136 @@
-"""Local fits from the same starts, against other libraries driving the same residuals."""
+"""Local fits from the same starts, by other libraries on the same residuals, too."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from benchmarks.batch import BATCH
-from benchmarks.fit_peers import by_lmfit, by_pypesto, by_scipy, by_scipy_in_two_turns
-from benchmarks.section import Row, Section, number, times_ours
-from benchmarks.setup import problem
-from benchmarks.starts import Started, fitted, started
+from benchmarks.fit_peers import by_lmfit, by_scipy, by_scipy_in_two_turns
+from benchmarks.noisy_traces import BATCH, OURS, SIDE_BY_SIDE, case, noisy_trace
+from benchmarks.report import Row as ReportRow
+from benchmarks.report import Section, number, times_ours
 from benchmarks.timing import Timed, alternate
 from biogrip.arrays import Array
-from biogrip.identify.multi_start import FINISHED
+from biogrip.identify.answer import Row, silent
+from biogrip.identify.multi_start import FINISHED, best_of_starts, screened
+from biogrip.identify.problem import Problem
 
-OURS, SIDE_BY_SIDE = "biogrip", f"biogrip, {BATCH} traces side by side"
-SCIPY, SCIPY_IN_TURNS = "SciPy least_squares", "SciPy least_squares, in two turns"
-LMFIT, PYPESTO = "lmfit", "pyPESTO"
 _ROUNDS, _FEW = 5, 3
 
-Fitter = Callable[[Started], Array]
-
-PEERS: Mapping[str, Fitter] = {
-    SCIPY: by_scipy,
-    SCIPY_IN_TURNS: by_scipy_in_two_turns,
-    LMFIT: by_lmfit,
-    PYPESTO: by_pypesto,
+PEERS: Mapping[str, Callable[[Problem, Array], Array]] = {
+    "SciPy least_squares": by_scipy,
+    "SciPy least_squares, in two turns": by_scipy_in_two_turns,
+    "lmfit": by_lmfit,
 }
 
 
-def _text(starts: int) -> str:
-    return f"""\
-Traces of Table 5's sample, each fitted from the same {starts} starting points, the best of random
-ones as in the study, to the best of the optima that they lead to. *biogrip* fits all starts at
-once, roughly, then the best {FINISHED} to the end, and settles the best of these to its last digit
-on all samples; *{BATCH} traces side by side*, as the study does, all starts of all traces. The
-others drive the same residuals and Jacobian, condensed to the same rows, one fit after the other
-and each to its own default tolerance (`benchmarks/fit_peers.py`): SciPy's trust region (trf);
-lmfit's Levenberg-Marquardt (leastsq, bounds by its transformation, Dfun); pyPESTO's multi-start of
-SciPy's trust region (ls_trf). *In two turns*, SciPy is spared what biogrip is spared: rough fits,
-and the best {FINISHED} to the end. What is done once for all traces, and the starting points, are
-not included. All but the batch are timed on its first {_FEW} traces, and times are those of one.
-The last column, over all {BATCH}: chi^2 = n (m/m_best)^2, n the samples and m_best the lowest
-misfit that any of them found, above its smallest value."""
+@dataclass(frozen=True)
+class Started:
+    """A trace, and where its fits start."""
+
+    problem: Problem
+    starts: Array
+    """Log-parameters, (n_starts, n_parameters)."""
+    before: Row
+    """First row of the history, see `best_of_starts`."""
 
 
-def local_fits_section() -> Section:
+def started(seed: int) -> Started:
+    """Choose starting points as the study's least squares does, from the best of random ones."""
+    problem, settings = noisy_trace(seed).problem(), _settings()
+    rng = np.random.default_rng(seed)
+    drawn = rng.uniform(problem.low, problem.high, (settings.candidates, len(problem.low)))
+    points, misfit = screened(problem.misfit, drawn)
+    before = np.exp(points[0]), float(misfit[0]), float(np.median(misfit)), len(points)
+    return Started(problem, points[: settings.starts], before)
+
+
+def _settings() -> Any:
+    return case().method("least_squares")
+
+
+def by_biogrip(traces: Sequence[Started]) -> Array:
+    """Fit traces side by side as the study does; log-parameters, (n_traces, n_parameters)."""
+    answers = best_of_starts(
+        [trace.problem for trace in traces],
+        [trace.starts for trace in traces],
+        [trace.before for trace in traces],
+        silent,
+    )
+    return np.log([answer.parameters for answer in answers])
+
+
+def measure() -> list[ReportRow]:
     """Time every library, and measure how far from the best optima it ends."""
-    traces = started([problem(seed) for seed in range(BATCH)])
-    rows = compared(traces, _FEW, _ROUNDS)
-    columns: dict[str, Callable[[Row], str]] = {
-        "library": lambda row: row["library"],
-        "time a trace (ms)": lambda row: number(row["time_ms"]),
-        "times ours (lowest to highest)": times_ours,
-        "times ours side by side": lambda row: number(row["times_side_by_side"]),
-        "largest chi^2 above the best": lambda row: f"{row['largest_chi2_above_best']:.1g}",
-    }
-    title, text = "Local fits", _text(len(traces[0].starts))
-    return Section("local_fits", title, text, columns, rows)
+    traces = [started(seed) for seed in range(BATCH)]
 
+    def one_by_one(fitter: Callable[[Started], Array], some: Sequence[Started]) -> Array:
+        return np.array([fitter(trace) for trace in some])
 
-def compared(traces: Sequence[Started], few: int, rounds: int) -> list[Row]:
-    """Fit traces by every library; all but the batch are timed on the first few."""
-    alone: dict[str, Fitter] = {OURS: lambda trace: fitted([trace])[0], **PEERS}
-    calls: dict[str, Callable[[], object]] = {
-        name: partial(_one_by_one, fitter, traces[:few]) for name, fitter in alone.items()
+    def theirs(fit: Callable[[Problem, Array], Array], trace: Started) -> Array:
+        return fit(trace.problem, trace.starts)
+
+    alone: dict[str, Callable[[Started], Array]] = {
+        OURS: lambda trace: by_biogrip([trace])[0],
+        **{name: partial(theirs, fit) for name, fit in PEERS.items()},
     }
-    calls[SIDE_BY_SIDE] = partial(fitted, traces)
-    timed = alternate(calls, rounds)
-    counts = {name: len(traces) if name == SIDE_BY_SIDE else few for name in calls}
+    calls: dict[str, Callable[[], Array]] = {
+        name: partial(one_by_one, fitter, traces[:_FEW]) for name, fitter in alone.items()
+    }
+    calls[SIDE_BY_SIDE] = partial(by_biogrip, traces)
+    timed = alternate(calls, _ROUNDS)
+    counts = {name: len(traces) if name == SIDE_BY_SIDE else _FEW for name in calls}
     a_trace = Timed({name: spent / counts[name] for name, spent in timed.seconds.items()})
-    found = {name: _one_by_one(fitter, traces) for name, fitter in alone.items()}
-    found[SIDE_BY_SIDE] = fitted(traces)
+    found = {name: one_by_one(fitter, traces) for name, fitter in alone.items()}
+    found[SIDE_BY_SIDE] = by_biogrip(traces)
     above = _chi2_above_best(traces, found)
     return [
         {
             "library": name,
             **a_trace.against(name, OURS),
             "times_side_by_side": a_trace.against(name, SIDE_BY_SIDE)["times_ours"],
-            "traces_timed": counts[name],
             "largest_chi2_above_best": float(above[name].max()),
         }
         for name in (OURS, SIDE_BY_SIDE, *PEERS)
     ]
 
 
-def _one_by_one(fitter: Fitter, traces: Sequence[Started]) -> Array:
-    return np.array([fitter(trace) for trace in traces])
-
-
 def _chi2_above_best(traces: Sequence[Started], found: Mapping[str, Array]) -> dict[str, Array]:
     """By library and trace; each entry of what was found is (n_traces, n_parameters)."""
     misfits = np.array(
         [
-            trace.case_problem.misfit(np.exp([each[index] for each in found.values()]))
+            trace.problem.misfit(np.exp([each[index] for each in found.values()]))
             for index, trace in enumerate(traces)
         ]
     ).T
-    samples = traces[0].case_problem.residuals.samples
+    samples = traces[0].problem.residuals.samples
     return dict(zip(found, samples * ((misfits / misfits.min(axis=0)) ** 2 - 1), strict=True))
+
+
+LOCAL_FITS = Section(
+    "local_fits",
+    "Local fits",
+    f"""\
+Traces of Table 5's sample, each fitted from the same {_settings().starts} starting points, the best
+of random ones as in the study, to the best of the optima that they lead to. *biogrip* fits all
+starts at once, roughly, then the best {FINISHED} to the end, and settles the best of these to its
+last digit on all samples; *{BATCH} traces side by side*, as the study does, all starts of all
+traces. The others drive the same residuals and Jacobian, condensed to the same rows, one fit after
+the other and each to its own default tolerance (`benchmarks/fit_peers.py`): SciPy's trust region
+(trf), and lmfit's Levenberg-Marquardt (leastsq, bounds by its transformation, Dfun). *In two
+turns*, SciPy is spared what biogrip is spared: rough fits, and the best {FINISHED} to the end. What
+is done once for all traces, and the starting points, are not included. All but the batch are timed
+on its first {_FEW} traces, and times are those of one. The last column, over all {BATCH}:
+chi^2 = n (m/m_best)^2, n the samples and m_best the lowest misfit that any of them found, above its
+smallest value.""",
+    {
+        "library": lambda row: row["library"],
+        "time a trace (ms)": lambda row: number(row["time_ms"]),
+        "times ours (lowest to highest)": times_ours,
+        "times ours side by side": lambda row: number(row["times_side_by_side"]),
+        "largest chi^2 above the best": lambda row: f"{row['largest_chi2_above_best']:.1g}",
+    },
+    measure,
+)

@@ -1,135 +1,109 @@
-"""Runs all benchmarks and writes what they found as Markdown, JSON and figures."""
+"""Benchmarks as tables: run together, written as JSON, and from that as Markdown."""
 
 import json
+import platform
+import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from benchmarks import identification, misfit
-from benchmarks.designed_sampling import sampling_section
-from benchmarks.designs import designs_section
-from benchmarks.growth import growth_section
-from benchmarks.identification import identification_section
-from benchmarks.limit import limit_section
-from benchmarks.local_fits import local_fits_section
-from benchmarks.machine import machine
-from benchmarks.metaheuristics import metaheuristics_section
-from benchmarks.misfit import misfit_section
-from benchmarks.nonlinear import nonlinear_section
-from benchmarks.profiles import profiles_section
-from benchmarks.scale import scale_section
-from benchmarks.section import Section, markdown, number, renewed, written
-from benchmarks.sheet import sheet_section
-from benchmarks.study import study_section
+import numpy as np
+import pandas as pd
+import psutil
+
 from benchmarks.timing import clocked
-from biogrip.files import atomic_write, write_text
-from biogrip.products.figures.style import styled
+from biogrip.files import write_text
 
-RESULTS = Path(__file__).parent / "results"
-
-SECTIONS: Mapping[str, Callable[[], Section]] = {
-    "misfit": misfit_section,
-    "identification": identification_section,
-    "nonlinear": nonlinear_section,
-    "local_fits": local_fits_section,
-    "profiles": profiles_section,
-    "sampling": sampling_section,
-    "designs": designs_section,
-    "metaheuristics": metaheuristics_section,
-    "growth": growth_section,
-    "limit": limit_section,
-    "study": study_section,
-    "scale": scale_section,
-    "sheet": sheet_section,
-}
-"""By name, in the order of the report."""
-
-# Section, peer and how many times faster than it this project means to be.
-AIMS = (
-    ("misfit", misfit.NUMPY, 25),
-    ("identification", identification.DEAP, 3),
-    ("identification", identification.PYGAD, 15),
-    ("identification", identification.PYMOO, 15),
-    ("identification", identification.DEAP_LEAN, 3),
-    ("identification", identification.PYGAD_LEAN, 15),
-    ("identification", identification.PYMOO_LEAN, 15),
-)
-
-_INTRODUCTION = """\
-# Benchmarks
-
-Written by `make bench`. All competitors run in one process on one thread and take turns, so that a
-slow moment strikes them all. Times are medians; ratios are taken turn by turn, and given as their
-median with the lowest and the highest."""
+Row = dict[str, Any]
 
 
-def run(names: Sequence[str] = ()) -> None:
-    """Run benchmarks and write `benchmarks/results`.
+@dataclass(frozen=True)
+class Section:
+    """One benchmark, a table of the report."""
 
-    Parameters
-    ----------
-    names
-        Of sections; what the report has of the others stays. By default all are run.
-    """
-    unknown = [name for name in names if name not in SECTIONS]
-    if unknown:
-        raise SystemExit(f"found {unknown[0]}, allowed are {', '.join(SECTIONS)}.")
-    sections = []
-    for name in names or SECTIONS:
-        seconds, section = clocked(SECTIONS[name])
-        print(f"{section.title}: {seconds:.0f} s", flush=True)
-        sections.append(section)
-        _draw(section)
-    described = machine()
-    page, numbers = RESULTS / "benchmarks.md", RESULTS / "benchmarks.json"
-    found: dict[str, Any] = {section.name: list(section.rows) for section in sections}
-    if names:
-        text = renewed(page.read_text(encoding="utf-8"), described, sections)
-        there = json.loads(numbers.read_text(encoding="utf-8"))
-        alone = there.get("machine_of", {}) | dict.fromkeys(found, described)
-        found = there | found | {"machine_of": alone}
-    else:
-        text = report(described, sections)
-        found = {"machine": described, **found}
-    write_text(page, text)
-    write_text(numbers, json.dumps(found, indent=1) + "\n")
-    print(f"\n{text}")
+    name: str
+    """Its key in the JSON file."""
+    title: str
+    text: str
+    """What was done and how to read the rows."""
+    columns: Mapping[str, Callable[[Row], str]]
+    """By heading, how a row's cell is printed."""
+    measure: Callable[[], list[Row]]
+    """Runs it, and returns plain numbers and words."""
 
 
-def report(described: Mapping[str, str], sections: Sequence[Section]) -> str:
-    """Return everything as Markdown."""
-    parts = [
-        _INTRODUCTION,
-        markdown([described]),
-        "## Aims",
-        markdown(_aims({section.name: section for section in sections})),
-        *map(written, sections),
-    ]
-    return "\n\n".join(parts) + "\n"
+@dataclass(frozen=True)
+class Report:
+    """Benchmarks that run together."""
+
+    stem: Path
+    """Its files, but for `.json` and `.md`."""
+    introduction: str
+    """Title, and what holds for all sections."""
+    sections: Sequence[Section]
+    peers: Sequence[str]
+    """The libraries whose versions are said."""
+
+    def run(self) -> None:
+        """Run all sections and write both files."""
+        found: dict[str, Any] = {"machine": describe_machine(self.peers)}
+        for section in self.sections:
+            seconds, found[section.name] = clocked(section.measure)
+            print(f"{section.title}: {seconds:.0f} s", flush=True)
+        write_text(self.stem.with_suffix(".json"), json.dumps(found, indent=1) + "\n")
+        self.write_page()
+
+    def write_page(self) -> None:
+        """Write the Markdown file from the JSON file."""
+        found = json.loads(self.stem.with_suffix(".json").read_text(encoding="utf-8"))
+        parts = [self.introduction, _markdown([found["machine"]])]
+        for section in self.sections:
+            rows = found[section.name]
+            cells = [{head: cell(row) for head, cell in section.columns.items()} for row in rows]
+            parts += [f"## {section.title}", section.text, _markdown(cells)]
+        write_text(self.stem.with_suffix(".md"), "\n\n".join(parts) + "\n")
 
 
-def _aims(sections: Mapping[str, Section]) -> list[dict[str, str]]:
-    found = []
-    for name, peer, aim in AIMS:
-        section = sections[name]
-        row = next(row for row in section.rows if peer in row.values())
-        alone, batch = row["times_ours"], row.get("times_side_by_side")
-        in_batch = "side by side" if batch is not None and batch >= aim else "no"
-        found.append(
-            {
-                "benchmark": section.title,
-                "faster than": peer,
-                "at least": f"{aim} times",
-                "measured": f"{number(alone)} times",
-                "traces side by side": "" if batch is None else f"{number(batch)} times",
-                "reached": "yes" if alone >= aim else in_batch,
-            }
-        )
-    return found
+def _markdown(rows: Sequence[Mapping[str, str]]) -> str:
+    return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))
 
 
-def _draw(section: Section) -> None:
-    if section.figure is None:
-        return
-    with styled(), atomic_write(RESULTS / f"{section.name}.png") as scratch:
-        section.figure().savefig(scratch, format="png", metadata={"Software": None})
+def describe_machine(peers: Sequence[str]) -> dict[str, str]:
+    """Describe processor, memory and the libraries that decide the speed."""
+    build: dict[str, Any] = np.show_config(mode="dicts")  # type: ignore[assignment]
+    blas = build["Build Dependencies"]["blas"]
+    return {
+        "processor": _processor(),
+        "cores": str(psutil.cpu_count(logical=False) or psutil.cpu_count()),
+        "memory": f"{psutil.virtual_memory().total / 2**30:.0f} GiB",
+        "system": f"{platform.system()} {platform.machine()}",
+        "Python": platform.python_version(),
+        "numpy": np.__version__,
+        "BLAS": f"{blas['name']} {blas['version']}, one thread",
+        **{name: version(name) for name in ("scipy", *peers)},
+    }
+
+
+def _processor() -> str:
+    described = Path("/proc/cpuinfo")
+    if described.exists():
+        found = re.search(r"^model name\s*:\s*(.*)$", described.read_text(), re.MULTILINE)
+        if found:
+            return found[1]
+    return platform.processor()
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Print a number with so many digits, and never in powers of ten between 0.001 and 10^6."""
+    if value == 0 or not 1e-3 <= abs(value) < 1e6:
+        return f"{value:.{digits}g}"
+    decimals = max(0, digits - 1 - int(f"{value:e}".split("e")[1]))
+    return f"{value:,.{decimals}f}"
+
+
+def times_ours(row: Row) -> str:
+    """Print a row's ratio with the range over the rounds."""
+    low, high = (number(row[f"times_ours_{end}"], 2) for end in ("lowest", "highest"))
+    return "1" if row["times_ours"] == 1 else f"{number(row['times_ours'])} ({low} to {high})"

@@ -28,24 +28,11 @@ class Timed:
 
     seconds: Mapping[str, Array]
 
-    def median_ms(self, name: str) -> float:
-        """Median over the rounds in ms."""
-        return 1e3 * float(np.median(self.seconds[name]))
-
-    def against(self, name: str, ours: str, scale: float = 1.0) -> dict[str, Any]:
-        """Return a row's time and its ratio to ours, taken round by round.
-
-        Parameters
-        ----------
-        name, ours
-            Which calls.
-        scale
-            What the time is to be multiplied with, if the call did a part of
-            the work.
-        """
-        ratios = scale * self.seconds[name] / self.seconds[ours]
+    def against(self, name: str, ours: str) -> dict[str, Any]:
+        """Return a row's time and its ratio to ours, taken round by round."""
+        ratios = self.seconds[name] / self.seconds[ours]
         return {
-            "time_ms": scale * self.median_ms(name),
+            "time_ms": 1e3 * float(np.median(self.seconds[name])),
             "times_ours": float(np.median(ratios)),
             "times_ours_lowest": float(ratios.min()),
             "times_ours_highest": float(ratios.max()),

@@ -2,7 +2,6 @@
 
 import csv
 import importlib
-import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout, suppress
@@ -30,14 +29,8 @@ ROOT = Path(__file__).parents[1]
 PUBLISHED = ROOT / "results" / "published"
 ERRORS = PUBLISHED / "tables" / "errors.csv"
 VERDICTS = PUBLISHED / "tables"
-NOISE = PUBLISHED / "noise" / "tables" / "noise.csv"
-STATUS = PUBLISHED / "status" / "tables" / "status.csv"
-SEQUENTIAL = PUBLISHED / "sequential" / "tables" / "sequential.csv"
 ROBUSTNESS = PUBLISHED / "robustness" / "tables" / "robustness_noise.csv"
 MEASURED = PUBLISHED / "measured"
-SHAPES = PUBLISHED / "shapes" / "tables" / "designed_shapes.csv"
-MEMORY = PUBLISHED / "design_memory" / "tables" / "design_memory.csv"
-CALIBRATION = PUBLISHED / "posterior_calibration" / "tables" / "posterior_calibration.csv"
 
 _CASES = {
     "endothelial_cell": "the cell",
@@ -51,12 +44,6 @@ _JUDGED_IN_NOISE = (
     (("endothelial_cell",), "k"),
     (("endothelial_cell",), "k_p"),
 )
-_WAYS = {
-    "the study's, repeated": "the paper's, repeated",
-    "each designed after those before": "the paper's, then each designed after those before",
-    "designed for the ranges, repeated": "one designed for all these cells, repeated",
-    "designed for the true cell, repeated": "one designed for the true cell, repeated",
-}
 # Of the independent fit of HL60's stretch, and of pyRheo's demonstrations.
 _MEASURED = {
     "hl60": {"alpha": 0.701},
@@ -82,7 +69,8 @@ def _verdicts() -> list[dict[str, str]]:
 
 def answer() -> str:
     """In how many of the paper's samples a trace determines which quantity."""
-    sentence = say_what_traces_tell(_verdicts(), " of the paper's experiment")
+    sentence = say_what_traces_tell(_verdicts())
+    sentence = sentence.replace("A trace", "A trace of the paper's experiment", 1)
     told, _, where = sentence.partition(": ")
     return f"**{told}**: {where}"
 
@@ -142,46 +130,6 @@ def claims() -> str:
     )
 
 
-def simulated_noise() -> str:
-    """How often intervals held the truth in noise of several kinds, over the quantities."""
-    noise = pd.read_csv(NOISE)
-    return _table(
-        {
-            "noise": kind,
-            "sample": str(case).replace("_", " "),
-            "flagged": f"{rows['flagged_percent'].max():.1f} %",
-            "truth inside, white noise assumed": _range(
-                rows["white_coverage_percent"], ".1f", " %"
-            ),
-            "truth inside, coloured noise assumed": _range(rows["coverage_percent"], ".1f", " %"),
-            "times as wide": _range(rows["times_wider"], ".2g"),
-        }
-        for (kind, case), rows in noise.groupby(["noise", "case"], sort=False)
-    )
-
-
-def simulated_statuses() -> str:
-    """Statuses of fits and coverage of limits, over the quantities, by set-up."""
-    return _table(
-        {"set-up": str(title), "traces": str(rows["traces"].max())} | _statuses(rows)
-        for title, rows in pd.read_csv(STATUS).groupby("set_up", sort=False)
-    )
-
-
-def _statuses(rows: pd.DataFrame) -> dict[str, str]:
-    white, coloured = (rows[rows["noise_model"] == name] for name in ("white", "coloured"))
-    found = {}
-    for name, of in (("white", white), ("coloured", coloured)):
-        one = of.iloc[0]
-        wrong = one["rejected_percent"] + one["refused_percent"]
-        shares = (one["ok_percent"], one["doubtful_percent"], wrong)
-        found[f"ok / doubtful / rejected, {name}"] = "/".join(f"{share:.0f}" for share in shares)
-    for name, of in (("white", white), ("coloured", coloured)):
-        held = of["coverage_percent"].dropna()
-        found[f"truth inside, {name}"] = _range(held, ".1f", " %") if len(held) else ""
-    return found
-
-
 def errors_by_noise() -> str:
     """What the genetic algorithm errs by, and the bound, at several levels of noise."""
     table = pd.read_csv(ROBUSTNESS)
@@ -228,72 +176,6 @@ def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
         return "none"
     low, high = format(values.min(), how), format(values.max(), how)
     return f"{low}{unit}" if low == high else f"{low}–{high}{unit}"
-
-
-def experiments_needed() -> str:
-    """In how many cells all parameters are known after some experiments, way by way."""
-    table = pd.read_csv(SEQUENTIAL).query("quantity == 'all'")
-    return _table(
-        {"all four determined, % of cells, after": _WAYS[way]}
-        | {
-            f"{row['experiments']} experiment{'s' * (row['experiments'] > 1)}": (
-                f"{row['determined_percent']:.0f}"
-            )
-            for row in rows.to_dict("records")
-        }
-        for way, rows in table.groupby("way", sort=False)
-    )
-
-
-def bounds_by_shape() -> str:
-    """What steps, sinusoids and ramps tell."""
-    table = pd.read_csv(SHAPES)
-    return _table(
-        {"torques": shape if shape != "ramps" else f"ramps of {shortest:g} ms and more"}
-        | {
-            f"{quantity} of {_CASES[case]} (%)": _bound(row["bound_percent"])
-            for row in rows.to_dict("records")
-            for case, quantity in [(row["case"], row["quantity"])]
-            if case == "endothelial_cell" or quantity == "c_p"
-        }
-        for (shape, shortest), rows in table.groupby(["shape", "shortest_ms"], sort=False)
-    )
-
-
-def bounds_by_memory() -> str:
-    """Worst bounds of the published designs by the memory of the noise."""
-    table = pd.read_csv(MEMORY).query("not along")
-    worst = table.groupby(["memory_s", "readings", "case"])["bound_percent"].max()
-    return _table(
-        {"memory": f"{memory:g} s" if memory else "none"}
-        | {
-            f"{name}, {readings} (%)": _bound(worst[memory, readings, case])
-            for case, name in _CASES.items()
-            for readings in ("published", "spread")
-        }
-        for memory in table["memory_s"].unique()
-    )
-
-
-def _bound(percent: float) -> str:
-    return "none" if math.isnan(percent) else f"{float(f'{percent:.2g}'):g}"
-
-
-def posterior_calibration() -> str:
-    """Whether ranks of true values among samples of posteriors are uniform."""
-    if not CALIBRATION.is_file():
-        return "(Not yet published.)"
-    return _table(
-        {
-            "draws": f"{row['part']}, {row['draws']}",
-            "quantity": row["quantity"],
-            "p-value": f"{row['p_value']:.2g}",
-            "in bins": f"{row['p_value_binned']:.2g}",
-            "in the 50 % interval": f"{row['coverage_50_percent']:.3g} %",
-            "in the 95 % interval": f"{row['coverage_95_percent']:.3g} %",
-        }
-        for row in pd.read_csv(CALIBRATION).to_dict("records")
-    )
 
 
 def identified_example() -> str:
@@ -379,19 +261,9 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "README.md": {"answer": answer, "example": identified_example},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
     ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "products": product_files},
-    ROOT / "docs" / "identifiability.md": {
-        "noise": simulated_noise,
-        "status": simulated_statuses,
-        "methods": methods_compared,
-    },
+    ROOT / "docs" / "identifiability.md": {"methods": methods_compared},
     ROOT / "docs" / "measured.md": {"measured": measured},
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
-    ROOT / "docs" / "design.md": {
-        "sequential": experiments_needed,
-        "shapes": bounds_by_shape,
-        "memory": bounds_by_memory,
-    },
-    ROOT / "docs" / "posterior.md": {"calibration": posterior_calibration},
     ROOT / "docs" / "reproduction.md": {"results": paper_against_study, "claims": claims},
 }
 """Parts of documents that are written, by what."""

@@ -7,7 +7,7 @@ import pytest
 from biogrip.cli import _parser, main
 from biogrip.experiment.models import MODELS
 
-COMMANDS = ("run", "identify", "groups", "design", "make", "verify", "clean", "crate", "publish")
+COMMANDS = ("run", "identify", "groups", "design", "make", "verify", "clean", "publish")
 
 
 @pytest.mark.parametrize("command", [*COMMANDS, "compare"])

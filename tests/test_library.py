@@ -1,24 +1,32 @@
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import biogrip
 from biogrip import library
+from biogrip.identifiability.verdicts import DETERMINED
 from tests.helpers.default import STUDY
+from tests.helpers.places import ROOT
 from tests.response.test_nonlinear import ARM, TIMES, symmetric_radau
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "library.md"
+POSTERIOR = DOCUMENT.parent / "howto" / "posterior.md"
+
+
+def code_in(document: Path) -> str:
+    (code,) = re.findall(r"```python\n(.*?)```", document.read_text(encoding="utf-8"), re.DOTALL)
+    return str(code)
 
 
 def test_what_the_documentation_shows_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (code,) = re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL)
     names: dict[str, object] = {}
-    exec(compile(code, str(DOCUMENT), "exec"), names)
+    exec(compile(code_in(DOCUMENT), str(DOCUMENT), "exec"), names)
     said = dict(line.split(" ", 1) for line in capsys.readouterr().out.splitlines()[:4])
     # A damper of 1e-3 cannot be told from none; the others stand out of 5 % of noise.
     assert said["k_p"].startswith("determined: 5.0")
@@ -27,6 +35,22 @@ def test_what_the_documentation_shows_runs(
     (k_p,) = (f for f in told.findings if f.quantity.label == "k_p")  # type: ignore[attr-defined]
     assert k_p.low < 5.0 < k_p.high
     assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_sampled_posterior_agrees_with_the_profiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the code of the how-to, with a chain a fifth as long."""
+    monkeypatch.chdir(ROOT)
+    code = code_in(POSTERIOR).replace("3000", "600").replace("1000", "200")
+    names: dict[str, Any] = {}
+    exec(compile(code, str(POSTERIOR), "exec"), names)
+    told = library.judge(*(names[each] for each in ("experiment", "time_s", "rotation", "found")))
+    medians = dict(
+        zip(names["experiment"].searched.names, np.median(names["chain"], axis=0), strict=True)
+    )
+    determined = {f.quantity.label: f for f in told.findings if f.verdict == DETERMINED}
+    assert {"k", "k_p", "c"} <= set(determined)
+    for name in ("k", "k_p", "c"):
+        assert determined[name].low < medians[name] < determined[name].high
 
 
 def test_what_is_simulated_by_the_nonlinear_model_is_not_what_the_linear_one_gives() -> None:

@@ -541,25 +541,24 @@ EVERYTHING = """
 study_seed: 7
 least_squares: {candidates: 60, starts: 3}
 identifiability: {confidence: 0.9}
-posterior: {walkers: 20, most_steps: 1000, prior: {k_p: {median: 5.0, spread: 1.0}}EVIDENCE}
 gripper: {uncertainty: {torque_percent: 1.0}}
 protocol: {phases: [{duration_s: 200, torque_Nm: 1.6e-9}, {duration_s: 200, torque_Nm: 0.32e-9}]}
 """
 
 
 @pytest.mark.parametrize(
-    ("options", "evidence", "models"),
+    ("options", "models"),
     [
-        (("--offset", "--fix", "c=77"), "", ""),
-        (("--noise", "3.6e-6"), ", evidence: true", "model_selection: {models: [damper, maxwell]}"),
+        (("--offset", "--fix", "c=77"), ""),
+        (("--noise", "3.6e-6"), "model_selection: {models: [damper, maxwell]}"),
     ],
 )
 def test_all_that_is_assumed_repeats_it(
-    tmp_path: Path, options: tuple[str, ...], evidence: str, models: str
+    tmp_path: Path, options: tuple[str, ...], models: str
 ) -> None:
-    """Every byte of the answer and of the samples, without any option but the model's."""
+    """Every byte of the answer, without any option but the model's."""
     config, found = tmp_path / "c.yaml", tmp_path / "f.json"
-    config.write_text(EVERYTHING.replace("EVIDENCE", evidence) + models)
+    config.write_text(EVERYTHING + models)
     told = []
     arguments: tuple[str, ...] = ("--model", "liquid_drop", *options)
     for _ in range(2):
@@ -567,7 +566,7 @@ def test_all_that_is_assumed_repeats_it(
         assert run.returncode == 0, run.stderr
         data = json.loads(found.read_text())
         data.pop("by_default")
-        told.append((json.dumps(data), found.with_suffix(".parquet").read_bytes()))
+        told.append(json.dumps(data))
         assumed = data["assumed"]
         arguments = ("--model", assumed.pop("model"))
         config.write_text(yaml.safe_dump(assumed))

@@ -65,12 +65,11 @@ def identified(folder: Path, times: Array, values: Array, *options: str) -> dict
 
 @pytest.fixture(scope="module")
 def started(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[str, Any], str]]:
-    """What is written and said of one trace with its onset given, and fitted before a posterior."""
+    """What is written and said of one trace with its onset given, and fitted."""
     answers = {}
-    for start, *further in ((f"{ONSET_S}",), ("fit", "--posterior")):
+    for start in (f"{ONSET_S}", "fit"):
         with redirect_stdout(StringIO()) as said:
-            options = ("--start", start, *further)
-            found = identified(tmp_path_factory.mktemp("late"), *late(2), *options)
+            found = identified(tmp_path_factory.mktemp("late"), *late(2), "--start", start)
         answers[start] = found, said.getvalue()
     return answers
 
@@ -239,23 +238,6 @@ def test_a_fitted_onset_widens_limits(started: dict[str, tuple[dict[str, Any], s
     )
     assert fitted["c_p"] > 1.05 * given["c_p"]
     assert all(fitted[name] > 0.99 * width for name, width in given.items())
-
-
-def test_a_posterior_that_takes_the_onset_as_exact_says_so(
-    started: dict[str, tuple[dict[str, Any], str]],
-) -> None:
-    """Limits of profiles are those of all onsets; the posterior's interval of c_p is narrower."""
-    found, said = started["fit"]
-    told = {each["quantity"]: each for each in found["posterior"]["quantities"]}
-    assert (
-        "takes the fitted onset as exact, so its intervals are too narrow"
-        in (found["posterior"]["in_words"])
-    )
-    assert found["posterior"]["in_words"] in said
-    for each in told.values():
-        if each["against_profile"] == "differs":
-            assert "uncertainty of the fitted onset" in each["why"]
-    assert all("posterior" not in note["text"] for note in found["notes"])
 
 
 def test_readings_before_the_onset_tell_the_zero(tmp_path: Path) -> None:

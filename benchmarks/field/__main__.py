@@ -1,21 +1,18 @@
-"""Runs the comparison and writes `benchmarks/field/results`."""
+"""Runs the comparison on measured traces and writes `benchmarks/field/results`."""
 
-import os
-import sys
+from pathlib import Path
 
-# One thread for every competitor. Libraries read this once, while they are imported.
-for variable in (
-    "BLIS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-):
-    os.environ[variable] = "1"
-os.environ["JAX_PLATFORMS"] = "cpu"
-os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+from benchmarks.one_thread import keep_to_one_thread
 
 if __name__ == "__main__":
-    from benchmarks.field.report import run
+    keep_to_one_thread()
+    from benchmarks.field.measured import BIOGRIP, PYRHEO, section
+    from benchmarks.field.measured_peers import PEERS
+    from benchmarks.report import Report
 
-    run(sys.argv[1:])
+    Report(
+        Path(__file__).parent / "results" / "field",
+        "# Beside what the field uses\n\nWritten by `make bench-field`, all of it in one run.",
+        (section((BIOGRIP, *PEERS, PYRHEO)),),
+        ("lmfit", "rheojax", "nlsq", "jax"),
+    ).run()

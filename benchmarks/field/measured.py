@@ -5,16 +5,21 @@ beside it by the curve that the program draws. Programs weigh readings different
 to change that: a fit is compared with the best one in its own measure.
 """
 
+import io
+import logging
+import signal
+import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
-from benchmarks.field.fitted import TIME_LIMIT_S, attempt
-from benchmarks.section import Row, Section, number
+from benchmarks.report import Row, Section, number
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array, BoolArray
 from biogrip.identifiability.verdicts import DETERMINED
@@ -29,12 +34,15 @@ from biogrip.study.study import Case
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ("config/config.yaml", "config/measured.yaml")
-ROUNDS = 3
+_ROUNDS = 3
+# Of a fit, and once more of its limits.
+_TIME_LIMIT_S = 60.0
 
 KNOWN, RELATIVE, EQUAL = "known", "relative", "equal"
 """What readings are divided by before their squares are summed: their known standard deviations,
 themselves, or nothing."""
 
+Result = TypeVar("Result")
 Said = Mapping[str, tuple[float | None, float | None, float | None]]
 """Value and limits by parameter, as a program prints them; what it does not give is none."""
 
@@ -49,27 +57,15 @@ def _recorded(name: str) -> tuple[Case, Measurements]:
 
 @dataclass(frozen=True)
 class Task:
-    """A measured trace and the model to fit.
-
-    Parameters
-    ----------
-    title
-        In the table.
-    name
-        Case of `config/measured.yaml`.
-    sample
-        The model.
-    fixed
-        What of it is known.
-    load_s
-        Start and end of the stretch that is taken for a step, if not the whole recording is.
-    """
+    """A measured trace, a case of `config/measured.yaml`, and the model to fit."""
 
     title: str
     name: str
     sample: Sample
     fixed: Mapping[str, float] = field(default_factory=dict)
+    """What of the model is known."""
     load_s: tuple[float, float] | None = None
+    """Start and end of the stretch that is taken for a step, if not the whole recording is."""
 
     @cached_property
     def _chosen(self) -> BoolArray:
@@ -148,38 +144,19 @@ TASKS = (
 
 @dataclass(frozen=True)
 class Answer:
-    """What a program found.
-
-    Parameters
-    ----------
-    curve : (n_samples,)
-        What it draws through the readings, or what it says that this leaves.
-    parameters
-        By name, if the program has the model; else none.
-    said
-        Returns what it prints of its parameters.
-    """
+    """What a program found."""
 
     curve: Array | float
+    """What it draws through the readings, (n_samples,), or what it says that this leaves."""
     parameters: Mapping[str, float] | None
+    """By name, if the program has the model; else none."""
     said: Callable[[], Said]
+    """Returns what it prints of its parameters."""
 
 
 @dataclass(frozen=True)
 class Program:
-    """A program and the tasks that it can take.
-
-    Parameters
-    ----------
-    name
-        In the table.
-    fit
-        Identifies the sample of a task.
-    takes
-        Whether a task is one for it.
-    measure
-        Of its fit to a task.
-    """
+    """A program, the tasks that it can take, and in which measure it fits them."""
 
     name: str
     fit: Callable[[Task], Answer]
@@ -244,73 +221,79 @@ def _is_pyrheos(task: Task) -> bool:
 PYRHEO = Program("pyRheo, as published", by_pyrheo, _is_pyrheos, lambda task: RELATIVE, timed=False)
 
 
-@dataclass
-class _Runs:
-    fit_s: list[float] = field(default_factory=list)
-    whole_s: list[float] = field(default_factory=list)
-    answer: Answer | None = None
-    said: Said | None = None
-    failures: Counter[str] = field(default_factory=Counter)
+@contextmanager
+def _kept_in_bounds() -> Iterator[None]:
+    """Keep quiet whoever prints, warns or logs, and stop whoever takes too long."""
 
-    def fit(self, program: Program, task: Task) -> None:
-        """Fit a task, and keep what came of it."""
-        fit_s, self.answer = clocked(partial(attempt, partial(program.fit, task), self.failures))
-        self.fit_s.append(fit_s)
+    def stop(*_: object) -> None:
+        raise TimeoutError
 
-    def ask(self) -> None:
-        """Have it say what it prints of the parameters."""
-        said = self.answer.said if self.answer else dict
-        said_s, self.said = clocked(partial(attempt, said, self.failures))
-        self.whole_s.append(self.fit_s[-1] + said_s)
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, _TIME_LIMIT_S)
+    logging.disable(logging.CRITICAL)
+    try:
+        with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+        logging.disable(logging.NOTSET)
 
 
-def compared(programs: Sequence[Program], task: Task, rounds: int = ROUNDS) -> list[Row]:
-    """Fit a task by every program that takes it, in turn, after a warm-up; a row a program."""
+def _attempt(call: Callable[[], Result], failures: Counter[str]) -> Result | None:
+    """Call others' code: whatever it raises is a result, too, and is counted by its kind."""
+    try:
+        with _kept_in_bounds():
+            return call()
+    except Exception as error:
+        failures[type(error).__name__] += 1
+        return None
+
+
+def compared(programs: Sequence[Program], task: Task) -> list[Row]:
+    """Fit a task by every program that takes it, in turn; a row a program."""
     own = [program for program in programs if program.takes(task)]
-    runs = {program.name: _Runs() for program in own}
-    for program in own:
-        _Runs().fit(program, task)
-    for _ in range(rounds):
-        for program in own:
-            runs[program.name].fit(program, task)
-            runs[program.name].ask()
-    exact = {name: _exact(task, run.answer) for name, run in runs.items()}
-    timed = {
-        "fit": Timed({name: np.array(run.fit_s) for name, run in runs.items()}),
-        "whole": Timed({name: np.array(run.whole_s) for name, run in runs.items()}),
+    failures = {program.name: Counter[str]() for program in own}
+    seconds: dict[str, list[tuple[float, float]]] = {program.name: [] for program in own}
+    answers: dict[str, Answer | None] = {}
+    said: dict[str, Said] = {}
+    for _ in range(1 + _ROUNDS):
+        for name, fit in ((program.name, program.fit) for program in own):
+            fit_s, answer = clocked(partial(_attempt, partial(fit, task), failures[name]))
+            asked = answer.said if answer else dict
+            said_s, found = clocked(partial(_attempt, asked, failures[name]))
+            seconds[name].append((fit_s, fit_s + said_s))
+            answers[name], said[name] = answer, found or {}
+    # The first round is a warm-up.
+    times = {name: np.array(spent[1:]).T for name, spent in seconds.items()}
+    fits, whole = (Timed({name: spent[i] for name, spent in times.items()}) for i in (0, 1))
+    exact = {
+        name: task.curve(answer.parameters) if answer and answer.parameters else None
+        for name, answer in answers.items()
     }
-    best = {
-        measure: min(_left(task, curve, measure) for curve in (*exact.values(), ours))
-        for measure, ours in _our_curves(task, {program.measure(task) for program in own}).items()
-    }
+    best = {}
+    for measure in {program.measure(task) for program in own}:
+        curves = (*exact.values(), np.asarray(by_biogrip(task, measure).curve))
+        best[measure] = min(_left(task, curve, measure) for curve in curves)
     rows: list[Row] = []
     for program in own:
-        measure, run = program.measure(task), runs[program.name]
+        name, measure = program.name, program.measure(task)
         row: Row = {
             "task": task.title,
-            "program": program.name,
+            "program": name,
             "measure": measure,
             "best": best[measure],
-            "drawn": _over(best[measure], _drawn(task, run.answer, measure)),
-            "exact": _over(best[measure], _left(task, exact[program.name], measure)),
-            "said": {n: list(of) for n, of in (run.said or {}).items()},
-            "failures": dict(run.failures),
+            "drawn": _over(best[measure], _drawn(task, answers[name], measure)),
+            "exact": _over(best[measure], _left(task, exact[name], measure)),
+            "said": {quantity: list(of) for quantity, of in said[name].items()},
+            "failures": dict(failures[name]),
         }
         if program.timed:
-            for part, times in timed.items():
-                row |= {f"{part}_{k}": x for k, x in times.against(program.name, OURS).items()}
+            row |= {f"fit_{key}": value for key, value in fits.against(name, OURS).items()}
+            row |= {f"whole_{key}": value for key, value in whole.against(name, OURS).items()}
         rows.append(row)
     return rows
-
-
-def _our_curves(task: Task, measures: Iterable[str]) -> dict[str, Array]:
-    return {measure: np.asarray(by_biogrip(task, measure).curve) for measure in sorted(measures)}
-
-
-def _exact(task: Task, answer: Answer | None) -> Array | None:
-    if answer is None or answer.parameters is None:
-        return None
-    return task.curve(answer.parameters)
 
 
 def _left(task: Task, curve: Array | None, measure: str) -> float:
@@ -326,12 +309,6 @@ def _drawn(task: Task, answer: Answer | None, measure: str) -> float:
 def _over(best: float, left: float) -> float | None:
     """JSON has no infinity."""
     return left / best if np.isfinite(left) else None
-
-
-def measured_section(programs: Sequence[Program]) -> Section:
-    """Compare the programs on all tasks."""
-    rows = [row for task in TASKS for row in compared(programs, task)]
-    return Section("measured", "Measured traces", TEXT, COLUMNS, rows)
 
 
 def _ratio(value: float | None) -> str:
@@ -356,7 +333,7 @@ def _limited(value: float | None, low: float | None, high: float | None) -> str:
     return f"{number(value, 4)} {between}" if any(ends) else f"{number(value, 4)}, no limits"
 
 
-COLUMNS: dict[str, Callable[[Row], str]] = {
+_COLUMNS: dict[str, Callable[[Row], str]] = {
     "trace, model": lambda row: row["task"] if row["program"] == OURS else "",
     "program": lambda row: row["program"],
     "weights": lambda row: row["measure"],
@@ -368,7 +345,7 @@ COLUMNS: dict[str, Callable[[Row], str]] = {
     "what it says (95 % limits)": _says,
 }
 
-TEXT = f"""\
+_TEXT = f"""\
 The traces of `data/measured`, each with the model that was published for it. Maxwell branches are
 fitted too, and to a step of strain a parallel damper, which acts at the step only, where nothing is
 read (`benchmarks/field/measured.py`; the other programs: `measured_peers.py`).
@@ -378,12 +355,21 @@ the least that any program with the model leaves. Beside it stands that of the c
 program draws. *Weights*: readings are divided by their known standard deviations, by themselves
 (relative), or by nothing (equal). Every program is compared in its own weights, and biogrip is
 fitted in all of them; its rows have those of `config/measured.yaml`. A dash: the printed parameters
-are not those of springs, dampers and springpots of the model. mcreep's has a damper in series more.
+are not those of springs, dampers and springpots of the model.
 
-RheoJAX takes no standard deviations. It and mcreep take steps only, not HL60's recovery. lmfit has
-no models, and is given biogrip's curve. Its limits are those of `conf_interval`; where that fails,
-or takes {TIME_LIMIT_S:g} s, they are 1.96 of its standard errors, and without those there are none.
+RheoJAX takes no standard deviations, and steps only, not HL60's recovery. lmfit has no models, and
+is given biogrip's curve. Its limits are those of `conf_interval`; where that fails, or takes
+{_TIME_LIMIT_S:g} s, they are 1.96 of its standard errors, and without those there are none.
 pyRheo cannot be installed from PyPI. Its rows are what its demonstrations print, fitted with the
 Padé approximation `Pade54` of Mittag-Leffler functions; that of the hydrogel is of other readings.
-Parameters have the names that each program prints. Times are medians of {ROUNDS} rounds after a
+Parameters have the names that each program prints. Times are medians of {_ROUNDS} rounds after a
 warm-up."""
+
+
+def section(programs: Sequence[Program]) -> Section:
+    """Return the comparison of programs on all tasks."""
+
+    def measure() -> list[Row]:
+        return [row for task in TASKS for row in compared(programs, task)]
+
+    return Section("measured", "Measured traces", _TEXT, _COLUMNS, measure)

@@ -1,12 +1,10 @@
-"""Other programs on measured traces, called as `by_*.py` calls them on simulated ones.
+"""lmfit and RheoJAX on measured traces, called as their documentation shows.
 
 lmfit has no models of rheology: its user writes the curve, and here is given biogrip's, from moduli
 as the eye reads them off a trace, and exponents in the middle. RheoJAX has the springpot, the
 fractional Kelvin-Voigt solid, two springpots in series (its `FractionalMaxwellModel`), the
 fractional Jeffreys liquid and Maxwell branches, all under a step. It starts by itself, takes no
-standard deviations, and divides the readings of all but Maxwell branches by themselves. mcreep's
-power law is a springpot; its damper and Kelvin-Voigt elements are Maxwell branches with one more.
-pyvisco fits Maxwell branches to relaxation.
+standard deviations, and divides the readings of all but Maxwell branches by themselves.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,8 +13,6 @@ from typing import Any
 
 import lmfit
 import numpy as np
-from mcreep import const, func, model
-from pyvisco import load, master, prony
 from rheojax.models import (
     FractionalJeffreysModel,
     FractionalKelvinVoigt,
@@ -24,7 +20,6 @@ from rheojax.models import (
     GeneralizedMaxwell,
     SpringPot,
 )
-from scipy.special import gamma
 
 from benchmarks.field.measured import (
     EQUAL,
@@ -146,53 +141,8 @@ def by_rheojax(task: Task) -> Answer:
     )
 
 
-def by_mcreep(task: Task) -> Answer:
-    """Fit a function of mcreep by `Model.fit_function_to_data`; limits are of its covariance."""
-    power_law = task.sample.name == "springpot"
-    own = model.Model(
-        const.Experiment(etype="Tensile", sigma=1.0),
-        const.DataParameters(),
-        const.PlotParameters(xlabel="t [s]", ylabel="J [1/Pa]"),
-        name="creep",
-        func=func.power_law if power_law else func.evp_s_d_2kv,
-    )
-    data = np.array([task.time_s, task.data])
-    values, covariance = own.fit_function_to_data(data, task.time_s[0], task.time_s[-1])
-    names = ("C", "n") if power_law else ("J_inf", "flow", "J_1", "J_2", "T_1", "T_2")
-    deviations = np.sqrt(np.diag(covariance))
-    said = {
-        n: (float(v), *_around(v, d)) for n, v, d in zip(names, values, deviations, strict=True)
-    }
-    found = None
-    if power_law:
-        found = {"k_alpha": 1 / (values[0] * gamma(1 + values[1])), "alpha": float(values[1])}
-    return Answer(own.func(task.time_s, *values), found, lambda: said)
-
-
-def by_pyvisco(task: Task) -> Answer:
-    """Fit so many terms by `prony.discretize` and `prony.fit`; it gives no limits."""
-    rows = zip(task.time_s.tolist(), task.data.tolist(), strict=True)
-    lines = ["t,E_relax", "s,MPa", *(f"{time!r},{modulus!r}" for time, modulus in rows)]
-    data, _ = load.user_master("\n".join(lines).encode(), "time", 20, "E")
-    data = master.smooth(data, 1)
-    found, _ = prony.fit(prony.discretize(data, "min", task.sample.branches), data, opt=True)
-    share, tau = (found["df_terms"][name].to_numpy(float) for name in ("alpha_i", "tau_i"))
-    whole = float(found["E_0"])
-    own = {"G_inf": whole * (1 - float(share.sum()))}
-    own |= {f"G_{j}": whole * float(g) for j, g in enumerate(share, start=1)}
-    own |= {f"tau_{j}": float(t) for j, t in enumerate(tau, start=1)}
-    parameters = _branches(own)
-    return Answer(
-        task.curve(parameters), parameters, lambda: {n: (v, None, None) for n, v in own.items()}
-    )
-
-
 def _under_a_step(task: Task) -> bool:
     return task.load_s is not None or task.name != "hl60"
-
-
-def _creep(task: Task) -> bool:
-    return _under_a_step(task) and not task.experiment(EQUAL).instrument.deforms
 
 
 PEERS = (
@@ -202,17 +152,5 @@ PEERS = (
         by_rheojax,
         lambda task: _under_a_step(task) and task.sample.name in _IN_RHEOJAX,
         lambda task: EQUAL if task.sample.name == "generalized_maxwell" else RELATIVE,
-    ),
-    Program(
-        "mcreep",
-        by_mcreep,
-        lambda task: _creep(task) and task.sample.name in {"springpot", "generalized_maxwell"},
-        lambda task: EQUAL,
-    ),
-    Program(
-        "pyvisco",
-        by_pyvisco,
-        lambda task: not _creep(task) and task.sample.name == "generalized_maxwell",
-        lambda task: EQUAL,
     ),
 )

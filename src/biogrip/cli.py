@@ -6,7 +6,7 @@ import re
 import signal
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -39,10 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Matrices are small: BLAS threads cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        # Protect only files inside a study's results.
-        with watch_writes(_refuse_others) if options.recorded else nullcontext():
-            options.command(options)
-            sys.stdout.flush()
+        options.command(options)
+        sys.stdout.flush()
     except BiogripError as error:
         print(f"biogrip: {visible_lines(error)}", file=sys.stderr)
         return 1
@@ -99,7 +97,7 @@ def _models() -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="biogrip", description=__doc__)
-    parser.set_defaults(recorded=False, status=0)
+    parser.set_defaults(status=0)
     parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
@@ -129,7 +127,7 @@ def _parser() -> argparse.ArgumentParser:
 
     text = "make products of the study that was last run here, as its jobs do"
     make = commands.add_parser("make", help=text, description=text)
-    make.set_defaults(command=_make, recorded=True)
+    make.set_defaults(command=_make)
     make.examples = _examples(
         "make errors_of_case --case liquid_drop_1",
         "make identification --case liquid_drop_1 --method genetic --batch seeds_0-49",
@@ -158,14 +156,6 @@ def _parser() -> argparse.ArgumentParser:
             "results", type=Path, nargs="?", default=RESULTS, help="folder [%(default)s]"
         )
 
-    text = "pack a finished study, with what it was run on, as a Workflow Run RO-Crate"
-    crate = commands.add_parser("crate", help=text, description=text)
-    crate.set_defaults(command=_crate, recorded=True)
-    crate.examples = _examples("crate", "crate --output study.zip")
-    crate.add_argument(
-        "--output", type=Path, default=RESULTS / "crate.zip", help="ZIP file [%(default)s]"
-    )
-
     publish = commands.add_parser("publish", help="renew published tables and figures")
     publish.set_defaults(command=_publish)
     publish.examples = _examples(
@@ -182,6 +172,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     compare.add_argument("published", type=Path, help="folder of published tables")
     compare.add_argument("now", type=Path, help="folder of regenerated tables")
+    compare.add_argument("--only", default="*", help="pattern of names, e.g. readings*")
     return parser
 
 
@@ -198,8 +189,7 @@ def _identify_parser(stages: Any) -> None:
     identify.examples = _examples(
         "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
         "identify cells.tsv --config my_gripper.yaml --csv found.csv",
-        cost="A trace takes seconds, most of them for comparing the sample models; --posterior "
-        "takes some more.",
+        cost="A trace takes seconds, most of them for comparing the sample models.",
     )
     identify.add_argument(
         "traces",
@@ -230,9 +220,6 @@ def _identify_parser(stages: Any) -> None:
     )
     identify.add_argument(
         "--force", action="store_true", help="replace a file that biogrip did not write"
-    )
-    identify.add_argument(
-        "--posterior", action="store_true", help="also sample the posterior: some seconds per trace"
     )
     identify.add_argument(
         "--strict", action="store_true", help="end with status 1 if a fit is rejected"
@@ -268,47 +255,15 @@ def _groups_parser(stages: Any) -> None:
 
 
 def _design_parser(stages: Any) -> None:
-    text = "design what to hold, and when to read, so that every parameter is determined"
+    text = "search for a train of steps that determines the samples of a config better"
     design = stages.add_parser("design", help=text, description=text)
-    design.set_defaults(command=_design, noise_model=None)
-    design.examples = _examples(
-        "design my_design.yaml --export generator",
-        "design my_design.yaml --after first.csv --output second.yaml",
-        cost="The search takes most, and grows with most_steps.",
+    design.set_defaults(command=_design)
+    design.examples = _examples("design my.yaml", cost="The search takes some ten seconds.")
+    design.add_argument(
+        "config", type=Path, help="YAML file with your samples, laid over the default study"
     )
     design.add_argument(
-        "configs",
-        type=Path,
-        nargs="+",
-        metavar="CONFIG",
-        help="YAML file with a block `design`, laid over the default study",
-    )
-    design.add_argument(
-        "--case", action="append", default=[], help="name of a case [all with such a block]"
-    )
-    design.add_argument(
-        "--after",
-        type=Path,
-        nargs="+",
-        action="append",
-        default=[],
-        metavar=("TRACE", "CONFIG"),
-        help="CSV file of an earlier trace, recorded as the config says, or as YAML files merged "
-        "over it say; repeat for every trace of the sample",
-    )
-    _reading_options(design)
-    design.add_argument(
-        "--output",
-        type=Path,
-        default=Path("designed.yaml"),
-        help="config for a study, YAML; a page is written beside it [%(default)s]",
-    )
-    design.add_argument(
-        "--export",
-        type=Path,
-        metavar="FOLDER",
-        help="write CASE_protocol.csv, volts for a generator, and CASE_readings.csv, instants for "
-        "a camera, too",
+        "--output", type=Path, help="config of the designed study, YAML [CONFIG_designed.yaml]"
     )
     design.add_argument(
         "--force", action="store_true", help="replace a file that biogrip did not write"
@@ -424,7 +379,8 @@ def _make(options: argparse.Namespace) -> None:
     names = ("case", "method", "batch", "sweep", "seed")
     given = {name: getattr(options, name) for name in names}
     job = {name: text for name, text in given.items() if text}
-    make(options.products, job, RESULTS, options.made_for)
+    with watch_writes(_refuse_others):
+        make(options.products, job, RESULTS, options.made_for)
 
 
 def _identify(options: argparse.Namespace) -> None:
@@ -439,7 +395,6 @@ def _identify(options: argparse.Namespace) -> None:
         report=options.report,
         table=options.csv,
         rows=options.rows,
-        posterior=options.posterior,
         fixed=_fixed(options.fix),
         strict=options.strict,
         force=options.force,
@@ -453,17 +408,9 @@ def _groups(options: argparse.Namespace) -> None:
 
 
 def _design(options: argparse.Namespace) -> None:
-    from biogrip.own_design.command import design
+    from biogrip.design import design
 
-    design(
-        options.configs,
-        options.case,
-        options.output,
-        after=options.after,
-        read_as=_read_as(options),
-        export=options.export,
-        force=options.force,
-    )
+    design(options.config, options.output, force=options.force)
 
 
 def _read_as(options: argparse.Namespace) -> "ReadAs":
@@ -512,15 +459,6 @@ def _clean(options: argparse.Namespace) -> None:
     print(visible_lines(clean(options.results)))
 
 
-def _crate(options: argparse.Namespace) -> None:
-    from biogrip.running.crate import write_crate
-    from biogrip.running.journal import recorded_in
-
-    with recorded_in(RESULTS):
-        said = write_crate(RESULTS, options.output)
-    print(visible_lines(said))
-
-
 def _publish(options: argparse.Namespace) -> None:
     from biogrip.running.published import publish
 
@@ -530,4 +468,4 @@ def _publish(options: argparse.Namespace) -> None:
 def _compare(options: argparse.Namespace) -> None:
     from biogrip.running.comparison import compare
 
-    print(visible_lines(compare(options.published, options.now)))
+    print(visible_lines(compare(options.published, options.now, options.only)))

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 from scipy.special import ndtri, stdtr, stdtrit
-from tabulate import tabulate
 
 from biogrip import __version__
 from biogrip.arrays import Array
@@ -30,7 +29,7 @@ from biogrip.identifiability.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETER
 from biogrip.own_traces.many_traces import FAILED
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.products.files.rows import read_rows, write_rows
-from biogrip.terminal import visible, visible_lines
+from biogrip.terminal import aligned, visible, visible_lines
 
 FEWEST_CELLS = 3
 """Fewest cells of which a median is estimated."""
@@ -221,7 +220,7 @@ def _printed(compared: Compared, first: str, units: Mapping[str, str]) -> str:
         ]
         for (name, group), row in compared.items()
     ]
-    return tabulate(rows, header, tablefmt="simple", disable_numparse=True)
+    return aligned(rows, header)
 
 
 def _left_out(traces: Sequence[Mapping[str, str]], by: str, cells: Sequence[Cell]) -> Iterator[str]:

@@ -1,7 +1,9 @@
-"""Escaping of untrusted text before it is printed on a terminal."""
+"""Text for a terminal: untrusted text escaped, and cells aligned in columns."""
 
 import os
 import sys
+from collections.abc import Sequence
+from itertools import zip_longest
 
 # Control characters, marks that change the writing direction, line separators, and surrogates,
 # which stand for bytes in file names that are not valid text.
@@ -21,6 +23,13 @@ def visible(text: object) -> str:
 def visible_lines(text: object) -> str:
     """Return text escaped like `visible`, keeping line ends."""
     return "\n".join(map(visible, str(text).split("\n")))
+
+
+def aligned(rows: Sequence[Sequence[str]], header: Sequence[str]) -> str:
+    """Return rows below a header and a line of dashes, in columns as wide as their widest cell."""
+    widths = [max(map(len, column)) for column in zip_longest(header, *rows, fillvalue="")]
+    lines = [header, ["-" * width for width in widths], *rows]
+    return "\n".join("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines)
 
 
 def open_closed_streams() -> None:

@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from biogrip.experiment.maxwell_models import generalized_maxwell, liquid_drop
+from biogrip.experiment.network import complex_modulus
 from biogrip.experiment.protocol import TorqueHistory, hold, torque_history
 from biogrip.experiment.sample import MODELS, Network, Sample, with_fixed
 from biogrip.instrument.gripper import Gripper
@@ -110,6 +111,16 @@ def test_a_model_is_the_network_that_its_drawing_shows(name: str) -> None:
         for s in 1j * np.geomspace(1e-5, 1e5, 21):
             expected = SPRING_OR_DAMPER[name](s, *values)
             assert impedance(model.network(values), s) == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize("name", SPRING_OR_DAMPER)
+def test_storage_and_loss_modulus_are_the_parts_of_the_same_complex_modulus(name: str) -> None:
+    rng, omega = np.random.default_rng(1), np.geomspace(1e-5, 1e5, 21)
+    model = MODELS[name]
+    values = 10 ** rng.uniform(-3, 3, (5, len(model.parameters)))
+    storage, loss = complex_modulus(model.network(values), omega)
+    expected = [[SPRING_OR_DAMPER[name](1j * w, *own) for w in omega] for own in values]
+    np.testing.assert_allclose(storage + 1j * loss, expected, rtol=1e-11)
 
 
 def test_more_branches_add_up() -> None:

@@ -58,11 +58,10 @@ def condensed_of(
     offset: bool = False,
     drift: bool = False,
     nonlinear: bool = False,
-    ringing_s: float = 0.0,
 ) -> Condensed:
     """Rows that stand for the samples of any trace at these times."""
     nuisance = nuisance_basis(time_s, offset=offset, drift=drift)
-    return Condensed(torque, time_s, nuisance, nonlinear=nonlinear, ringing_s=ringing_s)
+    return Condensed(torque, time_s, nuisance, nonlinear=nonlinear)
 
 
 def problem_alone(

@@ -57,23 +57,6 @@ def rotation_50_digits(
         return _checked(_output(gripper, given, steps, time_s, of_force=False))
 
 
-def sensitivity_50_digits(
-    gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array
-) -> Array:
-    """d phi_2 / d log p by central differences, which with 50 digits lose none of a double's."""
-    rows = []
-    with ctx.workdps(_DIGITS):
-        step = arb(10) ** -15
-        for index in range(len(parameters)):
-            both = []
-            for sign in (1, -1):
-                moved = [arb(float(value)) for value in parameters]
-                moved[index] *= (sign * step).exp()
-                both.append(_output(gripper, moved, steps, time_s, of_force=False))
-            rows.append([float(((a - b) / (2 * step)).mid()) for a, b in zip(*both, strict=True)])
-    return np.array(rows)
-
-
 def jaw_force_50_digits(
     gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array
 ) -> Array:

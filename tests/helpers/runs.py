@@ -19,8 +19,8 @@ from tests.helpers.places import ROOT
 # A whole study in a few seconds: real physics and algorithm, little of each.
 _PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 _WHEEL = _PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
-SHIPPED = [name for name in _WHEEL if name.startswith(("results/", "benchmarks/", "CITATION"))]
-"""What claims and the article read beside the code."""
+SHIPPED = [name for name in _WHEEL if name.startswith("results/")]
+"""What claims read beside the code."""
 
 SMALL = """
 seeds: 4

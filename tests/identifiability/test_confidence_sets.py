@@ -14,7 +14,7 @@ from biogrip.identifiability.profiles import Profile, compute_profiles, find_gap
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import Finding
 from biogrip.products.stages.full_judgements import refitted, shown_of
-from tests.helpers.limits_campaign import likelihood_for
+from tests.helpers.limits import likelihood_for
 from tests.helpers.problems import MODEL, problem, run
 
 QUANTITIES = parameters_and_sum(MODEL)

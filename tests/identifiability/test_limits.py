@@ -1,7 +1,4 @@
-"""Confidence limits are where their definition has them, whatever the random starts.
-
-All 100 traces of each case, and the whole profiles of twenty names, are `limits_campaign`'s.
-"""
+"""Confidence limits are where their definition has them, whatever the random starts."""
 
 from dataclasses import replace
 
@@ -17,7 +14,7 @@ from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.local_fits import FINE
 from biogrip.identify.multi_start import fit_from
 from tests.helpers.definition import FitConstraint
-from tests.helpers.limits_campaign import (
+from tests.helpers.limits import (
     ALIKE,
     ALLOWED,
     NAMES,
@@ -29,7 +26,6 @@ from tests.helpers.limits_campaign import (
 )
 from tests.helpers.problems import MODEL, clean, posed_for, problem, run
 
-QUICK = (6, 8)
 QUANTITIES = parameters_and_sum(MODEL)
 
 
@@ -37,7 +33,7 @@ QUANTITIES = parameters_and_sum(MODEL)
     ("case", "seed"), [("endothelial_cell", 0), ("liquid_drop_1", 4), ("liquid_drop_2", 0)]
 )
 def test_the_rise_at_a_limit_is_the_threshold(case: str, seed: int) -> None:
-    found = list(misses(likelihood_for(case, seed), QUANTITIES, QUICK))
+    found = list(misses(likelihood_for(case, seed), QUANTITIES))
     assert len(found) >= 8
     assert [miss for miss in found if abs(miss[-1]) > ALLOWED] == []
 
@@ -53,7 +49,7 @@ def test_the_name_of_a_trace_changes_no_limit() -> None:
     two = QUANTITIES[0], QUANTITIES[4]
     pair = [limits_of(likelihoods[i], two) for i in (0, int(np.argmax(away)))]
     assert differences(np.array(pair)).max() < ALIKE
-    assert [miss for miss in misses(likelihoods[3], two, QUICK) if abs(miss[-1]) > ALLOWED] == []
+    assert [miss for miss in misses(likelihoods[3], two) if abs(miss[-1]) > ALLOWED] == []
 
 
 @pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1", "liquid_drop_2"])

@@ -3,17 +3,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.setup import evolve
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.noise import Noise, add_noise, rms
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import MODELS
 from biogrip.identify.answer import Identification
+from biogrip.identify.genetic import evolve_many
 from biogrip.identify.genetic_operators import cross, mutate
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange, Genome, make_genome
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
+from biogrip.response.misfit import Misfit, combine_misfits
 from biogrip.response.misfit_series import SeriesMisfit
 from tests.helpers.plain_genetic import chromosomes_of
 
@@ -22,6 +23,13 @@ MODEL = MODELS["generalized_maxwell"]
 STIFFNESS, DAMPING = GeneRange((-3, 8), (1, 9)), GeneRange((-4, 5), (1, 9))
 GENOME = make_genome(MODEL, {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING})
 BOWL = np.log10([35.0, 5.5, 290.0, 4.4e-3])
+
+
+def evolve(
+    misfit: Misfit, genome: Genome, settings: GeneticSettings, rng: np.random.Generator
+) -> Identification:
+    """Search on any misfit of parameters of shape (n, n_parameters)."""
+    return evolve_many(combine_misfits([misfit]), genome, settings, [rng])[0].identification
 
 
 def crossed(parents: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:

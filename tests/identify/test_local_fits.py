@@ -17,7 +17,6 @@ from biogrip.identify.levenberg_marquardt import Normal, bounded_step
 from biogrip.identify.local_fits import FINE, ROUGH, LocalFits, alike
 from biogrip.identify.multi_start import fit_from, identify_from, screened
 from biogrip.identify.problem import Problem
-from biogrip.response.inertia import ringing_s
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.default import STUDY
 from tests.helpers.places import ROOT
@@ -187,13 +186,13 @@ def test_the_genetic_algorithm_is_polished_alike() -> None:
 
 def mixed() -> list[Problem]:
     """Traces of which some differ in more than the noise, in no order."""
-    (times, response), rings_s = clean("liquid_drop_2"), ringing_s(GRIPPER)
+    times, response = clean("liquid_drop_2")
     linear, other = of_case("liquid_drop_2", 3), of_case("liquid_drop_2", 1)
     trace = response + 1e-5 * np.random.default_rng(9).standard_normal(len(times))
     half = times[::2], trace[::2]
     drop = MODELS["liquid_drop"]
     (nonlinear,) = case_problem(times[::20], trace[::20], 1, nonlinear=True)
-    ringing = problem_alone(GRIPPER, MODEL, TORQUE, *half, ringing_s=rings_s)
+    sparse = problem_alone(GRIPPER, MODEL, TORQUE, *half)
     narrow = replace(linear[2], low=linear[2].low + 1)
     simple = replace(
         linear[2],
@@ -201,7 +200,7 @@ def mixed() -> list[Problem]:
         low=linear[2].low[:3],
         high=linear[2].high[:3],
     )
-    return [linear[0], nonlinear, linear[1], ringing, *other, narrow, linear[2], simple]
+    return [linear[0], nonlinear, linear[1], sparse, *other, narrow, linear[2], simple]
 
 
 def test_what_cannot_be_fitted_together_is_fitted_in_groups() -> None:

@@ -41,7 +41,7 @@ def with_gripper(**changes: Any) -> CaseProblem:
 
 def functions(uncertainty: Mapping[str, Mapping[str, float]], **changes: float) -> Array:
     case_problem = replace(with_gripper(**changes), uncertainty=uncertainty)
-    return gripper_functions(case_problem, TIMES, np.exp(TRUTH), inertia=False)
+    return gripper_functions(case_problem, TIMES, np.exp(TRUTH))
 
 
 def test_the_torque_is_a_factor_of_the_rotation() -> None:
@@ -55,7 +55,7 @@ def test_an_uncertain_length_is_that_of_all_elements() -> None:
     length, wholly = EXPERIMENT.gripper.arm_length_m, replace(CASE.problem)
     share, logs = 0.05, wholly.logs(CASE.parameters)
     uncertain = replace(wholly, uncertainty={"gripper": {"arm_length_m": share * length}})
-    odd, even = gripper_functions(uncertain, TIMES, np.exp(logs), inertia=False)
+    odd, even = gripper_functions(uncertain, TIMES, np.exp(logs))
     above, nominal, below = (simulated(wholly, logs + 2 * np.log1p(e)) for e in (share, 0, -share))
     np.testing.assert_allclose(odd, 0.5 * (above - below), rtol=1e-9, atol=1e-12)
     bent = 0.5 * (above + below) - nominal

@@ -31,7 +31,6 @@ EVERYTHING = """
 cases:
   sized:
     sample: {model: liquid_drop, k: 1.0, k_p: 0.1, c: 10.0, size_m: 60e-6}
-    posterior: {prior: {k: {median: 2.0, spread: 1.0}}, evidence: true}
   uneven:
     sample: {model: burgers, k_s: 3.0, c_s: 200.0, k_v: 2.0, c_v: 40.0}
     measurement: {times_s: [0.1, 0.3, 1, 3, 9, 20, 50, 100, 200, 201, 220, 250, 400]}
@@ -44,13 +43,7 @@ cases:
     measurement: {file: data/example_trace.csv, time: time_s, rotation: rotation_rad}
 """
 OVERLAYS = [
-    (file.name,)
-    for file in sorted((ROOT / "config").glob("*.yaml"))
-    if file.name not in ("config.yaml", "designed.yaml", "soft_designed.yaml")
-] + [
-    ("design.yaml", "designed.yaml"),
-    ("soft.yaml", "soft_designed.yaml"),
-    ("measured.yaml", "moduli.yaml"),
+    (file.name,) for file in sorted((ROOT / "config").glob("*.yaml")) if file.name != "config.yaml"
 ]
 ROBUSTNESS = (ROOT / "config" / "robustness.yaml").read_text()
 

@@ -2,7 +2,6 @@
 
 import re
 from base64 import b64decode
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,29 +10,24 @@ import pytest
 import yaml
 from axe_playwright_python.sync_playwright import Axe
 
-from biogrip.arrays import Array
-from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, torque_history
-from biogrip.experiment.sample import Network
-from biogrip.instrument.gripper import Gripper
+from biogrip.identify.methods import METHODS
 from biogrip.products.catalogue import products
+from biogrip.products.figures.results import Fit
+from biogrip.products.files.identifications import read_identifications
 from biogrip.products.files.rows import read_table
 from biogrip.products.files.traces import read_measurements
-from biogrip.products.files.verdicts import read_verdicts
 from biogrip.products.report.answers import (
     compare_with_paper,
     say_what_traces_tell,
     say_which_method_finds_it,
 )
+from biogrip.products.report.explorer import explorer
 from biogrip.products.source_files import fingerprint
-from biogrip.response.jaw_force import jaw_force
-from biogrip.response.linear import rotation, step_response
 from biogrip.running.manifest import Manifest
 from tests.helpers.places import ROOT
 
 MOST_BYTES = 8_000_000
 PHONE = {"width": 400, "height": 800}
-CLOSE = 1e-9
-CASE = "endothelial_cell"
 
 
 @pytest.fixture(scope="module")
@@ -60,14 +54,11 @@ class Opened:
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.goto(report.as_uri())
         if explored:
-            self.ready()
+            self.page.wait_for_selector("#explorer .main-svg")
 
     def _said(self, message: Any) -> None:
         if message.type == "error":
             self.problems.append(message.text)
-
-    def ready(self) -> None:
-        self.page.wait_for_selector("#plot-profile[data-ready=yes]", timeout=120_000)
 
 
 @pytest.fixture(scope="module")
@@ -201,7 +192,9 @@ def test_anybody_can_use_the_page(browser: Any, report: Path, scheme: Any) -> No
 def test_four_figures_are_shown_and_the_others_open_by_sample(opened: Opened) -> None:
     page = opened.page
     assert page.locator("figure").count() == 4
-    titles = page.evaluate("biogrip.cases.map(c => c.title)")
+    titles = page.evaluate(
+        "document.getElementById('explorer').layout.updatemenus[0].buttons.map(b => b.label)"
+    )
     folded = page.locator("details.sample > summary strong").all_inner_texts()
     assert set(titles) <= set(folded)
     first = page.locator("details.sample").first
@@ -220,18 +213,47 @@ def test_four_figures_are_shown_and_the_others_open_by_sample(opened: Opened) ->
         summary.locator("> summary").press("Enter")
 
 
-def test_plots_need_no_graphics_processor(opened: Opened) -> None:
-    """Dots as SVG, of which a trace has no more than a screen shows."""
-    page = opened.page
-    kinds = page.locator(".plot").evaluate_all("all => all.flatMap(p => p.data.map(d => d.type))")
-    # Lines have no type of their own.
-    assert set(kinds) == {"scatter", None}
+DRAWN = """document.getElementById('explorer')._fullData.filter(line => line.visible === true)
+    .map(line => ({name: line.name, y: Array.from(line.y)}))"""
+
+
+@pytest.mark.parametrize(
+    ("case", "title", "prefix"),
+    [("liquid_drop_2", "Liquid drop, case 2", "m"), ("endothelial_cell", "Endothelial cell", "µ")],
+)
+def test_the_explorer_shows_the_judged_trace_and_its_fits(
+    opened: Opened, finished: Path, case: str, title: str, prefix: str
+) -> None:
+    """Of the case that is chosen, as SVG, which needs no graphics processor."""
+    page, results = opened.page, finished / "results"
+    page.locator("#explorer .updatemenu-header").click()
+    page.locator("#explorer .updatemenu-dropdown-button", has_text=title).click()
+    label = f"closing rotation ({prefix}rad)"
+    page.locator("#explorer .ytitle", has_text=label).wait_for()
+    scale = {"m": 1e3, "µ": 1e6}[prefix]
+    drawn = {line["name"]: np.array(line["y"]) / scale for line in page.evaluate(DRAWN)}
+    (batch,) = (results / "measurements" / case).glob("seeds_0-*.parquet")
+    measured = read_measurements(batch, [0])
+    assert np.allclose(drawn.pop("noisy trace"), measured.rotation_rad[0], rtol=1e-5, atol=0)
+    assert measured.target_rad is not None
+    assert np.allclose(drawn.pop("target"), measured.target_rad, rtol=1e-5, atol=0)
+    assert set(drawn) == {
+        "genetic algorithm",
+        "multi-start least squares",
+        "differential evolution",
+    }
+    found = read_identifications(results / "identifications" / f"{case}.csv").set_index("seed")
+    for misfit, method in found.loc[0, ["misfit", "method"]].itertuples(index=False):
+        residual = measured.rotation_rad[0] - drawn[METHODS[method].title]
+        assert np.sqrt(np.mean(residual**2)) == pytest.approx(misfit, rel=1e-4)
     assert page.locator("canvas").count() == 0
-    lengths = page.evaluate(
-        """[999, 1000, 1001, 4001, 100000].map(n => Array(n).fill(0))
-            .map(values => biogrip.dots(values, values, '').x.length)"""
-    )
-    assert lengths == [999, 1000, 501, 801, 1000]
+    assert opened.problems == []
+
+
+def test_a_title_cannot_end_the_script() -> None:
+    time_s = np.linspace(0.0, 9.0, 10)
+    fits = [(METHODS["genetic"], Fit(time_s, None, time_s, time_s))]
+    assert "<b>mine" not in explorer([("</script><b>mine</b>", fits)])
 
 
 def test_summaries_are_whole_and_legible(browser: Any, finished: Path) -> None:
@@ -245,160 +267,3 @@ def test_summaries_are_whole_and_legible(browser: Any, finished: Path) -> None:
         assert opened.problems == []
         assert all(url.startswith("data:") for url in opened.asked[1:])
         opened.page.close()
-
-
-def phases() -> tuple[Phase, ...]:
-    """Steps, ramps, parabolas and sinusoids, one after the other, both arms alike."""
-    swing = Harmonic(3e-10, 0.7, 0.4)
-    loads = (
-        Load(1.6e-9),
-        Load(1.6e-9, -2e-11),
-        Load(3e-10, 4e-12, 1e-13),
-        Load(8e-10, harmonics=(swing,)),
-    )
-    lengths = (5.0, 50.0, 20.0, 60.0)
-    return tuple(Phase(t, load, load) for t, load in zip(lengths, loads, strict=True))
-
-
-def samples() -> Iterator[Network]:
-    """None to three branches over the search range, alike ones and none at all among them."""
-    rng = np.random.default_rng(14)
-    for branches in (0, 1, 1, 1, 2, 3):
-        for _ in range(6):
-            k, c = np.exp(rng.uniform(-6, 9, branches)), np.exp(rng.uniform(-6, 9, branches))
-            k_p, c_p = np.exp(rng.uniform(-9, 7, 2))
-            yield Network(np.array([k_p]), np.array([c_p]), k[None], c[None])
-    yield Network(np.array([0.0]), np.array([0.0]), np.array([[9.5]]), np.array([[10.0]]))
-
-
-def as_in_the_page(torque: TorqueHistory) -> dict[str, Any]:
-    return {
-        "jumps": [[start, order, float(h[0])] for start, order, h in torque.jumps],
-        "swings": [[t, omega, a[0].real, a[0].imag] for t, omega, a in torque.swings],
-    }
-
-
-def test_the_closed_form_is_the_library_s(opened: Opened, gripper: Gripper) -> None:
-    torque = torque_history(phases())
-    time_s = np.concatenate((np.geomspace(1e-6, 1, 30), np.linspace(1.003, torque.end_s, 200)))
-    arm = gripper.left
-    given = {
-        "gripper": {
-            "k": arm.stiffness_Nm_per_rad,
-            "c": arm.damping_Nms_per_rad,
-            "lever": gripper.lever_m,
-        },
-        "torque": as_in_the_page(torque),
-        "times": time_s.tolist(),
-    }
-    for network in samples():
-        sample = {
-            "k_p": float(network.k_p[0]),
-            "c_p": float(network.c_p[0]),
-            "k": network.k[0].tolist(),
-            "c": network.c[0].tolist(),
-        }
-        computed = opened.page.evaluate(
-            """({gripper, torque, times, sample}) => ["rotation", "jawForce"].map(
-                name => Array.from(biogrip.mechanics[name](gripper, sample, torque, times)))""",
-            {**given, "sample": sample},
-        )
-        response = step_response(gripper, network, inertia=False)
-        expected = (
-            rotation(response, torque, time_s)[0],
-            jaw_force(gripper, network, torque, time_s, nonlinear=False, inertia=False)[0],
-        )
-        for found, value in zip(computed, expected, strict=True):
-            assert np.max(np.abs(np.array(found) - value)) < CLOSE * np.max(np.abs(value)), sample
-
-
-def test_a_profile_is_the_library_s(opened: Opened, finished: Path) -> None:
-    """From the trace in single precision, by other fits; as exactly as one can see."""
-    verdicts = read_verdicts(finished / "results" / "identifiability" / f"{CASE}.json")
-    compared = 0
-    for index, quantity in enumerate(("k", "k_p", "c", "c_p", "c + c_p")):
-        (found,) = (q for q in verdicts["quantities"] if q["quantity"] == quantity)
-        values = np.array(found["profile"]["values"])
-        expected = np.array(found["profile"]["increases"])
-        # Further out another basin may begin, for which the page does not look.
-        shown = np.flatnonzero(expected < 3 * verdicts["threshold"])
-        # The page's elements in their order: branch and parallel ones of each kind.
-        names = opened.page.evaluate("biogrip.cases[0].elements.map(e => e.name)")
-        chosen = "sum" if index == 4 else names.index(quantity)
-        increases = opened.page.evaluate(
-            """([chosen, values]) => {
-                const item = biogrip.cases[0], fit = item.methods[0].fits[0];
-                return biogrip.profileOf(item, item.trace(0), fit.sample, chosen, values).rises;
-            }""",
-            [chosen, np.log(values[shown]).tolist()],
-        )
-        assert np.allclose(increases, expected[shown], rtol=0.01, atol=0.01), quantity
-        compared += len(shown)
-    assert compared > 50
-
-
-def test_choices_are_followed(opened: Opened, finished: Path) -> None:
-    page = opened.page
-    assert page.evaluate("biogrip.cases[0].name") == CASE
-    page.select_option("#case", "1")
-    page.select_option("#method", "1")
-    page.select_option("#seed", "2")
-    opened.ready()
-    name = page.evaluate("biogrip.cases[1].name")
-    batches = sorted((finished / "results").glob(f"measurements/{name}/*.parquet"))
-    traces = [read_measurements(batch).rotation_rad for batch in batches]
-    (trace,) = (part[2] for part in traces if 2 in part)
-    drawn = page.evaluate("document.getElementById('plot-trace').data.map(d => Array.from(d.y))")
-    # The page has them as whole numbers of two bytes.
-    assert np.allclose(drawn[0], trace, rtol=0, atol=np.max(np.abs(trace)) / 2**16)
-    left = page.evaluate("Array.from(document.getElementById('plot-residual').data[0].y)")
-    assert np.allclose(np.array(drawn[0]) - np.array(drawn[2]), left, rtol=0, atol=1e-9)
-    misfit = page.evaluate("biogrip.cases[1].methods[1].fits.find(f => f.seed === 2).misfit")
-    assert np.sqrt(np.mean(np.square(left))) == pytest.approx(misfit, rel=1e-3)
-    assert opened.problems == []
-
-
-def test_a_sample_of_one_s_own_is_judged_at_once(opened: Opened) -> None:
-    """More noise tells less; jaws that pull are said."""
-    page = opened.page
-
-    def deviations() -> Array:
-        return np.array(
-            page.evaluate(
-                """(() => { const item = biogrip.cases[0];
-                const logs = biogrip.inference.logsOf(item.layout, item.truth);
-                const respond = x => Array.from(biogrip.mechanics.rotation(item.gripper,
-                    biogrip.inference.sampleOf(item.layout, x), item.torque, item.times));
-                return biogrip.inference.deviations(item.layout, logs, respond, item.noise);
-                })()"""
-            )
-        )
-
-    def told() -> str:
-        return str(page.inner_text("#determined"))
-
-    page.select_option("#try-case", "0")
-    before = told()
-    assert "determined" in before
-    # As the card above, where the first order does not say the same.
-    profile = page.locator("#determined td:last-child").all_inner_texts()
-    verdicts = page.evaluate("Object.values(biogrip.cases[0].verdicts)")
-    assert [said.partition(":")[0] for said in profile] == verdicts
-    first_order = page.locator("#determined td:nth-child(4)").all_inner_texts()
-    for said, near, verdict in zip(profile, first_order, verdicts, strict=True):
-        differ = {near, verdict} != {"determined"} and "determined" in (near, verdict)
-        assert ("the profile disagrees" in said) == (differ and near != "roughly")
-    assert "press all the time" in page.inner_text("#force-words")
-    page.eval_on_selector(
-        "#try-noise", "e => { e.value = Math.log(1e-2); e.dispatchEvent(new Event('input')); }"
-    )
-    assert told() != before
-    assert told().count("not determined") == 5
-    # No profile is computed for other samples.
-    assert set(page.locator("#determined td:last-child").all_inner_texts()) == {"–"}
-    page.select_option("#try-case", "1")
-    assert "would have to pull" in page.inner_text("#force-words")
-    found = deviations()
-    # k_p of the cell shows in every sample, c_p in none.
-    assert found[1] < 0.05 < 1 < found[3]
-    assert opened.problems == []

@@ -7,11 +7,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.sample import MODELS, Sample
 from biogrip.instrument.gripper import GRIPPER, Gripper
-from biogrip.response.condensed import Condensed
-from biogrip.response.inertia import ringing_s
-from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
-from biogrip.response.whitening import NoiseModel, Whitening
 from tests.helpers.problems import condensed_of, condensed_rows
 from tests.helpers.responses import PROTOCOLS, random_samples
 from tests.helpers.responses import SAMPLING_TIMES as TIMES
@@ -92,46 +88,17 @@ def test_the_nonlinear_model_is_condensed_along(
     )
 
 
-@pytest.mark.parametrize("nuisance", [False, True])
+@pytest.mark.parametrize("nonlinear", [False, True])
 @pytest.mark.parametrize("times", DENSE)
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_of_arms_that_ring_few_nodes_stand_for_what_comes_later(
-    gripper: Gripper, protocol: str, times: str, nuisance: bool
+def test_too_many_nodes_have_a_row_each(
+    gripper: Gripper, protocol: str, times: str, nonlinear: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Some thousand rows at most, of which those of the first tenths of a second are samples."""
+    monkeypatch.setattr("biogrip.response.condensed.MOST_NODES", 10)
     torque, time_s = torque_history(PROTOCOLS[protocol]), DENSE[times]
-    rings_s = ringing_s(gripper)
-    condensed = condensed_of(torque, time_s, offset=nuisance, drift=nuisance, ringing_s=rings_s)
+    condensed = condensed_of(torque, time_s, offset=True, nonlinear=nonlinear)
     assert not condensed.reduced
     residuals = Residuals(
         gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed, instrument=GRIPPER
     )
-    assert residuals.inertia
-    for x in (CELL, *np.log(random_samples(2, seed=9))):
-        assert assert_alike(residuals, x) < 4000
-    starts = np.array([start for start, *_ in (*torque.jumps, *torque.swings)])
-    ringing = np.any((time_s >= starts[:, None]) & (time_s < starts[:, None] + rings_s), axis=0)
-    assert set(time_s[ringing]) <= set(condensed.time_s)
-
-
-@pytest.mark.parametrize("times", DENSE)
-def test_the_nonlinear_model_of_arms_that_ring(gripper: Gripper, times: str) -> None:
-    torque, time_s = torque_history(PROTOCOLS["steps"]), DENSE[times][::4]
-    condensed = condensed_of(torque, time_s, nonlinear=True, ringing_s=ringing_s(gripper))
-    residuals = Residuals(
-        gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed, instrument=GRIPPER
-    )
     assert assert_alike(residuals, CELL) < 8000
-
-
-def test_in_coloured_noise_every_sample_of_arms_that_ring_has_a_row(gripper: Gripper) -> None:
-    torque, time_s = torque_history(PROTOCOLS["steps"]), DENSE["uniform"][::100]
-    nuisance = nuisance_basis(time_s, offset=True, drift=True)
-    whitening = Whitening(time_s, NoiseModel(0.3, 5.0, 0.2), nuisance)
-    condensed = Condensed(
-        torque, time_s, nuisance, ringing_s=ringing_s(gripper), whitening=whitening
-    )
-    residuals = Residuals(
-        gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed, instrument=GRIPPER
-    )
-    assert assert_alike(residuals, CELL) == len(time_s) + 1

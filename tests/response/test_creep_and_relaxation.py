@@ -136,7 +136,7 @@ def test_derivatives_are_those_of_finite_differences(model: SampleModel, deforms
 
     def rows(at: Array) -> Array:
         return rotations_and_sensitivities(
-            NO_ARMS, model, history, times, np.exp(at), nonlinear=False, inertia=False
+            NO_ARMS, model, history, times, np.exp(at), nonlinear=False
         )[0]
 
     found = rows(logs)

@@ -1,34 +1,26 @@
-"""Whether arms are seen ringing is a matter of sampling and noise, and never underestimated."""
+"""The ringing of arms, which targets have and fits leave out, and what of it shows in a trace."""
+
+import re
 
 import numpy as np
 import pytest
 
+from biogrip import library
 from biogrip.arrays import Array
 from biogrip.experiment.network import Network
-from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.protocol import TorqueHistory, hold, torque_history
-from biogrip.experiment.sample import MODELS
+from biogrip.identifiability.fit_status import DOUBT, REJECTED, REJECTION, Note
 from biogrip.instrument.gripper import Arm, Gripper
-from biogrip.response.inertia import (
-    VISIBLE,
-    change_by_inertia,
-    inertia_shows,
-    ringing_s,
-    while_ringing,
-)
+from biogrip.response.inertia import VISIBLE, elapsed_s, find_ring, ring, ringing_s, while_ringing
 from biogrip.response.linear import rotation, step_response
-from biogrip.response.sensitivity import linear_responses
-from biogrip.response.simulation import simulated_rotation
 from tests.helpers.default import STUDY
-from tests.helpers.problems import MODEL, SAMPLES, TORQUE
-from tests.helpers.responses import MODEL_PARAMETERS, log_range, random_samples
+from tests.helpers.problems import GRIPPER, MODEL, SAMPLES, TORQUE
+from tests.helpers.responses import random_samples
 
-BURST_S = 1e-5 * np.arange(1, 200)
-SAMPLING = {
-    "17 ms": np.arange(0.0, 400.0, 0.017),
-    "30 ms": np.arange(0.0, 400.0, 0.030),
-    "1 ms at first": np.arange(0.0, 4.0, 1e-3),
-    "bursts": np.concatenate((BURST_S, 200 + BURST_S)),
+# Dampers between the jaws end a ring before it is seen; a spring in front of them goes on.
+RINGING = {
+    "generalized_maxwell": {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 1e-6},
+    "zener_kelvin": {"k_s": 12.0, "k_v": 20.0, "c_v": 100.0},
 }
 
 
@@ -47,37 +39,20 @@ def both_ways(gripper: Gripper, network: Network, torque: TorqueHistory, time_s:
     )
 
 
-@pytest.mark.parametrize("times", SAMPLING)
-@pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
-def test_no_sample_rings_more_than_is_reckoned_with(
-    request: pytest.FixtureRequest, arms: str, times: str
-) -> None:
-    """Of many from all over the search range, of which most are overdamped."""
-    gripper, time_s = request.getfixturevalue(arms), SAMPLING[times]
-    network = MODEL.network(random_samples(150, seed=3))
-    with_it, without = both_ways(gripper, network, TORQUE, time_s)
-    size = np.sqrt(np.mean(without**2, axis=1))
-    changes = np.linalg.norm(with_it - without, axis=1) / size
-    assert np.max(changes) < change_by_inertia(gripper, TORQUE, time_s)
-
-
-def test_an_empty_gripper_is_reckoned_with() -> None:
-    """A damped oscillator in closed form: as far from rest as it is pushed, after either step."""
+def test_an_empty_gripper_rings_like_a_damped_oscillator() -> None:
+    """In closed form: as far from rest as it is pushed."""
     inertia, damping, stiffness = 1e-14, 3.3e-12, 4.4e-7
     arm = Arm(inertia, damping, stiffness)
-    gripper = Gripper(1.5e-3, 75.0, arm, arm)
     decay = damping / (2 * inertia)
     omega = np.sqrt(stiffness / inertia - decay**2)
-    slow = stiffness / damping
     time_s: Array = 1e-4 * np.arange(1.0, 1000.0)
-    ring = np.exp(-decay * time_s) * (
-        np.cos(omega * time_s) + decay / omega * np.sin(omega * time_s)
-    )
-    change = np.linalg.norm(np.exp(-slow * time_s) - ring)
-    size = np.sqrt(np.mean((1 - np.exp(-slow * time_s)) ** 2))
-    found = change_by_inertia(gripper, torque_history((hold(1.0, 1e-9),)), time_s)
-    # The size is that at every other sample.
-    assert found >= change / size * (1 - 1e-3)
+    envelope = np.exp(-decay * time_s)
+    swing = envelope * (np.cos(omega * time_s) + decay / omega * np.sin(omega * time_s))
+    nothing = Network(np.zeros(1), np.zeros(1), np.zeros((1, 0)), np.zeros((1, 0)))
+    torque = torque_history((hold(1.0, 1e-9),))
+    found = ring(Gripper(1.5e-3, 75.0, arm, arm), nothing, torque, time_s)[0]
+    expected = 1e-9 / stiffness * (np.exp(-stiffness / damping * time_s) - swing)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * 1e-9 / stiffness)
 
 
 @pytest.mark.parametrize("stiffness", [0.0, 1e-2, 1.0, 1e2, 1e4])
@@ -94,73 +69,102 @@ def test_rings_are_over_when_they_are_said_to_be(
     assert np.max(np.abs(with_it - without)) < 1e-14 * np.max(np.abs(without))
 
 
-def test_what_is_seldom_sampled_shows_no_ring(gripper: Gripper) -> None:
-    time_s = np.arange(1.0, 400.0)
-    assert change_by_inertia(gripper, TORQUE, time_s[time_s != 200]) == 0.0
-    # Nothing has moved when the torque has just changed, but by the time of the next sample.
-    assert 0 < change_by_inertia(gripper, TORQUE, np.arange(4001) / 10) < 1e-5
+@pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
+def test_when_the_ring_is_over_it_is_as_without_inertia(
+    request: pytest.FixtureRequest, arms: str
+) -> None:
+    """Dropping the inertia costs 3.1e-8 s^2 / t^2 at most (docs/model.md)."""
+    gripper, times = request.getfixturevalue(arms), np.linspace(0.1, 400.0, 800)
+    network = MODEL.network(random_samples(50, seed=3))
+    with_it, without = both_ways(gripper, network, TORQUE, times)
+    peak = np.max(np.abs(without), axis=1, keepdims=True)
+    assert np.max(np.abs(with_it - without) / peak) < 4e-6
 
 
-def test_a_change_is_weighed_against_the_noise() -> None:
-    trace = 1e-4 * np.ones(100)
-    assert inertia_shows(0.02, trace, 1.9e-6 / VISIBLE)
-    assert not inertia_shows(0.02, trace, 2.1e-6 / VISIBLE)
-    # No instrument has none at all: one of 14 bits is as good as those are.
-    assert inertia_shows(1.1 * VISIBLE / 2**10, trace, 0.0)
-    assert not inertia_shows(0.9 * VISIBLE / 2**10, trace, 0.0)
+def test_times_count_from_the_last_change_of_the_torque() -> None:
+    torque, times = torque_history((hold(2.0, 1e-9), hold(2.0, 1e-10))), np.array([0.5, 2.0, 3.5])
+    np.testing.assert_allclose(elapsed_s(torque, times), [0.5, 0.0, 1.5])
+    late = times + ringing_s(GRIPPER)
+    assert while_ringing(GRIPPER, torque, times).tolist() == [False, True, False]
+    assert not while_ringing(GRIPPER, torque, late).any()
+
+
+def test_a_ring_shows_by_its_norm_beside_the_noise() -> None:
+    """All readings after the one that is named change by less than what counts."""
+    rng = np.random.default_rng(1)
+    elapsed = rng.permutation(1e-3 * np.arange(1.0, 200.0))
+    change = 5.0 * np.exp(-elapsed / 0.01) * np.cos(3e3 * elapsed)
+    found = find_ring(change, elapsed)
+    assert found is not None
+    assert found.largest == np.max(np.abs(change))
+    norms = [
+        np.linalg.norm(change[elapsed > last]) for last in (found.lasts_s, found.lasts_s - 1e-9)
+    ]
+    assert norms[0] <= VISIBLE < norms[1]
+    assert find_ring(0.99 * VISIBLE * change / np.linalg.norm(change), elapsed) is None
+    assert find_ring(np.zeros(3), np.arange(3.0)) is None
+
+
+def notes_about(ringing: list[Note]) -> list[Note]:
+    return [note for note in ringing if note.text.startswith("The arms ring")]
+
+
+def notes_of(model: str, time_s: Array, level: float, truth: dict[str, float]) -> list[Note]:
+    """Notes on the ringing of arms in a simulated trace, with the default study's gripper."""
+    protocol = (library.hold(200.0, 1.6e-9), library.hold(200.0, 0.32e-9))
+    experiment = library.set_up(GRIPPER, protocol, library.Sample(model))
+    clean = library.simulate(experiment, truth, time_s)
+    trace = clean + level * clean.max() * np.random.default_rng(4).standard_normal(len(time_s))
+    found = library.identify_sample(experiment, time_s, trace)
+    return notes_about(library.judge(experiment, time_s, trace, found).notes)
 
 
 @pytest.mark.parametrize("case", SAMPLES)
 def test_the_default_study_does_not_show_it(case: str) -> None:
     """At 10 Hz, beside a tenth of noise, and beside a thousandth."""
-    problem = STUDY.cases[case].problem
-    time_s = STUDY.cases[case].sampling.over(400.0)
-    sample = problem.searched.network([[SAMPLES[case][name] for name in MODEL.names]])
-    clean = simulated_rotation(problem.gripper, sample, TORQUE, time_s, nonlinear=False)[0]
+    time_s = STUDY.cases[case].sampling.over(400.0)[::5]
     for level in (0.1, 1e-3):
-        noisy = add_noise(clean, Noise("gaussian", level, "peak"), np.random.default_rng(1))
-        assert not problem.shows_inertia(time_s, noisy)
-        assert not problem.of(time_s, noisy).residuals.inertia
+        assert notes_of("generalized_maxwell", time_s, level, SAMPLES[case]) == []
 
 
-@pytest.mark.parametrize("interval_s", [0.017, 0.021, 0.025, 0.030])
-@pytest.mark.parametrize("level", [0.02, 0.04])
-def test_the_same_arms_sampled_fast_show_it(interval_s: float, level: float) -> None:
-    problem = STUDY.cases["endothelial_cell"].problem
-    time_s = np.arange(0.0, 400.0, interval_s)
-    sample = MODEL.network([[SAMPLES["endothelial_cell"][name] for name in MODEL.names]])
-    clean = simulated_rotation(problem.gripper, sample, TORQUE, time_s, nonlinear=False)[0]
-    noisy = add_noise(clean, Noise("gaussian", level, "peak"), np.random.default_rng(1))
-    assert problem.shows_inertia(time_s, noisy)
-    case_problem = problem.of(time_s, noisy)
-    assert case_problem.residuals.inertia
-    assert not case_problem.residuals.plain
-    # Noise that is given counts, not that which neighbours suggest.
-    assert not problem.shows_inertia(time_s, noisy, noise_rad=1e4 * float(clean.max()))
+@pytest.mark.parametrize("model", RINGING)
+def test_who_samples_fast_is_told_to_leave_out_the_first_milliseconds(model: str) -> None:
+    """Without these readings nothing is said any more."""
+    time_s = np.unique([start + 0.017 * np.arange(2000) for start in (0.0, 200.0)])
+    (note,) = notes_of(model, time_s, 0.02, RINGING[model])
+    assert note.weight == DOUBT
+    (milliseconds,) = re.findall(r"the first (\d+) ms after each change", note.text)
+    assert 17 <= float(milliseconds) < 1e3 * ringing_s(GRIPPER)
+    kept = time_s[elapsed_s(TORQUE, time_s) > 1e-3 * float(milliseconds)]
+    assert notes_of(model, kept, 0.02, RINGING[model]) == []
 
 
-@pytest.mark.parametrize("name", [name for name in MODELS if MODELS[name].power_law])
-def test_power_laws_ring_whoever_else_does(gripper: Gripper, name: str) -> None:
-    """Byte for byte; of any samples, what targets are made with while arms ring.
+@pytest.mark.parametrize("model", RINGING)
+@pytest.mark.parametrize("level", [0.02, 0.003])
+def test_a_ring_that_is_taken_for_the_sample_is_told(model: str, level: float) -> None:
+    """Without inertia a damper between the jaws is the nearest that a fit has to a ring."""
+    time_s = np.unique([start + 0.002 * np.arange(1000) for start in (0.0, 200.0)])
+    assert len(notes_of(model, time_s, level, RINGING[model])) == 1
 
-    Then the inertia is dropped, which costs 3.1e-8 s^2 / t^2 at most (docs/model.md).
-    """
-    model = MODELS[name]
-    near = np.log(MODEL_PARAMETERS[name])
-    rng = np.random.default_rng(2)
-    logs = np.clip(near + rng.normal(size=(8, len(near))), *log_range(model))
-    step = torque_history((hold(0.5, 1.6e-9), hold(1.0, 0.4e-9)))
-    time_s = np.sort(np.concatenate([start + np.geomspace(1e-7, 0.4, 15) for start in (0, 0.5)]))
-    ringing = while_ringing(gripper, step, time_s)
-    allowed = np.where(ringing, 1e-12, 3.1e-8 / ringing_s(gripper) ** 2)
-    together = linear_responses(gripper, model, step, time_s, np.exp(logs), inertia=True)
-    for own, rows in zip(np.exp(logs), together, strict=True):
-        alone = linear_responses(gripper, model, step, time_s, own[None], inertia=True)[0]
-        np.testing.assert_array_equal(alone, rows)
-        network = model.network(own[None])
-        exact = simulated_rotation(gripper, network, step, time_s, nonlinear=False)[0]
-        assert np.all(np.abs(rows[0] - exact) <= allowed * np.abs(exact).max())
-        few = linear_responses(gripper, model, step, time_s, own[None], inertia=True, slopes=False)[
-            0
-        ]
-        np.testing.assert_allclose(few[0], rows[0], rtol=0, atol=1e-12 * np.abs(exact).max())
+
+def test_a_damper_that_is_seen_after_the_ring_ends_it() -> None:
+    time_s = np.unique([start + 0.017 * np.arange(2000) for start in (0.0, 200.0)])
+    assert notes_of("kelvin_voigt", time_s, 0.02, {"k_p": 12.3, "c_p": 30.0}) == []
+
+
+def test_with_a_rejected_fit_the_ring_is_told_as_a_reason() -> None:
+    """Of such a fit only what rejects it is kept; here the torques are wrong ones."""
+    time_s = np.unique([start + 0.002 * np.arange(1000) for start in (0.0, 1.9)])
+    torques = ((1.9, 1.6e-9), (200.0, 0.32e-9)), ((1.9, 1.6e-9), (200.0, 0.2e-9))
+    true, assumed = (
+        library.set_up(
+            GRIPPER, tuple(library.hold(*each) for each in own), library.Sample("zener_kelvin")
+        )
+        for own in torques
+    )
+    clean = library.simulate(true, RINGING["zener_kelvin"], time_s)
+    trace = clean + 1e-3 * clean.max() * np.random.default_rng(4).standard_normal(len(time_s))
+    found = library.identify_sample(assumed, time_s, trace)
+    told = library.judge(assumed, time_s, trace, found)
+    assert told.status == REJECTED
+    assert [note.weight for note in notes_about(told.notes)] == [REJECTION]

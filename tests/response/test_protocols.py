@@ -22,7 +22,6 @@ from biogrip.experiment.protocol import (
 from biogrip.experiment.sample import MODELS
 from biogrip.instrument.actuator import torque as torque_of_voltage
 from biogrip.instrument.gripper import GRIPPER, Arm, Gripper
-from biogrip.response.inertia import ringing_s
 from biogrip.response.linear import phi_function, rotation, step_response
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.study.protocol_block import PhaseBlock, ProtocolBlock
@@ -160,5 +159,5 @@ def test_the_fastest_way_is_chosen(gripper: Gripper) -> None:
     assert not needs_no_response(steps, np.sqrt(uniform))
     assert not needs_no_response(ramp, uniform)
     assert not needs_no_response(swings, uniform)
-    for assumed in ({"nonlinear": True}, {"offset": True}, {"ringing_s": ringing_s(gripper)}):
+    for assumed in ({"nonlinear": True}, {"offset": True}):
         assert not needs_no_response(steps, uniform, **assumed)

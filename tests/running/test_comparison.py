@@ -47,3 +47,15 @@ def test_each_difference_says_which_side_has_what(folders: tuple[Path, Path]) ->
         ["errors", "drop", "value", "2", "3"],
         ["errors", "other", "(row)", "absent", "present"],
     ]
+
+
+def test_only_some_tables_are_compared(folders: tuple[Path, Path]) -> None:
+    """An overlay publishes what it is about; its study has more tables."""
+    published, now = folders
+    (now / "verdicts.csv").write_text("case,value\n")
+    assert "1 file" in compare(published, now, "err*")
+    (now / "errors_cell.csv").write_text("case,value\n")
+    with pytest.raises(BiogripError, match=r"errors_cell.csv: regenerated, but not published"):
+        compare(published, now, "err*")
+    with pytest.raises(BiogripError, match="holds no tables"):
+        compare(published, now, "robust*")

@@ -118,12 +118,6 @@ BAD = {
     r"1e\+11, which is not searched for; allowed is .* N/m, or another search_range",
     "readings: {}": r"my.yaml, line 1: readings: unknown key, now called `interpretations`",
     "measurement: {noise: {relaxing: {}}}": r"noise.relaxing: unknown key, now called `ar1`",
-    "design: {samples: 9}": r"design.samples: unknown key, now called `readings`",
-    "design: {drawn: 9}": r"design.drawn: unknown key, now called `plausible_samples`",
-    "design: {tried: 9}": r"design.tried: unknown key, now called `candidates`",
-    "measurement: {exposure_s: 0.1}\nmodels: {target: nonlinear}": r"measurement.exposure_s: is "
-    r"for linear responses; leave it out, or models.target: nonlinear",
-    "measurement: {exposure_s: -1}": r"measurement.exposure_s: found -1, allowed is at least 0",
     "models: {inertia: true}": r"my.yaml, line 1: models.inertia: unknown key, no longer needed: ",
     "seedz: 3": r"my.yaml, line 1: seedz: unknown key. Did you mean 'seeds'\? Allowed here: .*see",
     "seeds: many": r"my.yaml, line 1: seeds: found 'many', allowed is an integer",

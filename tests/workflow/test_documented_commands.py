@@ -16,7 +16,6 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 import pytest
-import yaml
 
 from tests.helpers import loaded
 from tests.helpers.places import ROOT
@@ -34,7 +33,7 @@ LEFT = {
     "howto/case.md": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
     "howto/trace.md": [
         *("found.json", "drifting.json", "coloured.json", "page.html", "traces.csv"),
-        *("maxwell.json", "uncertain.json", "posterior.json", "posterior.parquet"),
+        *("maxwell.json", "uncertain.json"),
     ],
     "howto/creep.md": ["mucus.json", "hl60.json"],
     "howto/relaxation.md": ["fish.json", "dwell.json"],
@@ -42,9 +41,8 @@ LEFT = {
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),
         "results/tables/robustness_levels.md",
     ],
-    "howto/crate.md": ["study.zip"],
+    "howto/posterior.md": [],
     "howto/doubts.md": ["found.json", "page.html", "coloured.json"],
-    "howto/fork.md": ["published/SHA256SUMS", "published/tables/errors_my_cell.csv"],
     "howto/module.md": ["lab/mine.csv", "lab/results/tables/errors_my_cell.csv"],
     # These change the copy's code.
     "howto/noise_kind.md": ["results/tables/verdicts_laplace_drop.md"],
@@ -55,12 +53,11 @@ LOOKED_AT = {
     "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
 }
 # A trace fitted from few starts, with few models, of which the chosen one has two parameters unless
-# the document says which; where it is asked for, a short posterior.
+# the document says which.
 TINY_FIT = """
 least_squares: {candidates: 50, starts: 3}
 model_selection: {models: [damper, maxwell]}
 """
-SHORT = "posterior: {walkers: 20, most_steps: 1000}\n"
 
 
 @pytest.fixture(scope="module")
@@ -81,19 +78,13 @@ def test_every_howto_is_followed() -> None:
 
 
 @pytest.mark.parametrize("document", LEFT)
-def test_what_is_said_can_be_done(
-    document: str, place: Tree, request: pytest.FixtureRequest
-) -> None:
+def test_what_is_said_can_be_done(document: str, place: Tree) -> None:
     shutil.rmtree(place.root / "results", ignore_errors=True)
-    if document == "howto/crate.md":
-        finished: Path = request.getfixturevalue("tiny")
-        shutil.copytree(finished / "results", place.root / "results")
     text = (ROOT / "docs" / document).read_text(encoding="utf-8")
     # Most bring a case of their own.
     needed = "cases:" not in text or "[liquid_drop_2]" in text
     (place.root / "tiny.yaml").write_text(TINY if needed else f"{TINY}  liquid_drop_2: null\n")
     (place.root / "tiny_fit.yaml").write_text(TINY_FIT)
-    (place.root / "short.yaml").write_text(TINY_FIT + SHORT)
     blocks = BLOCK.findall(text)
     # Else the copy's code is the repository's, which is loaded already.
     own_code = any(title.endswith((".py", ".diff")) for _, title, _ in blocks)
@@ -116,29 +107,13 @@ def test_what_is_said_can_be_done(
     assert [name for name in LEFT[document] if not (place.root / name).is_file()] == []
 
 
-@pytest.mark.parametrize("document", ["howto/fork.md"])
-def test_what_a_workflow_of_github_runs_is_typed_above(document: str) -> None:
-    """Its file cannot be run here; its commands are those of the page, and have been."""
-    text = (ROOT / "docs" / document).read_text(encoding="utf-8")
-    blocks = BLOCK.findall(text)
-    typed = {line for language, _, code in blocks if language == "sh" for line in code.splitlines()}
-    (workflow,) = (yaml.safe_load(code) for _, title, code in blocks if ".github" in title)
-    steps = [step for job in workflow["jobs"].values() for step in job["steps"]]
-    commands = [step["run"] for step in steps if "run" in step]
-    assert {command for command in commands if command.startswith("biogrip")} <= typed
-    locks = re.findall(r"-r (\S+)", " ".join(commands))
-    assert [lock for lock in locks if not (ROOT / lock).is_file()] == []
-    assert all("uses" in step or "run" in step for step in steps)
-
-
 def _typed(arguments: list[str]) -> list[str]:
     """Arguments of biogrip, such that a run is small."""
     if arguments[0] == "run":
         return ["run", "tiny.yaml", *arguments[1:], *LOOKED_AT.get(arguments[-1], [])]
     if arguments[0] == "identify" and "--config" not in arguments:
-        config = "short.yaml" if "--posterior" in arguments else "tiny_fit.yaml"
         model = [] if "--model" in arguments else ["--model", "maxwell"]
-        return [*arguments, *model, "--config", config]
+        return [*arguments, *model, "--config", "tiny_fit.yaml"]
     return arguments
 
 

@@ -12,7 +12,7 @@ from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
-from biogrip.study.source import overlaid, read_config
+from biogrip.study.source import read_config
 from tests.helpers.default import study_of
 from tests.helpers.in_process import inputs_and_outputs, make_in_process
 from tests.helpers.pictures import assert_drawn, in_coarse_dots
@@ -182,9 +182,6 @@ def test_shipped_configurations_are_valid(file: Path, monkeypatch: pytest.Monkey
     """All that they ask for can be made: what is read is made, too, or is there."""
     assert len(CONFIGS) >= 3
     monkeypatch.chdir(ROOT)
-    over = read_config(file)
-    if file.stem == "soft_designed":
-        over = overlaid(read_config(file.with_name("soft.yaml")), over)
-    inputs, outputs = inputs_and_outputs(study_of(yaml.safe_dump(over)))
+    inputs, outputs = inputs_and_outputs(study_of(yaml.safe_dump(read_config(file))))
     assert len(outputs) > 50
     assert [read for read in inputs - outputs if not Path(read).is_file()] == []

@@ -58,22 +58,16 @@ def in_process(
     return done.stdout
 
 
-# A study by the command line's commands, and a posterior.
+# A study by the command line's commands.
 DONE = """
-import hashlib, json, sys
-from pathlib import Path
+import json, sys
 from biogrip.cli import main
-from tests.identifiability import test_posterior as own
-status = max(map(main, json.load(sys.stdin)))
-problem = own.posed_for(own.MODELS["liquid_drop"], *own.trace_of("liquid_drop_2"))
-found = own.sample(own.posterior_of(problem), 3)
-Path("posterior").write_text(hashlib.sha256(found.log_parameters.tobytes()).hexdigest())
-sys.exit(status)
+sys.exit(max(map(main, json.load(sys.stdin))))
 """
 
 
 def make(folder: Path, environment: dict[str, str]) -> None:
-    """Targets to error tables, and a posterior, in one process."""
+    """Targets to error tables in one process."""
     results = folder / "results"
     write_study(study_of("seeds: 2"), results)
     calls = []
@@ -83,8 +77,6 @@ def make(folder: Path, environment: dict[str, str]) -> None:
         calls += [["make", "identification", *batch, "--method", method] for method in METHODS]
         calls += [["make", "judgement", "--case", case], ["make", "model_fits", *batch]]
         calls.append(["make", "identifications", "errors_of_case", "--case", case])
-    python_path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
-    environment = {**environment, "PYTHONPATH": python_path}
     in_process(environment, "-c", DONE, given=json.dumps(calls), folder=folder)
 
 
@@ -119,14 +111,6 @@ def test_other_code_paths_change_no_byte(name: str, made: Callable[[str], Path])
     ours, reference = files_of(made(name)), files_of(made("two threads"))
     assert ours.keys() == reference.keys()
     assert [file for file in ours if ours[file] != reference[file]] == []
-
-
-@pytest.mark.parametrize("name", SETTINGS)
-def test_other_code_paths_sample_the_same_posterior(name: str, made: Callable[[str], Path]) -> None:
-    """To the last bit, over some hundred thousand decisions."""
-    ours, reference = ((made(each) / "posterior").read_text() for each in (name, "two threads"))
-    assert len(ours) == 64
-    assert ours == reference
 
 
 def test_the_settings_do_change_last_bits() -> None:

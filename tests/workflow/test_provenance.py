@@ -81,7 +81,7 @@ def test_another_trace_is_identified_again(recorded: Path, tmp_path: Path) -> No
     assert biogrip_run(folder, "-n", config=RECORDED).all_jobs()["recording"] == 1
 
 
-@pytest.mark.parametrize("command", ["verify", "crate", "publish results published"])
+@pytest.mark.parametrize("command", ["verify", "publish results published"])
 def test_tables_of_another_study_are_refused(
     copied: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
 ) -> None:

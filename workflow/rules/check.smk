@@ -11,17 +11,14 @@ OVERLAYS = {
         "interpretations interpretations_jointly",
         "interpretations*",
     ),
-    "design": (["design", "designed"], "all_designs", "designed*"),
-    "sequential": (["sequential"], "all_sequences", "sequential*"),
-    "posterior": (["posterior"], "all_posteriors", "posterior*"),
     "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
+    # Errors, verdicts and coverage.
+    "calibration": (["calibration"], "all_tables", "[cev][eor][rv]*"),
     "measured": (["measured"], "all", "*"),
-    "moduli": (["moduli"], "all_moduli", "modulus_bands*"),
-    "moduli_recorded": (["recorded", "moduli"], "all_moduli", "modulus_bands*"),
-    "moduli_measured": (["measured", "moduli"], "all_moduli", "modulus_bands*"),
+    "power_law": (["power_law"], "all_tables", "[cev][eor][rv]*"),
+    "recorded": (["recorded"], "all_tables", "[cev][eor][rv]*"),
     # Errors, verdicts and robustness.
     "soft": (["soft"], "all_tables all_maps", "[erv][eor]*_soft*"),
-    "soft_design": (["soft", "soft_designed"], "designed", "designed"),
 }
 CONFIGS = Path(workflow.basedir) / "config"
 
@@ -35,7 +32,7 @@ RUN_AFRESH = (
 )
 
 
-# Neither has an output, so that neither is ever taken for done.
+# None of these has an output, so that none is ever taken for done.
 rule check:
     input:
         published=PUBLISHED / "tables",
@@ -88,4 +85,24 @@ for overlay, (configs, target, only) in OVERLAYS.items():
         shell:
             f"{RUN_AFRESH}; "
             'biogrip publish "$scratch/results" {params.published:q} --only {params.only:q} '
+            "2>> {log:q} | tee -a {log:q}"
+
+    rule:
+        name:
+            f"check_{overlay}"
+        input:
+            published=PUBLISHED / overlay / "tables",
+        log:
+            f"results/logs/check_{overlay}.log",
+        threads: lambda _: workflow.cores
+        params:
+            snakefile=workflow.main_snakefile,
+            config=f"--configfile {' '.join(f'{CONFIGS / name}.yaml' for name in configs)}",
+            targets=target,
+            only=only,
+        message:
+            f"Running {' and '.join(configs)} afresh and comparing its tables with the published ones"
+        shell:
+            f"{RUN_AFRESH}; "
+            'biogrip compare {input.published:q} "$scratch/results/tables" --only {params.only:q} '
             "2>> {log:q} | tee -a {log:q}"

@@ -36,13 +36,12 @@ def columns_of(parameters: ArrayLike) -> Array:
 def complex_modulus(network: Network, omega: Array) -> tuple[Array, Array]:
     """Return storage and loss moduli of n samples, in N/m or Pa, each (n, n_omega).
 
-    Angular frequencies are those of all samples, (n_omega,), or of each, (n, n_omega). The formulas
-    hold for parameters with a small imaginary part, too.
+    Angular frequencies are in rad/s, (n_omega,).
     """
-    rates, across = (network.k / network.c)[:, :, None], omega[..., None, :]
-    share = network.k[:, :, None] / (across**2 + rates**2)
-    storage = network.k_p[:, None] + np.sum(share * across**2, axis=1)
-    loss = network.c_p[:, None] * omega + np.sum(share * across * rates, axis=1)
+    rates = (network.k / network.c)[:, :, None]
+    share = network.k[:, :, None] / (omega**2 + rates**2)
+    storage = network.k_p[:, None] + np.sum(share * omega**2, axis=1)
+    loss = network.c_p[:, None] * omega + np.sum(share * omega * rates, axis=1)
     return storage, loss
 
 

@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, rms, standard_deviation
+from biogrip.experiment.noise import Noise, standard_deviation
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.case_problem import CaseProblem
@@ -46,18 +45,9 @@ def bounds_percent(
     if noise.absent:
         return [(q, math.nan) for q in quantities]
     values = np.array([parameters[name] for name in model.names])
-    simulated = partial(
-        rotation_and_sensitivity,
-        problem.gripper,
-        model,
-        problem.torque,
-        time_s,
-        values,
-        nonlinear=problem.nonlinear,
+    rotation, sensitivity = rotation_and_sensitivity(
+        problem.gripper, model, problem.torque, time_s, values, nonlinear=problem.nonlinear
     )
-    rotation, sensitivity = simulated()
-    if problem.shows_inertia(time_s, rotation, rms(standard_deviation(rotation, noise))):
-        rotation, sensitivity = simulated(inertia=True)
     sigma = standard_deviation(rotation, noise)
     with np.errstate(divide="ignore"):
         logarithms = np.log(values)

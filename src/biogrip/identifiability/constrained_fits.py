@@ -1,7 +1,6 @@
 """Increase of chi^2 with a quantity held at a value, for many traces and quantities at once."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -10,20 +9,13 @@ from biogrip.identifiability.likelihood import MISSED, Likelihood
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identifiability.quantity_constraint import QuantityConstraint
 from biogrip.identify.levenberg_marquardt import Minima
-from biogrip.identify.local_fits import FitConstraint, LocalFits
+from biogrip.identify.local_fits import LocalFits
 
 CLOSE = 1e-7
 """Tolerance of fits that give chi^2 of some thousand readings to 0.001.
 
 Along a valley, a fit to the last digit takes three times as many steps.
 """
-
-
-class PricedConstraint(FitConstraint, Protocol):
-    """A constraint whose residuals count as an increase of chi^2."""
-
-    def price(self, x: Array) -> Array:
-        """Return what its residuals add to the sums of squares of all fits, (n,)."""
 
 
 class ConstrainedFits:
@@ -48,10 +40,6 @@ class ConstrainedFits:
         Logarithm of the quantity there.
     threshold, certainty : (n_profiles,)
         As in `Likelihood`; certainty is no less than the threshold.
-    ratio : (n_traces,)
-        Ratio of chi^2 to the fits' sums of squares.
-    basins : (n_starts, n_traces, n_parameters)
-        Log-parameters that profiles are fitted from besides the optimum; none here.
     missed
         By trace, the lowest increase of chi^2 and its log-parameters, if it is so far
         below zero that the trace's global optimum was missed.
@@ -70,12 +58,12 @@ class ConstrainedFits:
         threshold, certainty, self._misfit_rad, self._noise_rad = np.array(settings).T
         self.threshold = threshold[self.trace]
         self.certainty = np.maximum(certainty, threshold)[self.trace]
-        self.basins = np.empty((0, *self._optima.shape))
         self.missed: dict[int, tuple[float, Array]] = {}
         self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
         scale_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
-        self.ratio = (scale_rad / self._noise_rad) ** 2
+        # Ratio of chi^2 to the fits' sums of squares.
+        self._ratio = (scale_rad / self._noise_rad) ** 2
 
     def at(
         self, profile: IntArray, targets: Array, near: Array, tolerance: float
@@ -102,17 +90,12 @@ class ConstrainedFits:
         """
         trace, which = np.divmod(profile, len(self.quantities))
         low, high = self._fits.low[trace], self._fits.high[trace]
-        constraint = self.constraint(trace, which, targets, low, high)
-        found = self._fits.fitted(near, trace, tolerance, constraint=constraint)
-        price = constraint.price(found.x) * self.ratio[trace]
-        return self._increases(found, trace) + price, found.x
-
-    def constraint(
-        self, trace: IntArray, which: IntArray, targets: Array, low: Array, high: Array
-    ) -> PricedConstraint:
-        """Return the constraint that holds one quantity of each fit, all of shape (n, ...)."""
         last_s = self._residuals.duration_s
-        return QuantityConstraint(self.quantities, which, targets, low, high, last_s)
+        constraint = QuantityConstraint(self.quantities, which, targets, low, high, last_s)
+        found = self._fits.fitted(near, trace, tolerance, constraint=constraint)
+        return self._increases(found, trace) + constraint.price(found.x) * self._ratio[
+            trace
+        ], found.x
 
     def from_each(
         self, profile: IntArray, targets: Array, starts: Array, tolerance: float
@@ -165,7 +148,7 @@ class ConstrainedFits:
     def deviations(self) -> Array:
         """Return the logarithms' first-order standard deviations, at most 1, (n_profiles,)."""
         information = self._fits.normal(self._optima, np.arange(len(self._optima))).information
-        information = information * self.ratio[:, None, None]
+        information = information * self._ratio[:, None, None]
         slopes = np.array([[q.gradient(x) for q in self.quantities] for x in self._optima])
         # The prior keeps the matrix regular.
         spread = np.linalg.solve(information, slopes.swapaxes(1, 2)).swapaxes(1, 2)

@@ -7,7 +7,15 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
-from biogrip.identifiability.fit_status import DOUBT, HARMLESS, REJECTION, Note, compute_status
+from biogrip.experiment.sample_model import C_P
+from biogrip.identifiability.fit_status import (
+    DOUBT,
+    HARMLESS,
+    REJECTED,
+    REJECTION,
+    Note,
+    compute_status,
+)
 from biogrip.identifiability.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.range_ends import note_range_ends
@@ -148,7 +156,36 @@ def _with_notes(judged: Diagnosis, model: SampleModel, *, converged: bool) -> Di
                 "chi-squared. Rely on its verdicts, not on its digits.",
             )
         )
+    notes += _ringing(judged, rejected=compute_status(notes) == REJECTED)
     return replace(judged, grip=grip, notes=notes)
+
+
+def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
+    """Yield a note if the trace shows the arms ringing, which fits leave out.
+
+    The parallel damper has the least value that the trace allows. Ringing may be why a fit is
+    rejected, and only what rejects it is said of such a fit; its misfit is no noise.
+    """
+    likelihood = judged.likelihood
+    residuals = likelihood.problem.residuals
+    network = residuals.model.network(np.exp(likelihood.best))
+    damper = [each for each in judged.findings if each.quantity.label == C_P.name]
+    if damper:
+        network = replace(network, c_p=np.array([damper[0].low or 0.0]))
+    noise_rad = residuals.noise_scale_rad if rejected else likelihood.noise_rad
+    if ring := residuals.ring(network, noise_rad):
+        yield Note(
+            REJECTION if rejected else DOUBT,
+            "The arms ring: their inertia, which fits leave out, changes readings of this sample "
+            f"by up to {ring.largest:.2g} times the noise. Leave out the readings of the first "
+            f"{_rounded_up(1e3 * ring.lasts_s)} ms after each change of the torque.",
+        )
+
+
+def _rounded_up(value: float) -> str:
+    """Return a number of two digits that is not below the value."""
+    unit = 10.0 ** (np.floor(np.log10(value)) - 1) if value > 0 else 1.0
+    return f"{unit * np.ceil(value / unit * (1 - 1e-9)):.6g}"
 
 
 def _pulling(grip: Grip | None, last_s: float) -> Iterator[Note]:

@@ -51,15 +51,6 @@ class Points:
         point = np.flatnonzero(~self._optimum)
         self._try(point, point, FAIR)
 
-    def from_basins(self) -> None:
-        """Fit every point but the optimum from the basins of its trace, if there are any."""
-        for basins in self.fits.basins:
-            starts = basins[self.fits.trace[self.profile]]
-            elsewhere = np.any(starts != self.fits.best[self.profile], axis=1)
-            point = np.flatnonzero(~self._optimum & elsewhere)
-            if len(point):
-                self._fit(point, starts[point], FAIR)
-
     def from_neighbours(self) -> None:
         """Fit points from their neighbours' fits, as long as these have improved."""
         # Optima, and places beyond the ends, belong to no profile here: they are not fitted.
@@ -73,18 +64,11 @@ class Points:
 
     def _try(self, point: IntArray, start: IntArray, tolerance: float) -> BoolArray:
         """Fit points from other points' fits; return a mask of those that have improved much."""
-        return self._fit(point, self.x[start], tolerance, point <= start)
-
-    def _fit(
-        self, point: IntArray, starts: Array, tolerance: float, first: BoolArray | None = None
-    ) -> BoolArray:
-        """Fit points from log-parameters, (n, n_parameters); `first` marks one fit of a point."""
         profile, targets = self.profile[point], self.values[point]
-        increases, x = self.fits.at(profile, targets, starts, tolerance)
+        increases, x = self.fits.at(profile, targets, self.x[start], tolerance)
         news = np.zeros(len(self.values), dtype=bool)
-        every = np.ones(len(point), dtype=bool)
         # A point may be fitted from both sides, so one side after the other.
-        for side in (every,) if first is None else (first, ~first):
+        for side in (point <= start, point > start):
             before, after = self.increases[point[side]], increases[side]
             news[point[side]] |= after < before - NEWS * (1 + np.abs(after))
             better = after < before

@@ -62,11 +62,7 @@ class Profile:
 
 
 def compute_profiles(
-    likelihoods: Sequence[Likelihood],
-    quantities: Sequence[Quantity],
-    *,
-    smooth: bool = True,
-    kind: type[ConstrainedFits] = ConstrainedFits,
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Profile]]:
     """Compute profile likelihoods over the whole ranges of quantities, and confidence limits.
 
@@ -78,8 +74,6 @@ def compute_profiles(
         Quantities that are profiled.
     smooth
         True to add as many points as a drawing needs.
-    kind
-        How the quantities are held.
 
     Returns
     -------
@@ -89,7 +83,7 @@ def compute_profiles(
     found: dict[int, list[Profile]] = {}
     count = len(quantities)
     for group in alike([likelihood.problem for likelihood in likelihoods]):
-        fits = kind([likelihoods[index] for index in group], quantities)
+        fits = ConstrainedFits([likelihoods[index] for index in group], quantities)
         own = _profiles(fits, smooth=smooth)
         for place, index in enumerate(group.tolist()):
             found[index] = own[place * count : (place + 1) * count]
@@ -100,7 +94,6 @@ def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
     grids = [_grid(each, quantity) for each in fits.likelihoods for quantity in fits.quantities]
     points = Points(fits, grids)
     points.from_optimum()
-    points.from_basins()
     points.from_neighbours()
     limits = _limits(points).T
     if smooth:

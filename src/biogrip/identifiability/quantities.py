@@ -80,14 +80,10 @@ class Quantity:
 
     def log(self, log_parameters: Array) -> float:
         """Return its logarithm, from log-parameters of shape (n_parameters,)."""
-        return float(self.logs(log_parameters[None])[0])
-
-    def logs(self, log_parameters: Array) -> Array:
-        """Return its logarithms, (n,), from log-parameters of shape (n, n_parameters)."""
-        x = log_parameters[:, list(self.members)]
+        x = log_parameters[list(self.members)]
         if self.form == "product":
-            return np.sum(x * np.array(self.sign), axis=1)
-        return self.sense * np.logaddexp.reduce(self.sense * x, axis=1)
+            return float(np.sum(x * np.array(self.sign)))
+        return float(self.sense * np.logaddexp.reduce(self.sense * x))
 
     def gradient(self, log_parameters: Array) -> Array:
         """Return the derivatives of its logarithm by the log-parameters, (n_parameters,)."""

@@ -16,15 +16,16 @@ from biogrip.instrument.calibrated_gripper import read_calibrated_arms
 from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.instrument import Instrument
 from biogrip.response.condensed import Condensed
-from biogrip.response.inertia import change_by_inertia, inertia_shows, ringing_s
 from biogrip.response.misfit import Misfit
 from biogrip.response.misfit_series import SeriesMisfit
-from biogrip.response.noise_estimate import estimate_noise
 from biogrip.response.nuisance import nuisance_basis, with_uncertain
 from biogrip.response.whitening import WEIGHTED, NoiseModel, Whitening
 
 SharedRows = dict[Hashable, Condensed]
 """Condensed rows by all that they depend on."""
+
+NOT_FITTED = "inertia_kgm2"
+"""Key of an arm that fits leave out, and its uncertainty with it."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class CaseProblem:
     gripper: Gripper
     """Gripper of the simulated responses."""
     phases: tuple[Phase, ...]
-    """The protocol, as averaged by what reads (`biogrip.experiment.exposure`)."""
+    """The protocol."""
     ranges: Mapping[str, GeneRange]
     """Search ranges by `Parameter.range_name`."""
     sample: Sample
@@ -63,7 +64,6 @@ class CaseProblem:
     fit_start: bool = False
     """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
     _condensed: "SharedRows" = field(default_factory=dict, init=False, compare=False)
-    _changes: dict[bytes, float] = field(default_factory=dict, init=False, compare=False)
 
     @cached_property
     def torque(self) -> TorqueHistory:
@@ -101,9 +101,13 @@ class CaseProblem:
 
     @property
     def uncertain_keys(self) -> list[str]:
-        """Parts and keys of the gripper that are known with an uncertainty."""
-        parts = self.uncertainty.items()
-        return [f"{part}.{key}" for part, known in parts for key in known if known[key]]
+        """Parts and keys of the gripper whose uncertainty changes what a fit simulates."""
+        return [
+            f"{part}.{key}"
+            for part, known in self.uncertainty.items()
+            for key in known
+            if known[key] and key != NOT_FITTED
+        ]
 
     @property
     def plain(self) -> bool:
@@ -140,11 +144,10 @@ class CaseProblem:
         noise_rad = noise_rad or self.noise_rad
         if condensed is None:
             # Shared by all traces of a case: condensing takes as long as some fifty responses.
-            shown = self.shows_inertia(time_s, rotation_rad, noise_rad)
             rows = self._condensed if shared is None else shared
-            sampled = (*self._sets_rows, time_s.tobytes(), shown)
+            sampled = (*self._sets_rows, time_s.tobytes())
             if sampled not in rows:
-                rows[sampled] = self._condense_weighted(time_s, shown)
+                rows[sampled] = self._condense_weighted(time_s)
             condensed = rows[sampled]
         return make_problem(
             self.gripper,
@@ -160,7 +163,7 @@ class CaseProblem:
 
     @property
     def _sets_rows(self) -> tuple[Hashable, ...]:
-        """All that condensed rows depend on but the sampling times and inertia."""
+        """All that condensed rows depend on but the sampling times."""
         sd = None if self.sd_rad is None else self.sd_rad.tobytes()
         return (
             self.gripper,
@@ -172,24 +175,10 @@ class CaseProblem:
             sd,
         )
 
-    def _condense_weighted(self, time_s: Array, inertia: bool) -> Condensed:
+    def _condense_weighted(self, time_s: Array) -> Condensed:
         if self.sd_rad is not None:
-            return self.in_noise(time_s, None, np.zeros((0, len(time_s))), inertia=inertia)
-        return self._condense(time_s, self.nuisance(time_s), inertia)
-
-    def shows_inertia(
-        self, time_s: Array, rotation_rad: Array, noise_rad: float | None = None
-    ) -> bool:
-        """Return True if a trace shows ringing of the arms: its fit then includes their inertia."""
-        sampled = time_s.tobytes()
-        if sampled not in self._changes:
-            self._changes[sampled] = change_by_inertia(self.gripper, self.torque, time_s)
-        change = self._changes[sampled]
-        # Ringing that does not show even without noise needs no estimate of the noise.
-        if not inertia_shows(change, rotation_rad, 0.0):
-            return False
-        noise_rad = noise_rad or self.noise_rad or estimate_noise(rotation_rad)
-        return inertia_shows(change, rotation_rad, noise_rad)
+            return self.in_noise(time_s, None, np.zeros((0, len(time_s))))
+        return self._condense(time_s, self.nuisance(time_s))
 
     def for_model(self, problem: Problem, model: SampleModel) -> Problem:
         """Return one of its problems posed for another model; both share tables of the trace."""
@@ -209,7 +198,6 @@ class CaseProblem:
         noise_model: NoiseModel | None,
         uncertain: Array,
         *,
-        inertia: bool,
         growing: Array | None = None,
     ) -> Condensed:
         """Condense the readings for autocorrelated noise or an uncertain gripper.
@@ -222,8 +210,6 @@ class CaseProblem:
             Autocorrelation model of the noise; None if it is white.
         uncertain : (n_functions, n_samples)
             Functions added with a random amplitude, see `with_uncertain`.
-        inertia
-            True to include the inertia of the arms.
         growing : (n_samples,), optional
             Rotation that noise grows with, see `Whitening`.
         """
@@ -232,19 +218,12 @@ class CaseProblem:
             noise_model, growing = WEIGHTED, self.sd_rad
         if noise_model is not None:
             whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
-        return self._condense(time_s, with_uncertain(nuisance, uncertain), inertia, whitening)
+        return self._condense(time_s, with_uncertain(nuisance, uncertain), whitening)
 
     def _condense(
-        self, time_s: Array, basis: Array, inertia: bool, whitening: Whitening | None = None
+        self, time_s: Array, basis: Array, whitening: Whitening | None = None
     ) -> Condensed:
-        return Condensed(
-            self.torque,
-            time_s,
-            basis,
-            nonlinear=self.nonlinear,
-            ringing_s=ringing_s(self.gripper) if inertia else 0.0,
-            whitening=whitening,
-        )
+        return Condensed(self.torque, time_s, basis, nonlinear=self.nonlinear, whitening=whitening)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""

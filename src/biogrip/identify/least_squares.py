@@ -59,14 +59,11 @@ def _screened(
 ) -> tuple[Array, Row]:
     """Return the best random points as starts, and the first row of the history."""
     shape = (settings.candidates, len(problem.low))
-    # With ringing arms chi^2 has many basins; points are ranked better without inertia.
-    quiet = problem.without_inertia()
-    points, misfit = screened(quiet.misfit, rng.uniform(problem.low, problem.high, shape))
+    points, misfit = screened(problem.misfit, rng.uniform(problem.low, problem.high, shape))
     if not len(points):
         raise BiogripError(
             "least_squares: the model has no answer anywhere in the search range; "
             "allowed are smaller torques, or the linear model."
         )
-    lowest = float(problem.misfit(np.exp(points[:1]))[0]) if quiet is not problem else misfit[0]
-    before = np.exp(points[0]), float(lowest), float(np.median(misfit)), settings.candidates
+    before = np.exp(points[0]), float(misfit[0]), float(np.median(misfit)), settings.candidates
     return points[: settings.starts], before

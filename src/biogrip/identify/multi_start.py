@@ -20,10 +20,6 @@ from biogrip.identify.local_fits import FAIR, FINE, ROUGH, LocalFits, alike
 from biogrip.identify.newton_refinement import refine_optima
 from biogrip.identify.problem import Problem
 
-# Changes of the springs' logarithms in additional starts for ringing arms.
-_STIFFER = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3])
-_BESIDE = np.concatenate((-_STIFFER[::-1], _STIFFER))
-
 FINISHED = 4
 """Number of a trace's best rough fits that are continued to the optimum."""
 
@@ -69,12 +65,8 @@ def _best_of_alike(
     before: Sequence[Row],
     progress: Progress,
 ) -> list[Identification]:
-    if problems[0].residuals.inertia:
-        starts, before = _started_quietly(problems, starts, before)
     fits, traces = LocalFits(problems), np.arange(len(problems))
     rough, trace, fine, trace_of_fine = _finished(fits, starts)
-    if problems[0].residuals.inertia:
-        fine, trace_of_fine = _beside_the_best(fits, fine, trace_of_fine)
     winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
     best = refine_optima(fits, fine[winners], traces)
     answers = []
@@ -96,53 +88,9 @@ def _finished(
     trace = np.repeat(np.arange(len(starts)), [len(own_starts) for own_starts in starts])
     rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
     # Rough fits show which basins are deepest; only the best are continued to the optimum.
-    residuals = fits.problems[0].residuals
-    # Of the many basins of a ring the best few may all be one.
-    most = len(starts[0]) if residuals.inertia and not residuals.model.power_law else FINISHED
-    best = [_best(rough, trace == own, most) for own in range(len(starts))]
+    best = [_best(rough, trace == own, FINISHED) for own in range(len(starts))]
     finalists = np.concatenate(best)
     return rough, trace, fits.fitted(rough.x[finalists], trace[finalists]), trace[finalists]
-
-
-def _beside_the_best(
-    fits: LocalFits, fine: Minima, trace_of_fine: IntArray
-) -> tuple[Minima, IntArray]:
-    """Add fits with springs a little stiffer and softer than those of the best of each trace."""
-    model = fits.problems[0].residuals.model
-    springs = np.array([parameter.kind == "stiffness" for parameter in model.parameters])
-    if model.power_law:
-        return fine, trace_of_fine
-    traces = np.unique(trace_of_fine)
-    best = [fine.x[_best(fine, trace_of_fine == own, 1)] for own in traces]
-    starts = np.concatenate([x + _BESIDE[:, None] * springs for x in best])
-    trace = np.repeat(traces, len(_BESIDE))
-    again = fits.fitted(starts, trace)
-    return Minima.joined([fine, again]), np.concatenate((trace_of_fine, trace))
-
-
-def _started_quietly(
-    problems: Sequence[Problem], starts: Sequence[Array], before: Sequence[Row]
-) -> tuple[list[Array], list[Row]]:
-    """Add the best fits without inertia to the starts of fits with inertia.
-
-    Ringing of different frequencies may agree at the sampling times, so that chi^2 has many
-    basins. Without inertia it has few, and the deepest lies near the right one. Starts with
-    slightly stiffer and softer springs cover the basins beside it.
-    """
-    quiet = LocalFits([problem.without_inertia() for problem in problems])
-    rough, trace, fine, trace_of_fine = _finished(quiet, starts)
-    model = problems[0].residuals.model
-    springs = [parameter.kind == "stiffness" for parameter in model.parameters]
-    # Ringing responses of power-law models take a hundred times as long.
-    most, beside = (FINISHED, _BESIDE[:0]) if model.power_law else (None, _BESIDE)
-    more, rows = [], []
-    for own, (own_starts, row) in enumerate(zip(starts, before, strict=True)):
-        here = trace_of_fine == own
-        around = fine.x[_best(fine, here, 1)] + beside[:, None] * np.array(springs, dtype=float)
-        more.append(np.concatenate((fine.x[here], around, own_starts[:most])))
-        spent = rough.evaluations[trace == own].sum() + fine.evaluations[here].sum()
-        rows.append((*row[:3], row[3] + int(spent)))
-    return more, rows
 
 
 def identify_from(problem: Problem, start: Array) -> Identification:

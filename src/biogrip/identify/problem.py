@@ -31,13 +31,6 @@ class Problem:
     high: Array
     """Those of the upper ends."""
 
-    def without_inertia(self) -> "Problem":
-        """Return the same problem with the inertia of the arms neglected."""
-        if not self.residuals.inertia:
-            return self
-        quiet = self.residuals.without_inertia()
-        return replace(self, misfit=quiet.condensed_misfit, residuals=quiet)
-
     def later(self, change_s: float) -> "Problem":
         """Return the problem of the same trace for a protocol that starts later by some s."""
         moved = self.residuals.later(change_s)

@@ -208,8 +208,7 @@ def _in_turn(
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)
-        inertia = problem.residuals.inertia
-        uncertain = gripper_functions(case_problem, time_s, found.parameters, inertia=inertia)
+        uncertain = gripper_functions(case_problem, time_s, found.parameters)
         left = problem.residuals.free - len(found.parameters)
         noise_rad = case_problem.noise_rad or found.misfit_rad * np.sqrt(len(time_s) / left)
         before: NoiseModel | None = noise_model
@@ -220,7 +219,7 @@ def _in_turn(
             likelihood = NoiseModelLikelihood(time_s, residual, directions, growing)
             noise_model = likelihood.best(near=before)
         condensed = case_problem.in_noise(
-            time_s, noise_model, uncertain / noise_rad, inertia=inertia, growing=growing
+            time_s, noise_model, uncertain / noise_rad, growing=growing
         )
         problem = case_problem.of(time_s, rotation_rad, condensed=condensed)
         found = found.at(fit := fit_from([problem], start))

@@ -7,18 +7,15 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
-from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.case_problem import NOT_FITTED, CaseProblem
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.simulation import simulated_rotation
 
 # Square of three standard uncertainties.
 _SECOND_ORDER = 9.0
-_OF_RING = "inertia_kgm2"
 
 
-def gripper_functions(
-    case_problem: CaseProblem, time_s: Array, parameters: Array, *, inertia: bool
-) -> Array:
+def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Array) -> Array:
     """Compute the changes of a rotation by the uncertainties of the gripper's properties.
 
     To the first order it is half the difference between rotations with the property a standard
@@ -35,8 +32,6 @@ def gripper_functions(
         Ascending times.
     parameters : (n_parameters,)
         Searched parameters, SI units.
-    inertia
-        True if the trace shows the arms ringing.
 
     Returns
     -------
@@ -54,10 +49,7 @@ def gripper_functions(
         nonlinear = case_problem.nonlinear
         return simulated_rotation(gripper, network, torque, time_s, nonlinear=nonlinear)[0]
 
-    pairs = [
-        (simulated(*above), simulated(*below))
-        for above, below in _pairs(case_problem, inertia=inertia)
-    ]
+    pairs = [(simulated(*above), simulated(*below)) for above, below in _pairs(case_problem)]
     if not pairs:
         return np.zeros((0, len(time_s)))
     above, below = np.stack(pairs, axis=1)
@@ -68,12 +60,12 @@ def gripper_functions(
 _Instrument = tuple[Gripper, TorqueHistory]
 
 
-def _pairs(case_problem: CaseProblem, *, inertia: bool) -> Iterator[tuple[_Instrument, ...]]:
+def _pairs(case_problem: CaseProblem) -> Iterator[tuple[_Instrument, ...]]:
     """Yield two instruments for each uncertain property, one above and one below its value."""
     gripper, torque = case_problem.gripper, case_problem.torque
     for name, known in case_problem.uncertainty.items():
         for key, uncertainty in known.items():
-            if not uncertainty or (key == _OF_RING and not inertia):
+            if not uncertainty or key == NOT_FITTED:
                 continue
             errors = (uncertainty, -uncertainty)
             if name == "torque":

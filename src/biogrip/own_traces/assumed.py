@@ -9,7 +9,7 @@ from biogrip.study.plain import plain
 from biogrip.study.study import Case
 
 
-def assumed(case: Case, tried: Sequence[str] | None) -> dict[str, Any]:
+def assumed(case: Case, tried: Sequence[str]) -> dict[str, Any]:
     """Return what an identification relies on, as plain data: its model, and a config.
 
     Parameters
@@ -17,19 +17,17 @@ def assumed(case: Case, tried: Sequence[str] | None) -> dict[str, Any]:
     case
         The case that the trace was identified as.
     tried
-        Names of the sample models that were tried; None if the config leaves them to biogrip.
+        Names of the sample models that were tried.
     """
     blocks = ["instrument", "protocol", "search_range", "measurement", "models", "least_squares"]
     blocks += ["gripper"] if case.instrument.has_jaws else []
-    own = case.posterior
     return {
         "model": case.sample.candidate,
         **{name: plain(_block(case, name)) for name in blocks},
         **({"actuator": plain(case.actuator)} if case.instrument.has_jaws else {}),
         "fixed": case.fixed,
         "identifiability": {"confidence": case.confidence},
-        "model_selection": {} if tried is None else {"models": list(tried)},
-        **({} if own is None else {"posterior": plain(own)}),
+        "model_selection": {"models": list(tried)},
         "study_seed": case.study.study_seed,
     }
 

@@ -9,7 +9,7 @@ from biogrip.files import refuse_inputs
 from biogrip.identifiability.fit_status import REJECTED
 from biogrip.own_traces.many_traces import identify_batch, identify_traces, write_table
 from biogrip.own_traces.one_trace import IdentifyOptions, check_trace_file
-from biogrip.own_traces.outputs import SAMPLES, check_output
+from biogrip.own_traces.outputs import check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.table_of_traces import Row, cases_of, is_table, read_table
 from biogrip.own_traces.words import in_words, side_by_side
@@ -27,7 +27,6 @@ def identify(
     report: Path | None,
     table: Path | None,
     rows: tuple[int, int] | None,
-    posterior: bool,
     fixed: Mapping[str, float],
     strict: bool,
     force: bool,
@@ -47,8 +46,8 @@ def identify(
     rows
         First and last row of a single table to identify, from 0, in one process and without JSON
         files; by default all.
-    posterior, fixed
-        Fields of `IdentifyOptions`.
+    fixed
+        Field of `IdentifyOptions`.
     strict
         If true, a rejected fit counts as a failure.
     force
@@ -66,7 +65,7 @@ def identify(
     """
     if len(traces) == 1:
         check_trace_file(traces[0])
-    options = IdentifyOptions(traces[0], model, read_as, config, posterior, fixed)
+    options = IdentifyOptions(traces[0], model, read_as, config, fixed)
     tables = {trace: read_table(trace) for trace in traces if _is_table(trace)}
     if rows is not None:
         tables = {trace: _chosen(trace, every, rows) for trace, every in tables.items()}
@@ -82,14 +81,12 @@ def identify(
     alone = len(traces) == 1 and not tables
     if output is not None and not alone:
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
-    samples = posterior
     if every and (not alone or config is not None):
         # Errors of options and config concern all traces: raise them once, here.
-        samples = cases_of(every)[0].posterior is not None
+        cases_of(every)
     outputs = [output or each.trace.with_suffix(".identified.json") for each in every]
     outputs = outputs if rows is None else []
-    drawn = [path.with_suffix(SAMPLES) for path in outputs] if samples else []
-    written = [*outputs, *drawn, *filter(None, (report, table))]
+    written = [*outputs, *filter(None, (report, table))]
     if len({path.absolute() for path in written}) < len(written):
         raise BiogripError("found the same file to be written twice; allowed are different ones.")
     read = [*traces, *(each.trace for each in every), *filter(None, [config])]
@@ -115,7 +112,6 @@ def identify(
     said = [
         path for each, path in zip(every, outputs, strict=False) if str(each.trace) not in refused
     ]
-    said += [path.with_suffix(SAMPLES) for path in said if samples]
     said += [path for path in (report, table) if path is not None]
     if said:
         print(f"Written to {', '.join(map(visible, said))}.")

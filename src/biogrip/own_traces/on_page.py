@@ -8,11 +8,9 @@ from typing import Any
 
 import yaml
 
-from biogrip.identifiability.fit_status import REJECTED
 from biogrip.own_traces.curves import curves_of
 from biogrip.own_traces.one_trace import Identified
 from biogrip.own_traces.words import (
-    evidence_in_words,
     for_a_paper,
     further_notes,
     limits_in_short,
@@ -26,7 +24,6 @@ from biogrip.terminal import visible
 def for_page(identified: Identified) -> dict[str, Any]:
     """Return the numbers and sentences of a trace on a page, as plain data."""
     data = identified.data
-    compared = data["posterior"]["evidence"] if "posterior" in data else []
     assumed = dict(data["assumed"])
     # The page names the trace, and says once what several assume alike.
     assumed["measurement"] = {**assumed["measurement"]}
@@ -38,13 +35,11 @@ def for_page(identified: Identified) -> dict[str, Any]:
         "trace": visible(data["trace"]),
         "curves": json_in_page(curves),
         "drawn_quantiles": len(curves["quantiles"]),
-        "corner": _corner(identified),
         "noise_in_words": noise_in_words(data),
         "further_notes": further_notes(data),
         "for_a_paper": for_a_paper(data),
         "in_short": {q["quantity"]: limits_in_short(q) for q in data["quantities"]},
         "setup": yaml.dump(assumed, Dumper=dumper, sort_keys=False, allow_unicode=True),
-        "evidence_in_words": evidence_in_words(compared),
         "one_sided": " ".join(one_sided_in_words([data])),
         "granted": taken_for_granted(data) if data["by_default"] else None,
     }
@@ -54,20 +49,3 @@ def json_in_page(data: Any) -> str:
     """Return plain data as JSON that cannot close the script element around it."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c")
-
-
-def _corner(identified: Identified) -> str | None:
-    """Return a drawing of the posterior as a data URL, if there is one to be shown."""
-    data = identified.data
-    if identified.samples is None or data["fit"] == REJECTED:
-        return None
-    # Imported here: loading Matplotlib takes long.
-    from biogrip.products.figures.corner import draw_corner
-    from biogrip.products.figures.style import styled
-    from biogrip.products.pages.figure_address import figure_address
-
-    parameters = identified.problem.searched.parameters
-    with styled():
-        return figure_address(
-            draw_corner(parameters, identified.samples, data["posterior"], {}, "")
-        )

@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +30,13 @@ from biogrip.own_traces.assumed import (
 )
 from biogrip.own_traces.fitted_models import FittedModels, judge_again, models_tried
 from biogrip.own_traces.instrument_of_trace import with_instrument
-from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY, in_own_units
+from biogrip.own_traces.outputs import WRITTEN_BY, in_own_units
 from biogrip.own_traces.read_as import ReadAs, laid_over, read_trace
 from biogrip.own_traces.second_opinion import second_opinions
 from biogrip.own_traces.trace_case import TraceCase
-from biogrip.products.files.posterior import limits_in, write_samples
 from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import exact_data
-from biogrip.products.stages import posterior, recording
+from biogrip.products.stages import recording
 from biogrip.products.stages.judgement import fits_judged, notes_on_fit
 from biogrip.progress import Progress
 from biogrip.response.nuisance import within
@@ -74,8 +72,6 @@ class IdentifyOptions:
         Columns of the file, and offset, drift and noise of the instrument.
     config
         YAML file laid over the default study: gripper, protocol, search range.
-    posterior
-        If true, sample the posterior even if the config does not say so.
     fixed
         Known parameters by name, SI units, beside those of the config.
     settings
@@ -89,7 +85,6 @@ class IdentifyOptions:
     model: str
     read_as: ReadAs
     config: Path | None
-    posterior: bool = False
     fixed: Mapping[str, float] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     table: Path | None = None
@@ -143,14 +138,11 @@ class Identified:
         Assumptions of the fit.
     recorded
         The trace.
-    samples : (n, n_parameters)
-        Posterior samples, SI units, if the posterior was sampled.
     """
 
     data: dict[str, Any]
     problem: CaseProblem
     recorded: Measurements
-    samples: Array | None = None
 
 
 def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
@@ -161,7 +153,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
     options
         The trace and the options.
     output
-        JSON file to write; posterior samples are written beside it as Parquet.
+        JSON file to write.
 
     Raises
     ------
@@ -169,7 +161,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
         With file, line and column or key, if trace or config cannot be used.
     """
     case = case_of(options)
-    with Progress(str(options.trace), 5 + (case.posterior is not None), live=True) as progress:
+    with Progress(str(options.trace), 5, live=True) as progress:
         trace = read(options, case, progress)
         progress.done()
         (identified,) = identify_alike([options], [trace], [output], progress)
@@ -218,7 +210,7 @@ def identify_alike(
     outputs
         JSON file of each; None to write nothing.
     progress
-        Counter of the five steps, or six with a posterior.
+        Counter of the five steps.
 
     Raises
     ------
@@ -256,21 +248,11 @@ def identify_alike(
         )
     ]
     data = [_data(*each) for each in zip(options, traces, judged, strict=True)]
-    drawn = [
-        _posterior(own, fit, of_trace, progress) if own.case.posterior is not None else None
-        for own, fit, of_trace in zip(traces, fits, data, strict=True)
-    ]
-    for own, of_trace, samples, output in zip(traces, data, drawn, outputs or (), strict=False):
-        if samples is not None:
-            words = {WRITTEN_BY: __version__}
-            path = output.with_suffix(SAMPLES)
-            write_samples(path, own.problem.searched, samples, words)
+    for of_trace, output in zip(data, outputs or (), strict=False):
         write_text(output, json.dumps(_written(of_trace), indent=1) + "\n")
     return [
-        Identified(
-            of_trace, own.problem, own.recorded, None if samples is None else np.exp(samples)
-        )
-        for own, of_trace, samples in zip(traces, data, drawn, strict=True)
+        Identified(of_trace, own.problem, own.recorded)
+        for own, of_trace in zip(traces, data, strict=True)
     ]
 
 
@@ -285,7 +267,7 @@ class Judged:
 
 
 def _data(options: IdentifyOptions, trace: TraceCase, judged: Judged) -> dict[str, Any]:
-    """Return all that is said of a trace but its posterior, as plain data."""
+    """Return all that is said of a trace, as plain data."""
     case, case_problem, recorded = trace.case, trace.problem, trace.recorded
     diagnosis, models, doubts = judged.diagnosis, judged.models, judged.notes
     if case.may_start_late:
@@ -295,9 +277,6 @@ def _data(options: IdentifyOptions, trace: TraceCase, judged: Judged) -> dict[st
     assumptions = [Note(HARMLESS, _NOT_COMPARED)] if case_problem.fixed else []
     instrument = case_problem.instrument
     said = exact_data(diagnosis, [*assumptions, *notes_on_fit(judged.fit), *doubts], read)
-    # Evidence is compared of fewer models than are tried where the config names none.
-    unnamed = case.compared_models and not trace.names_models
-    tried = None if unnamed else models.names or list(case.models)
     return {
         WRITTEN_BY: __version__,
         "trace": str(options.trace),
@@ -313,24 +292,10 @@ def _data(options: IdentifyOptions, trace: TraceCase, judged: Judged) -> dict[st
         **said,
         "noise_model": judged.fit.noise_data(),
         **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
-        "assumed": assumed(case, tried),
+        "assumed": assumed(case, models.names or list(case.models)),
         "by_default": by_default(options.given) if instrument.has_jaws else [],
         "versions": versions(),
     }
-
-
-def _posterior(trace: TraceCase, fit: TraceFit, data: dict[str, Any], progress: Progress) -> Array:
-    """Sample the posterior of a trace; add it to the data, and return log-parameters."""
-    progress.done()
-    progress.doing("sampling the posterior")
-    data["posterior"], drawn = posterior.posterior_of_trace(
-        trace.case,
-        trace.problem,
-        partial(trace.problem.for_model, fit.problem),
-        limits_in(data),
-        progress.within,
-    )
-    return drawn
 
 
 def _read_as(case: Case, recorded: Measurements) -> dict[str, Any]:
@@ -340,10 +305,9 @@ def _read_as(case: Case, recorded: Measurements) -> dict[str, Any]:
 
 
 def _written(data: dict[str, Any]) -> dict[str, Any]:
-    """Round results; keep assumptions, which must be repeatable, and the posterior as they are."""
-    kept = {name: data[name] for name in ("assumed", "posterior") if name in data}
+    """Round results; keep assumptions, which must be repeatable, as they are."""
     read = INSTRUMENTS[data["reads"]["quantity"]].read
-    return in_own_units({**rounded_numbers(data), **kept}, read)
+    return in_own_units({**rounded_numbers(data), "assumed": data["assumed"]}, read)
 
 
 def check_trace_file(trace: Path) -> None:
@@ -390,8 +354,6 @@ def study_of(options: IdentifyOptions) -> Study:
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
         merged.pop(name, None)
-    if options.posterior:
-        merged.setdefault("posterior", {})
     merged["cases"] = {
         case: {
             "sample": _sample(sample, of_sample),

@@ -9,14 +9,10 @@ from typing import Any
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_path
 from biogrip.instrument.instrument import Quantity
-from biogrip.products.files.parquet import column_names
 from biogrip.terminal import visible
 
 WRITTEN_BY = "written_by_biogrip"
 """Mark in every file that biogrip writes; files without it are not replaced."""
-
-SAMPLES = ".parquet"
-"""Suffix of a file with posterior samples, in place of ``.json``."""
 
 _HEAD_BYTES = 500
 _LONGEST = 100_000
@@ -67,15 +63,13 @@ def _is_ours(output: Path) -> bool:
     try:
         if output.suffix == ".json":
             return WRITTEN_BY in json.loads(output.read_bytes())
-        if output.suffix == SAMPLES:
-            return WRITTEN_BY in column_names(output)
         with output.open("rb") as stream:
             # The mark is in the header of a table, however long, and in the first lines of a page.
             head = (
                 stream.readline(_LONGEST) if output.suffix == ".csv" else stream.read(_HEAD_BYTES)
             )
             return WRITTEN_BY.encode() in head
-    except (BiogripError, OSError, ValueError, TypeError, RecursionError):
+    except (OSError, ValueError, TypeError, RecursionError):
         return False
 
 

@@ -17,7 +17,7 @@ from biogrip.own_traces.curves import normal_quantiles
 from biogrip.own_traces.on_page import json_in_page
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.strips import strips_of
-from biogrip.own_traces.words import POSTERIOR_OF_REJECTED, in_unit, labels_of
+from biogrip.own_traces.words import in_unit, labels_of
 from biogrip.terminal import visible, visible_lines
 
 _STATUSES = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
@@ -79,7 +79,6 @@ def write_page(
         counts=counts,
         setups=setups,
         in_unit=in_unit,
-        not_shown=POSTERIOR_OF_REJECTED,
     )
     write_text(page, text)
 

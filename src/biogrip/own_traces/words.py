@@ -5,12 +5,8 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from tabulate import tabulate
-
 from biogrip.digits import with_unit
 from biogrip.identifiability.fit_status import OK, REJECTED
-from biogrip.identifiability.marginals import AGREES
 from biogrip.identifiability.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
@@ -19,15 +15,7 @@ from biogrip.identifiability.verdicts import (
 )
 from biogrip.products.files.verdicts import FIT_REJECTED
 from biogrip.study.measurement_block import KNOWN_NOISE
-from biogrip.terminal import visible, visible_lines
-
-STRONG = 3.0
-"""Natural logarithm of a ratio of evidences that counts as strong (Kass and Raftery 1995)."""
-
-POSTERIOR_OF_REJECTED = (
-    "The posterior assumes the model and set-up that are rejected, so it is not shown."
-)
-"""Sentence in the place of the posterior of a rejected fit."""
+from biogrip.terminal import aligned, visible, visible_lines
 
 _COLOURS = {
     DETERMINED: 32,
@@ -64,9 +52,6 @@ def in_words(found: Mapping[str, Any]) -> str:
         lines.append(f"Drift of the instrument: {in_unit(found['drift_rad_per_s'], found)}/s")
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
-    if "posterior" in found:
-        rejected = found["fit"] == REJECTED
-        lines += [POSTERIOR_OF_REJECTED] if rejected else _posterior(found["posterior"])
     lines += [taken_for_granted(found)] if found["by_default"] else []
     return "\n".join(lines)
 
@@ -142,41 +127,6 @@ def further_notes(found: Mapping[str, Any]) -> list[str]:
     return [note["text"] for note in found["notes"] if note["text"] not in found["reasons"]]
 
 
-def _posterior(posterior: Mapping[str, Any]) -> list[str]:
-    """Return sentences and a table about the posterior samples."""
-    width = max(len(item["quantity"]) for item in posterior["quantities"])
-    prior = (
-        f"prior: {', '.join(posterior['prior'])} as given, else log-uniform over the search range"
-        if posterior["prior"]
-        else "prior: log-uniform over the search range"
-    )
-    return [
-        f"Posterior, median and {100 * posterior['confidence']:g} % interval ({prior}):",
-        *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in posterior["quantities"]),
-        *(
-            f"  {item['why']}"
-            for item in posterior["quantities"]
-            if item["against_profile"] != AGREES
-        ),
-        posterior["in_words"],
-        posterior["prior_in_words"],
-        *evidence_in_words(posterior["evidence"]),
-    ]
-
-
-def evidence_in_words(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return a sentence on the models with the highest evidence; nothing if none was computed."""
-    if not rows:
-        return []
-    best = min(rows, key=lambda row: row["delta_log_evidence"])
-    close = [row for row in rows if row is not best and row["delta_log_evidence"] < STRONG]
-    near = ", ".join(row["title"] for row in close)
-    also = f"; less than {np.exp(STRONG):.2g} times lower is that of {near}" if near else ""
-    unreliable = [row["title"] for row in rows if not row["reliable"]]
-    but = f" Not to be relied on: {', '.join(unreliable)}." if unreliable else ""
-    return [f"The evidence is highest for the {best['title']}{also}.{but}"]
-
-
 def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -> str:
     """Return several traces as a table with one row per trace, followed by refused traces."""
     lines = []
@@ -185,7 +135,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         rows = [[visible(each["trace"]), each["fit"], *_cells(each, labels)] for each in found]
         units = {q["quantity"]: q["unit"] for each in found for q in each["quantities"]}
         header = ["trace", "fit", *(with_unit(label, units[label]) for label in labels)]
-        lines.append(tabulate(rows, header, tablefmt="simple", disable_numparse=True))
+        lines.append(aligned(rows, header))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)

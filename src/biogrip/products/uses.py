@@ -77,9 +77,8 @@ def from_case(names: str = "", **computed: Callable[[Case], object]) -> Uses:
     return lambda study, job: using(names.format(**job), **computed)(study.case(job["case"]))
 
 
-every, simulated, gripped, covered, published, sampled, with_moduli = (
-    attrgetter(name)
-    for name in ("cases", "simulated", "gripped", "covered", "published", "sampled", "with_moduli")
+every, simulated, gripped, covered, published = (
+    attrgetter(name) for name in ("cases", "simulated", "gripped", "covered", "published")
 )
 """Names of a study's cases, or of some of them."""
 

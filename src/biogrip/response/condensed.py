@@ -5,9 +5,8 @@ protocol, g(t; r). Over all rates r these nearly span a space of some fifty dime
 only, in which a function is determined by its values at as many well-chosen times. So
 a response is simulated at those times, and a square matrix turns its values into rows
 with the sum of squares, and the gradients, of the residuals at all readings. Dense
-readings are first replaced by nodes (`biogrip.response.dense_samples`). Arms ring at any
-frequency, and no small space contains their responses. With inertia, and if nodes are
-too many, every node has a row of its own.
+readings are first replaced by nodes (`biogrip.response.dense_samples`). If nodes are too
+many, every node has a row of its own.
 
 References
 ----------
@@ -57,8 +56,6 @@ class Condensed:
         Functions projected out of trace and responses, see `nuisance_basis`, `with_uncertain`.
     nonlinear
         True if rows must also represent corrections by the nonlinear model.
-    ringing_s
-        Time for which arms may ring after a change of the torque; 0 without inertia.
     whitening
         Transformation that whitens noise and projects nuisance out; None for white noise.
     """
@@ -70,26 +67,13 @@ class Condensed:
         nuisance: Array,
         *,
         nonlinear: bool = False,
-        ringing_s: float = 0.0,
         whitening: Whitening | None = None,
     ) -> None:
         self.nuisance = nuisance if whitening is None else whitening.nuisance
         self.nonlinear = nonlinear
-        self.ringing_s = ringing_s
         self._whitening = whitening
         self._torque = torque
         self._all_s = time_s
-
-    @cached_property
-    def without_ringing(self) -> "Condensed":
-        """Condensed rows for the same readings without inertia."""
-        return Condensed(
-            self._torque,
-            self._all_s,
-            self.nuisance,
-            nonlinear=self.nonlinear,
-            whitening=self._whitening,
-        )
 
     def later(self, change_s: float) -> "Condensed":
         """Return rows for a protocol that starts later by some s; noise and nuisance stay."""
@@ -98,7 +82,6 @@ class Condensed:
             self._all_s - change_s,
             self.nuisance,
             nonlinear=self.nonlinear,
-            ringing_s=self.ringing_s,
             whitening=self._whitening,
         )
 
@@ -117,8 +100,7 @@ class Condensed:
     def reduced(self) -> bool:
         """True if rows are fewer than nodes."""
         functions = len(self._edges_s) * (STAGES + 1)
-        few = len(self.dense.time_s) <= MOST_NODES and functions <= _MOST_FUNCTIONS
-        return few and not self.ringing_s
+        return len(self.dense.time_s) <= MOST_NODES and functions <= _MOST_FUNCTIONS
 
     def of_trace(self, rotation_rad: Array) -> Array:
         """Return rows of a trace without nuisance, (n_rows,); no response reaches the last."""
@@ -166,9 +148,7 @@ class Condensed:
         """Nodes that replace the readings."""
         # Whitened functions are not smooth: each reading is a node.
         dense = self._whitening is None
-        return DenseSamples(
-            self._torque, self._all_s, self._edges_s, ringing_s=self.ringing_s, dense=dense
-        )
+        return DenseSamples(self._torque, self._all_s, self._edges_s, dense=dense)
 
     @cached_property
     def _edges_s(self) -> Array:

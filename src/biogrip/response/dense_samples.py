@@ -55,9 +55,9 @@ class _Piece:
 class DenseSamples:
     """Rows with the products of all readings, for any smooth functions of time.
 
-    Functions are smooth between changes of the torque, but for `ringing_s` after each, and may be
-    less so at further edges, (n_edges,). Sampling times, (n_samples,), ascend. Only if `dense` may
-    nodes replace readings; otherwise each reading is a node.
+    Functions are smooth between changes of the torque, and may be less so at further edges,
+    (n_edges,). Sampling times, (n_samples,), ascend. Only if `dense` may nodes replace readings;
+    otherwise each reading is a node.
     """
 
     def __init__(
@@ -66,11 +66,9 @@ class DenseSamples:
         time_s: Array,
         further_edges_s: Array | None = None,
         *,
-        ringing_s: float = 0.0,
         dense: bool = True,
     ) -> None:
         self._all_s = time_s
-        self._ringing_s = ringing_s
         self._kept: dict[tuple[int, int], list[tuple[slice, Array]]] = {}
         starts = [start for start, *_ in (*torque.jumps, *torque.swings)]
         self._starts_s = np.unique([-np.inf, *starts])
@@ -138,7 +136,7 @@ class DenseSamples:
             return
         start, end = self._all_s[first], self._all_s[stop - 1]
         elapsed = start - self._starts_s[self._starts_s.searchsorted(start, side="right") - 1]
-        if elapsed >= self._ringing_s and end - start <= min(elapsed, self._longest_s):
+        if end - start <= min(elapsed, self._longest_s):
             gram = np.zeros((_NODES, _NODES))
             for _, series in self._blocks(first, stop):
                 gram += series.T @ series

@@ -1,10 +1,10 @@
-"""Effect of the arms' inertia on a trace, which decides whether fits include inertia.
+"""Effect of the arms' inertia on a trace, which targets have and fits leave out.
 
-After a change of the torque, arms ring for milliseconds. The effect on a trace depends on the
-sampling times and the noise, not on the fit. It is largest for a bare spring between the jaws,
-since dampers take energy from the ring. While arms ring, the change by inertia with a spring
-bounds the change with any sample; later changes are negligible (docs/model.md, "Without inertia").
+After a change of the torque, arms ring for milliseconds. Later changes by inertia are negligible
+(docs/model.md, "Without inertia").
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,16 +16,23 @@ from biogrip.response.linear import rotation, step_response
 
 # A ring of exp(-36) is lost in rounding.
 _DECAYED = 36.0
-# Stiffnesses over that of the arms: several, since one ring may be zero at all readings.
-_STIFFNESS = np.geomspace(0.1, 1e4, 16)
-# Number of readings from which the size of a rotation is computed.
-_SOME = 500
 
-VISIBLE = 2e-4
-"""Largest bias of an estimate, in standard deviations, from neglecting inertia."""
+VISIBLE = 0.2
+"""Norm of a ring in standard deviations of the noise from which it counts as visible.
 
-# A thousandth of the peak: traces with less noise, or none, count as having that much.
-_FINEST_NOISE = 2.0**-10
+No estimate is off by more of its standard deviations: a 95 % interval then holds the truth in 94.5
+% or more of traces.
+"""
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Ringing of the arms that shows in a trace."""
+
+    largest: float
+    """Largest change of a reading by inertia, in standard deviations of the noise."""
+    lasts_s: float
+    """Time after a change of the torque of the last reading that would have to be left out."""
 
 
 def ringing_s(gripper: Gripper) -> float:
@@ -38,11 +45,16 @@ def ringing_s(gripper: Gripper) -> float:
     return _DECAYED * max(2 * arm.inertia_kgm2 / arm.damping_Nms_per_rad for arm in arms)
 
 
-def while_ringing(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> BoolArray:
-    """Return True for times, (n_times,), at which arms may ring."""
+def elapsed_s(torque: TorqueHistory, time_s: Array) -> Array:
+    """Return the times since the last change of the torque, (n_times,)."""
     changes_s = np.unique([start for start, *_ in (*torque.jumps, *torque.swings)])
     last = np.maximum(changes_s.searchsorted(time_s, side="right") - 1, 0)
-    return time_s - changes_s[last] <= ringing_s(gripper)
+    return time_s - changes_s[last]
+
+
+def while_ringing(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> BoolArray:
+    """Return True for times, (n_times,), at which arms may ring."""
+    return elapsed_s(torque, time_s) <= ringing_s(gripper)
 
 
 def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array) -> Array:
@@ -55,26 +67,19 @@ def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Arra
     return with_it - without
 
 
-def change_by_inertia(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> float:
-    """Compute the norm of the change of a trace by inertia, relative to the rotation's RMS."""
-    if not gripper.has_inertia:
-        return 0.0
-    ringing = time_s[while_ringing(gripper, torque, time_s)]
-    if not len(ringing):
-        return 0.0
-    springs = np.append(0.0, _STIFFNESS) * gripper.jaw_stiffness_N_per_m
-    none = np.zeros((len(springs), 0))
-    network = Network(k_p=springs, c_p=np.zeros_like(springs), k=none, c=none)
-    change = np.linalg.norm(ring(gripper, network, torque, ringing), axis=1)
-    some_s = time_s[np.linspace(0, len(time_s) - 1, min(_SOME, len(time_s))).astype(np.int64)]
-    without = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
-    size = np.sqrt(np.mean(rotation(without, torque, some_s) ** 2, axis=1))
-    # If the torque never changes, nothing rings.
-    return float(np.max(change / size)) if np.all(size > 0) else 0.0
+def find_ring(change: Array, elapsed_s: Array) -> Ring | None:
+    """Return what shows of the ringing of arms, or None.
 
-
-def inertia_shows(change: float, rotation_rad: Array, noise_rad: float) -> bool:
-    """Return True if a change from `change_by_inertia` shows in a trace with this noise."""
-    size = float(np.sqrt(np.mean(np.square(rotation_rad))))
-    noise_rad = max(noise_rad, _FINEST_NOISE * float(np.max(np.abs(rotation_rad))))
-    return change * size > VISIBLE * noise_rad
+    Parameters
+    ----------
+    change : (n_times,)
+        Change of the readings by inertia, in standard deviations of the noise.
+    elapsed_s : (n_times,)
+        Time of each reading since the last change of the torque.
+    """
+    latest_first = np.argsort(-elapsed_s, kind="stable")
+    norms = np.sqrt(np.cumsum(change[latest_first] ** 2))
+    shown = np.flatnonzero(norms > VISIBLE)
+    if not len(shown):
+        return None
+    return Ring(float(np.max(np.abs(change))), float(elapsed_s[latest_first[shown[0]]]))

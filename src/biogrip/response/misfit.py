@@ -27,8 +27,8 @@ def make_misfit(
     """Return the RMS misfit as a function of parameters of shape (n, n_parameters).
 
     That of residuals serves any protocol, sampling and noise. `SeriesMisfit` is used for steps of
-    a torque, sampled uniformly from the start on, with the linear model without inertia, in white
-    noise alone.
+    a torque, sampled uniformly from the start on, with the linear model, in white noise
+    alone.
     """
     uniform = np.arange(len(time_s)) * (time_s[-1] / max(len(time_s) - 1, 1))
     is_uniform = np.allclose(time_s, uniform, rtol=0, atol=1e-9 * time_s[-1])

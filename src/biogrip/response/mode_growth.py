@@ -1,9 +1,6 @@
 """Response of a mode of unit weight to a protocol, and its derivative by the mode's rate."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from biogrip.arrays import Array, ComplexArray, IntArray
 from biogrip.experiment.protocol import TorqueHistory, drives
@@ -14,9 +11,7 @@ from biogrip.response.mode_decay import compute_decay
 _DECAYED = 40.0
 
 
-def compute_growth(
-    rates: NDArray[Any], torque: TorqueHistory, time_s: Array
-) -> tuple[NDArray[Any], NDArray[Any]]:
+def compute_growth(rates: Array, torque: TorqueHistory, time_s: Array) -> tuple[Array, Array]:
     """Compute responses of modes of unit weight to a protocol, and derivatives by the rate.
 
     A mode is carried on from step to step: with G its response at the last step, T the
@@ -30,8 +25,8 @@ def compute_growth(
     Parameters
     ----------
     rates : (n, n_modes)
-        In 1/s, with negative real parts. Rates in a column should be similar: times at which
-        all of a column have decayed are not computed.
+        In 1/s, negative. Rates in a column should be similar: times at which all of a column have
+        decayed are not computed.
     torque
         The protocol.
     time_s : (n_times,)
@@ -46,7 +41,7 @@ def compute_growth(
         return compute_decay(rates, torque, time_s)
     if before := int(time_s.searchsorted(torque.time_s[0])):
         growth, slope = compute_growth(rates, torque, time_s[before:])
-        zeros = np.zeros((*growth.shape[:-1], before), growth.dtype)
+        zeros = np.zeros((*growth.shape[:-1], before))
         return np.concatenate((zeros, growth), axis=-1), np.concatenate((zeros, slope), axis=-1)
     n, m = rates.shape
     if not torque.only_steps:
@@ -56,9 +51,9 @@ def compute_growth(
     firsts = np.append(time_s.searchsorted(torque.time_s), len(time_s))
     phase = np.repeat(np.arange(len(levels[0])), np.diff(firsts))
     elapsed = time_s - torque.time_s[phase]
-    growth = np.empty((n, len(levels), m, len(time_s)), dtype=rates.dtype)
+    growth = np.empty((n, len(levels), m, len(time_s)))
     slope = np.empty_like(growth)
-    for j, slowest in enumerate(-np.max(rates.real, axis=0, initial=-np.inf)):
+    for j, slowest in enumerate(-np.max(rates, axis=0, initial=-np.inf)):
         live = elapsed < _DECAYED / slowest
         if live.all():
             growth[:, :, j], slope[:, :, j] = _carried_on(
@@ -75,16 +70,14 @@ def compute_growth(
     return growth, slope
 
 
-def _from_phase_to_phase(
-    rates: NDArray[Any], torque: TorqueHistory, time_s: Array
-) -> tuple[NDArray[Any], NDArray[Any]]:
+def _from_phase_to_phase(rates: Array, torque: TorqueHistory, time_s: Array) -> tuple[Array, Array]:
     """Compute growth and slope, (n, n_drives, n_modes, n_times), phase by phase."""
     rate = rates[:, None, :, None]
     powers, swings = torque.within_phases
     shape = len(rates), powers.shape[1], rates.shape[1]
-    growth = np.empty((*shape, len(time_s)), dtype=rates.dtype)
+    growth = np.empty((*shape, len(time_s)))
     slope = np.empty_like(growth)
-    reached = np.zeros((*shape, 1), dtype=rates.dtype)
+    reached = np.zeros((*shape, 1))
     slanted = np.zeros_like(reached)
     starts = np.append(torque.time_s, torque.end_s)
     firsts = np.append(time_s.searchsorted(torque.time_s), len(time_s))
@@ -92,7 +85,7 @@ def _from_phase_to_phase(
         here = slice(firsts[k], firsts[k + 1])
         # The end of a phase is the initial state of the next.
         elapsed = np.append(time_s[here], starts[k + 1]) - start
-        decay = 1 + _expm1(rate * elapsed)
+        decay = 1 + np.expm1(rate * elapsed)
         grown, grown_slope = reached * decay, (slanted + reached * elapsed) * decay
         for order, heights in enumerate(powers[k].T[..., None, None]):
             if heights.any():
@@ -110,15 +103,15 @@ def _from_phase_to_phase(
 
 
 def _carried_on(
-    rates: NDArray[Any],
-    reached: NDArray[Any],
-    slanted: NDArray[Any],
+    rates: Array,
+    reached: Array,
+    slanted: Array,
     levels: Array,
     phase: IntArray,
     elapsed: Array,
-) -> tuple[NDArray[Any], NDArray[Any]]:
+) -> tuple[Array, Array]:
     """Return a mode of each sample, (n, n_drives, n_times), from its responses at the steps."""
-    growing = _expm1(rates[:, None] * elapsed)[:, None]
+    growing = np.expm1(rates[:, None] * elapsed)[:, None]
     growth = (reached + levels).take(phase, axis=2)
     slope = growth * elapsed
     growth *= growing
@@ -128,13 +121,11 @@ def _carried_on(
     return growth, slope
 
 
-def _at_steps(
-    rates: NDArray[Any], starts_s: Array, levels: Array
-) -> tuple[NDArray[Any], NDArray[Any]]:
+def _at_steps(rates: Array, starts_s: Array, levels: Array) -> tuple[Array, Array]:
     """Return responses of modes at each step, and derivatives, (n, n_drives, n_steps, m)."""
     gaps = np.diff(starts_s)
-    growing = _expm1(rates * gaps[:, None, None])
-    reached = np.zeros((len(gaps) + 1, len(rates), len(levels), rates.shape[1]), rates.dtype)
+    growing = np.expm1(rates * gaps[:, None, None])
+    reached = np.zeros((len(gaps) + 1, len(rates), len(levels), rates.shape[1]))
     slanted = np.zeros_like(reached)
     for k, gap in enumerate(gaps):
         grown = growing[k][:, None]
@@ -144,19 +135,7 @@ def _at_steps(
     return np.moveaxis(reached, 0, 2), np.moveaxis(slanted, 0, 2)
 
 
-def _expm1(z: NDArray[Any]) -> NDArray[Any]:
-    """Compute e^z - 1; for complex z by real functions, which are faster."""
-    if not np.iscomplexobj(z):
-        return np.expm1(z)
-    grown, half = np.expm1(z.real), 0.5 * z.imag
-    sine = np.sin(half)
-    value = np.empty_like(z)
-    value.real = grown - 2 * (grown + 1) * sine**2
-    value.imag = 2 * (grown + 1) * sine * np.cos(half)
-    return value
-
-
-def _growth(order: int, rate: NDArray[Any], elapsed: Array) -> tuple[NDArray[Any], NDArray[Any]]:
+def _growth(order: int, rate: Array, elapsed: Array) -> tuple[Array, Array]:
     """Return a mode's response to t^order/order! over its weight, and derivative by the rate.
 
     With z = r t these are r t^(n+1) phi_(n+1)(z) and t^(n+1) [phi_n(z) - n phi_(n+1)(z)],
@@ -171,30 +150,14 @@ def _growth(order: int, rate: NDArray[Any], elapsed: Array) -> tuple[NDArray[Any
     return rate * power * this, power * (before - order * this)
 
 
-def _swing(
-    omega: float, rate: NDArray[Any], elapsed: Array, phasor: ComplexArray
-) -> tuple[NDArray[Any], NDArray[Any]]:
+def _swing(omega: float, rate: Array, elapsed: Array, phasor: ComplexArray) -> tuple[Array, Array]:
     """Return a mode's response to Re(a e^(i omega t)) over its weight, and derivative by the rate.
 
-    For a real mode, it is the real part of the response to a e^(i omega t). For a complex
-    mode, it is half the sum of the responses to the drive and to its complex conjugate.
+    These are the real parts of those to a e^(i omega t).
     """
-    ahead = _rotating(omega, rate, elapsed)
-    if not np.iscomplexobj(rate):
-        return (phasor * ahead[0]).real, (phasor * ahead[1]).real
-    back = _rotating(-omega, rate, elapsed)
-    growth, slope = (
-        0.5 * (phasor * one + phasor.conj() * other) for one, other in zip(ahead, back, strict=True)
-    )
-    return growth, slope
-
-
-def _rotating(
-    omega: float, rate: NDArray[Any], elapsed: Array
-) -> tuple[ComplexArray, ComplexArray]:
-    """Return a mode's response to e^(i omega t) over its weight, and derivative by the rate."""
     decay = np.exp(rate * elapsed)
     difference = np.exp(1j * omega * elapsed) - decay
     share = rate / (1j * omega - rate)
     slope = 1j * omega / (1j * omega - rate) ** 2
-    return share * difference, slope * difference - share * elapsed * decay
+    growth, by_rate = share * difference, slope * difference - share * elapsed * decay
+    return (phasor * growth).real, (phasor * by_rate).real

@@ -14,7 +14,6 @@ References
    approximation, ACM Transactions on Mathematical Software 29 (2003), 245-262.
 """
 
-from dataclasses import dataclass
 from functools import cache
 from itertools import permutations
 from typing import Any, NamedTuple
@@ -36,37 +35,14 @@ COMPLEX_STEP = 1e-30
 class Modes(NamedTuple):
     """Step responses of n samples' left arm, and their derivatives by the log-parameters."""
 
-    rates: NDArray[Any]
-    """In 1/s, (n, n_modes); real and negative, or complex with a negative real part."""
-    weights: NDArray[Any]
+    rates: Array
+    """In 1/s, (n, n_modes), negative."""
+    weights: Array
     """In rad per N m, (n, n_drives, n_modes)."""
-    rate_slopes: NDArray[Any]
+    rate_slopes: Array
     """(n, n_parameters, n_modes)."""
-    weight_slopes: NDArray[Any]
+    weight_slopes: Array
     """(n, n_parameters, n_drives, n_modes)."""
-
-
-@dataclass(frozen=True)
-class Polynomials:
-    """Rotation of the left arm over torque of n samples, with derivatives by log-parameters."""
-
-    denominator: Array
-    """In ascending powers of s, (n, terms)."""
-    denominator_slopes: Array
-    """(n_parameters, n, terms)."""
-    numerators: Array
-    """(n_drives, n, terms)."""
-    numerator_slopes: Array
-    """(n_parameters, n_drives, n, terms)."""
-
-    def of(self, rows: NDArray[Any]) -> "Polynomials":
-        """Return the polynomials of some of the samples."""
-        return Polynomials(
-            self.denominator[rows],
-            self.denominator_slopes[:, rows],
-            self.numerators[:, rows],
-            self.numerator_slopes[:, :, rows],
-        )
 
 
 def complex_step_network(
@@ -77,45 +53,6 @@ def complex_step_network(
         return model.network(parameters), 0
     count = parameters.shape[1]
     return model.network((parameters * _complex_steps(count)[:, None]).reshape(-1, count)), count
-
-
-def compute_polynomials(
-    gripper: Gripper, network: Network, count: int, *, symmetric: bool, inertia: bool
-) -> Polynomials:
-    """Compute the transfer functions of samples, and their derivatives.
-
-    Network and count are those of `complex_step_network`; a count of zero gives no derivatives.
-    """
-    numerators, denominator = transfer_functions(
-        gripper, network, symmetric=symmetric, inertia=inertia
-    )
-    return Polynomials(
-        *_split_complex_step(denominator, count), *_split_complex_step(numerators[LEFT], count)
-    )
-
-
-def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
-    """Compute the modes of given poles: all those of a denominator, no two of them close."""
-    denominator, denominator_slopes = polynomials.denominator, polynomials.denominator_slopes
-    slope = slope_at_poles(denominator, rates)
-    # A pole stays where the denominator is zero.
-    rate_slopes = -evaluate(denominator_slopes, rates) / slope
-    # Of log(p_j D'(p_j)), with D'(p_j) the leading coefficient times all p_j - p_i.
-    steepening = rate_slopes / rates + (denominator_slopes[..., -1] / denominator[:, -1])[..., None]
-    for i, j in permutations(range(rates.shape[1]), 2):
-        approach = rate_slopes[..., i] - rate_slopes[..., j]
-        steepening[..., i] += approach / (rates[:, i] - rates[:, j])
-    numerators = polynomials.numerators
-    weights = evaluate(numerators, rates) / (rates * slope)
-    along = evaluate(numerators[..., 1:] * np.arange(1, numerators.shape[-1]), rates)
-    change = evaluate(polynomials.numerator_slopes, rates) + along * rate_slopes[:, None]
-    weight_slopes = change / (rates * slope) - weights * steepening[:, None]
-    return Modes(
-        rates,
-        weights.swapaxes(0, 1),
-        rate_slopes.swapaxes(0, 1),
-        weight_slopes.transpose(2, 0, 1, 3),
-    )
 
 
 def compute_modes(
@@ -129,8 +66,28 @@ def compute_modes(
     if network.k.shape[1] > MOST_BRANCHES:
         parts = modes_with_slopes(gripper, network, COMPLEX_STEP, count, symmetric=symmetric)
         return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
-    polynomials = compute_polynomials(gripper, network, count, symmetric=symmetric, inertia=False)
-    return modes_at(polynomials, poles(polynomials.denominator, real=True))
+    numerators, denominator = transfer_functions(gripper, network, symmetric=symmetric)
+    denominator, denominator_slopes = _split_complex_step(denominator, count)
+    numerators, numerator_slopes = _split_complex_step(numerators[LEFT], count)
+    rates = poles(denominator, real=True)
+    slope = slope_at_poles(denominator, rates)
+    # A pole stays where the denominator is zero.
+    rate_slopes = -evaluate(denominator_slopes, rates) / slope
+    # Of log(p_j D'(p_j)), with D'(p_j) the leading coefficient times all p_j - p_i.
+    steepening = rate_slopes / rates + (denominator_slopes[..., -1] / denominator[:, -1])[..., None]
+    for i, j in permutations(range(rates.shape[1]), 2):
+        approach = rate_slopes[..., i] - rate_slopes[..., j]
+        steepening[..., i] += approach / (rates[:, i] - rates[:, j])
+    weights = evaluate(numerators, rates) / (rates * slope)
+    along = evaluate(numerators[..., 1:] * np.arange(1, numerators.shape[-1]), rates)
+    change = evaluate(numerator_slopes, rates) + along * rate_slopes[:, None]
+    weight_slopes = change / (rates * slope) - weights * steepening[:, None]
+    return Modes(
+        rates,
+        weights.swapaxes(0, 1),
+        rate_slopes.swapaxes(0, 1),
+        weight_slopes.transpose(2, 0, 1, 3),
+    )
 
 
 def _split_complex_step(coefficients: NDArray[Any], count: int) -> tuple[Array, Array]:

@@ -5,15 +5,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, parts
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import Network, SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.mode_decay import compute_decay
+from biogrip.response.mode_growth import compute_growth
 from biogrip.response.modes import COMPLEX_STEP, Modes, complex_step_network, compute_modes
 
 # Rate at which a bare damper forgets, in 1/s; its force is c times the rate of the deformation.
 _AT_ONCE = 1e30
+# Numbers formed together, which should fit a processor's cache.
+_TOGETHER = 400_000
 
 
 def compute_protocol_modes(
@@ -32,6 +35,27 @@ def compute_protocol_modes(
     if torque.deforms:
         return _relaxation_modes(model, parameters, slopes=slopes)
     return compute_modes(gripper, model, parameters, symmetric=torque.symmetric, slopes=slopes)
+
+
+def compute_responses(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
+    """Compute responses of modes to a protocol, and their derivatives by the log-parameters.
+
+    (n, 1 + n_parameters, n_times): d(w g) = dw g + w dr dg/dr.
+    """
+    n, count, m = modes.rate_slopes.shape
+    drives = modes.weights.shape[1]
+    by_growth = np.concatenate((modes.weights[:, None], modes.weight_slopes), axis=1)
+    by_slope = np.zeros_like(by_growth)
+    by_slope[:, 1:] = modes.weights[:, None] * modes.rate_slopes[:, :, None]
+    mixing = np.concatenate((by_growth, by_slope), axis=2).reshape(n, 1 + count, -1)
+    rows = np.empty((n, 1 + count, len(time_s)))
+    at_once = max(1, _TOGETHER // (m * len(time_s)))
+    for some in parts(n, at_once):
+        both = np.concatenate(compute_growth(modes.rates[some], torque, time_s), axis=1)
+        both = both.reshape(-1, 2 * drives * m, len(time_s))
+        # One product per sample: the order of its sums does not depend on the number of samples.
+        rows[some] = mixing[some] @ both
+    return rows
 
 
 def relaxation(network: Network, history: TorqueHistory, time_s: Array) -> Array:

@@ -2,17 +2,19 @@
 
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from biogrip.arrays import Array, parts
 from biogrip.experiment.protocol import TorqueHistory
-from biogrip.experiment.sample import SampleModel
+from biogrip.experiment.sample import Network, SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.instrument import Instrument
 from biogrip.response.condensed import Condensed
 from biogrip.response.grip import Grip, compute_grip
+from biogrip.response.inertia import Ring, elapsed_s, find_ring, ring, ringing_s, while_ringing
 from biogrip.response.linear import LEFT
 from biogrip.response.noise_estimate import estimate_noise, measure_rounding
 from biogrip.response.nuisance import taken_out
@@ -40,7 +42,7 @@ class Residuals:
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
     condensed
-        Rows for the protocol and the sampling times; specify nonlinearity, inertia, nuisance
+        Rows for the protocol and the sampling times; specify nonlinearity, nuisance
         functions and noise model. Residuals are white.
     noise_rad
         Standard deviation of the noise; by default estimated from neighbouring readings.
@@ -76,8 +78,6 @@ class Residuals:
             noise_rad = estimate_noise(self._rotation_rad, self.rounding_rad)
         self.noise_scale_rad = noise_rad
         self._freedom = np.inf
-        # Rows of the trace by inclusion of inertia, shared by all models.
-        self._trace_rows: dict[bool, Array] = {}
 
     @property
     def free(self) -> int:
@@ -96,17 +96,29 @@ class Residuals:
         network = self.model.network(np.exp(log_parameters))
         return compute_grip(self._gripper, network, self._torque, nonlinear=self.nonlinear)
 
+    def ring(self, network: Network, noise_rad: float) -> Ring | None:
+        """Return what noise of this size lets be seen of the arms' ringing on a sample, if any.
+
+        A parallel damper ends a ring. It only counts if it is seen when the ring is over, too:
+        what readings of a ring tell of it, without inertia, is the ring's.
+        """
+        gripper, torque = self._gripper, self._torque
+        if not gripper.has_inertia:
+            return None
+        springs = network.k_p + network.k.sum(axis=1) + gripper.jaw_stiffness_N_per_m
+        is_seen = network.c_p > ringing_s(gripper) * springs
+        network = replace(network, c_p=np.where(is_seen, network.c_p, 0.0))
+        ringing = while_ringing(gripper, torque, self._time_s)
+        change = np.zeros(self.samples)
+        change[ringing] = ring(gripper, network, torque, self._time_s[ringing])[0]
+        elapsed = elapsed_s(torque, self._time_s)
+        return find_ring(self._condensed.cleared(change) / noise_rad, elapsed)
+
     def of_model(self, model: SampleModel) -> "Residuals":
-        """Return the residuals of another model against the same trace."""
+        """Return the residuals of another model against the same trace, whose rows they share."""
+        _ = self.condensed_trace
         other = copy(self)
         other.model = model
-        return other
-
-    def without_inertia(self) -> "Residuals":
-        """Return the residuals of the same trace with the inertia of the arms neglected."""
-        other = copy(self)
-        other._condensed = self._condensed.without_ringing
-        other.__dict__.pop("_trace_at_nodes", None)
         return other
 
     def later(self, change_s: float) -> "Residuals":
@@ -114,8 +126,8 @@ class Residuals:
         other = copy(self)
         other._time_s = self._time_s - change_s
         other._condensed = self._condensed.later(change_s)
-        other._trace_rows = {}
-        other.__dict__.pop("_trace_at_nodes", None)
+        for of_trace in ("condensed_trace", "_trace_at_nodes"):
+            other.__dict__.pop(of_trace, None)
         return other
 
     def with_freedom(self, freedom: float) -> "Residuals":
@@ -205,12 +217,10 @@ class Residuals:
         """True if residuals are whitened, as the noise is autocorrelated."""
         return self._condensed.coloured
 
-    @property
+    @cached_property
     def condensed_trace(self) -> Array:
         """Condensed rows of the trace, (n_rows,) in rad."""
-        if self.inertia not in self._trace_rows:
-            self._trace_rows[self.inertia] = self._condensed.of_trace(self._rotation_rad)
-        return self._trace_rows[self.inertia]
+        return self._condensed.of_trace(self._rotation_rad)
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Compute condensed rows of the responses of many samples.
@@ -238,9 +248,8 @@ class Residuals:
         gripper, model, torque = self._gripper, self.model, self._torque
         parameters, condensed = np.exp(log_parameters), self._condensed
         if not condensed.reduced:
-            time_s, inertia = condensed.time_s, self.inertia
             rotations = linear_responses(
-                gripper, model, torque, time_s, parameters, inertia=inertia, slopes=slopes
+                gripper, model, torque, condensed.time_s, parameters, slopes=slopes
             )
             return condensed.rows(rotations)
         modes = compute_protocol_modes(gripper, model, torque, parameters, slopes=slopes)
@@ -284,16 +293,10 @@ class Residuals:
         return np.where(np.isnan(misfit), np.inf, misfit)
 
     @property
-    def inertia(self) -> bool:
-        """True if the inertia of the arms is included."""
-        return self._condensed.ringing_s > 0
-
-    @property
     def plain(self) -> bool:
-        """True for the linear model without inertia, nuisance functions and whitening."""
+        """True for the linear model without nuisance functions and whitening."""
         condensed = self._condensed
-        bare = not (condensed.coloured or len(condensed.nuisance))
-        return bare and not (self.nonlinear or self.inertia)
+        return not (condensed.coloured or len(condensed.nuisance) or self.nonlinear)
 
     def shares_responses(self, other: "Residuals") -> bool:
         """Return True if `other` differs in its trace and noise only, so that responses agree."""
@@ -308,5 +311,4 @@ class Residuals:
             time_s,
             np.exp(log_parameters),
             nonlinear=self.nonlinear,
-            inertia=self.inertia,
         )

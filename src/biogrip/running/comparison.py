@@ -11,13 +11,15 @@ from biogrip.products.product import PUBLISHED_TABLE_KINDS
 _SHOWN = 40
 
 
-def compare(published: Path, now: Path) -> str:
-    """Compare all tables of two folders.
+def compare(published: Path, now: Path, only: str = "*") -> str:
+    """Compare the tables of two folders.
 
     Parameters
     ----------
     published, now
         Folders of published and of regenerated tables.
+    only
+        Pattern for file names without suffix.
 
     Returns
     -------
@@ -30,11 +32,11 @@ def compare(published: Path, now: Path) -> str:
         If a table is missing on either side or any cell differs; the message names row, column
         and both values.
     """
-    names = _tables(published)
+    names = _tables(published, only)
     if not names:
         raise BiogripError(f"{published}: holds no tables to compare with.")
     problems = [f"{name}: published, but not regenerated" for name in _missing(names, now)]
-    regenerated = _tables(now)
+    regenerated = _tables(now, only)
     problems += [
         f"{name}: regenerated, but not published" for name in _missing(regenerated, published)
     ]
@@ -50,9 +52,9 @@ def compare(published: Path, now: Path) -> str:
     raise BiogripError(_report(published, problems, differences))
 
 
-def _tables(folder: Path) -> set[str]:
-    """Return names of the tables in a folder."""
-    return {path.name for path in folder.glob("*.*") if path.suffix in PUBLISHED_TABLE_KINDS}
+def _tables(folder: Path, only: str) -> set[str]:
+    """Return names of the tables in a folder whose stem is like a pattern."""
+    return {path.name for path in folder.glob(f"{only}.*") if path.suffix in PUBLISHED_TABLE_KINDS}
 
 
 def _missing(names: set[str], folder: Path) -> list[str]:

@@ -8,8 +8,9 @@ from biogrip.products.catalogue import chosen, products
 from biogrip.products.plan import Plan
 from biogrip.products.product import Product
 from biogrip.running.journal import JOURNALS, digest_of_files, hash_file, recorded_in
+from biogrip.running.manifest import STUDY
 from biogrip.running.places import refuse_files_as_folders, refuse_links
-from biogrip.running.resolved import NAME, read_study
+from biogrip.running.resolved import read_study
 from biogrip.running.rules import ProductRule, inputs_of, make_rules
 
 
@@ -42,7 +43,7 @@ def make(
         rule = ProductRule("", tuple(requested), plan)
         if rule.digest_of_settings(job) != made_for.split("-")[0]:
             raise BiogripError(
-                f"{results / NAME}: has changed since this run was planned: another run was begun "
+                f"{results / STUDY}: has changed since this run was planned: another run was begun "
                 "beside it. Run again."
             )
         _make(rule, requested, job, made_for)

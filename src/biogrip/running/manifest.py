@@ -32,8 +32,8 @@ from biogrip.running.records import (
 NAME = "manifest.jsonl"
 """Name of the manifest, in the results folder and in the folder of the journals."""
 
-OF_NO_RULE = "study.json", "crate.zip"
-"""Results that no rule makes: the resolved study, and its RO-Crate."""
+STUDY = "study.json"
+"""Name of the resolved study in the results folder, the one result that no rule makes."""
 
 # Records kept per file: a kill can leave a file in its state before the last write.
 _KEPT = 2

@@ -9,8 +9,7 @@ from biogrip.errors import BiogripError
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.running.journal import digest_of_files, hash_file
-from biogrip.running.manifest import Manifest
-from biogrip.running.resolved import NAME as STUDY
+from biogrip.running.manifest import STUDY, Manifest
 from biogrip.running.resolved import read_study
 from biogrip.running.rules import ProductRule, inputs_of, make_rules
 
@@ -125,7 +124,7 @@ def name_of(file: str) -> str:
     return PurePosixPath(file).relative_to(_RESULTS).as_posix()
 
 
-def finished(results: Path, manifest: Manifest, only: str = "*") -> list[str]:
+def finished(results: Path, manifest: Manifest, only: str) -> list[str]:
     """Return all results of a finished study, except batches.
 
     Parameters

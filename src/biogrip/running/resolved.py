@@ -7,13 +7,11 @@ from pathlib import Path
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.running.journal import recorded_in
-from biogrip.running.manifest import Manifest
+from biogrip.running.manifest import STUDY, Manifest
 from biogrip.running.wholeness import make_room
 from biogrip.study.config import StudyConfig
 from biogrip.study.plain import plain
 from biogrip.study.study import Study
-
-NAME = "study.json"
 
 
 def write_study(study: Study, results: Path) -> None:
@@ -24,18 +22,18 @@ def write_study(study: Study, results: Path) -> None:
     BiogripError
         If a file is in the way that no study wrote.
     """
-    file = results / NAME
+    file = results / STUDY
     text = json.dumps(plain(study.config), indent=1) + "\n"
     if os.path.lexists(file):
         manifest = Manifest(results)
-        if file.is_symlink() or not file.is_file() or not manifest.knows(NAME):
+        if file.is_symlink() or not file.is_file() or not manifest.knows(STUDY):
             raise BiogripError(
                 f"{file}: in the way, and not written by a study. Move it away and run again."
             )
         if file.read_text(encoding="utf-8", errors="replace") == text:
             return
-        if not manifest.was_written(NAME):
-            make_room(manifest, results, NAME, changing=True)
+        if not manifest.was_written(STUDY):
+            make_room(manifest, results, STUDY, changing=True)
     with recorded_in(results):
         write_text(file, text)
 
@@ -48,7 +46,7 @@ def read_study(results: Path) -> Study:
     BiogripError
         If no study was run there, or its file is damaged.
     """
-    file = results / NAME
+    file = results / STUDY
     try:
         study = Study(StudyConfig.model_validate_json(file.read_bytes()))
         # Access all derived properties, so that a damaged file is reported here.

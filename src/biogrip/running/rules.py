@@ -23,10 +23,6 @@ _CONSTRAINTS = {
 GROUPS = {
     "tables": "results/tables/*",
     "maps": "robustness_*",
-    "designs": "designed*",
-    "sequences": "sequential*",
-    "posteriors": "posterior*",
-    "moduli": "modulus_bands*",
 }
 """Patterns of results that a rule asks for together, see `pathlib.PurePath.match`."""
 

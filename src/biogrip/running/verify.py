@@ -7,9 +7,8 @@ from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
-from biogrip.running.manifest import OF_NO_RULE, Manifest
+from biogrip.running.manifest import STUDY, Manifest
 from biogrip.running.provenance import Provenance, name_of
-from biogrip.running.resolved import NAME as STUDY
 from biogrip.running.resolved import read_study
 from biogrip.running.rules import files_of, make_rules
 
@@ -47,7 +46,7 @@ def verify(results: Path) -> str:
             for name in sorted(Provenance(results, manifest).outdated(rules))
             if manifest.knows(name)
         ]
-        others = len(manifest.others([*map(name_of, files_of(rules)), *OF_NO_RULE]))
+        others = len(manifest.others([*map(name_of, files_of(rules)), STUDY]))
     if problems:
         raise BiogripError("\n".join([*problems, "The next run makes them again."]))
     also = f" Of other studies than {results / STUDY}: {others}." if others else ""

@@ -9,7 +9,7 @@ from tempfile import TemporaryFile
 
 from biogrip.errors import BiogripError
 from biogrip.running.journal import Journal
-from biogrip.running.manifest import OF_NO_RULE, Manifest, set_aside
+from biogrip.running.manifest import STUDY, Manifest, set_aside
 from biogrip.running.places import refuse_files_as_folders, refuse_links
 from biogrip.terminal import visible, visible_lines
 
@@ -29,7 +29,7 @@ def message_only() -> Iterator[None]:
 def say_what_else_is_there(results: Path, requested: Iterable[str]) -> None:
     """Print how many results belong to other studies."""
     own = [_name(results, Path(file)) for file in requested]
-    others = Manifest(results).others([*own, *OF_NO_RULE])
+    others = Manifest(results).others([*own, STUDY])
     if others:
         print(
             f"biogrip: {results} also holds results of other studies ({len(others)}, the first "

@@ -11,13 +11,11 @@ from pydantic import BaseModel, Field, GetJsonSchemaHandler, Tag, TypeAdapter, V
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from biogrip.design.settings import DesignSettings
 from biogrip.digits import counted
-from biogrip.errors import BiogripError, nearest
+from biogrip.errors import BiogripError
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
 from biogrip.experiment.truth import Published
-from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import METHODS, block_class
 from biogrip.instrument.actuator import CombDrive
@@ -85,9 +83,6 @@ class Identifiability(Block):
     verdicts_every: Annotated[int, Field(ge=1, le=1_000_000)] = 25
     """One in so many of these seeds also gets the verdicts that users are shown, from whole
     profiles. By default 25; with 1 a table counts them."""
-    moduli: bool = False
-    """True for the limits that the first trace sets storage and loss modulus over frequency, as a
-    figure and a table: some seconds a case. By default false."""
 
 
 class Shared(Checked, BaseModel):
@@ -121,14 +116,6 @@ class Shared(Checked, BaseModel):
         ),
     ]
     identifiability: Identifiability
-    design: DesignSettings | None = None
-    posterior: Annotated[
-        PosteriorSettings | None,
-        Field(
-            description="Settings of posterior sampling for the first trace; it is sampled if this "
-            "block is there, even an empty one, `{}`."
-        ),
-    ] = None
     fixed: Annotated[
         Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]] | None,
         Field(
@@ -222,12 +209,13 @@ class CaseBlock(Shared):
         return self.fixed or {}
 
     @property
-    def _searched(self) -> list[Parameter]:
+    def searched(self) -> list[Parameter]:
+        """Parameters that are identified."""
         return [p for p in self.sample.sample.model.parameters if p.name not in self.known]
 
     @property
     def _genes(self) -> int:
-        return sum(getattr(self.search_range, p.range_name).digits + 1 for p in self._searched)
+        return sum(getattr(self.search_range, p.range_name).digits + 1 for p in self.searched)
 
     def problems(self) -> Iterator[Problem]:
         """Find blocks that are in conflict."""
@@ -245,10 +233,7 @@ class CaseBlock(Shared):
         )
         yield from self._instrument_problems()
         yield from self._contact_problems()
-        yield from self._exposure_problems()
-        yield from self._design_problems()
         yield from self._method_problems()
-        yield from self._posterior_problems()
         if self.sample.sample.model.power_law:
             yield from self._band_problems()
         if not self.recorded:
@@ -310,43 +295,6 @@ class CaseBlock(Shared):
             text = "found unilateral and a nonlinear target, allowed is models.target: linear"
             yield ("contact",), f"{text} with it."
 
-    def _exposure_problems(self) -> Iterator[Problem]:
-        """Find what readings cannot be averaged of."""
-        designed = self.design.noise if self.design else None
-        if not self.measurement.exposure_s and not (designed and designed.exposure_s):
-            return
-        nonlinear = [key for key, value in vars(self.models).items() if value == "nonlinear"]
-        if self.measurement.exposure_s and (nonlinear or self.contact == "unilateral"):
-            found = f"models.{nonlinear[0]}: nonlinear" if nonlinear else "contact: unilateral"
-            text = f"is for linear responses; leave it out, or {found}."
-            yield ("measurement", "exposure_s"), text
-        for index, phase in enumerate(self.protocol.phases):
-            if phase.to_voltage_V is not None:
-                text = "is a ramp of the voltage, of whose torque no means are known; leave it "
-                yield ("protocol", "phases", index, "to_voltage_V"), f"{text}out, or exposure_s."
-                break
-
-    def _design_problems(self) -> Iterator[Problem]:
-        if self.design is None:
-            return
-        for where, text in self.design.instrument_problems(self.instrument_used):
-            yield ("design", *where), text
-        searched = [p.name for p in self._searched]
-        named: list[tuple[tuple[str, str | int], str]] = [
-            (("quantities", i), name) for i, name in enumerate(self.design.quantities)
-        ]
-        named += [(("ranges", name), name) for name in self.design.ranges or {}]
-        for path, name in named:
-            if name not in searched:
-                text = f"found '{name}', allowed are {', '.join(searched)}."
-                yield ("design", *path), text + nearest(name, searched)
-        if not self.recorded:
-            return
-        missing = set(searched) - set(self.design.ranges or {})
-        if missing:
-            text = f"has none for {', '.join(sorted(missing))}, of which nothing else is known."
-            yield ("design", "ranges"), text
-
     def _method_problems(self) -> Iterator[Problem]:
         """Find settings of methods that conflict with the length of a chromosome."""
         for name, settings in self.method_blocks.items():
@@ -354,19 +302,9 @@ class CaseBlock(Shared):
                 for path, text in settings.problems_of(self._genes):
                     yield (name, *path), text
 
-    def _posterior_problems(self) -> Iterator[Problem]:
-        if self.posterior is None:
-            return
-        if self.models.identification != "linear":
-            text = "is sampled with hundreds of thousands of responses; allowed with it is "
-            yield ("posterior",), f"{text}models.identification: linear."
-        model = self.sample.sample.model
-        for path, text in self.posterior.problems_of(model, list(self.known)):
-            yield ("posterior", *path), text
-
     def _unreachable_problems(self) -> Iterator[Problem]:
         """Find true values outside the decades that are searched."""
-        for parameter in self._searched:
+        for parameter in self.searched:
             value = self.sample.parameters.get(parameter.name)
             genes: GeneRange = getattr(self.search_range, parameter.range_name)
             low = 10.0 ** math.floor(math.log10(genes.low))
@@ -390,7 +328,7 @@ class CaseBlock(Shared):
     def _sampling_problems(self) -> Iterator[Problem]:
         measured, end = self.measurement, self.protocol.end_s
         fitted_along = measured.fits_offset + measured.fits_drift
-        needed = len(self._searched) + fitted_along + 1
+        needed = len(self.searched) + fitted_along + 1
         if measured.bursts:
             yield from self._burst_problems(needed)
             return

@@ -13,6 +13,7 @@ from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
 from biogrip.keys import Block, Distinct, OneOf, Problem
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
+from biogrip.study.design_block import DesignBlock
 from biogrip.study.interpretations import InterpretationBlock
 from biogrip.study.sweeps import MOST_POINTS, SweepBlock
 from biogrip.study.traces_block import TracesBlock
@@ -143,6 +144,7 @@ class StudyConfig(Shared):
         ),
         Distinct(),
     ] = ()
+    design: DesignBlock = DesignBlock()
     sweeps: Annotated[
         Mapping[_Name, SweepBlock],
         Field(
@@ -179,10 +181,24 @@ class StudyConfig(Shared):
         for index, key in enumerate(self.reconstructed):
             if not _exists(known, key):
                 yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
+        yield from self._design_problems()
         for index, name in enumerate(self.only):
             if name not in self.cases:
                 text = f"found '{name}', allowed are {', '.join(list(self.cases)[:_SHOWN])}."
                 yield ("only", index), text + nearest(name, self.cases)
+
+    def _design_problems(self) -> Iterator[Problem]:
+        """Find parameters in the block `design` that no case identifies."""
+        found = (p.name for case in self.cases.values() for p in case.searched)
+        searched = list(dict.fromkeys(found))
+        named: list[tuple[str, str | int, str]] = [
+            ("parameters", index, name) for index, name in enumerate(self.design.parameters)
+        ]
+        named += [("ranges", name, name) for name in self.design.ranges or {}]
+        for block, key, name in named:
+            if name not in searched:
+                text = f"found '{name}', allowed are {', '.join(searched)}."
+                yield ("design", block, key), text + nearest(name, searched)
 
     def _band_problems(self) -> Iterator[Problem]:
         """Find power-law models in a study whose protocols exceed their range of validity."""

@@ -44,9 +44,6 @@ class MeasurementBlock(Block):
     bursts: Annotated[tuple[Burst, ...], Field(min_length=1, max_length=20_000)] = ()
     """Successive bursts of samples instead of a uniform rate, as of a camera that is fast after
     every step. See docs/design.md."""
-    exposure_s: Annotated[float, Field(ge=0, le=1e6)] = 0.0
-    """Time over which each reading is averaged, up to its instant, as the exposure of a camera's
-    frame. By default 0: readings are of instants."""
     file: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
     """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. See
     "Your own measurement"."""

@@ -21,13 +21,10 @@ MISSING = "is missing and has no default."
 
 # Keys of earlier versions of the config, by their last two names.
 _RETIRED: dict[tuple[Hashable, ...], str] = {
-    ("models", "inertia"): "no longer needed: traces that show the arms ringing are fitted with "
-    "their inertia. Leave it out.",
+    ("models", "inertia"): "no longer needed: targets have the arms' inertia, fits do not. "
+    "Leave it out.",
     ("readings",): "now called `interpretations`.",
     ("noise", "relaxing"): "now called `ar1`.",
-    ("design", "samples"): "now called `readings`.",
-    ("design", "drawn"): "now called `plausible_samples`.",
-    ("design", "tried"): "now called `candidates`.",
 }
 
 _UNITS = ([*TIME_UNITS], [*ROTATION.units])

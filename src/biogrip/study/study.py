@@ -6,11 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar, cast
 
-from biogrip.design.settings import DesignSettings
-from biogrip.experiment.exposure import average
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.sample import CANDIDATES, Sample, SampleModel, with_fixed
-from biogrip.experiment.sampling import Sampling
 from biogrip.experiment.truth import UNPUBLISHED, Truth
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genetic_settings import GeneticSettings
@@ -82,12 +79,8 @@ class Case:
     """Settings of the calibration test without sample."""
     confidence = _of_case(lambda case: case.block.identifiability.confidence)
     """Confidence level of all intervals."""
-    posterior = _of_case(lambda case: case.block.posterior)
-    """Settings of posterior sampling, if the posterior is sampled."""
     verdicts_every = _of_case(lambda case: case.block.identifiability.verdicts_every)
     """Seeds of the coverage test that are multiples of this get verdicts, too."""
-    profiles_moduli = _of_case(lambda case: case.block.identifiability.moduli)
-    """True if the limits of moduli over frequency are computed."""
 
     @property
     def title(self) -> str:
@@ -130,11 +123,6 @@ class Case:
         return self.block.protocol.make_phases(self.instrument, self.actuator)
 
     @cached_property
-    def averaged(self) -> tuple[Phase, ...]:
-        """Phases that the readings follow: means over the exposure of each."""
-        return average(self.phases, self.block.measurement.exposure_s)
-
-    @cached_property
     def gripper(self) -> Gripper:
         """True gripper, at the angle at which the jaws touch the sample; or none."""
         if not self.instrument.has_jaws:
@@ -154,20 +142,9 @@ class Case:
         return stroke - self.block.gripper.contact(self.actuator, self.size_m).closing_rad
 
     @property
-    def experiment(self) -> tuple[tuple[Phase, ...], Sampling]:
-        """Protocol and sampling."""
-        return self.phases, self.sampling
-
-    @property
     def searched(self) -> SampleModel:
         """Sample model without fixed parameters."""
         return self.problem.searched
-
-    @property
-    def design(self) -> DesignSettings:
-        """Inputs of designs for a case that has them."""
-        assert self.block.design is not None
-        return self.block.design
 
     @property
     def samples(self) -> int:
@@ -188,7 +165,7 @@ class Case:
             gripper = built(Gripper, overlaid(plain(gripper), assumed))
         return CaseProblem(
             gripper,
-            self.averaged,
+            self.phases,
             self.ranges,
             self.sample,
             self.fixed,
@@ -243,12 +220,6 @@ class Case:
         names = (*self.study.config.model_selection.models, self.sample.candidate)
         per_area = self.instrument.per_area
         return {name: replace(CANDIDATES[name], per_area=per_area) for name in names}
-
-    @property
-    def compared_models(self) -> dict[str, Sample]:
-        """Sample models whose evidence is compared, by name; none if it is not asked for."""
-        compared = self.posterior and self.posterior.evidence and not self.fixed
-        return self.models if compared else {}
 
     @property
     def coverage_seeds(self) -> int:
@@ -361,12 +332,6 @@ class Study:
         )
 
     @property
-    def experiment(self) -> tuple[tuple[Phase, ...], Sampling]:
-        """Protocol and sampling, for cases that do not change them."""
-        phases = self.config.protocol.make_phases(GRIPPER, self.config.actuator)
-        return phases, self.config.measurement.sampling
-
-    @property
     def ranges(self) -> dict[str, GeneRange]:
         """Search ranges of the study, for cases that do not change them."""
         return dict(vars(self.config.search_range))
@@ -399,16 +364,6 @@ class Study:
     def covered(self) -> list[str]:
         """Names of cases whose intervals are tested for coverage."""
         return [name for name, case in self.cases.items() if case.coverage_seeds > 0]
-
-    @property
-    def sampled(self) -> list[str]:
-        """Names of cases whose posterior is sampled."""
-        return [name for name, case in self.cases.items() if case.posterior is not None]
-
-    @property
-    def with_moduli(self) -> list[str]:
-        """Names of cases whose moduli over frequency get limits."""
-        return [name for name, case in self.cases.items() if case.profiles_moduli]
 
     @property
     def published(self) -> list[str]:

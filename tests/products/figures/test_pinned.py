@@ -3,7 +3,6 @@
 ``make pinned`` draws the pictures anew. Look at what has changed before you commit them.
 """
 
-import json
 from collections.abc import Callable
 from itertools import product as all_pairs
 from pathlib import Path
@@ -18,19 +17,15 @@ from matplotlib.image import imread
 from PIL import Image
 
 from biogrip.arrays import Array
-from biogrip.experiment.sample import MODELS
 from biogrip.products.catalogue import products
-from biogrip.products.figures import declared, designed_map, modulus_bands, sequential
+from biogrip.products.figures import declared
 from biogrip.products.figures import robustness as heat_map
-from biogrip.products.figures.corner import draw_corner
 from biogrip.products.figures.style import lay_out, styled
 from biogrip.products.heat_maps import heat_maps
 from biogrip.products.plan import Plan
 from biogrip.products.stages.sweep_points import POINTS
-from tests.helpers.default import STUDY, plan_of, study_of
+from tests.helpers.default import plan_of, study_of
 from tests.helpers.runs import SMALL
-from tests.products.tables.test_designed import OVERLAY
-from tests.products.tables.test_sequential import made_up
 
 PINNED = Path(__file__).with_name("pinned")
 # Small pictures, in which a line is still a line.
@@ -73,10 +68,6 @@ HEAT_MAPS = "robustness_level"
 # Those of overlays, by what they are drawn from here.
 OTHERS = {
     HEAT_MAPS: "robustness_figure",
-    "posterior_made_up": "posterior_figure",
-    "designed_map": "designed_map",
-    "sequential": "sequential_figure",
-    "modulus_bands_made_up": "modulus_bands_figure",
 }
 NAMES = [*JOBS, *OTHERS]
 EACH = pytest.mark.parametrize(
@@ -152,50 +143,7 @@ def figure(
     if request.param not in OTHERS:
         return draw(request.param)
     with styled():
-        if request.param == HEAT_MAPS:
-            study = study_of(SWEEP)
-            return heat_map.draw(heat_maps(study, {"sweep": "level"}), judged)
-        if request.param == "designed_map":
-            designed = study_of(OVERLAY.replace("SEEDS", "0"))
-            return designed_map.draw(designed.case("endothelial_cell"))
-        if request.param == "sequential":
-            cell = STUDY.cases["endothelial_cell"]
-            rows = made_up(tmp_path_factory.mktemp("cells"))
-            return sequential.draw(cell, rows)
-        if request.param == "modulus_bands_made_up":
-            return _bands(tmp_path_factory.mktemp("moduli") / "moduli.json")
-        return _corner()
-
-
-def _bands(limits: Path) -> Figure:
-    """Moduli with limits on both sides, on one and on none, made up."""
-    moduli = [
-        {"part": part, "rad_per_s": omega, "value": value}
-        | {"low": value / 2 if place < 5 else None, "high": 3 * value if place > 1 else None}
-        for part in ("storage", "loss")
-        for place, omega in enumerate(np.geomspace(1e-3, 1e2, 8).tolist())
-        for value in [0.5 + omega ** {"storage": 0.2, "loss": 0.7}[part]]
-    ]
-    said = {"fit": "ok", "unit": "N/m", "confidence": 0.95, "moduli": moduli}
-    limits.write_text(json.dumps(said))
-    return modulus_bands.draw(STUDY.cases["liquid_drop_2"], limits)
-
-
-def _corner() -> Figure:
-    """Two parameters that trade, and one of which nothing is known, made up."""
-    rng = np.random.default_rng(0)
-    first, second = rng.standard_normal((2, 4000))
-    logs = np.stack((first, 0.3 * second - first, rng.uniform(-9, 0, 4000)), axis=1)
-    parameters = MODELS["liquid_drop"].parameters
-    told = [
-        {"quantity": p.name, "median": m, "low": low, "high": high}
-        for p, (low, m, high) in zip(
-            parameters, np.exp(np.quantile(logs, (0.025, 0.5, 0.975), axis=0)).T, strict=True
-        )
-    ]
-    truth = {p.name: 1.0 for p in parameters[:2]}
-    said = {"quantities": told, "confidence": 0.95}
-    return draw_corner(parameters, np.exp(logs), said, truth, "made up")
+        return heat_map.draw(heat_maps(study_of(SWEEP), {"sweep": "level"}), judged)
 
 
 @pytest.fixture

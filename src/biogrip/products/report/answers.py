@@ -61,7 +61,7 @@ def compare_with_paper(
     return f"Of {len(rows)} values of the paper, sums included, {'; '.join(parts)}."
 
 
-def say_what_traces_tell(verdicts: Iterable[Row], experiment: str = "") -> str:
+def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
     """Say which quantities a trace determines always, never, or in some of the samples."""
     decided: dict[str, list[bool]] = defaultdict(list)
     for (_, quantity), determined in _determined(verdicts).items():
@@ -79,7 +79,7 @@ def say_what_traces_tell(verdicts: Iterable[Row], experiment: str = "") -> str:
     if some:
         parts.append(f"{'the rest' if parts else 'determines each'} sometimes")
     samples = f": {_listed(some)} samples" if some else ""
-    return f"A trace{experiment} {_listed(parts)}{samples}." if parts else ""
+    return f"A trace {_listed(parts)}{samples}." if parts else ""
 
 
 def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:

@@ -1,4 +1,4 @@
-"""Figures and tables that pages and the article show, with the rules that make them."""
+"""Figures and tables that the page shows, with the rules that make them."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

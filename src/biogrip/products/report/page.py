@@ -1,12 +1,11 @@
 """The report of a study: one self-contained HTML file with tables, figures and an explorer."""
 
 import base64
-import gzip
-import json
 import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
@@ -14,11 +13,9 @@ from typing import Any
 
 import jinja2
 import yaml
-from markupsafe import Markup, escape
 
 from biogrip.errors import BiogripError
 from biogrip.files import atomic_write
-from biogrip.products.files.identifications import HISTORIES
 from biogrip.products.files.identifications import PATH as IDENTIFICATIONS
 from biogrip.products.files.rows import read_table
 from biogrip.products.files.traces import MEASUREMENTS
@@ -34,8 +31,9 @@ from biogrip.products.report.answers import (
     say_which_method_finds_it,
 )
 from biogrip.products.report.entries import Entry, entries, files_shown, rules_of
-from biogrip.products.report.explorer_data import CaseFiles, explorer_data
+from biogrip.products.report.explorer import explorer, fits_of
 from biogrip.products.stages.calibrated import CALIBRATED
+from biogrip.products.stages.judgement import TRACE
 from biogrip.products.tables.verdicts import target_of
 from biogrip.products.uses import each, every, using
 from biogrip.study.plain import plain
@@ -45,7 +43,7 @@ PAGE = "results/report.html"
 
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
-_SOURCES = ("report.html.j2", "report.css", "mechanics.js", "inference.js", "explorer.js")
+_SOURCES = ("report.html.j2", "report.css")
 _LIBRARIES = ("biogrip", "numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
 # Category, and which of a product's files is shown.
 _FIGURES, _TABLES, _DOWNLOADS = ("Figures", "png"), ("Tables", "html"), ("Tables", "csv")
@@ -71,9 +69,7 @@ class Content:
 
 _STUDY = using(
     "identifiers shown has_gripper",
-    cases=each(
-        every, "name title instrument parameters problem recorded noise nonlinear_target truth"
-    ),
+    cases=each(every, "name title instrument parameters problem recorded truth"),
 )
 
 
@@ -96,7 +92,6 @@ def write(
     tables: list[Path],
     downloads: list[Path],
     identifications: list[Path],
-    histories: list[Path],
     verdicts: list[Path],
     measurements: list[Path],
     calibrated: list[Path],
@@ -112,10 +107,10 @@ def write(
         PNG and HTML files, in the order of the entries.
     downloads
         CSV files of the tables.
-    identifications, histories, verdicts
-        Files of all cases, in their order.
-    measurements, calibrated
-        Files of all cases; the case is told by folder or file name.
+    identifications, verdicts, measurements
+        Files of all cases, in their order; of the measurements those with the judged trace.
+    calibrated
+        Files of the cases that have them; the case is told by the file name.
     page
         HTML.
 
@@ -125,19 +120,11 @@ def write(
         If an input cannot be read.
     """
     cases = list(shown.study.cases.values())
-    files = [
-        CaseFiles(
-            identified,
-            history,
-            verdict,
-            [path for path in measurements if path.parent.name == case.name],
-            [path for path in calibrated if path.stem == case.name],
-        )
-        for case, identified, history, verdict in zip(
-            cases, identifications, histories, verdicts, strict=True
-        )
+    methods = list(shown.study.identifiers.values())
+    fits = [
+        fits_of(case, methods, found, measured, [p for p in calibrated if p.stem == case.name])
+        for case, found, measured in zip(cases, identifications, measurements, strict=True)
     ]
-    data = explorer_data(cases, files, list(shown.study.identifiers.values()))
     shown_tables: list[dict[str, Any]] = [
         {"entry": entry, "html": _table(path, entry.caption), "download": _download(csv)}
         for entry, path, csv in zip(shown.tables, tables, downloads, strict=True)
@@ -155,10 +142,7 @@ def write(
     )
     parts = environment.from_string(shown.sources["report.html.j2"]).stream(
         style=shown.sources["report.css"],
-        scripts=[shown.sources[name] for name in _SOURCES[2:]],
-        plotly=_compressed(_plotly()),
-        # Prevent text of a case from closing the script element.
-        data=json.dumps(data).replace("<", "\\u003c"),
+        explorer=explorer([(case.title, own) for case, own in zip(cases, fits, strict=True)]),
         answers=[
             compare_with_paper(errors, judged, {case.name: _whose(case) for case in cases}),
             say_what_traces_tell(judged),
@@ -212,7 +196,7 @@ def _in_few_colours(path: Path) -> bytes:
     return packed.getvalue()
 
 
-def _table(path: Path, caption: str) -> Markup:
+def _table(path: Path, caption: str) -> str:
     """Return the table element of an HTML file written by `biogrip.products.tables.layout`."""
     try:
         text = path.read_text(encoding="utf-8")
@@ -222,7 +206,7 @@ def _table(path: Path, caption: str) -> Markup:
     if found is None:
         raise BiogripError(f"{path}: holds no table.")
     columns = found[0].replace("<th>", '<th scope="col">')
-    return Markup(re.sub("(<table[^>]*>)", rf"\1<caption>{escape(caption)}</caption>", columns))
+    return re.sub("(<table[^>]*>)", rf"\1<caption>{escape(caption)}</caption>", columns)
 
 
 def _download(path: Path) -> str:
@@ -261,15 +245,8 @@ def _by_sample(
     return found
 
 
-def _compressed(text: str) -> str:
-    """Return a text as base64 of gzip, which browsers unpack."""
-    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
-
-
-def _plotly() -> str:
-    from plotly.offline import get_plotlyjs
-
-    return get_plotlyjs()
+def _judged_traces(plan: Plan, _: Wildcards) -> list[str]:
+    return [plan.batch_of_seed(MEASUREMENTS, name, TRACE) for name in plan.study.cases]
 
 
 def _calibrated(plan: Plan, _: Wildcards) -> list[str]:
@@ -288,9 +265,8 @@ REPORT = Product(
         "tables": files_shown(_TABLES),
         "downloads": files_shown(_DOWNLOADS),
         "identifications": of_cases(IDENTIFICATIONS, every),
-        "histories": of_cases(HISTORIES, every),
         "verdicts": of_cases(VERDICTS, every),
-        "measurements": of_cases(MEASUREMENTS, every),
+        "measurements": Reads(_judged_traces),
         "calibrated": Reads(_calibrated),
     },
     weight=Weight(10, 2000),

@@ -31,7 +31,7 @@ def simulate(case: Case, target: Path) -> None:
     network = case.sample.model.sample(case.parameters)
     time_s = case.sampling.over(torque.end_s)
     if not case.instrument.has_jaws:
-        read = simulated_rotation(case.gripper, network, _read(case), time_s, nonlinear=False)[0]
+        read = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0]
         _check_finite(case, time_s, read)
         controlled = torque_at(torque, time_s)
         write_target_without_jaws(target, time_s, controlled, read, case.instrument)
@@ -50,13 +50,8 @@ def _response(
     if case.unilateral:
         found = unilateral_response(gripper, network, torque, time_s)
         return found.rotation_rad[0], found.jaw_force_N
-    rotation = simulated_rotation(gripper, network, _read(case), time_s, nonlinear=nonlinear)
+    rotation = simulated_rotation(gripper, network, torque, time_s, nonlinear=nonlinear)
     return rotation[0], jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear)[0]
-
-
-def _read(case: Case) -> TorqueHistory:
-    """Return what is held, as readings average it."""
-    return torque_history(case.averaged, deforms=case.instrument.deforms)
 
 
 def _say_if_contact_is_lost(case: Case, network: Network, torque: TorqueHistory) -> None:
@@ -99,7 +94,7 @@ TARGET = Product(
     {"target": TARGETS},
     simulate,
     from_case(
-        "name instrument gripper phases averaged sampling sample parameters nonlinear_target "
+        "name instrument gripper phases sampling sample parameters nonlinear_target "
         "unilateral stroke_rad"
     ),
     lambda plan: wildcards_of([*plan.study.simulated, *plan.study.points]),

@@ -1,0 +1,103 @@
+"""The problem that all benchmarks share: noisy traces of the default study's cell."""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from biogrip.arrays import Array
+from biogrip.experiment.noise import add_noise, rms
+from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
+from biogrip.experiment.sample import SampleModel
+from biogrip.identify.genetic_settings import GeneticSettings
+from biogrip.identify.genome import Genome, make_genome
+from biogrip.identify.problem import Problem, make_problem
+from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.response.condensed import Condensed
+from biogrip.response.linear import rotation, step_response
+from biogrip.response.misfit import Misfit, make_misfit
+from biogrip.response.nuisance import nuisance_basis
+from biogrip.response.residuals import Residuals
+from biogrip.study.load import load_study
+from biogrip.study.study import Case
+
+CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
+BATCH = 25
+"""Traces that are identified side by side."""
+OURS, SIDE_BY_SIDE = "biogrip", f"biogrip, {BATCH} traces side by side"
+"""In the tables."""
+
+
+@cache
+def case() -> Case:
+    """Return the endothelial cell of the default study."""
+    return load_study(yaml.safe_load(CONFIG.read_text()), [CONFIG]).cases["endothelial_cell"]
+
+
+@cache
+def _clean() -> tuple[TorqueHistory, Array, Array]:
+    steps = torque_history(case().phases)
+    time_s = sample_times(steps.end_s, case().sampling.rate_Hz)
+    model = case().sample.model
+    truth = np.array([case().parameters[name] for name in model.names])
+    response = step_response(case().gripper, model.network(truth))
+    return steps, time_s, rotation(response, steps, time_s)[0]
+
+
+@cache
+def _condensed() -> Condensed:
+    steps, time_s, _ = _clean()
+    return Condensed(steps, time_s, nuisance_basis(time_s, offset=False, drift=False))
+
+
+@dataclass(frozen=True)
+class NoisyTrace:
+    """One noisy trace, (n_samples,), and what it takes to identify its sample."""
+
+    gripper: Gripper
+    model: SampleModel
+    steps: TorqueHistory
+    time_s: Array
+    trace_rad: Array
+    noise_rms_rad: float
+    genome: Genome
+    genetic: GeneticSettings
+
+    def misfit(self) -> Misfit:
+        """Return the study's misfit of a population against the trace."""
+        given = self.steps, self.time_s, self.trace_rad
+        residuals = Residuals(self.gripper, self.model, *given, _condensed(), instrument=GRIPPER)
+        return make_misfit(residuals, self.gripper, *given)
+
+    def problem(self) -> Problem:
+        """Pose the identification as the study does."""
+        return make_problem(
+            self.gripper,
+            self.model,
+            self.steps,
+            self.time_s,
+            self.trace_rad,
+            case().ranges,
+            _condensed(),
+            instrument=GRIPPER,
+        )
+
+
+def noisy_trace(seed: int = 0) -> NoisyTrace:
+    """Return the cell's trace with the noise of a seed."""
+    steps, time_s, clean = _clean()
+    trace_rad = add_noise(clean, case().noise, np.random.default_rng(seed))
+    model, genetic = case().sample.model, case().method("genetic")
+    assert isinstance(genetic, GeneticSettings)
+    return NoisyTrace(
+        case().gripper,
+        model,
+        steps,
+        time_s,
+        trace_rad,
+        rms(trace_rad - clean),
+        make_genome(model, case().ranges),
+        genetic,
+    )

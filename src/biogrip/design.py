@@ -1,0 +1,603 @@
+"""The command ``biogrip design``: a train of steps that tells plausible samples better.
+
+A train holds a torque, a load or a deformation, then another, and so on; after each step it is read
+at one rate. SciPy's differential evolution searches levels, durations and rates for the lowest
+worst Cramér-Rao bound. While it searches, sums over readings are integrals; what is printed is
+computed from the readings themselves.
+"""
+
+from collections.abc import Iterator, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from biogrip import __version__
+from biogrip.arrays import Array, BoolArray, parts
+from biogrip.errors import BiogripError
+from biogrip.experiment.noise import standard_deviation
+from biogrip.experiment.protocol import Phase, hold, largest_load, torque_history
+from biogrip.experiment.sampling import Burst, Sampling
+from biogrip.files import refuse_inputs, write_text
+from biogrip.identifiability.at_truth import bounds_percent
+from biogrip.instrument.instrument import Quantity
+from biogrip.own_traces.outputs import WRITTEN_BY, check_output
+from biogrip.response.grip import compute_grip
+from biogrip.response.jaw_force import jaw_force_response
+from biogrip.response.modes import Modes
+from biogrip.response.protocol_modes import compute_protocol_modes
+from biogrip.response.simulation import simulated_rotation
+from biogrip.study.defaults import default_config
+from biogrip.study.design_block import DesignBlock
+from biogrip.study.load import load_study, read_configs
+from biogrip.study.source import overlaid, read_config
+from biogrip.study.study import Case
+from biogrip.terminal import visible_lines
+
+GENERATIONS = 300
+"""Generations of the search; each has five trains for every unknown of a train."""
+
+NO_BOUND = 10.0
+"""Relative bound from which on a parameter counts as unknown."""
+
+# Seed of the search, trains of a generation per unknown, trains tried to see what is within reach,
+# samples drawn around a case's own, and decades of the readings' rates.
+_SEED, _POPSIZE, _TRIED, _DRAWN, _DECADES = 1, 5, 512, 8, 4.0
+# Least readings in a step, share of their force that the jaws keep at least when a torque steps
+# down, and share of the noise at which the ringing of arms no longer counts.
+_FEWEST, _KEPT, _UNSEEN = 5, 0.01, 0.01
+# Nodes in a step, as shares of its duration, dense after its start: of integrals over readings,
+# with their weights, and of forces.
+_ROOTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+_NODES, _SHARES = ((_ROOTS + 1) / 2) ** 3, 1.5 * ((_ROOTS + 1) / 2) ** 2 * _WEIGHTS
+_INSTANTS = np.linspace(0.0, 1.0, 16) ** 3
+# Numbers formed at once.
+_AT_ONCE = 2_000_000
+_TIMES = ("rate_Hz", "times_s", "bursts")
+
+
+@dataclass(frozen=True, eq=False)
+class Plausible:
+    """The plausible samples of a case: its own, and those around it."""
+
+    case: Case
+    parameters: Array
+    """The case's own first, (n, n_parameters)."""
+    noise: float
+    """Standard deviation of the noise, in the SI unit of what is read."""
+    asked: BoolArray
+    """True for the parameters asked for, (n_parameters,)."""
+
+    @cached_property
+    def modes(self) -> Modes:
+        """Modes of the responses, with derivatives by the log-parameters."""
+        unit = torque_history((hold(1.0, 1.0),), deforms=self.case.instrument.deforms)
+        problem = self.case.problem
+        return compute_protocol_modes(problem.gripper, problem.searched, unit, self.parameters)
+
+    @cached_property
+    def force(self) -> tuple[Array, Array, Array]:
+        """Force of the jaws after a unit step: constant, (n,), rates and weights, (n, n_modes)."""
+        problem = self.case.problem
+        network = problem.searched.network(self.parameters)
+        found = jaw_force_response(problem.gripper, network, inertia=False)
+        return found.static[:, 0, 0], found.rates, found.weights[:, 0, 0]
+
+    def quiet_s(self, largest: float) -> float:
+        """Return the time in which the ringing of free arms falls far below the noise."""
+        found = [0.0]
+        for arm in (self.case.gripper.left, self.case.gripper.right):
+            if arm.inertia_kgm2:
+                excess = largest / arm.stiffness_Nm_per_rad / (_UNSEEN * self.noise)
+                rate = arm.damping_Nms_per_rad / (2 * arm.inertia_kgm2)
+                found.append(float(np.log(max(excess, 1.0))) / rate)
+        return max(found)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of a train."""
+
+    steps: int
+    """Number of steps."""
+    largest: float
+    """Level of the largest magnitude, in the SI unit of what is held."""
+    frames: int
+    """Duration, in intervals of the camera at its highest rate."""
+    rate_Hz: float
+    """Highest rate of the readings."""
+    readings: int
+    """Most readings in all."""
+    quiet_s: float
+    """Time after each step that is left to ringing arms, without readings."""
+
+    @property
+    def shares_readings(self) -> bool:
+        """True if there are too few readings for the highest rate throughout."""
+        return self.frames > self.readings
+
+
+@dataclass(frozen=True, eq=False)
+class Trains:
+    """Trains of steps, (n_trains, n_steps) each."""
+
+    levels: Array
+    """What is held, in its SI unit."""
+    durations_s: Array
+    """Durations of the steps."""
+    readings: Array
+    """Number of readings in each, whole numbers."""
+    quiet_s: float
+    """Time after each step without readings."""
+
+    def some(self, rows: slice) -> "Trains":
+        """Return some of the trains."""
+        return Trains(self.levels[rows], self.durations_s[rows], self.readings[rows], self.quiet_s)
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """Phases of the first train; levels are rounded to four digits."""
+        pairs = zip(self.durations_s[0], self.levels[0], strict=True)
+        return tuple(hold(_rounded(lasts, 12), _rounded(level, 4)) for lasts, level in pairs)
+
+    @property
+    def bursts(self) -> tuple[Burst, ...]:
+        """Readings of the first train, at one rate in each step."""
+        starts_s = np.cumsum(self.durations_s[0]) - self.durations_s[0] + self.quiet_s
+        found = []
+        for start_s, lasts_s, count in zip(
+            starts_s, self.durations_s[0] - self.quiet_s, self.readings[0], strict=True
+        ):
+            if count:
+                rate_Hz = count / lasts_s
+                found.append(
+                    Burst(_rounded(start_s + 0.5 / rate_Hz, 12), _rounded(rate_Hz, 12), int(count))
+                )
+        return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """Protocol and readings, with what they tell of the plausible samples of a case."""
+
+    phases: tuple[Phase, ...]
+    sampling: Sampling
+    times_s: Array
+    """Times of the readings."""
+    bounds: Array
+    """Relative bounds, (n, n_parameters); infinite for parameters without one."""
+    force_N: float | None
+    """Least force of the jaws, if there are jaws; negative if they have to pull."""
+    turn_rad: float
+    """Largest of what is read of any sample."""
+
+
+def design(config: Path, output: Path | None, *, force: bool) -> None:
+    """Search for a train of steps, print what it tells, and write a config that runs it.
+
+    Parameters
+    ----------
+    config
+        YAML file, laid over the default study; its block `design` is optional.
+    output
+        YAML file to write; by default beside `config`, with `_designed` in its name.
+    force
+        If true, replace even a file that biogrip did not write.
+
+    Raises
+    ------
+    BiogripError
+        If the config or the output cannot be used, or no train tells anything.
+    """
+    output = output or config.with_stem(f"{config.stem}_designed")
+    refuse_inputs([output], [config])
+    check_output(output, force=force)
+    files = [default_config(), config]
+    study = load_study(read_configs(files), files, for_workflow=False)
+    samples = list(make_plausible(list(study.cases.values()), study.config.design))
+    limits = make_limits(samples, study.config.design)
+    train, reached = search(samples, limits)
+    before = [rated(one, one.case.phases, one.case.sampling) for one in samples]
+    sampling = Sampling(limits.rate_Hz)
+    if limits.shares_readings or limits.quiet_s:
+        sampling = Sampling(bursts=train.bursts)
+    after = [rated(one, train.phases, sampling) for one in samples]
+    _check(samples, after)
+    write_text(output, as_config(read_config(config), samples, after))
+    print(visible_lines("\n".join(_said(samples, before, after, reached))))
+    print(visible_lines(f"Written to {output}; biogrip run {output} simulates and fits it."))
+
+
+def make_plausible(cases: Sequence[Case], block: DesignBlock) -> Iterator[Plausible]:
+    """Yield the plausible samples of cases: their own, and some spread evenly around them.
+
+    Raises
+    ------
+    BiogripError
+        If a case cannot be judged.
+    """
+    if not cases:
+        raise BiogripError("design: found no case, allowed are cases with a sample.")
+    for case in cases:
+        if problem := _problem(case, cases[0]):
+            raise BiogripError(f"design: {case.name}: {problem}")
+        names = case.searched.names
+        own = np.log([case.parameters[name] for name in names])
+        aside = np.log(block.factor or 1.0)
+        ends = np.array([own - aside, own + aside])
+        for name in set(block.ranges or {}) & set(names):
+            ends[:, names.index(name)] = np.log((block.ranges or {})[name])
+        logs = own[None]
+        if np.any(ends[1] > ends[0]):
+            # Imported lazily: it is slow to import.
+            from scipy.stats import qmc
+
+            drawn = qmc.Halton(len(names), scramble=False).random(_DRAWN + 1)[1:]
+            logs = np.concatenate((logs, ends[0] + (ends[1] - ends[0]) * drawn))
+        asked = np.array([name in (block.parameters or names) for name in names])
+        yield Plausible(case, np.exp(logs), _noise(case), asked)
+
+
+def _problem(case: Case, first: Case) -> str | None:
+    """Return what of a case cannot be judged, and what is allowed."""
+    measured, controlled = case.block.measurement, case.instrument.controlled
+    if case.recorded:
+        return "found a recorded trace, allowed is a sample with values."
+    for name in case.searched.names:
+        if not case.parameters[name]:
+            return f"found {name} = 0, allowed is a value above 0, or the 0 under `fixed`, too."
+    if controlled != first.instrument.controlled:
+        text = f"found a protocol of {controlled.name}, allowed is one of "
+        return f"{text}{first.instrument.controlled.name} as in {first.name}."
+    if case.noise.absent or not case.noise.white or case.noise.reference == "signal":
+        return "measurement.noise: allowed is white noise, of a share of the peak or a level_rad."
+    if measured.fits_offset or measured.fits_drift:
+        return "measurement: found an offset or drift to be fitted along, allowed is neither."
+    if case.nonlinear_target or case.problem.nonlinear:
+        return "models: found nonlinear, allowed is linear."
+    return None
+
+
+def _noise(case: Case) -> float:
+    """Return the noise of an instrument: that of a case's own sample under its own protocol."""
+    problem, network = case.problem, case.sample.model.sample(case.parameters)
+    times_s = case.sampling.over(problem.torque.end_s)
+    read = simulated_rotation(case.gripper, network, problem.torque, times_s, nonlinear=False)
+    return float(standard_deviation(read[0], case.noise)[0])
+
+
+def make_limits(samples: Sequence[Plausible], block: DesignBlock) -> Limits:
+    """Return the limits of a block; those that it does not set are those of all protocols.
+
+    Raises
+    ------
+    BiogripError
+        If there is no room for a step.
+    """
+    cases = [one.case for one in samples]
+    largest = min((largest_load(case.phases) for case in cases), key=abs)
+    if block.largest is not None:
+        largest = float(np.copysign(block.largest, largest))
+    ends_s = [case.problem.torque.end_s for case in cases]
+    rate_Hz = block.rate_Hz or min(case.block.measurement.rate_Hz for case in cases)
+    frames = int((block.duration_s or min(ends_s)) * rate_Hz * (1 + 1e-12))
+    if frames < _FEWEST:
+        text = f"found room for {frames} readings at {rate_Hz:g} Hz, allowed are at least "
+        raise BiogripError(f"design: {text}{_FEWEST}; a longer duration_s or a higher rate_Hz.")
+    readings = min(len(c.sampling.over(end_s)) for c, end_s in zip(cases, ends_s, strict=True))
+    quiet_s = max(one.quiet_s(largest) for one in samples)
+    quiet_s = quiet_s if 2 * quiet_s * rate_Hz > 1 else 0.0
+    steps = min(block.steps, frames // _FEWEST)
+    return Limits(steps, largest, frames, rate_Hz, readings, quiet_s)
+
+
+def search(
+    samples: Sequence[Plausible], limits: Limits, generations: int = GENERATIONS
+) -> tuple[Trains, list[BoolArray]]:
+    """Search for the train with the lowest worst bound of all parameters within reach.
+
+    A parameter is within reach if some train tells it to a factor of e, all others known.
+
+    Returns
+    -------
+    train
+        The best one, alone.
+    reached
+        For each case, True for parameters that are asked for and within reach, (n, n_parameters).
+
+    Raises
+    ------
+    BiogripError
+        If none is within reach.
+    """
+    # Imported lazily: it is slow to import.
+    from scipy.optimize import differential_evolution
+
+    unknowns = limits.steps * (3 if limits.shares_readings else 2)
+    rng = np.random.default_rng(_SEED)
+    tried = decode(rng.random((_TRIED, unknowns)), samples, limits)
+    reached = [
+        np.any(np.diagonal(information(one, tried), axis1=2, axis2=3) >= 1, axis=1) & one.asked
+        for one in samples
+    ]
+    if not any(map(np.any, reached)):
+        text = "no train of steps tells any parameter asked for; allowed are less noise, a higher "
+        raise BiogripError(f"design: {text}`largest`, a longer duration_s or a higher rate_Hz.")
+
+    def worst(columns: Array) -> Array:
+        trains = decode(columns.T, samples, limits)
+        bounds = [
+            relative_bounds(information(one, trains)).swapaxes(0, 1)[:, within]
+            for one, within in zip(samples, reached, strict=True)
+        ]
+        logs = np.log(np.concatenate(bounds, axis=1))
+        # The mean decides among equals, and last bits do not.
+        return (logs.max(axis=1) + 0.01 * logs.mean(axis=1)).astype(np.float32).astype(float)
+
+    found = differential_evolution(
+        worst,
+        [(0.0, 1.0)] * unknowns,
+        popsize=_POPSIZE,
+        maxiter=generations,
+        tol=0.0,
+        rng=rng,
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+    )
+    return decode(found.x[None], samples, limits), reached
+
+
+def decode(unknowns: Array, samples: Sequence[Plausible], limits: Limits) -> Trains:
+    """Return trains within their limits from numbers between 0 and 1.
+
+    Parameters
+    ----------
+    unknowns : (n_trains, 2 n_steps or 3 n_steps)
+        Levels, as shares of what is allowed; logarithms of durations; if there are too few
+        readings for the highest rate, logarithms of the rates.
+    """
+    heights, lengths, *rates = np.split(unknowns, unknowns.shape[1] // limits.steps, axis=1)
+    frames = _shared_out((_FEWEST / limits.frames) ** lengths, limits.frames)
+    # Steps fall half way between two readings.
+    ends_s = (np.cumsum(frames, axis=1) + 0.5) / limits.rate_Hz
+    ends_s[:, -1] = limits.frames / limits.rate_Hz
+    durations_s = np.diff(ends_s, axis=1, prepend=0.0)
+    left_s = np.maximum(durations_s - limits.quiet_s, 0.0)
+    readings = np.floor(left_s * limits.rate_Hz)
+    if rates:
+        readings = _filled(10 ** (-_DECADES * rates[0]) * left_s, readings, limits.readings)
+    jaws = [one for one in samples if one.case.instrument.has_jaws]
+    levels = limits.largest * heights
+    if jaws:
+        levels = _pressing(jaws, heights, durations_s, limits.largest)
+    return Trains(levels, durations_s, readings, limits.quiet_s)
+
+
+def _shared_out(shares: Array, frames: int) -> Array:
+    """Return whole frames in proportion to shares, enough in each step, (n_trains, n_steps)."""
+    found = np.maximum(np.round(shares / shares.sum(axis=1, keepdims=True) * frames), _FEWEST)
+    found[np.arange(len(found)), found.argmax(axis=1)] += frames - found.sum(axis=1)
+    return found
+
+
+def _filled(shares: Array, room: Array, readings: int) -> Array:
+    """Return whole readings in proportion to shares, as far as there is room, (n_trains, n_steps).
+
+    Readings without room in a step are shared out among the others.
+    """
+    found = np.zeros_like(room)
+    for _ in range(room.shape[1]):
+        free = np.where(found < room, shares, 0.0)
+        left = readings - found.sum(axis=1, keepdims=True)
+        more = left * free / np.maximum(free.sum(axis=1, keepdims=True), 1e-99)
+        found = np.minimum(found + more, room)
+    return np.floor(found)
+
+
+def _pressing(
+    jaws: Sequence[Plausible], heights: Array, durations_s: Array, largest: float
+) -> Array:
+    """Return torques under which the jaws press all samples throughout, (n_trains, n_steps).
+
+    After a step they keep a share of the force that they would have without it.
+    """
+    levels, now = np.zeros_like(heights), np.zeros(len(heights))
+    moving = [np.zeros((len(one.parameters), len(heights), one.force[1].shape[1])) for one in jaws]
+    for step in range(heights.shape[1]):
+        elapsed = durations_s[:, step, None] * _INSTANTS
+        lowest = np.full(len(heights), 0.0 if step else _KEPT * largest)
+        for one, carried in zip(jaws, moving, strict=True):
+            static, rates, weights = (each[:, None, None] for each in one.force)
+            decay = np.exp(rates * elapsed[..., None])
+            unit = static + (decay * weights).sum(axis=3)
+            force = static * now[:, None] + (decay * carried[:, :, None]).sum(axis=3)
+            lowest = np.maximum(lowest, now - (1 - _KEPT) * (force / unit).min(axis=(0, 2)))
+        levels[:, step] = lowest + heights[:, step] * (largest - lowest)
+        for one, carried in zip(jaws, moving, strict=True):
+            _, rates, weights = (each[:, None] for each in one.force)
+            carried += (levels[:, step] - now)[:, None] * weights
+            carried *= np.exp(rates * durations_s[:, step, None])
+        now = levels[:, step]
+    return levels
+
+
+def information(samples: Plausible, trains: Trains) -> Array:
+    """Compute the Fisher information on log-parameters of each sample in each train.
+
+    Sums over readings are integrals over the time since the last step.
+
+    Returns
+    -------
+    (n, n_trains, n_parameters, n_parameters)
+    """
+    size = samples.modes.rates.size * trains.levels.shape[1] * len(_NODES)
+    some = parts(len(trains.levels), max(1, _AT_ONCE // size))
+    return np.concatenate([_information(samples, trains.some(rows)) for rows in some], axis=1)
+
+
+def _information(samples: Plausible, trains: Trains) -> Array:
+    """Compute the information in a few trains.
+
+    A mode of weight w and rate r responds to jumps D at times t_i with w [A exp(r e) - sum D] or,
+    where a deformation is held, w A exp(r e), and its derivative by the rate is
+    w (B + A e) exp(r e), at a time e after the last step at t, with A = sum D exp(r (t - t_i)),
+    B = sum D (t - t_i) exp(r (t - t_i)) and, free of cancellation, C = A - sum D.
+    """
+    rates, weights, rate_slopes, weight_slopes = samples.modes
+    n, m = rates.shape
+    a, b, c = np.zeros((3, n, *trains.levels.shape, m))
+    jumps = np.diff(trains.levels, axis=1, prepend=0.0)
+    for k in range(trains.levels.shape[1]):
+        if k:
+            passed = trains.durations_s[:, k - 1, None]
+            decay, change = (each(rates[:, None] * passed) for each in (np.exp, np.expm1))
+            c[:, :, k] = c[:, :, k - 1] * decay + trains.levels[:, k - 1, None] * change
+            b[:, :, k] = (b[:, :, k - 1] + passed * a[:, :, k - 1]) * decay
+            a[:, :, k] = a[:, :, k - 1] * decay
+        a[:, :, k] += jumps[:, k, None]
+    a, b, c = (each[:, :, :, None] for each in (a, b, c))
+    left_s = np.maximum(trains.durations_s - trains.quiet_s, 0.0)[..., None]
+    first_s = left_s / np.maximum(trains.readings, 1.0)[..., None] / 2
+    elapsed = (trains.quiet_s + np.maximum(left_s * _NODES, first_s))[..., None]
+    exponent = rates[:, None, None, None] * elapsed
+    # Each is of (n, n_trains, n_steps, n_nodes, n_modes).
+    grown = a * np.expm1(exponent) + (a if samples.case.instrument.deforms else c)
+    moved = (b + a * elapsed) * np.exp(exponent)
+    by_weight = weight_slopes[:, :, 0].swapaxes(1, 2)
+    by_rate = (weights * rate_slopes).swapaxes(1, 2)
+    rows = grown @ by_weight[:, None, None] + moved @ by_rate[:, None, None]
+    rows = rows.reshape(n, len(trains.levels), -1, rows.shape[-1]) / samples.noise
+    counts = (trains.readings[..., None] * _SHARES).reshape(len(trains.levels), -1, 1)
+    return rows.swapaxes(2, 3) @ (rows * counts)
+
+
+def relative_bounds(found: Array) -> Array:
+    """Return standard deviations of log-parameters from information, (..., n_parameters).
+
+    A parameter that is not told to a factor of e with all others known is taken as known for the
+    others, as in `biogrip.identifiability.fisher`, and has `NO_BOUND`.
+    """
+    own = np.diagonal(found, axis1=-2, axis2=-1)
+    told = own >= 1
+    size = np.sqrt(np.where(told, own, 1.0))
+    both = told[..., :, None] & told[..., None, :]
+    scaled = np.where(both, found / (size[..., :, None] * size[..., None, :]), 0.0)
+    # Parameters that stand for one another leave a matrix that can hardly be inverted.
+    scaled = np.where(np.eye(found.shape[-1], dtype=bool), 1 + 1e-12, scaled)
+    variance = np.diagonal(np.linalg.inv(scaled), axis1=-2, axis2=-1)
+    bounds = np.sqrt(np.where(variance > 0, variance, np.inf)) / size
+    return np.where(told, np.minimum(bounds, NO_BOUND), NO_BOUND)
+
+
+def rated(samples: Plausible, phases: tuple[Phase, ...], sampling: Sampling) -> Experiment:
+    """Compute what an experiment tells of the plausible samples of a case."""
+    case, noise = samples.case, replace(samples.case.noise, level_rad=samples.noise)
+    problem = replace(case.problem, phases=phases)
+    times_s = sampling.over(problem.torque.end_s)
+    bounds, forces = [], []
+    for values in samples.parameters:
+        named = dict(zip(problem.searched.names, values.tolist(), strict=True))
+        found = {q.label: percent for q, percent in bounds_percent(problem, noise, named, times_s)}
+        bounds.append([found[name] / 100 for name in problem.searched.names])
+        if case.instrument.has_jaws:
+            network = problem.searched.network(values[None])
+            grip = compute_grip(case.gripper, network, problem.torque, nonlinear=False)
+            forces.append(grip.lowest_N)
+    network = problem.searched.network(samples.parameters)
+    read = simulated_rotation(case.gripper, network, problem.torque, times_s, nonlinear=False)
+    force_N = min(forces, default=None)
+    return Experiment(phases, sampling, times_s, np.array(bounds), force_N, float(np.max(read)))
+
+
+def _check(samples: Sequence[Plausible], after: Sequence[Experiment]) -> None:
+    """Refuse a train that turns the arms too far."""
+    for one, found in zip(samples, after, strict=True):
+        most = one.case.stroke_rad
+        if one.case.instrument.has_jaws and found.turn_rad > most:
+            text = f"the best train turns the arms by {1e3 * found.turn_rad:.4g} mrad, allowed is "
+            text += f"what the comb drive's stroke leaves, {1e3 * most:.4g} mrad: a lower `largest`"
+            raise BiogripError(f"design: {one.case.name}: {text}.")
+
+
+def as_config(
+    given: dict[str, Any], samples: Sequence[Plausible], after: Sequence[Experiment]
+) -> str:
+    """Return a config, as YAML, with an experiment as that of its cases."""
+    found = deepcopy(given)
+    cases = found.setdefault("cases", {})
+    for block in (found, *filter(None, cases.values())):
+        for key in set(_TIMES) & set(block.get("measurement") or {}):
+            del block["measurement"][key]
+    for one, experiment in zip(samples, after, strict=True):
+        base = one.case.instrument.controlled.column
+        phases = [
+            {"duration_s": phase.duration_s, base: phase.left.value_Nm}
+            for phase in experiment.phases
+        ]
+        if experiment.sampling.bursts:
+            read: dict[str, Any] = {"bursts": [vars(each) for each in experiment.sampling.bursts]}
+        else:
+            read = {"rate_Hz": experiment.sampling.rate_Hz}
+        own = {
+            "protocol": {"phases": phases},
+            "measurement": {"noise": {"level_rad": one.noise}, **read},
+        }
+        cases[one.case.name] = overlaid(cases.get(one.case.name) or {}, own)
+    text = yaml.safe_dump(found, sort_keys=False, default_flow_style=None, width=100)
+    return f"# {WRITTEN_BY} {__version__}: a protocol by `biogrip design`.\n{text}"
+
+
+def _said(
+    samples: Sequence[Plausible],
+    before: Sequence[Experiment],
+    after: Sequence[Experiment],
+    reached: Sequence[BoolArray],
+) -> Iterator[str]:
+    """Yield lines: a table, and what it takes for granted."""
+    rows: list[tuple[str, ...]] = [("sample", "", "config's protocol", "designed")]
+    notes = []
+    for one, within, *both in zip(samples, reached, before, after, strict=True):
+        case, n = one.case, len(one.parameters)
+        for index, name in enumerate(case.searched.names):
+            bounds = [each.bounds[:, index] for each in both]
+            rows.append((case.name, f"bound of {name} (%)", *(_percent(b[0]) for b in bounds)))
+            if n > 1:
+                worst = (_percent(b.max()) for b in bounds)
+                rows.append((case.name, f"worst of {n} samples (%)", *worst))
+            if one.asked[index] and not np.all(within[:, index]):
+                notes.append(f"No train that was tried tells {name} of {case.name}.")
+        held, read = case.instrument.controlled, case.instrument.read
+        for label, values in (
+            (f"noise of the {read.name}{_unit(read)}", [one.noise] * 2),
+            (f"largest {held.name}{_unit(held)}", [largest_load(each.phases) for each in both]),
+            ("highest rate (Hz)", [1 / np.diff(each.times_s).min() for each in both]),
+            ("readings", [len(each.times_s) for each in both]),
+            ("least force of the jaws (N)", [each.force_N for each in both]),
+        ):
+            if None not in values:
+                rows.append((case.name, label, *(f"{value:.4g}" for value in values)))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(map(str.ljust, row, widths)).rstrip()
+    yield from notes
+    yield (
+        "The noise is taken for white, and for the instrument's: the same under both protocols. "
+        "Bounds are standard deviations of logarithms, all parameters unknown."
+    )
+
+
+def _unit(quantity: Quantity) -> str:
+    return f" ({quantity.unit})" if quantity.unit else ""
+
+
+def _percent(bound: float) -> str:
+    return f"{100 * bound:.3g}" if bound < NO_BOUND else "none"
+
+
+def _rounded(value: float, digits: int) -> float:
+    return float(f"{value:.{digits}g}")

@@ -1,1 +1,0 @@
-"""Optimal experimental design: torque and sampling that determine the parameters best."""

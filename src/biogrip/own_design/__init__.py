@@ -1,1 +1,0 @@
-"""The command ``biogrip design``: experimental design, written as a config and a page."""
