@@ -10,6 +10,8 @@ from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,6 @@ from biogrip.experiment.protocol import Phase, hold, largest_load, torque_histor
 from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.files import refuse_inputs, write_text
 from biogrip.identifiability.at_truth import bounds_percent
-from biogrip.instrument.instrument import Quantity
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.response.grip import compute_grip
 from biogrip.response.jaw_force import jaw_force_response
@@ -38,7 +39,7 @@ from biogrip.study.source import overlaid, read_config
 from biogrip.study.study import Case
 from biogrip.terminal import visible_lines
 
-GENERATIONS = 300
+GENERATIONS = 500
 """Generations of the search; each has five trains for every unknown of a train."""
 
 NO_BOUND = 10.0
@@ -50,6 +51,8 @@ _SEED, _POPSIZE, _TRIED, _DRAWN, _DECADES = 1, 5, 512, 8, 4.0
 # Least readings in a step, share of their force that the jaws keep at least when a torque steps
 # down, and share of the noise at which the ringing of arms no longer counts.
 _FEWEST, _KEPT, _UNSEEN = 5, 0.01, 0.01
+# Levels in the largest.
+_FINE = 10_000
 # Nodes in a step, as shares of its duration, dense after its start: of integrals over readings,
 # with their weights, and of forces.
 _ROOTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -69,7 +72,7 @@ class Plausible:
     """The case's own first, (n, n_parameters)."""
     noise: float
     """Standard deviation of the noise, in the SI unit of what is read."""
-    asked: BoolArray
+    required: BoolArray
     """True for the parameters asked for, (n_parameters,)."""
 
     @cached_property
@@ -140,9 +143,12 @@ class Trains:
 
     @property
     def phases(self) -> tuple[Phase, ...]:
-        """Phases of the first train; levels are rounded to four digits."""
-        pairs = zip(self.durations_s[0], self.levels[0], strict=True)
-        return tuple(hold(_rounded(lasts, 12), _rounded(level, 4)) for lasts, level in pairs)
+        """Phases of the first train; steps of the same level are one."""
+        pairs = zip(self.levels[0], self.durations_s[0], strict=True)
+        return tuple(
+            hold(_rounded(sum(lasts for _, lasts in same)), _rounded(level))
+            for level, same in groupby(pairs, key=itemgetter(0))
+        )
 
     @property
     def bursts(self) -> tuple[Burst, ...]:
@@ -154,9 +160,8 @@ class Trains:
         ):
             if count:
                 rate_Hz = count / lasts_s
-                found.append(
-                    Burst(_rounded(start_s + 0.5 / rate_Hz, 12), _rounded(rate_Hz, 12), int(count))
-                )
+                from_s = start_s + 0.5 / rate_Hz
+                found.append(Burst(_rounded(from_s), _rounded(rate_Hz), int(count)))
         return tuple(found)
 
 
@@ -172,8 +177,6 @@ class Experiment:
     """Relative bounds, (n, n_parameters); infinite for parameters without one."""
     force_N: float | None
     """Least force of the jaws, if there are jaws; negative if they have to pull."""
-    turn_rad: float
-    """Largest of what is read of any sample."""
 
 
 def design(config: Path, output: Path | None, *, force: bool) -> None:
@@ -206,7 +209,6 @@ def design(config: Path, output: Path | None, *, force: bool) -> None:
     if limits.shares_readings or limits.quiet_s:
         sampling = Sampling(bursts=train.bursts)
     after = [rated(one, train.phases, sampling) for one in samples]
-    _check(samples, after)
     write_text(output, as_config(read_config(config), samples, after))
     print(visible_lines("\n".join(_said(samples, before, after, reached))))
     print(visible_lines(f"Written to {output}; biogrip run {output} simulates and fits it."))
@@ -238,8 +240,8 @@ def make_plausible(cases: Sequence[Case], block: DesignBlock) -> Iterator[Plausi
 
             drawn = qmc.Halton(len(names), scramble=False).random(_DRAWN + 1)[1:]
             logs = np.concatenate((logs, ends[0] + (ends[1] - ends[0]) * drawn))
-        asked = np.array([name in (block.parameters or names) for name in names])
-        yield Plausible(case, np.exp(logs), _noise(case), asked)
+        required = np.array([name in (block.parameters or names) for name in names])
+        yield Plausible(case, np.exp(logs), _noise(case), required)
 
 
 def _problem(case: Case, first: Case) -> str | None:
@@ -321,7 +323,7 @@ def search(
     rng = np.random.default_rng(_SEED)
     tried = decode(rng.random((_TRIED, unknowns)), samples, limits)
     reached = [
-        np.any(np.diagonal(information(one, tried), axis1=2, axis2=3) >= 1, axis=1) & one.asked
+        np.any(np.diagonal(information(one, tried), axis1=2, axis2=3) >= 1, axis=1) & one.required
         for one in samples
     ]
     if not any(map(np.any, reached)):
@@ -372,7 +374,7 @@ def decode(unknowns: Array, samples: Sequence[Plausible], limits: Limits) -> Tra
     if rates:
         readings = _filled(10 ** (-_DECADES * rates[0]) * left_s, readings, limits.readings)
     jaws = [one for one in samples if one.case.instrument.has_jaws]
-    levels = limits.largest * heights
+    levels = _rounded_up(limits.largest * heights, limits.largest)
     if jaws:
         levels = _pressing(jaws, heights, durations_s, limits.largest)
     return Trains(levels, durations_s, readings, limits.quiet_s)
@@ -417,13 +419,19 @@ def _pressing(
             unit = static + (decay * weights).sum(axis=3)
             force = static * now[:, None] + (decay * carried[:, :, None]).sum(axis=3)
             lowest = np.maximum(lowest, now - (1 - _KEPT) * (force / unit).min(axis=(0, 2)))
-        levels[:, step] = lowest + heights[:, step] * (largest - lowest)
+        level = lowest + heights[:, step] * (largest - lowest)
+        levels[:, step] = _rounded_up(level, largest)
         for one, carried in zip(jaws, moving, strict=True):
             _, rates, weights = (each[:, None] for each in one.force)
             carried += (levels[:, step] - now)[:, None] * weights
             carried *= np.exp(rates * durations_s[:, step, None])
         now = levels[:, step]
     return levels
+
+
+def _rounded_up(levels: Array, largest: float) -> Array:
+    """Return levels as ten-thousandths of the largest, no lower ones."""
+    return np.ceil(levels / largest * _FINE) / _FINE * largest
 
 
 def information(samples: Plausible, trains: Trains) -> Array:
@@ -483,19 +491,25 @@ def relative_bounds(found: Array) -> Array:
     others, as in `biogrip.identifiability.fisher`, and has `NO_BOUND`.
     """
     own = np.diagonal(found, axis1=-2, axis2=-1)
-    told = own >= 1
-    size = np.sqrt(np.where(told, own, 1.0))
-    both = told[..., :, None] & told[..., None, :]
+    informed = own >= 1
+    size = np.sqrt(np.where(informed, own, 1.0))
+    both = informed[..., :, None] & informed[..., None, :]
     scaled = np.where(both, found / (size[..., :, None] * size[..., None, :]), 0.0)
     # Parameters that stand for one another leave a matrix that can hardly be inverted.
     scaled = np.where(np.eye(found.shape[-1], dtype=bool), 1 + 1e-12, scaled)
     variance = np.diagonal(np.linalg.inv(scaled), axis1=-2, axis2=-1)
     bounds = np.sqrt(np.where(variance > 0, variance, np.inf)) / size
-    return np.where(told, np.minimum(bounds, NO_BOUND), NO_BOUND)
+    return np.where(informed, np.minimum(bounds, NO_BOUND), NO_BOUND)
 
 
 def rated(samples: Plausible, phases: tuple[Phase, ...], sampling: Sampling) -> Experiment:
-    """Compute what an experiment tells of the plausible samples of a case."""
+    """Compute what an experiment tells of the plausible samples of a case.
+
+    Raises
+    ------
+    BiogripError
+        If it turns the arms further than the comb drives can.
+    """
     case, noise = samples.case, replace(samples.case.noise, level_rad=samples.noise)
     problem = replace(case.problem, phases=phases)
     times_s = sampling.over(problem.torque.end_s)
@@ -510,18 +524,11 @@ def rated(samples: Plausible, phases: tuple[Phase, ...], sampling: Sampling) -> 
             forces.append(grip.lowest_N)
     network = problem.searched.network(samples.parameters)
     read = simulated_rotation(case.gripper, network, problem.torque, times_s, nonlinear=False)
-    force_N = min(forces, default=None)
-    return Experiment(phases, sampling, times_s, np.array(bounds), force_N, float(np.max(read)))
-
-
-def _check(samples: Sequence[Plausible], after: Sequence[Experiment]) -> None:
-    """Refuse a train that turns the arms too far."""
-    for one, found in zip(samples, after, strict=True):
-        most = one.case.stroke_rad
-        if one.case.instrument.has_jaws and found.turn_rad > most:
-            text = f"the best train turns the arms by {1e3 * found.turn_rad:.4g} mrad, allowed is "
-            text += f"what the comb drive's stroke leaves, {1e3 * most:.4g} mrad: a lower `largest`"
-            raise BiogripError(f"design: {one.case.name}: {text}.")
+    if forces and (turn := float(read.max())) > case.stroke_rad:
+        text = f"found a torque that turns the arms by {1e3 * turn:.4g} mrad, allowed is what the "
+        text += f"stroke leaves, {1e3 * case.stroke_rad:.4g} mrad: a lower `largest`."
+        raise BiogripError(f"design: {case.name}: {text}")
+    return Experiment(phases, sampling, times_s, np.array(bounds), min(forces, default=None))
 
 
 def as_config(
@@ -569,18 +576,18 @@ def _said(
             if n > 1:
                 worst = (_percent(b.max()) for b in bounds)
                 rows.append((case.name, f"worst of {n} samples (%)", *worst))
-            if one.asked[index] and not np.all(within[:, index]):
+            if one.required[index] and not np.all(within[:, index]):
                 notes.append(f"No train that was tried tells {name} of {case.name}.")
-        held, read = case.instrument.controlled, case.instrument.read
-        for label, values in (
-            (f"noise of the {read.name}{_unit(read)}", [one.noise] * 2),
-            (f"largest {held.name}{_unit(held)}", [largest_load(each.phases) for each in both]),
-            ("highest rate (Hz)", [1 / np.diff(each.times_s).min() for each in both]),
-            ("readings", [len(each.times_s) for each in both]),
-            ("least force of the jaws (N)", [each.force_N for each in both]),
-        ):
-            if None not in values:
-                rows.append((case.name, label, *(f"{value:.4g}" for value in values)))
+        controlled, read = case.instrument.controlled, case.instrument.read
+        largest, rates, counts, forces = zip(*map(_of_protocol, both), strict=True)
+        rows += [
+            (case.name, f"noise of the {read.column}", *2 * (f"{one.noise:.4g}",)),
+            (case.name, f"largest {controlled.column}", *largest),
+            (case.name, "highest rate_Hz", *rates),
+            (case.name, "readings", *counts),
+        ]
+        if case.instrument.has_jaws:
+            rows.append((case.name, "least force_N of the jaws", *forces))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "  ".join(map(str.ljust, row, widths)).rstrip()
@@ -591,13 +598,17 @@ def _said(
     )
 
 
-def _unit(quantity: Quantity) -> str:
-    return f" ({quantity.unit})" if quantity.unit else ""
+def _of_protocol(found: Experiment) -> tuple[str, str, str, str]:
+    """Return largest level, highest rate, number of readings and least force of the jaws."""
+    rate_Hz = 1 / np.diff(found.times_s).min()
+    force = "" if found.force_N is None else f"{found.force_N:.3g}"
+    return f"{largest_load(found.phases):.4g}", f"{rate_Hz:.4g}", f"{len(found.times_s)}", force
 
 
 def _percent(bound: float) -> str:
     return f"{100 * bound:.3g}" if bound < NO_BOUND else "none"
 
 
-def _rounded(value: float, digits: int) -> float:
-    return float(f"{value:.{digits}g}")
+def _rounded(value: float) -> float:
+    """Return a number without the last digits, in which rounding shows."""
+    return float(f"{value:.12g}")
