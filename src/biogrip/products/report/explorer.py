@@ -22,7 +22,7 @@ from biogrip.study.study import Case
 _MOST_READINGS = 2000
 # More digits than a screen shows, and fewer than those in which processors differ.
 _DIGITS = 6
-_DASHES = {"-": "solid", "--": "dash", "-.": "dashdot"}
+_DASHES = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
 _LAYOUT: dict[str, Any] = {
     "template": "simple_white",
     "height": 480,
