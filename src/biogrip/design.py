@@ -37,7 +37,7 @@ from biogrip.study.design_block import DesignBlock
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import overlaid, read_config
 from biogrip.study.study import Case
-from biogrip.terminal import visible_lines
+from biogrip.terminal import aligned, visible_lines
 
 GENERATIONS = 500
 """Generations of the search; each has five trains for every unknown of a train."""
@@ -229,17 +229,13 @@ def make_plausible(cases: Sequence[Case], block: DesignBlock) -> Iterator[Plausi
             raise BiogripError(f"design: {case.name}: {problem}")
         names = case.searched.names
         own = np.log([case.parameters[name] for name in names])
-        aside = np.log(block.factor or 1.0)
-        ends = np.array([own - aside, own + aside])
-        for name in set(block.ranges or {}) & set(names):
-            ends[:, names.index(name)] = np.log((block.ranges or {})[name])
         logs = own[None]
-        if np.any(ends[1] > ends[0]):
+        if block.factor is not None:
             # Imported lazily: it is slow to import.
             from scipy.stats import qmc
 
             drawn = qmc.Halton(len(names), scramble=False).random(_DRAWN + 1)[1:]
-            logs = np.concatenate((logs, ends[0] + (ends[1] - ends[0]) * drawn))
+            logs = np.concatenate((logs, own + np.log(block.factor) * (2 * drawn - 1)))
         required = np.array([name in (block.parameters or names) for name in names])
         yield Plausible(case, np.exp(logs), _noise(case), required)
 
@@ -566,7 +562,7 @@ def _said(
     reached: Sequence[BoolArray],
 ) -> Iterator[str]:
     """Yield lines: a table, and what it takes for granted."""
-    rows: list[tuple[str, ...]] = [("sample", "", "config's protocol", "designed")]
+    rows: list[tuple[str, ...]] = []
     notes = []
     for one, within, *both in zip(samples, reached, before, after, strict=True):
         case, n = one.case, len(one.parameters)
@@ -578,19 +574,16 @@ def _said(
                 rows.append((case.name, f"worst of {n} samples (%)", *worst))
             if one.required[index] and not np.all(within[:, index]):
                 notes.append(f"No train that was tried tells {name} of {case.name}.")
-        controlled, read = case.instrument.controlled, case.instrument.read
-        largest, rates, counts, forces = zip(*map(_of_protocol, both), strict=True)
+        held, read = case.instrument.controlled, case.instrument.read
+        noise, forces = f"{one.noise:.4g}", [f"{own.force_N:.3g}" for own in both if own.force_N]
         rows += [
-            (case.name, f"noise of the {read.column}", *2 * (f"{one.noise:.4g}",)),
-            (case.name, f"largest {controlled.column}", *largest),
-            (case.name, "highest rate_Hz", *rates),
-            (case.name, "readings", *counts),
+            (case.name, f"noise of the {read.name} ({read.unit})", noise, noise),
+            (case.name, f"largest {held.name} ({held.unit})", *map(_largest, both)),
+            (case.name, "highest rate (Hz)", *map(_rate, both)),
+            (case.name, "readings", *(str(len(own.times_s)) for own in both)),
+            *([(case.name, "least force of the jaws (N)", *forces)] if forces else []),
         ]
-        if case.instrument.has_jaws:
-            rows.append((case.name, "least force_N of the jaws", *forces))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(map(str.ljust, row, widths)).rstrip()
+    yield aligned(rows, ("sample", "", "config's protocol", "designed"))
     yield from notes
     yield (
         "The noise is taken for white, and for the instrument's: the same under both protocols. "
@@ -598,11 +591,12 @@ def _said(
     )
 
 
-def _of_protocol(found: Experiment) -> tuple[str, str, str, str]:
-    """Return largest level, highest rate, number of readings and least force of the jaws."""
-    rate_Hz = 1 / np.diff(found.times_s).min()
-    force = "" if found.force_N is None else f"{found.force_N:.3g}"
-    return f"{largest_load(found.phases):.4g}", f"{rate_Hz:.4g}", f"{len(found.times_s)}", force
+def _largest(found: Experiment) -> str:
+    return f"{largest_load(found.phases):.4g}"
+
+
+def _rate(found: Experiment) -> str:
+    return f"{1 / np.diff(found.times_s).min():.4g}"
 
 
 def _percent(bound: float) -> str:

@@ -191,14 +191,10 @@ class StudyConfig(Shared):
         """Find parameters in the block `design` that no case identifies."""
         found = (p.name for case in self.cases.values() for p in case.searched)
         searched = list(dict.fromkeys(found))
-        named: list[tuple[str, str | int, str]] = [
-            ("parameters", index, name) for index, name in enumerate(self.design.parameters)
-        ]
-        named += [("ranges", name, name) for name in self.design.ranges or {}]
-        for block, key, name in named:
+        for index, name in enumerate(self.design.parameters):
             if name not in searched:
                 text = f"found '{name}', allowed are {', '.join(searched)}."
-                yield ("design", block, key), text + nearest(name, searched)
+                yield ("design", "parameters", index), text + nearest(name, searched)
 
     def _band_problems(self) -> Iterator[Problem]:
         """Find power-law models in a study whose protocols exceed their range of validity."""

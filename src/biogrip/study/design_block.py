@@ -1,16 +1,11 @@
 """Config block of `biogrip design`: limits of a train of steps, and the samples it is for."""
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import Field
 
-from biogrip.keys import Block, Distinct, Problem
-
-_Ends = Annotated[
-    tuple[Annotated[float, Field(gt=0, le=1e12)], ...], Field(min_length=2, max_length=2)
-]
+from biogrip.keys import Block, Distinct
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,11 +28,3 @@ class DesignBlock(Block):
     factor: Annotated[float | None, Field(gt=1, le=1000)] = None
     """Factor by which all parameters may be smaller or larger than in a case's sample. By default,
     the cases' samples alone are plausible."""
-    ranges: Mapping[str, _Ends] | None = None
-    """Lowest and highest plausible value of parameters, SI units, instead of the factor."""
-
-    def problems(self) -> Iterator[Problem]:
-        """Find ranges whose ends are not in order."""
-        for name, (low, high) in (self.ranges or {}).items():
-            if not low < high:
-                yield ("ranges", name), f"found {low} to {high}, allowed is the lower one first."
