@@ -19,7 +19,7 @@ import numpy as np
 import yaml
 
 from biogrip import __version__
-from biogrip.arrays import Array, BoolArray, parts
+from biogrip.arrays import Array, BoolArray
 from biogrip.errors import BiogripError
 from biogrip.experiment.noise import standard_deviation
 from biogrip.experiment.protocol import Phase, hold, largest_load, torque_history
@@ -51,15 +51,12 @@ _SEED, _POPSIZE, _TRIED, _DRAWN, _DECADES = 1, 5, 512, 8, 4.0
 # Least readings in a step, share of their force that the jaws keep at least when a torque steps
 # down, and share of the noise at which the ringing of arms no longer counts.
 _FEWEST, _KEPT, _UNSEEN = 5, 0.01, 0.01
-# Levels in the largest.
-_FINE = 10_000
+_FINE = 10_000  # levels in the largest
 # Nodes in a step, as shares of its duration, dense after its start: of integrals over readings,
 # with their weights, and of forces.
 _ROOTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 _NODES, _SHARES = ((_ROOTS + 1) / 2) ** 3, 1.5 * ((_ROOTS + 1) / 2) ** 2 * _WEIGHTS
 _INSTANTS = np.linspace(0.0, 1.0, 16) ** 3
-# Numbers formed at once.
-_AT_ONCE = 2_000_000
 _TIMES = ("rate_Hz", "times_s", "bursts")
 
 
@@ -83,12 +80,13 @@ class Plausible:
         return compute_protocol_modes(problem.gripper, problem.searched, unit, self.parameters)
 
     @cached_property
-    def force(self) -> tuple[Array, Array, Array]:
-        """Force of the jaws after a unit step: constant, (n,), rates and weights, (n, n_modes)."""
-        problem = self.case.problem
-        network = problem.searched.network(self.parameters)
-        found = jaw_force_response(problem.gripper, network, inertia=False)
-        return found.static[:, 0, 0], found.rates, found.weights[:, 0, 0]
+    def forces(self) -> list[tuple[float, Array, Array]]:
+        """Forces of the jaws after a unit step: constant, rates and weights, for each sample."""
+        if not self.case.instrument.has_jaws:
+            return []
+        network = self.case.searched.network(self.parameters)
+        found = jaw_force_response(self.case.gripper, network, inertia=False)
+        return list(zip(found.static[:, 0, 0], found.rates, found.weights[:, 0, 0], strict=True))
 
     def quiet_s(self, largest: float) -> float:
         """Return the time in which the ringing of free arms falls far below the noise."""
@@ -137,10 +135,6 @@ class Trains:
     quiet_s: float
     """Time after each step without readings."""
 
-    def some(self, rows: slice) -> "Trains":
-        """Return some of the trains."""
-        return Trains(self.levels[rows], self.durations_s[rows], self.readings[rows], self.quiet_s)
-
     @property
     def phases(self) -> tuple[Phase, ...]:
         """Phases of the first train; steps of the same level are one."""
@@ -155,13 +149,11 @@ class Trains:
         """Readings of the first train, at one rate in each step."""
         starts_s = np.cumsum(self.durations_s[0]) - self.durations_s[0] + self.quiet_s
         found = []
-        for start_s, lasts_s, count in zip(
-            starts_s, self.durations_s[0] - self.quiet_s, self.readings[0], strict=True
-        ):
+        rates_Hz = self.readings[0] / np.maximum(self.durations_s[0] - self.quiet_s, 1e-99)
+        for start_s, rate_Hz, count in zip(starts_s, rates_Hz, self.readings[0], strict=True):
             if count:
-                rate_Hz = count / lasts_s
-                from_s = start_s + 0.5 / rate_Hz
-                found.append(Burst(_rounded(from_s), _rounded(rate_Hz), int(count)))
+                from_s = _rounded(start_s + 0.5 / rate_Hz)
+                found.append(Burst(from_s, _rounded(rate_Hz), int(count)))
         return tuple(found)
 
 
@@ -172,7 +164,6 @@ class Experiment:
     phases: tuple[Phase, ...]
     sampling: Sampling
     times_s: Array
-    """Times of the readings."""
     bounds: Array
     """Relative bounds, (n, n_parameters); infinite for parameters without one."""
     force_N: float | None
@@ -182,19 +173,9 @@ class Experiment:
 def design(config: Path, output: Path | None, *, force: bool) -> None:
     """Search for a train of steps, print what it tells, and write a config that runs it.
 
-    Parameters
-    ----------
-    config
-        YAML file, laid over the default study; its block `design` is optional.
-    output
-        YAML file to write; by default beside `config`, with `_designed` in its name.
-    force
-        If true, replace even a file that biogrip did not write.
-
-    Raises
-    ------
-    BiogripError
-        If the config or the output cannot be used, or no train tells anything.
+    The config, a YAML file, is laid over the default study. By default the output is beside it,
+    with `_designed` in its name; with `force` it replaces a file that biogrip did not write, too.
+    A `BiogripError` says what cannot be used, or that no train tells anything.
     """
     output = output or config.with_stem(f"{config.stem}_designed")
     refuse_inputs([output], [config])
@@ -217,13 +198,10 @@ def design(config: Path, output: Path | None, *, force: bool) -> None:
 def make_plausible(cases: Sequence[Case], block: DesignBlock) -> Iterator[Plausible]:
     """Yield the plausible samples of cases: their own, and some spread evenly around them.
 
-    Raises
-    ------
-    BiogripError
-        If a case cannot be judged.
+    A `BiogripError` says which case cannot be judged, and why.
     """
     if not cases:
-        raise BiogripError("design: found no case, allowed are cases with a sample.")
+        raise BiogripError("design: found no case, allowed is one with a sample or more.")
     for case in cases:
         if problem := _problem(case, cases[0]):
             raise BiogripError(f"design: {case.name}: {problem}")
@@ -251,7 +229,8 @@ def _problem(case: Case, first: Case) -> str | None:
     if controlled != first.instrument.controlled:
         text = f"found a protocol of {controlled.name}, allowed is one of "
         return f"{text}{first.instrument.controlled.name} as in {first.name}."
-    if case.noise.absent or not case.noise.white or case.noise.reference == "signal":
+    of_signal = case.noise.level_rad is None and case.noise.reference == "signal"
+    if case.noise.absent or not case.noise.white or of_signal:
         return "measurement.noise: allowed is white noise, of a share of the peak or a level_rad."
     if measured.fits_offset or measured.fits_drift:
         return "measurement: found an offset or drift to be fitted along, allowed is neither."
@@ -271,10 +250,7 @@ def _noise(case: Case) -> float:
 def make_limits(samples: Sequence[Plausible], block: DesignBlock) -> Limits:
     """Return the limits of a block; those that it does not set are those of all protocols.
 
-    Raises
-    ------
-    BiogripError
-        If there is no room for a step.
+    If there is no room for a step, it is a `BiogripError`.
     """
     cases = [one.case for one in samples]
     largest = min((largest_load(case.phases) for case in cases), key=abs)
@@ -298,26 +274,20 @@ def search(
 ) -> tuple[Trains, list[BoolArray]]:
     """Search for the train with the lowest worst bound of all parameters within reach.
 
-    A parameter is within reach if some train tells it to a factor of e, all others known.
-
-    Returns
-    -------
-    train
-        The best one, alone.
-    reached
-        For each case, True for parameters that are asked for and within reach, (n, n_parameters).
-
-    Raises
-    ------
-    BiogripError
-        If none is within reach.
+    Such are asked for, and told to a factor of e by some train if all others are known: True in an
+    array (n, n_parameters) for each case, returned beside the train. If there is none, it is a
+    `BiogripError`.
     """
     # Imported lazily: it is slow to import.
     from scipy.optimize import differential_evolution
 
     unknowns = limits.steps * (3 if limits.shares_readings else 2)
     rng = np.random.default_rng(_SEED)
-    tried = decode(rng.random((_TRIED, unknowns)), samples, limits)
+    drawn = rng.random((_TRIED, unknowns))
+    if limits.shares_readings:
+        # What is fast shows where short steps are read at high rates.
+        drawn[::2, 2 * limits.steps :] = 1 - drawn[::2, limits.steps : 2 * limits.steps]
+    tried = decode(drawn, samples, limits)
     reached = [
         np.any(np.diagonal(information(one, tried), axis1=2, axis2=3) >= 1, axis=1) & one.required
         for one in samples
@@ -328,11 +298,9 @@ def search(
 
     def worst(columns: Array) -> Array:
         trains = decode(columns.T, samples, limits)
-        bounds = [
-            relative_bounds(information(one, trains)).swapaxes(0, 1)[:, within]
-            for one, within in zip(samples, reached, strict=True)
-        ]
-        logs = np.log(np.concatenate(bounds, axis=1))
+        bounds = [relative_bounds(information(one, trains)).swapaxes(0, 1) for one in samples]
+        pairs = zip(bounds, reached, strict=True)
+        logs = np.log(np.concatenate([found[:, within] for found, within in pairs], axis=1))
         # The mean decides among equals, and last bits do not.
         return (logs.max(axis=1) + 0.01 * logs.mean(axis=1)).astype(np.float32).astype(float)
 
@@ -351,16 +319,16 @@ def search(
 
 
 def decode(unknowns: Array, samples: Sequence[Plausible], limits: Limits) -> Trains:
-    """Return trains within their limits from numbers between 0 and 1.
+    """Return trains within their limits from numbers between 0 and 1, (n_trains, n_unknowns).
 
-    Parameters
-    ----------
-    unknowns : (n_trains, 2 n_steps or 3 n_steps)
-        Levels, as shares of what is allowed; logarithms of durations; if there are too few
-        readings for the highest rate, logarithms of the rates.
+    These are, for each step, its level as a share of what is allowed, the logarithm of its duration
+    and, if there are too few readings for the highest rate, that of its rate.
     """
     heights, lengths, *rates = np.split(unknowns, unknowns.shape[1] // limits.steps, axis=1)
-    frames = _shared_out((_FEWEST / limits.frames) ** lengths, limits.frames)
+    shares = (_FEWEST / limits.frames) ** lengths
+    shares /= shares.sum(axis=1, keepdims=True)
+    frames = np.maximum(np.round(shares * limits.frames), _FEWEST)
+    frames[np.arange(len(frames)), frames.argmax(axis=1)] += limits.frames - frames.sum(axis=1)
     # Steps fall half way between two readings.
     ends_s = (np.cumsum(frames, axis=1) + 0.5) / limits.rate_Hz
     ends_s[:, -1] = limits.frames / limits.rate_Hz
@@ -369,18 +337,9 @@ def decode(unknowns: Array, samples: Sequence[Plausible], limits: Limits) -> Tra
     readings = np.floor(left_s * limits.rate_Hz)
     if rates:
         readings = _filled(10 ** (-_DECADES * rates[0]) * left_s, readings, limits.readings)
-    jaws = [one for one in samples if one.case.instrument.has_jaws]
-    levels = _rounded_up(limits.largest * heights, limits.largest)
-    if jaws:
-        levels = _pressing(jaws, heights, durations_s, limits.largest)
-    return Trains(levels, durations_s, readings, limits.quiet_s)
-
-
-def _shared_out(shares: Array, frames: int) -> Array:
-    """Return whole frames in proportion to shares, enough in each step, (n_trains, n_steps)."""
-    found = np.maximum(np.round(shares / shares.sum(axis=1, keepdims=True) * frames), _FEWEST)
-    found[np.arange(len(found)), found.argmax(axis=1)] += frames - found.sum(axis=1)
-    return found
+    forces = [each for one in samples for each in one.forces]
+    levels = _pressing(forces, heights, durations_s) if forces else _rounded_up(heights)
+    return Trains(limits.largest * levels, durations_s, readings, limits.quiet_s)
 
 
 def _filled(shares: Array, room: Array, readings: int) -> Array:
@@ -398,86 +357,82 @@ def _filled(shares: Array, room: Array, readings: int) -> Array:
 
 
 def _pressing(
-    jaws: Sequence[Plausible], heights: Array, durations_s: Array, largest: float
+    forces: Sequence[tuple[float, Array, Array]], heights: Array, durations_s: Array
 ) -> Array:
-    """Return torques under which the jaws press all samples throughout, (n_trains, n_steps).
+    """Return torques, as shares of the largest, under which the jaws press all samples throughout.
 
-    After a step they keep a share of the force that they would have without it.
+    After a step they keep a share of the force that they would have without it. Forces are those
+    of all samples; arrays are of (n_trains, n_steps).
     """
     levels, now = np.zeros_like(heights), np.zeros(len(heights))
-    moving = [np.zeros((len(one.parameters), len(heights), one.force[1].shape[1])) for one in jaws]
+    moving = [np.zeros((len(heights), len(rates))) for _, rates, _ in forces]
     for step in range(heights.shape[1]):
-        elapsed = durations_s[:, step, None] * _INSTANTS
-        lowest = np.full(len(heights), 0.0 if step else _KEPT * largest)
-        for one, carried in zip(jaws, moving, strict=True):
-            static, rates, weights = (each[:, None, None] for each in one.force)
-            decay = np.exp(rates * elapsed[..., None])
-            unit = static + (decay * weights).sum(axis=3)
-            force = static * now[:, None] + (decay * carried[:, :, None]).sum(axis=3)
-            lowest = np.maximum(lowest, now - (1 - _KEPT) * (force / unit).min(axis=(0, 2)))
-        level = lowest + heights[:, step] * (largest - lowest)
-        levels[:, step] = _rounded_up(level, largest)
-        for one, carried in zip(jaws, moving, strict=True):
-            _, rates, weights = (each[:, None] for each in one.force)
+        elapsed = (durations_s[:, step, None] * _INSTANTS)[..., None]
+        lowest = np.full(len(heights), 0.0 if step else _KEPT)
+        for (static, rates, weights), carried in zip(forces, moving, strict=True):
+            decay = np.exp(rates * elapsed)
+            force = static * now[:, None] + (decay * carried[:, None]).sum(axis=2)
+            share = (force / (static + (decay * weights).sum(axis=2))).min(axis=1)
+            lowest = np.maximum(lowest, now - (1 - _KEPT) * share)
+        levels[:, step] = _rounded_up(lowest + heights[:, step] * (1 - lowest))
+        for (_, rates, weights), carried in zip(forces, moving, strict=True):
             carried += (levels[:, step] - now)[:, None] * weights
             carried *= np.exp(rates * durations_s[:, step, None])
         now = levels[:, step]
     return levels
 
 
-def _rounded_up(levels: Array, largest: float) -> Array:
-    """Return levels as ten-thousandths of the largest, no lower ones."""
-    return np.ceil(levels / largest * _FINE) / _FINE * largest
+def _rounded_up(levels: Array) -> Array:
+    """Return levels, as shares of the largest, as ten-thousandths."""
+    found: Array = np.ceil(_FINE * levels) / _FINE
+    return found
 
 
 def information(samples: Plausible, trains: Trains) -> Array:
-    """Compute the Fisher information on log-parameters of each sample in each train.
+    """Compute the Fisher information on log-parameters, (n, n_trains, n_parameters, n_parameters).
 
     Sums over readings are integrals over the time since the last step.
-
-    Returns
-    -------
-    (n, n_trains, n_parameters, n_parameters)
     """
-    size = samples.modes.rates.size * trains.levels.shape[1] * len(_NODES)
-    some = parts(len(trains.levels), max(1, _AT_ONCE // size))
-    return np.concatenate([_information(samples, trains.some(rows)) for rows in some], axis=1)
+    left_s = np.maximum(trains.durations_s - trains.quiet_s, 0.0)[..., None]
+    first_s = left_s / np.maximum(trains.readings, 1.0)[..., None] / 2
+    elapsed = trains.quiet_s + np.maximum(left_s * _NODES, first_s)
+    counts = (trains.readings[..., None] * _SHARES).reshape(len(elapsed), -1, 1)
+    found = []
+    for modes in map(Modes._make, zip(*samples.modes, strict=True)):
+        rows = _sensitivities(modes, trains, elapsed, deforms=samples.case.instrument.deforms)
+        rows = rows.reshape(len(elapsed), -1, rows.shape[-1]) / samples.noise
+        found.append(rows.swapaxes(1, 2) @ (rows * counts))
+    return np.stack(found)
 
 
-def _information(samples: Plausible, trains: Trains) -> Array:
-    """Compute the information in a few trains.
+def _sensitivities(modes: Modes, trains: Trains, elapsed: Array, *, deforms: bool) -> Array:
+    """Compute derivatives by the log-parameters of a sample at times since the last step.
 
     A mode of weight w and rate r responds to jumps D at times t_i with w [A exp(r e) - sum D] or,
     where a deformation is held, w A exp(r e), and its derivative by the rate is
     w (B + A e) exp(r e), at a time e after the last step at t, with A = sum D exp(r (t - t_i)),
     B = sum D (t - t_i) exp(r (t - t_i)) and, free of cancellation, C = A - sum D.
+    Times are (n_trains, n_steps, n_times), derivatives (n_trains, n_steps, n_times, n_parameters).
     """
-    rates, weights, rate_slopes, weight_slopes = samples.modes
-    n, m = rates.shape
-    a, b, c = np.zeros((3, n, *trains.levels.shape, m))
+    rates = modes.rates
+    a, b, c = np.zeros((3, *trains.levels.shape, len(rates)))
     jumps = np.diff(trains.levels, axis=1, prepend=0.0)
     for k in range(trains.levels.shape[1]):
         if k:
             passed = trains.durations_s[:, k - 1, None]
-            decay, change = (each(rates[:, None] * passed) for each in (np.exp, np.expm1))
-            c[:, :, k] = c[:, :, k - 1] * decay + trains.levels[:, k - 1, None] * change
-            b[:, :, k] = (b[:, :, k - 1] + passed * a[:, :, k - 1]) * decay
-            a[:, :, k] = a[:, :, k - 1] * decay
-        a[:, :, k] += jumps[:, k, None]
-    a, b, c = (each[:, :, :, None] for each in (a, b, c))
-    left_s = np.maximum(trains.durations_s - trains.quiet_s, 0.0)[..., None]
-    first_s = left_s / np.maximum(trains.readings, 1.0)[..., None] / 2
-    elapsed = (trains.quiet_s + np.maximum(left_s * _NODES, first_s))[..., None]
-    exponent = rates[:, None, None, None] * elapsed
-    # Each is of (n, n_trains, n_steps, n_nodes, n_modes).
-    grown = a * np.expm1(exponent) + (a if samples.case.instrument.deforms else c)
-    moved = (b + a * elapsed) * np.exp(exponent)
-    by_weight = weight_slopes[:, :, 0].swapaxes(1, 2)
-    by_rate = (weights * rate_slopes).swapaxes(1, 2)
-    rows = grown @ by_weight[:, None, None] + moved @ by_rate[:, None, None]
-    rows = rows.reshape(n, len(trains.levels), -1, rows.shape[-1]) / samples.noise
-    counts = (trains.readings[..., None] * _SHARES).reshape(len(trains.levels), -1, 1)
-    return rows.swapaxes(2, 3) @ (rows * counts)
+            decay, change = np.exp(rates * passed), np.expm1(rates * passed)
+            c[:, k] = c[:, k - 1] * decay + trains.levels[:, k - 1, None] * change
+            b[:, k] = (b[:, k - 1] + passed * a[:, k - 1]) * decay
+            a[:, k] = a[:, k - 1] * decay
+        a[:, k] += jumps[:, k, None]
+    a, b, c = a[:, :, None], b[:, :, None], c[:, :, None]
+    exponent = rates * elapsed[..., None]
+    grown = a * np.expm1(exponent) + (a if deforms else c)
+    moved = (b + a * elapsed[..., None]) * np.exp(exponent)
+    found: Array = (
+        grown @ modes.weight_slopes[:, 0].T + moved @ (modes.weights * modes.rate_slopes).T
+    )
+    return found
 
 
 def relative_bounds(found: Array) -> Array:
@@ -501,23 +456,19 @@ def relative_bounds(found: Array) -> Array:
 def rated(samples: Plausible, phases: tuple[Phase, ...], sampling: Sampling) -> Experiment:
     """Compute what an experiment tells of the plausible samples of a case.
 
-    Raises
-    ------
-    BiogripError
-        If it turns the arms further than the comb drives can.
+    If it turns the arms further than the comb drives can, it is a `BiogripError`.
     """
     case, noise = samples.case, replace(samples.case.noise, level_rad=samples.noise)
     problem = replace(case.problem, phases=phases)
     times_s = sampling.over(problem.torque.end_s)
-    bounds, forces = [], []
+    names, bounds, forces = problem.searched.names, [], []
     for values in samples.parameters:
-        named = dict(zip(problem.searched.names, values.tolist(), strict=True))
+        named = dict(zip(names, values.tolist(), strict=True))
         found = {q.label: percent for q, percent in bounds_percent(problem, noise, named, times_s)}
-        bounds.append([found[name] / 100 for name in problem.searched.names])
+        bounds.append([found[name] / 100 for name in names])
         if case.instrument.has_jaws:
-            network = problem.searched.network(values[None])
-            grip = compute_grip(case.gripper, network, problem.torque, nonlinear=False)
-            forces.append(grip.lowest_N)
+            given = case.gripper, problem.searched.network(values[None]), problem.torque
+            forces.append(compute_grip(*given, nonlinear=False).lowest_N)
     network = problem.searched.network(samples.parameters)
     read = simulated_rotation(case.gripper, network, problem.torque, times_s, nonlinear=False)
     if forces and (turn := float(read.max())) > case.stroke_rad:
@@ -542,14 +493,12 @@ def as_config(
             {"duration_s": phase.duration_s, base: phase.left.value_Nm}
             for phase in experiment.phases
         ]
+        measured: dict[str, Any] = {"noise": {"level_rad": one.noise}}
         if experiment.sampling.bursts:
-            read: dict[str, Any] = {"bursts": [vars(each) for each in experiment.sampling.bursts]}
+            measured["bursts"] = [vars(each) for each in experiment.sampling.bursts]
         else:
-            read = {"rate_Hz": experiment.sampling.rate_Hz}
-        own = {
-            "protocol": {"phases": phases},
-            "measurement": {"noise": {"level_rad": one.noise}, **read},
-        }
+            measured["rate_Hz"] = experiment.sampling.rate_Hz
+        own = {"protocol": {"phases": phases}, "measurement": measured}
         cases[one.case.name] = overlaid(cases.get(one.case.name) or {}, own)
     text = yaml.safe_dump(found, sort_keys=False, default_flow_style=None, width=100)
     return f"# {WRITTEN_BY} {__version__}: a protocol by `biogrip design`.\n{text}"
@@ -565,38 +514,32 @@ def _said(
     rows: list[tuple[str, ...]] = []
     notes = []
     for one, within, *both in zip(samples, reached, before, after, strict=True):
-        case, n = one.case, len(one.parameters)
-        for index, name in enumerate(case.searched.names):
+        name, held, read = one.case.name, one.case.instrument.controlled, one.case.instrument.read
+        for index, parameter in enumerate(one.case.searched.names):
             bounds = [each.bounds[:, index] for each in both]
-            rows.append((case.name, f"bound of {name} (%)", *(_percent(b[0]) for b in bounds)))
-            if n > 1:
+            rows.append((name, f"{parameter}: bound (%)", *(_percent(b[0]) for b in bounds)))
+            if (n := len(one.parameters)) > 1:
                 worst = (_percent(b.max()) for b in bounds)
-                rows.append((case.name, f"worst of {n} samples (%)", *worst))
+                rows.append((name, f"{parameter}: worst of {n} samples (%)", *worst))
             if one.required[index] and not np.all(within[:, index]):
-                notes.append(f"No train that was tried tells {name} of {case.name}.")
-        held, read = case.instrument.controlled, case.instrument.read
-        noise, forces = f"{one.noise:.4g}", [f"{own.force_N:.3g}" for own in both if own.force_N]
-        rows += [
-            (case.name, f"noise of the {read.name} ({read.unit})", noise, noise),
-            (case.name, f"largest {held.name} ({held.unit})", *map(_largest, both)),
-            (case.name, "highest rate (Hz)", *map(_rate, both)),
-            (case.name, "readings", *(str(len(own.times_s)) for own in both)),
-            *([(case.name, "least force of the jaws (N)", *forces)] if forces else []),
-        ]
+                notes.append(f"No train that was tried tells {parameter} of {name}.")
+        for label, values in {
+            f"noise of the {read.name} ({read.unit})": (one.noise, one.noise),
+            f"largest {held.name} ({held.unit})": [largest_load(each.phases) for each in both],
+            "highest rate (Hz)": [1 / np.diff(each.times_s).min() for each in both],
+            "readings": [len(each.times_s) for each in both],
+            "least force of the jaws (N)": [
+                each.force_N for each in both if each.force_N is not None
+            ],
+        }.items():
+            if values:
+                rows.append((name, label, *(f"{value:.4g}" for value in values)))
     yield aligned(rows, ("sample", "", "config's protocol", "designed"))
     yield from notes
     yield (
         "The noise is taken for white, and for the instrument's: the same under both protocols. "
         "Bounds are standard deviations of logarithms, all parameters unknown."
     )
-
-
-def _largest(found: Experiment) -> str:
-    return f"{largest_load(found.phases):.4g}"
-
-
-def _rate(found: Experiment) -> str:
-    return f"{1 / np.diff(found.times_s).min():.4g}"
 
 
 def _percent(bound: float) -> str:

@@ -1,0 +1,160 @@
+"""`biogrip design`: bounds, limits of trains, jaws that press, and what is written."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from biogrip.cli import main
+from biogrip.design import decode, make_limits, make_plausible, rated, search
+from biogrip.experiment.sampling import Sampling
+from biogrip.identify.multi_start import fit_from
+from biogrip.library import simulate
+from biogrip.response.grip import compute_grip
+from biogrip.study.defaults import default_config
+from biogrip.study.load import load_study, read_configs
+
+GRIPPER = """
+only: [endothelial_cell]
+measurement: {noise: {level_rad: 3.0e-6}}
+cases: {endothelial_cell: {fixed: {c_p: 1.0e-3}}}
+design: {rate_Hz: 100, steps: 4, factor: 1.3}
+"""
+CREEP = """
+instrument: creep
+protocol: {phases: [{duration_s: 30.0, HELD: 1.0}]}
+measurement: {rate_Hz: 10.0, noise: {level: 0.02}}
+only: [solid]
+cases: {solid: {sample: {model: zener_maxwell, k: 300.0, k_p: 200.0, c: 900.0}}}
+design: {steps: 3}
+"""
+
+
+def designed(folder: Path, text: str = GRIPPER) -> tuple[Path, Path]:
+    config = folder / "my.yaml"
+    config.write_text(text)
+    assert main(["design", str(config)]) == 0
+    return config, folder / "my_designed.yaml"
+
+
+def set_up(folder: Path, text: str = GRIPPER):  # type: ignore[no-untyped-def]
+    config = folder / "my.yaml"
+    config.write_text(text)
+    files = [default_config(), config]
+    study = load_study(read_configs(files), files, for_workflow=False)
+    samples = list(make_plausible(list(study.cases.values()), study.config.design))
+    return samples, make_limits(samples, study.config.design)
+
+
+def test_a_design_is_better_keeps_its_limits_and_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config, output = designed(tmp_path)
+    said = capsys.readouterr().out
+    rows = [line for line in said.splitlines() if "worst of 9 samples" in line]
+    worst = np.array([[float(number) for number in row.split()[-2:]] for row in rows])
+    assert len(worst) == 3
+    assert worst[:, 1].max() < 0.7 * worst[:, 0].max()
+    # Noise, torque, rate and force stand beside the bounds.
+    for label in ("noise of the rotation (rad)", "largest torque (N m)", "highest rate (Hz)"):
+        assert label in said
+    files = [default_config(), output]
+    (case,) = load_study(read_configs(files), files, for_workflow=False).cases.values()
+    levels = [phase.left.value_Nm for phase in case.phases]
+    assert max(levels) <= 1.6e-9 * (1 + 1e-12)
+    assert min(levels) > 0
+    assert case.problem.torque.end_s == pytest.approx(400.0)
+    times_s = case.sampling.over(400.0)
+    assert len(times_s) <= 4001
+    assert np.diff(times_s).min() >= 0.01 * (1 - 1e-9)
+    # The same command gives the same bytes.
+    before = output.read_bytes()
+    assert main(["design", str(config)]) == 0
+    assert output.read_bytes() == before
+
+
+def test_the_jaws_press_every_plausible_sample(tmp_path: Path) -> None:
+    """By the force of the jaws over the whole protocol, which the search does not compute so."""
+    samples, limits = set_up(tmp_path)
+    unknowns = np.random.default_rng(0).random((20, 3 * limits.steps))
+    for each in unknowns:
+        phases = decode(each[None], samples, limits).phases
+        case = samples[0].case
+        torque = replace(case.problem, phases=phases).torque
+        for values in samples[0].parameters:
+            network = case.problem.searched.network(values[None])
+            assert compute_grip(case.gripper, network, torque, nonlinear=False).lowest_N > 0
+
+
+def test_bounds_are_those_of_the_inverse_information(tmp_path: Path) -> None:
+    """By central differences of simulated readings; the truncation of 1e-4 is some 1e-8."""
+    samples, limits = set_up(tmp_path)
+    (one,) = samples
+    train, _ = search(samples, limits, 5)
+    found = rated(one, train.phases, Sampling(bursts=train.bursts))
+    problem = replace(one.case.problem, phases=train.phases)
+    names, step = one.case.searched.names, 1e-4
+
+    def read(shift: np.ndarray) -> np.ndarray:
+        values = dict(zip(names, one.parameters[0] * np.exp(shift), strict=True))
+        return simulate(problem, {**problem.fixed, **values}, found.times_s)
+
+    shifts = step * np.eye(len(names))
+    rows = np.array([(read(own) - read(-own)) / (2 * step) for own in shifts]) / one.noise
+    expected = np.sqrt(np.diagonal(np.linalg.inv(rows @ rows.T)))
+    assert found.bounds[0] == pytest.approx(expected, rel=1e-4)
+
+
+def test_simulated_fits_scatter_as_the_bounds_say(tmp_path: Path) -> None:
+    """200 fits: a standard deviation is then known to 5 %, and four of these are allowed."""
+    samples, limits = set_up(tmp_path)
+    (one,) = samples
+    train, _ = search(samples, limits, 40)
+    found = rated(one, train.phases, Sampling(bursts=train.bursts))
+    problem = replace(one.case.problem, phases=train.phases)
+    true = dict(zip(one.case.searched.names, one.parameters[0], strict=True))
+    exact = simulate(problem, {**problem.fixed, **true}, found.times_s)
+    rng = np.random.default_rng(3)
+    traces = exact + one.noise * rng.standard_normal((200, len(exact)))
+    posed = [problem.of(found.times_s, trace) for trace in traces]
+    fits = fit_from(posed, np.tile(np.log(one.parameters[0]), (200, 1)))
+    scatter = np.std(fits.x, axis=0, ddof=1)
+    assert scatter == pytest.approx(found.bounds[0], rel=0.2)
+    bias = np.mean(fits.x, axis=0) - np.log(one.parameters[0])
+    assert np.all(np.abs(bias) < 4 * found.bounds[0] / np.sqrt(200))
+
+
+@pytest.mark.parametrize(("instrument", "held"), [("creep", "stress_Pa"), ("relaxation", "strain")])
+def test_creep_and_relaxation_are_designed(
+    tmp_path: Path, instrument: str, held: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = CREEP.replace("HELD", held).replace("creep", instrument)
+    _, output = designed(tmp_path, text)
+    said = capsys.readouterr().out
+    assert "jaws" not in said
+    assert f"largest {held.removesuffix('_Pa')}" in said
+    phases = yaml.safe_load(output.read_text())["cases"]["solid"]["protocol"]["phases"]
+    assert {held, "duration_s"} == set(phases[0])
+
+
+@pytest.mark.parametrize(
+    ("block", "words"),
+    [
+        ("{stepps: 4}", "Did you mean 'steps'?"),
+        ("{steps: 0}", "found 0"),
+        ("{parameters: [q]}", "found 'q', allowed are k, k_p, c"),
+        ("{rate_Hz: 1.0e-3}", "found room for 0 readings"),
+    ],
+)
+def test_what_cannot_be_designed_is_said(
+    tmp_path: Path, block: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = tmp_path / "my.yaml"
+    config.write_text(f"only: [endothelial_cell]\ndesign: {block}\n")
+    assert main(["design", str(config)]) == 1
+    said = capsys.readouterr().err
+    assert words in said
+    assert "Traceback" not in said
+    assert not (tmp_path / "my_designed.yaml").exists()
