@@ -147,7 +147,7 @@ clean:
 	rm -rf .venv .venv-bench .venv-field .venv-site .venv-lowest .venv-3.12 .venv-3.13 .snakemake report.html site
 
 $(READY): requirements-install.lock requirements.lock pyproject.toml
-	@echo "Installing the $(call counted,requirements.lock) packages of requirements.lock into .venv: 0.9 GB, 20 to 60 seconds"
+	@echo "Installing the $(call counted,requirements.lock) packages of requirements.lock into .venv: 0.8 GB, 20 to 60 seconds"
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	@$(call locked,.venv,requirements.lock)
 	@$(call ourselves,.venv)

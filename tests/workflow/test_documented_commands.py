@@ -29,7 +29,7 @@ LEFT = {
         "results/tables/verdicts_longer.md",
     ],
     "groups.md": ["found.csv"],
-    "design.md": ["designed.yaml", "designed.html"],
+    "design.md": ["my_designed.yaml"],
     "howto/case.md": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
     "howto/trace.md": [
         *("found.json", "drifting.json", "coloured.json", "page.html", "traces.csv"),
