@@ -456,7 +456,8 @@ def test_one_trace_is_drawn_at_once(
 
 def test_a_thousand_rows(browser: Any, of_example: dict[str, Any], tmp_path: Path) -> None:
     path = tmp_path / "many.html"
-    write_page([made_up(of_example, number) for number in range(ROWS)], {}, path)
+    traces = [made_up(of_example, number) for number in range(ROWS)]
+    write_page(traces, {}, path, copied(traces))
     assert path.stat().st_size < MOST_BYTES_OF_MANY
     start = time.monotonic()
     opened = Opened(browser, path)
