@@ -90,6 +90,21 @@ def calibration_of(wildcards):
     return [f"results/calibrations/{case.name}.yaml"] if case.is_calibrated else []
 
 
+def rows_of(wildcards):
+    """The rows of the table that a batch has, as `biogrip identify --rows` chooses them."""
+    first, last = map(int, wildcards.rows.split("-"))
+    return TABLE[first : last + 1]
+
+
+def batches_of_traces(wildcards):
+    """The tables of all batches."""
+    size = TRACES.rows_a_batch
+    firsts = range(0, len(TABLE), size)
+    return [
+        f"results/traces/batches/{first}-{first + size - 1}.csv" for first in firsts
+    ]
+
+
 CLAIM = Claim(RESULTS)
 
 # `biogrip run` has checked already, and put right what can be.

@@ -17,21 +17,6 @@ if TRACES is not None:
     ALL_FILES.append("results/tables/traces.csv")
 
 
-def rows_of(wildcards):
-    """The rows of the table that a batch has, as `biogrip identify --rows` chooses them."""
-    first, last = map(int, wildcards.rows.split("-"))
-    return TABLE[first : last + 1]
-
-
-def batches_of_traces(wildcards):
-    """The tables of all batches."""
-    size = TRACES.rows_a_batch
-    firsts = range(0, len(TABLE), size)
-    return [
-        f"results/traces/batches/{first}-{first + size - 1}.csv" for first in firsts
-    ]
-
-
 if TRACES is not None:
 
     # A trace that is not there or cannot be used is a row that says so.
