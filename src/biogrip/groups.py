@@ -29,6 +29,7 @@ from biogrip.identifiability.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETER
 from biogrip.own_traces.many_traces import FAILED
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.products.files.rows import read_rows, write_rows
+from biogrip.study.trace_file import trace_file_problem
 from biogrip.terminal import aligned, visible, visible_lines
 
 FEWEST_CELLS = 3
@@ -147,6 +148,8 @@ def groups(found: Path, by: str, table: Path | None, *, force: bool) -> None:
     BiogripError
         If the file is no such table, or has no such column.
     """
+    if problem := trace_file_problem(found):
+        raise BiogripError(f"FOUND: {problem}")
     header, *rows = read_rows(found)
     traces = [dict(zip(header, map(visible, row), strict=False)) for row in rows]
     if missing := [name for name in ("trace", "fit", "confidence", by) if name not in header]:

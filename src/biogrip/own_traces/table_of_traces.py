@@ -116,8 +116,7 @@ def read_table(path: Path, *, for_workflow: bool = False) -> list[Row]:
                 value, problem = _value(name, schema, by_name[name])
                 own = overlaid(own, value)
                 problems += [f"{place(path, line, name)}: {problem}"] if problem else []
-        words = {name: by_name[name] for name in header if _is_copied(name)}
-        found.append(Row(line, file, own, words))
+        found.append(Row(line, file, own, {it: by_name[it] for it in header if _is_copied(it)}))
     if problems:
         raise BiogripError(_first(problems))
     return found
