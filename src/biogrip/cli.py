@@ -258,7 +258,11 @@ def _design_parser(stages: Any) -> None:
     text = "search for a train of steps that determines the samples of a config better"
     design = stages.add_parser("design", help=text, description=text)
     design.set_defaults(command=_design)
-    design.examples = _examples("design my.yaml", cost="The search takes some ten seconds.")
+    design.examples = _examples(
+        "design my.yaml",
+        "design my.yaml --output designed.yaml",
+        cost="The search takes some ten seconds.",
+    )
     design.add_argument(
         "config", type=Path, help="YAML file with your samples, laid over the default study"
     )
