@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from biogrip.cli import main
-from biogrip.design import decode, make_limits, make_plausible, rated, search
+from biogrip.design import NO_BOUND, decode, make_limits, make_plausible, rated, search
 from biogrip.experiment.sampling import Sampling
 from biogrip.identify.multi_start import fit_from
 from biogrip.library import simulate
@@ -105,6 +105,34 @@ def test_bounds_are_those_of_the_inverse_information(tmp_path: Path) -> None:
     rows = np.array([(read(own) - read(-own)) / (2 * step) for own in shifts]) / one.noise
     expected = np.sqrt(np.diagonal(np.linalg.inv(rows @ rows.T)))
     assert found.bounds[0] == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("rate_Hz", [0.7, 10.0, 1000.0])
+def test_trains_keep_their_limits(tmp_path: Path, rate_Hz: float) -> None:
+    """Where steps are as many as have room, too: at 0.7 Hz, 12 of five readings and more in 70."""
+    block = f"steps: 12, largest: 1.0e-9, duration_s: 100.0, rate_Hz: {rate_Hz}"
+    samples, limits = set_up(tmp_path, GRIPPER.split("design:")[0] + f"design: {{{block}}}")
+    unknowns = np.random.default_rng(1).random((20, 36 if limits.shares_readings else 24))
+    for each in unknowns:
+        train = decode(each[None], samples, limits)
+        assert np.all((train.levels > 0) & (train.levels <= 1.0e-9 * (1 + 1e-12)))
+        assert train.durations_s.min() >= 4.5 / rate_Hz * (1 - 1e-9)
+        end_s = sum(phase.duration_s for phase in train.phases)
+        assert 100.0 - 1 / rate_Hz < end_s <= 100.0 * (1 + 1e-9)
+        times_s = Sampling(bursts=train.bursts).over(end_s)
+        assert len(times_s) <= 4001
+        assert np.diff(times_s).min() >= (1 - 1e-6) / rate_Hz
+        assert times_s[-1] <= end_s
+
+
+def test_parameters_that_trade_have_no_bound(tmp_path: Path) -> None:
+    """All four of the paper's drop under its own protocol: c and c_p show as their sum alone."""
+    text = "only: [liquid_drop_2]\nmeasurement: {noise: {level_rad: 3.0e-6}}"
+    (one,), _ = set_up(tmp_path, text)
+    found = rated(one, one.case.phases, one.case.sampling)
+    by_name = dict(zip(one.case.searched.names, found.bounds[0], strict=True))
+    assert by_name["c"] == by_name["c_p"] == NO_BOUND
+    assert by_name["k_p"] < 0.1
 
 
 def test_simulated_fits_scatter_as_the_bounds_say(tmp_path: Path) -> None:

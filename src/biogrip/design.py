@@ -25,12 +25,12 @@ from biogrip.experiment.noise import standard_deviation
 from biogrip.experiment.protocol import Phase, hold, largest_load, torque_history
 from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.files import refuse_inputs, write_text
-from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.response.grip import compute_grip
 from biogrip.response.jaw_force import jaw_force_response
 from biogrip.response.modes import Modes
 from biogrip.response.protocol_modes import compute_protocol_modes
+from biogrip.response.sensitivity import linear_responses
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.defaults import default_config
 from biogrip.study.design_block import DesignBlock
@@ -46,7 +46,7 @@ NO_BOUND = 10.0
 """Relative bound from which on a parameter counts as unknown."""
 
 # Seed of the search, trains of a generation per unknown, trains tried to see what is within reach,
-# samples drawn around a case's own, and decades of the readings' rates.
+# samples drawn around a case's own, and decades of the steps' shares of readings.
 _SEED, _POPSIZE, _TRIED, _DRAWN, _DECADES = 1, 5, 512, 8, 4.0
 # Least readings in a step, share of their force that the jaws keep at least when a torque steps
 # down, and share of the noise at which the ringing of arms no longer counts.
@@ -165,7 +165,7 @@ class Experiment:
     sampling: Sampling
     times_s: Array
     bounds: Array
-    """Relative bounds, (n, n_parameters); infinite for parameters without one."""
+    """Relative bounds, (n, n_parameters); `NO_BOUND` for parameters without one."""
     force_N: float | None
     """Least force of the jaws, if there are jaws; negative if they have to pull."""
 
@@ -274,8 +274,8 @@ def search(
 ) -> tuple[Trains, list[BoolArray]]:
     """Search for the train with the lowest worst bound of all parameters within reach.
 
-    Such are asked for, and told to a factor of e by some train if all others are known: True in an
-    array (n, n_parameters) for each case, returned beside the train. If there is none, it is a
+    Such are asked for, and have a bound in one of some hundred random trains: True in an array
+    (n, n_parameters) for each case, returned beside the train. If there is none, it is a
     `BiogripError`.
     """
     # Imported lazily: it is slow to import.
@@ -285,11 +285,11 @@ def search(
     rng = np.random.default_rng(_SEED)
     drawn = rng.random((_TRIED, unknowns))
     if limits.shares_readings:
-        # What is fast shows where short steps are read at high rates.
-        drawn[::2, 2 * limits.steps :] = 1 - drawn[::2, limits.steps : 2 * limits.steps]
+        # What is fast shows where short steps have as many readings as long ones.
+        drawn[::2, 2 * limits.steps :] = 0.0
     tried = decode(drawn, samples, limits)
     reached = [
-        np.any(np.diagonal(information(one, tried), axis1=2, axis2=3) >= 1, axis=1) & one.required
+        np.any(relative_bounds(information(one, tried)) < NO_BOUND, axis=1) & one.required
         for one in samples
     ]
     if not any(map(np.any, reached)):
@@ -322,12 +322,12 @@ def decode(unknowns: Array, samples: Sequence[Plausible], limits: Limits) -> Tra
     """Return trains within their limits from numbers between 0 and 1, (n_trains, n_unknowns).
 
     These are, for each step, its level as a share of what is allowed, the logarithm of its duration
-    and, if there are too few readings for the highest rate, that of its rate.
+    and, if there are too few for the highest rate, that of its share of the readings.
     """
-    heights, lengths, *rates = np.split(unknowns, unknowns.shape[1] // limits.steps, axis=1)
+    heights, lengths, *counts = np.split(unknowns, unknowns.shape[1] // limits.steps, axis=1)
     shares = (_FEWEST / limits.frames) ** lengths
     shares /= shares.sum(axis=1, keepdims=True)
-    frames = np.maximum(np.round(shares * limits.frames), _FEWEST)
+    frames = _FEWEST + np.floor(shares * (limits.frames - _FEWEST * limits.steps))
     frames[np.arange(len(frames)), frames.argmax(axis=1)] += limits.frames - frames.sum(axis=1)
     # Steps fall half way between two readings.
     ends_s = (np.cumsum(frames, axis=1) + 0.5) / limits.rate_Hz
@@ -335,8 +335,8 @@ def decode(unknowns: Array, samples: Sequence[Plausible], limits: Limits) -> Tra
     durations_s = np.diff(ends_s, axis=1, prepend=0.0)
     left_s = np.maximum(durations_s - limits.quiet_s, 0.0)
     readings = np.floor(left_s * limits.rate_Hz)
-    if rates:
-        readings = _filled(10 ** (-_DECADES * rates[0]) * left_s, readings, limits.readings)
+    if counts:
+        readings = _filled(10 ** (-_DECADES * counts[0]), readings, limits.readings)
     forces = [each for one in samples for each in one.forces]
     levels = _pressing(forces, heights, durations_s) if forces else _rounded_up(heights)
     return Trains(limits.largest * levels, durations_s, readings, limits.quiet_s)
@@ -458,24 +458,24 @@ def rated(samples: Plausible, phases: tuple[Phase, ...], sampling: Sampling) -> 
 
     If it turns the arms further than the comb drives can, it is a `BiogripError`.
     """
-    case, noise = samples.case, replace(samples.case.noise, level_rad=samples.noise)
-    problem = replace(case.problem, phases=phases)
-    times_s = sampling.over(problem.torque.end_s)
-    names, bounds, forces = problem.searched.names, [], []
-    for values in samples.parameters:
-        named = dict(zip(names, values.tolist(), strict=True))
-        found = {q.label: percent for q, percent in bounds_percent(problem, noise, named, times_s)}
-        bounds.append([found[name] / 100 for name in names])
-        if case.instrument.has_jaws:
-            given = case.gripper, problem.searched.network(values[None]), problem.torque
-            forces.append(compute_grip(*given, nonlinear=False).lowest_N)
-    network = problem.searched.network(samples.parameters)
-    read = simulated_rotation(case.gripper, network, problem.torque, times_s, nonlinear=False)
-    if forces and (turn := float(read.max())) > case.stroke_rad:
+    case, problem = samples.case, replace(samples.case.problem, phases=phases)
+    times_s, model = sampling.over(problem.torque.end_s), problem.searched
+    given = problem.gripper, model, problem.torque, times_s, samples.parameters
+    rows = linear_responses(*given) / samples.noise
+    bounds = relative_bounds(rows[:, 1:] @ rows[:, 1:].swapaxes(1, 2))
+    if not case.instrument.has_jaws:
+        return Experiment(phases, sampling, times_s, bounds, None)
+    turn = samples.noise * float(rows[:, 0].max())
+    if turn > case.stroke_rad:
         text = f"found a torque that turns the arms by {1e3 * turn:.4g} mrad, allowed is what the "
         text += f"stroke leaves, {1e3 * case.stroke_rad:.4g} mrad: a lower `largest`."
         raise BiogripError(f"design: {case.name}: {text}")
-    return Experiment(phases, sampling, times_s, np.array(bounds), min(forces, default=None))
+    networks = (model.network(values[None]) for values in samples.parameters)
+    force_N = min(
+        compute_grip(case.gripper, each, problem.torque, nonlinear=False).lowest_N
+        for each in networks
+    )
+    return Experiment(phases, sampling, times_s, bounds, force_N)
 
 
 def as_config(
