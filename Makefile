@@ -123,7 +123,7 @@ site: $(SITE_READY)
 
 # The pictures that figures are compared with; look at what has changed before committing them.
 pinned: $(TEST_READY)
-	$(BIN)/python -m pytest -q tests/products/figures/test_pinned.py --pin
+	$(BIN)/python -m pytest -q tests/figures/test_pinned.py --pin
 
 # The second lock holds only what tests add to the first, and the next two what running on Slurm,
 # and benchmarks, add to both, of which they may need what is there for PyPy only.

@@ -14,13 +14,13 @@ from unittest import mock
 import numpy as np
 import pandas as pd
 
-import biogrip.products.files
+import biogrip.records
 from biogrip.cli import main
 from biogrip.digits import with_unit
+from biogrip.page.answers import compared_rows, say_what_traces_tell
 from biogrip.products.catalogue import products
-from biogrip.products.files import identifications, traces
-from biogrip.products.files.rows import RowFile, read_table
-from biogrip.products.report.answers import compared_rows, say_what_traces_tell
+from biogrip.records import identifications, traces
+from biogrip.records.rows import RowFile, read_table
 from tests.helpers.key_reference import file_schema, reference
 from tests.helpers.places import EXAMPLE
 from tests.published_numbers import renewed_numbers
@@ -224,7 +224,7 @@ def file_columns() -> str:
 
 
 def _kinds() -> Iterator[RowFile]:
-    package = biogrip.products.files
+    package = biogrip.records
     modules = [module.name for module in iter_modules(package.__path__, f"{package.__name__}.")]
     modules += [product.module for product in products().values()]
     for module in dict.fromkeys(modules):

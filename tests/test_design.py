@@ -10,7 +10,7 @@ import yaml
 from biogrip.cli import main
 from biogrip.design import NO_BOUND, decode, make_limits, make_plausible, rated, search
 from biogrip.experiment.sampling import Sampling
-from biogrip.identify.multi_start import fit_from
+from biogrip.fit.multi_start import fit_from
 from biogrip.library import simulate
 from biogrip.response.grip import compute_grip
 from biogrip.study.defaults import default_config

@@ -8,16 +8,16 @@ import pytest
 from scipy.stats import chi2, norm
 
 from biogrip.arrays import Array
-from biogrip.identifiability.diagnosis import Diagnosis, diagnose
-from biogrip.identifiability.fit_status import Note
-from biogrip.identifiability.likelihood import compute_fall
-from biogrip.identifiability.whiteness import wandering
-from biogrip.identify.answer import silent
-from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace, study_of
-from biogrip.own_traces.read_as import ReadAs
-from biogrip.own_traces.second_opinion import second_opinions
-from biogrip.own_traces.trace_case import TraceCase
-from biogrip.products.files.traces import Measurements
+from biogrip.fit.answer import silent
+from biogrip.identify.one_trace import IdentifyOptions, identify_trace, study_of
+from biogrip.identify.read_as import ReadAs
+from biogrip.identify.second_opinion import second_opinions
+from biogrip.identify.trace_case import TraceCase
+from biogrip.judge.diagnosis import Diagnosis, diagnose
+from biogrip.judge.fit_status import Note
+from biogrip.judge.likelihood import compute_fall
+from biogrip.judge.whiteness import wandering
+from biogrip.records.traces import Measurements
 from tests.helpers.problems import clean, run
 
 TIMES, CLEAN = clean("endothelial_cell", 5.0)

@@ -13,7 +13,7 @@ from scipy.stats import norm, ttest_ind
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.groups import FEWEST_CELLS, Cell, adjusted, compare, estimate
-from biogrip.own_traces.outputs import WRITTEN_BY
+from biogrip.identify.outputs import WRITTEN_BY
 from tests.helpers.places import ROOT
 
 # Log risk ratios of tuberculosis, with and without vaccination, and their variances: Colditz et

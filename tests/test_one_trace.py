@@ -23,20 +23,20 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.errors import BiogripError
 from biogrip.experiment.sample import CANDIDATES, MODELS
-from biogrip.identifiability.fit_status import Note
-from biogrip.identifiability.profiles import Profile
-from biogrip.identifiability.quantities import parameters_and_sum
-from biogrip.identifiability.verdicts import Finding
-from biogrip.identify.answer import History, Identification
-from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.model_choice import ranked
-from biogrip.own_traces import one_trace
-from biogrip.own_traces.fitted_models import FittedModels
-from biogrip.own_traces.many_traces import Outcome, write_table
-from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace
-from biogrip.own_traces.outputs import WRITTEN_BY, check_output
-from biogrip.own_traces.read_as import ReadAs
-from biogrip.own_traces.words import for_a_paper, side_by_side
+from biogrip.fit.answer import History, Identification
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.model_choice import ranked
+from biogrip.identify import one_trace
+from biogrip.identify.fitted_models import FittedModels
+from biogrip.identify.many_traces import Outcome, write_table
+from biogrip.identify.one_trace import IdentifyOptions, identify_trace
+from biogrip.identify.outputs import WRITTEN_BY, check_output
+from biogrip.identify.read_as import ReadAs
+from biogrip.identify.words import for_a_paper, side_by_side
+from biogrip.judge.fit_status import Note
+from biogrip.judge.profiles import Profile
+from biogrip.judge.quantities import parameters_and_sum
+from biogrip.judge.verdicts import Finding
 from biogrip.traces.late_onset import note_late_onset
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean

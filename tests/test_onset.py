@@ -13,10 +13,10 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.experiment.protocol import Phase, hold, load
-from biogrip.identify.fitted_onset import OnsetFits
+from biogrip.fit.fitted_onset import OnsetFits
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.library import Sample, set_up, simulate
-from biogrip.products.stages import judgement, recording
+from biogrip.stages import judgement, recording
 from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
 from biogrip.traces.onset import begins_constant, estimate_onset

@@ -15,13 +15,13 @@ from axe_playwright_python.sync_playwright import Axe
 from scipy.interpolate import PchipInterpolator
 
 from biogrip.arrays import Array
-from biogrip.own_traces.curves import curves_of, normal_quantiles
-from biogrip.own_traces.on_page import for_page
-from biogrip.own_traces.one_trace import Identified, IdentifyOptions, identify_trace
-from biogrip.own_traces.page import write_page
-from biogrip.own_traces.read_as import ReadAs
-from biogrip.products.figures import style
-from biogrip.products.figures.results import Fit, fit_of
+from biogrip.figures import style
+from biogrip.figures.results import Fit, fit_of
+from biogrip.identify.curves import curves_of, normal_quantiles
+from biogrip.identify.on_page import for_page
+from biogrip.identify.one_trace import Identified, IdentifyOptions, identify_trace
+from biogrip.identify.page import write_page
+from biogrip.identify.read_as import ReadAs
 from biogrip.terminal import visible
 from tests.helpers.places import EXAMPLE, ROOT
 
@@ -157,7 +157,7 @@ def test_over_decades_the_axes_are_logarithmic(identified: Identified) -> None:
 
 
 def test_colours_are_those_of_the_figures() -> None:
-    css = (ROOT / "src/biogrip/own_traces/traces.css").read_text()
+    css = (ROOT / "src/biogrip/identify/traces.css").read_text()
     colours = {"measured": style.MEASURED, "fitted": style.FITTED, "green": style.GREEN}
     colours |= {"shade": style.SHADE, "grey": style.GREY, "amber": style.COLORS["amber"]}
     for name, colour in colours.items():

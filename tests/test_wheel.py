@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 import biogrip
-from biogrip.products.tables import claims
+from biogrip.tables import claims
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.runs import SHIPPED, TINY
 

@@ -17,7 +17,7 @@ from biogrip.files import watch_writes
 from biogrip.terminal import visible, visible_lines
 
 if TYPE_CHECKING:
-    from biogrip.own_traces.read_as import ReadAs
+    from biogrip.identify.read_as import ReadAs
 
 RESULTS = Path("results")
 FIT = "fit"
@@ -388,7 +388,7 @@ def _make(options: argparse.Namespace) -> None:
 
 
 def _identify(options: argparse.Namespace) -> None:
-    from biogrip.own_traces.identify import identify
+    from biogrip.identify.identify import identify
 
     options.status = identify(
         options.traces,
@@ -418,7 +418,7 @@ def _design(options: argparse.Namespace) -> None:
 
 
 def _read_as(options: argparse.Namespace) -> "ReadAs":
-    from biogrip.own_traces.read_as import ReadAs
+    from biogrip.identify.read_as import ReadAs
 
     return ReadAs(
         options.time,

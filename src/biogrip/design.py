@@ -25,7 +25,7 @@ from biogrip.experiment.noise import standard_deviation
 from biogrip.experiment.protocol import Phase, hold, largest_load, torque_history
 from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.files import refuse_inputs, write_text
-from biogrip.own_traces.outputs import WRITTEN_BY, check_output
+from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.response.grip import compute_grip
 from biogrip.response.jaw_force import jaw_force_response
 from biogrip.response.modes import Modes
@@ -439,7 +439,7 @@ def relative_bounds(found: Array) -> Array:
     """Return standard deviations of log-parameters from information, (..., n_parameters).
 
     A parameter that is not told to a factor of e with all others known is taken as known for the
-    others, as in `biogrip.identifiability.fisher`, and has `NO_BOUND`.
+    others, as in `biogrip.judge.fisher`, and has `NO_BOUND`.
     """
     own = np.diagonal(found, axis1=-2, axis2=-1)
     informed = own >= 1

@@ -123,8 +123,8 @@ def _serve(place: str) -> None:
 def _load() -> None:
     from snakemake.cli import get_argument_parser
 
+    from biogrip.figures.style import figure, styled
     from biogrip.products.catalogue import products
-    from biogrip.products.figures.style import figure, styled
     from biogrip.products.source_files import fingerprint
 
     # What either imports only when it is needed.

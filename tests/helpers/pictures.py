@@ -9,8 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from biogrip.figures import declared
 from biogrip.files import atomic_write
-from biogrip.products.figures import declared
 
 _DOTS_PER_INCH = 60
 
@@ -33,7 +33,7 @@ def _save_coarsely(figure: Figure, png: Path) -> None:
 def assert_drawn(path: Path) -> None:
     """See that a figure is not blank, and that something in colour goes across it.
 
-    What figures show is pinned (`tests/products/figures/test_pinned.py`); here it is that
+    What figures show is pinned (`tests/figures/test_pinned.py`); here it is that
     other data, too, come to a picture, and are not drawn outside of it.
     """
     picture = np.asarray(imread(path))[..., :3]

@@ -17,10 +17,10 @@ import yaml
 
 import biogrip
 from biogrip.errors import BiogripError
+from biogrip.page import page
 from biogrip.products.catalogue import chosen, products
 from biogrip.products.digest import digest
 from biogrip.products.product import Product
-from biogrip.products.report import page
 from biogrip.products.uses import Used, using
 from biogrip.running.rules import ProductRule, files_of, make_rules
 from biogrip.study.source import overlaid, read_config
@@ -250,8 +250,8 @@ def test_a_digest_refuses_what_it_does_not_know(value: object) -> None:
 
 
 def test_a_name_can_be_declared_once_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    from biogrip.products.figures import fit
-    from biogrip.products.tables import errors_of_case
+    from biogrip.figures import fit
+    from biogrip.tables import errors_of_case
 
     def draw() -> None:
         """Draw nothing."""

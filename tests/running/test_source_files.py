@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-import biogrip.products
+import biogrip
 from biogrip.products.source_files import _SAYING, fingerprint, source_files
 from tests.helpers.places import EXAMPLE
 
@@ -20,8 +20,8 @@ def stems(module: str) -> set[str]:
 
 
 def test_a_stage_names_what_it_imports_and_nothing_else() -> None:
-    files = stems("biogrip.products.stages.measurement")
-    wanted = {"products/stages/measurement.py", "products/files/traces.py"}
+    files = stems("biogrip.stages.measurement")
+    wanted = {"stages/measurement.py", "records/traces.py"}
     assert wanted | {"experiment/noise.py", "experiment/random_streams.py"} <= files
     assert not {file for file in files if file.startswith(("identify/", "response/"))}
 
@@ -58,10 +58,10 @@ STAGES = ("target", "measurement", "identification", "identifications", "sweep_p
 @pytest.mark.parametrize(
     "module",
     [
-        *(f"biogrip.products.stages.{s}" for s in STAGES),
-        "biogrip.products.tables.evidence",
-        "biogrip.products.figures.fit",
-        "biogrip.products.figures.robustness",
+        *(f"biogrip.stages.{s}" for s in STAGES),
+        "biogrip.tables.evidence",
+        "biogrip.figures.fit",
+        "biogrip.figures.robustness",
     ],
 )
 def test_no_module_that_python_loads_is_forgotten(module: str) -> None:
@@ -136,13 +136,13 @@ def loaded_by(statement: str) -> set[str]:
 def test_what_starts_often_loads_no_library_that_it_does_not_use() -> None:
     """Start-up is what a job costs beyond its work."""
     heavy = {"matplotlib", "pandas", "scipy", "snakemake", "jinja2"}
-    identification = "import biogrip.products.stages.identification, biogrip.identify.genetic"
+    identification = "import biogrip.stages.identification, biogrip.fit.genetic"
     assert not heavy & loaded_by(identification)
-    stages = "biogrip.products.stages"
+    stages = "biogrip.stages"
     assert not heavy & loaded_by(f"import {stages}.measurement, {stages}.identifications")
     assert not {*heavy, "numpy", "pyarrow"} & loaded_by("import biogrip.cli; biogrip.cli._parser()")
     # Tables and figures are of a page that was not asked for.
-    read = "import biogrip.own_traces.identify; from biogrip.traces.plain_rows import plain_rows"
+    read = "import biogrip.identify.identify; from biogrip.traces.plain_rows import plain_rows"
     read += f"; from pathlib import Path; plain_rows(Path({str(EXAMPLE)!r}), 1, 2, (0, 1), ',')"
     assert loaded_by(read) & {*heavy, "pyarrow"} == {"pyarrow", "scipy"}
 
@@ -150,7 +150,7 @@ def test_what_starts_often_loads_no_library_that_it_does_not_use() -> None:
 def test_a_fingerprint_changes_with_what_a_module_imports(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = "biogrip.products.stages.single_trace"
+    module = "biogrip.stages.single_trace"
     package = Path(source_files(module)[0]).parent
     while package.name != "biogrip":
         package = package.parent
@@ -158,23 +158,24 @@ def test_a_fingerprint_changes_with_what_a_module_imports(
     of_original = fingerprint.__wrapped__(module)
     monkeypatch.setattr("biogrip.products.source_files._PACKAGE", tmp_path / "biogrip")
     assert fingerprint.__wrapped__(module) == of_original
-    for file, same in (("identify/genetic.py", True), ("products/files/traces.py", False)):
+    for file, same in (("fit/genetic.py", True), ("records/traces.py", False)):
         edited = tmp_path / "biogrip" / file
         edited.write_text(edited.read_text() + "# edited\n")
         assert (fingerprint.__wrapped__(module) == of_original) is same
 
 
-LISTS = {"METHODS": "biogrip.identify.methods", "MODELS": "biogrip.experiment.models"}
+LISTS = {"METHODS": "biogrip.fit.methods", "MODELS": "biogrip.experiment.models"}
 # Candidates are the models with numbers of branches; their module holds more, and is followed.
 LISTED = {*LISTS, "CANDIDATES"}
+DECLARING = ("products", "records", "stages", "tables", "figures", "page")
 
 
 def test_what_products_use_of_methods_and_models_is_in_their_settings() -> None:
     """No digest follows the lists of them; so products name modules from these, no more."""
     assert set(LISTS.values()) <= set(_SAYING)
-    (folder,) = map(Path, biogrip.products.__path__)
+    (folder,) = map(Path, biogrip.__path__)
     uses = 0
-    for file in folder.rglob("*.py"):
+    for file in (one for name in DECLARING for one in (folder / name).rglob("*.py")):
         if file.name == "digest.py":
             continue
         tree = ast.parse(file.read_text(encoding="utf-8"))

@@ -10,9 +10,9 @@ from biogrip.errors import BiogripError
 from biogrip.experiment.noise import Noise
 from biogrip.instrument.actuator import torque
 from biogrip.products.digest import digest
-from biogrip.products.tables import coverage
 from biogrip.study.load import load_study
 from biogrip.study.study import Study
+from biogrip.tables import coverage
 from tests.helpers.default import study_of
 
 DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"

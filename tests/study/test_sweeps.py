@@ -9,12 +9,12 @@ import yaml
 from biogrip.errors import BiogripError
 from biogrip.experiment.noise import Noise
 from biogrip.products.digest import digest
-from biogrip.products.heat_maps import ShownAxis, heat_maps
-from biogrip.products.stages.identification import IDENTIFICATION
-from biogrip.products.stages.measurement import MEASUREMENT
-from biogrip.products.stages.target import TARGET
+from biogrip.stages.identification import IDENTIFICATION
+from biogrip.stages.measurement import MEASUREMENT
+from biogrip.stages.target import TARGET
 from biogrip.study.load import load_study
 from biogrip.study.study import Study
+from biogrip.tables.heat_maps import ShownAxis, heat_maps
 
 ROOT = Path(__file__).parents[2]
 DEFAULT = ROOT / "config" / "config.yaml"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.identify.methods import METHODS
+from biogrip.fit.methods import METHODS
 from biogrip.running.resolved import write_study
 from tests.helpers.default import study_of
 from tests.helpers.places import ROOT

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.products.files.differences import DIFFERENCES
+from biogrip.records.differences import DIFFERENCES
 from tests.helpers.default import study_of
 from tests.helpers.in_process import inputs_and_outputs, make_in_process
 from tests.helpers.runs import COMPARED, SMALL, TINY, Tree, copied_tree, replaced, snakemake, tables
@@ -158,8 +158,8 @@ def tree(tiny: Path, tmp_path_factory: pytest.TempPathFactory) -> Tree:
 @pytest.mark.parametrize(
     ("file", "jobs"),
     [
-        ("src/biogrip/products/figures/scatter.py", {"case_figures": 1, "report": 1}),
-        ("src/biogrip/products/tables/models.py", {"tables": 1, "claims": 1, "report": 1}),
+        ("src/biogrip/figures/scatter.py", {"case_figures": 1, "report": 1}),
+        ("src/biogrip/tables/models.py", {"tables": 1, "claims": 1, "report": 1}),
     ],
 )
 def test_an_edit_reruns_exactly_what_it_is_used_in(
@@ -179,7 +179,7 @@ def test_an_edited_caption_reruns_nothing(tree: Tree) -> None:
 
 
 def test_an_edited_method_reruns_its_identifications_and_what_follows(tree: Tree) -> None:
-    with edited(tree.root / "src/biogrip/identify/genetic.py"):
+    with edited(tree.root / "src/biogrip/fit/genetic.py"):
         run = tree.run("-n", config=TINY)
     jobs = run.all_jobs()
     assert (jobs["identification"], jobs["identifications"], jobs["errors_of_case"]) == (2, 1, 1)
@@ -211,7 +211,7 @@ def test_a_method_and_a_model_more_rerun_nothing(tree: Tree) -> None:
 def test_a_method_said_otherwise_reruns_what_says_it(tree: Tree) -> None:
     """Least squares is drawn and listed, but not what it found."""
     said = '\nMETHODS["least_squares"] = replace(METHODS["least_squares"], title="fits")\n'
-    file = tree.root / "src/biogrip/identify/methods.py"
+    file = tree.root / "src/biogrip/fit/methods.py"
     with edited(file, f"\nfrom dataclasses import replace\n{said}"):
         run = tree.run("-n", config=TINY)
     drawn = {"study_figures": 1, "case_figures": 1}

@@ -8,7 +8,7 @@ from snakemake.settings.types import ExecMode
 
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
-from biogrip.products.stages.recording import check_traces
+from biogrip.stages.recording import check_traces
 from biogrip.running import preparation
 from biogrip.running.locks import sign_locks
 from biogrip.running.provenance import Provenance

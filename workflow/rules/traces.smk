@@ -5,8 +5,8 @@
 Batches have fixed rows, so that more rows redo the last at most.
 """
 
-from biogrip.own_traces.many_traces import join_tables
-from biogrip.own_traces.table_of_traces import read_table
+from biogrip.identify.many_traces import join_tables
+from biogrip.identify.table_of_traces import read_table
 from biogrip.products.source_files import fingerprint
 
 TRACES = STUDY.traces
@@ -42,7 +42,7 @@ if TRACES is not None:
             rows=lambda wildcards: [
                 [str(row.file), row.settings, row.copied] for row in rows_of(wildcards)
             ],
-            code=fingerprint("biogrip.own_traces.identify"),
+            code=fingerprint("biogrip.identify.identify"),
         message:
             "Identifying the traces in rows {wildcards.rows} of {input.table}"
         shell:

@@ -1,4 +1,4 @@
-"""Registry of all products, collected from the modules of a package."""
+"""Registry of all products, collected from the packages that declare them."""
 
 from collections.abc import Iterable
 from functools import cache
@@ -10,7 +10,7 @@ from pkgutil import walk_packages
 from biogrip.errors import BiogripError, nearest
 from biogrip.products.product import Product
 
-_PACKAGE = "biogrip.products"
+_PACKAGES = ("biogrip.stages", "biogrip.tables", "biogrip.figures", "biogrip.page")
 
 
 @cache
@@ -52,8 +52,11 @@ def _product(name: str) -> Product:
 
 @cache
 def _modules() -> tuple[str, ...]:
-    path = import_module(_PACKAGE).__path__
-    return tuple(module.name for module in walk_packages(path, f"{_PACKAGE}."))
+    return tuple(
+        module.name
+        for package in _PACKAGES
+        for module in walk_packages(import_module(package).__path__, f"{package}.")
+    )
 
 
 @cache

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from biogrip.errors import BiogripError
-from biogrip.products.batches import (
+from biogrip.study.batches import (
     Batch,
     existing_batches,
     parse_batch,

@@ -18,10 +18,11 @@ import biogrip
 _PACKAGE = Path(biogrip.__file__).parent
 _SAYING = (
     "biogrip.study",
-    "biogrip.identify.methods",
+    "biogrip.fit.methods",
     "biogrip.experiment.models",
     *(f"biogrip.products.{name}" for name in ("declared", "product", "plan", "digest", "uses")),
-    *(f"biogrip.products.{folder}.declared" for folder in ("tables", "figures")),
+    "biogrip.tables.declared",
+    "biogrip.figures.declared",
 )
 
 

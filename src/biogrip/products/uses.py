@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from operator import attrgetter
 from typing import Any, NoReturn
 
-from biogrip.identify.case_problem import CaseProblem
+from biogrip.fit.case_problem import CaseProblem
 from biogrip.products.plan import Wildcards
 from biogrip.study.study import Case, Study
 

@@ -15,7 +15,6 @@ from typing import Any
 
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
-from biogrip.products.stages.recording import check_traces
 from biogrip.running import job_lines
 from biogrip.running.locks import is_locked, is_locked_by_dead
 from biogrip.running.manifest import Manifest
@@ -23,6 +22,7 @@ from biogrip.running.provenance import Provenance
 from biogrip.running.resolved import write_study
 from biogrip.running.rules import ProductRule, files_of, make_rules, needed_for
 from biogrip.running.wholeness import check_results
+from biogrip.stages.recording import check_traces
 from biogrip.study.defaults import default_config, snakefile
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import overlaid

@@ -16,8 +16,8 @@ from biogrip.errors import BiogripError
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
 from biogrip.experiment.truth import Published
-from biogrip.identify.genome import GeneRange
-from biogrip.identify.methods import METHODS, block_class
+from biogrip.fit.genome import GeneRange
+from biogrip.fit.methods import METHODS, block_class
 from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.calibration import CalibrationTest
 from biogrip.instrument.gripper import GRIPPER

@@ -9,7 +9,7 @@ from pydantic import Field
 from biogrip.errors import nearest
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.experiment.springpot import LONGEST_S
-from biogrip.identify.methods import METHODS
+from biogrip.fit.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
 from biogrip.keys import Block, Distinct, OneOf, Problem
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared

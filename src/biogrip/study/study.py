@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, TypeVar, cast
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.sample import CANDIDATES, Sample, SampleModel, with_fixed
 from biogrip.experiment.truth import UNPUBLISHED, Truth
-from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.genetic_settings import GeneticSettings
-from biogrip.identify.genome import GeneRange
-from biogrip.identify.methods import METHODS, Method
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genome import GeneRange
+from biogrip.fit.methods import METHODS, Method
 from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Gripper
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
@@ -22,7 +22,7 @@ from biogrip.study.source import overlaid
 from biogrip.study.sweeps import point_blocks
 
 if TYPE_CHECKING:
-    from biogrip.identify.least_squares import LeastSquaresSettings
+    from biogrip.fit.least_squares import LeastSquaresSettings
 
 _Part = TypeVar("_Part")
 

@@ -7,7 +7,7 @@ from itertools import islice
 from typing import Any, TypeVar
 
 from biogrip.errors import BiogripError
-from biogrip.identify.methods import block_class
+from biogrip.fit.methods import block_class
 from biogrip.instrument.gripper import Gripper
 from biogrip.keys import Problem
 from biogrip.study.case_blocks import METHOD_BLOCKS, OVERRIDABLE, CaseBlock, Shared
