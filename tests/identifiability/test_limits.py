@@ -32,6 +32,7 @@ QUANTITIES = parameters_and_sum(MODEL)
 @pytest.mark.parametrize(
     ("case", "seed"), [("endothelial_cell", 0), ("liquid_drop_1", 4), ("liquid_drop_2", 0)]
 )
+@pytest.mark.nightly
 def test_the_rise_at_a_limit_is_the_threshold(case: str, seed: int) -> None:
     found = list(misses(likelihood_for(case, seed), QUANTITIES))
     assert len(found) >= 8

@@ -253,6 +253,7 @@ def called(
 
 
 @pytest.mark.parametrize("name", JOBS)
+@pytest.mark.nightly
 def test_no_code_that_makes_a_product_is_missing_from_its_digest(
     called: dict[str, set[str]], name: str
 ) -> None:
