@@ -236,6 +236,7 @@ def test_padding_before_the_onset_is_no_measurement(tmp_path: Path) -> None:
     assert found["fit"] == "ok"
 
 
+@pytest.mark.nightly
 def test_a_fitted_onset_widens_limits(started: dict[str, tuple[dict[str, Any], str]]) -> None:
     given, fitted = (
         {q["quantity"]: q["high"] - (q["low"] or 0) for q in found["quantities"]}

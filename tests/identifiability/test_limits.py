@@ -39,6 +39,7 @@ def test_the_rise_at_a_limit_is_the_threshold(case: str, seed: int) -> None:
     assert [miss for miss in found if abs(miss[-1]) > ALLOWED] == []
 
 
+@pytest.mark.nightly
 def test_the_name_of_a_trace_changes_no_limit() -> None:
     """Fast limits of all names, and two profiles of the two whose optima differ most."""
     likelihoods = [example(name) for name in NAMES]

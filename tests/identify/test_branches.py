@@ -106,6 +106,7 @@ def test_another_name_of_the_optimum_is_none_of_its_neighbours() -> None:
         assert np.all(increases > 10)
 
 
+@pytest.mark.nightly
 def test_intervals_are_those_of_one_branch() -> None:
     quantities = parameters_and_sum(TWO)
     for profiles in compute_profiles(likelihoods(), quantities, smooth=False):

@@ -60,6 +60,7 @@ def assert_of_one_point(
 
 @pytest.mark.parametrize("case", SAMPLES)
 @pytest.mark.parametrize("level", [0.1, 0.002])
+@pytest.mark.nightly
 def test_a_model_fits_no_worse_than_one_in_it(case: str, level: float) -> None:
     """Parameters and misfit are of one point, also of elements that have vanished."""
     times, response = clean(case)

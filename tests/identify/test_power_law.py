@@ -87,6 +87,7 @@ def test_the_model_that_made_a_trace_is_preferred(made_by: str, truth: list[floa
         assert sorted(each.delta_aic for each in tried)[1] > 5
 
 
+@pytest.mark.nightly
 def test_the_genetic_algorithm_finds_exponents_too() -> None:
     """Two digits of each parameter; none encodes an exponent of one or more."""
     clean = response(SOLID, [0.3, 10.0, 0.4])

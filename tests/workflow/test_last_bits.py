@@ -16,6 +16,8 @@ from tests.helpers.default import study_of
 from tests.helpers.places import ROOT
 from tests.helpers.runs import built_once
 
+pytestmark = pytest.mark.nightly
+
 # One of each model.
 CASES = ("endothelial_cell", "liquid_drop_2")
 SEEDS = "seeds_0-1"
@@ -64,8 +66,6 @@ def in_process(
 DONE = """
 import json, sys
 from biogrip.cli import main
-
-pytestmark = pytest.mark.nightly
 sys.exit(max(map(main, json.load(sys.stdin))))
 """
 
