@@ -208,7 +208,6 @@ def test_a_full_disk_is_named_and_the_run_continues(tiny: Path, tmp_path: Path) 
     assert results == results_of(tiny)
 
 
-@pytest.mark.nightly
 def test_a_difference_is_shown_and_fails(finished: Path, tmp_path: Path) -> None:
     """The comparison behind the check, on one changed cell and one missing table."""
     published = tmp_path / "published"
