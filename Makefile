@@ -31,7 +31,7 @@ counted = $$(grep -o '^[a-z][^=]*' $(1) | sort -u | wc -l)
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) tests/workflow/test_results.py
 
-.PHONY: study test test-lowest test-pythons check check-overlays verify publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
+.PHONY: study test test-nightly test-lowest test-pythons check check-overlays verify publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
 
 study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
@@ -39,6 +39,10 @@ study: $(READY)
 # One worker more than there are processors: some wait for the programs that they have started.
 test: $(TEST_READY)
 	$(BIN)/python -m pytest -n $$(($(JOBS) + 1)) --dist worksteal
+
+# What takes longer than a change should wait; nightly, on a machine with Slurm.
+test-nightly: $(TEST_READY)
+	$(BIN)/python -m pytest -m nightly -n $$(($(JOBS) + 1)) --dist worksteal
 
 # A small study and the quick tests, weekly and before a release: with the oldest versions that
 # pyproject.toml allows, and with whichever other Pythons there are, at least one.

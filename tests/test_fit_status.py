@@ -76,6 +76,7 @@ def test_the_heaviest_note_decides() -> None:
 
 @pytest.mark.parametrize("noise_model", ["white", "coloured"])
 @pytest.mark.parametrize("wrong", WRONG)
+@pytest.mark.nightly
 def test_a_wrong_set_up_determines_nothing(tmp_path: Path, wrong: str, noise_model: str) -> None:
     (tmp_path / "few.yaml").write_text(FEW)
     trace, found, table = (tmp_path / name for name in ("t.csv", "t.json", "table.csv"))

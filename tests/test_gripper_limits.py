@@ -48,6 +48,7 @@ def noisy(clean: Array) -> Array:
     return clean + noise
 
 
+@pytest.mark.nightly
 def test_limits_hold_the_truth_of_a_wrong_gripper_only_with_its_uncertainty(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -294,6 +294,7 @@ def test_the_two_springpots_of_fish_muscle() -> None:
     assert values == pytest.approx(published, rel=0.01)
 
 
+@pytest.mark.nightly
 def test_mucus_is_fitted_better_than_published(tmp_path: Path) -> None:
     """With the published model; exact inversion of the published values leaves 0.0039."""
     trace = tmp_path / "mucus.csv"

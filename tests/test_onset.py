@@ -142,6 +142,7 @@ CLOCKS = {
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.nightly
 def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
     """Its misfit is no higher than with the onset of the simulation."""
     times = CLOCKS[clock]
@@ -170,6 +171,7 @@ def test_a_trace_over_many_decades_of_time_has_an_answer(tmp_path: Path, last_s:
 
 
 @pytest.mark.parametrize("flat", [True, False])
+@pytest.mark.nightly
 def test_a_late_protocol_is_said(
     tmp_path: Path, flat: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -182,6 +184,7 @@ def test_a_late_protocol_is_said(
 
 @pytest.mark.parametrize("noise_model", ["white", "coloured"])
 @pytest.mark.parametrize("onset_s", [0.87, 3.0])
+@pytest.mark.nightly
 def test_a_late_protocol_determines_nothing(
     tmp_path: Path, onset_s: float, noise_model: str
 ) -> None:
@@ -193,6 +196,7 @@ def test_a_late_protocol_determines_nothing(
 
 
 @pytest.mark.parametrize("start", ["", ", start_s: 0.87"])
+@pytest.mark.nightly
 def test_the_workflow_knows_a_late_protocol(tmp_path: Path, start: str) -> None:
     trace = written(tmp_path / "trace.csv", *late(2, 0.87))
     config, traces, verdicts = (tmp_path / name for name in ("c.yaml", "t.parquet", "v.json"))
@@ -208,6 +212,7 @@ def test_the_workflow_knows_a_late_protocol(tmp_path: Path, start: str) -> None:
 
 
 @pytest.mark.parametrize("start", [f"{ONSET_S}", "fit"])
+@pytest.mark.nightly
 def test_limits_hold_the_truth_from_the_onset_on(
     started: dict[str, tuple[dict[str, Any], str]], start: str
 ) -> None:
@@ -231,6 +236,7 @@ def test_padding_before_the_onset_is_no_measurement(tmp_path: Path) -> None:
     assert found["fit"] == "ok"
 
 
+@pytest.mark.nightly
 def test_a_fitted_onset_widens_limits(started: dict[str, tuple[dict[str, Any], str]]) -> None:
     given, fitted = (
         {q["quantity"]: q["high"] - (q["low"] or 0) for q in found["quantities"]}

@@ -141,6 +141,7 @@ def test_progress_and_warnings_are_shown(
     ("arguments", "status"),
     [("verify .", 1), ("clean .", 0), ("identify a.csv --config few.yaml", 0), ("design", 2)],
 )
+@pytest.mark.nightly
 def test_a_command_may_have_nobody_to_talk_to(
     tmp_path: Path, arguments: str, status: int, closed: str
 ) -> None:

@@ -17,6 +17,8 @@ from biogrip.tables import claims
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.runs import SHIPPED, TINY
 
+pytestmark = pytest.mark.nightly
+
 PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check")
 
 

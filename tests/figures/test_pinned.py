@@ -168,6 +168,7 @@ def test_a_figure_is_what_it_was(name: str, figure: Figure, tmp_path: Path, pinn
 
 @pytest.mark.usefixtures("comparable")
 @EACH
+@pytest.mark.nightly
 def test_a_change_of_drawing_is_seen(name: str, figure: Figure) -> None:
     """A line's colour, or where it is by a fiftieth of the axis; or else a number or a bar."""
     lines = [

@@ -46,6 +46,7 @@ def assert_in_order(model: SampleModel, parameters: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("branches", [2, 3, 4])
+@pytest.mark.nightly
 def test_least_squares_counts_branches_as_they_relax(branches: int) -> None:
     model = Sample("generalized_maxwell", branches).model
     dampers = np.geomspace(3.0, 3e3, branches)[::-1]
@@ -57,6 +58,7 @@ def test_least_squares_counts_branches_as_they_relax(branches: int) -> None:
 
 
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "least_squares"])
+@pytest.mark.nightly
 def test_every_method_counts_branches_as_they_relax(method: str) -> None:
     """Of a population some half would come out the other way round."""
     for answer in identified(method, problems(TWO, SAMPLE, 4, 1e-3)):
@@ -104,6 +106,7 @@ def test_another_name_of_the_optimum_is_none_of_its_neighbours() -> None:
         assert np.all(increases > 10)
 
 
+@pytest.mark.nightly
 def test_intervals_are_those_of_one_branch() -> None:
     quantities = parameters_and_sum(TWO)
     for profiles in compute_profiles(likelihoods(), quantities, smooth=False):

@@ -60,6 +60,7 @@ def assert_of_one_point(
 
 @pytest.mark.parametrize("case", SAMPLES)
 @pytest.mark.parametrize("level", [0.1, 0.002])
+@pytest.mark.nightly
 def test_a_model_fits_no_worse_than_one_in_it(case: str, level: float) -> None:
     """Parameters and misfit are of one point, also of elements that have vanished."""
     times, response = clean(case)
@@ -70,6 +71,7 @@ def test_a_model_fits_no_worse_than_one_in_it(case: str, level: float) -> None:
 
 # Their fits take twenty times as long as all others: every sample, every level, once.
 @pytest.mark.parametrize(("case", "level"), list(zip(SAMPLES, (0.1, 0.02, 0.002), strict=True)))
+@pytest.mark.nightly
 def test_a_model_with_springpots_fits_no_worse_than_one_in_it(case: str, level: float) -> None:
     times, response = clean(case)
     problems, found = fitted(response, times, TRIED, 2, level)

@@ -109,6 +109,7 @@ def test_parameters_are_those_of_the_misfit_told(draw: int) -> None:
 
 
 @pytest.mark.parametrize("name", MODELS_SETTLED)
+@pytest.mark.nightly
 def test_settling_never_makes_a_fit_worse(name: str) -> None:
     """And the misfit told is that of the parameters told."""
     for case_problem, _ in noisy(MODELS_SETTLED[name], 6):
@@ -123,6 +124,7 @@ def test_settling_never_makes_a_fit_worse(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MODELS_SETTLED)
+@pytest.mark.nightly
 def test_steps_that_lead_away_are_taken_back(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where they are not those of the way ahead, what was found before counts, to the last bit."""
     closer: list[Array] = []

@@ -60,6 +60,7 @@ def test_the_likelihood_of_noise_that_grows_is_that_of_dense_matrices() -> None:
 
 
 @pytest.mark.parametrize("share", [0.5, 0.999])
+@pytest.mark.nightly
 def test_the_share_that_grows_is_found(share: float) -> None:
     growing, rng = np.geomspace(0.01, 1.0, 200), np.random.default_rng(6)
     grown = share * growing**2 / np.mean(growing**2)
@@ -88,6 +89,7 @@ def test_what_directions_have_in_it_does_not_matter() -> None:
         (Noise("gaussian", 1.0, "peak", flicker=Flicker(0.5)), (0.0, 0.5)),
     ],
 )
+@pytest.mark.nightly
 def test_colours_are_found(noise: Noise, expected: tuple[float, float]) -> None:
     """On the median of nine traces; the scatter of one is some 0.15.
 

@@ -46,6 +46,7 @@ def response(model: SampleModel, sample: list[float]) -> Array:
         (MODELS["springpots_in_parallel"], [60.0, 0.8, 5.0, 0.2], 0.01),
     ],
 )
+@pytest.mark.nightly
 def test_intervals_hold_the_exponent(model: SampleModel, truth: list[float], level: float) -> None:
     """20 seeds, 95 %: fewer than 15 hold it once in 3000 times."""
     problems = case_problem(TIMES, response(model, truth), 20, model, level=level)
@@ -70,6 +71,7 @@ def test_intervals_hold_the_exponent(model: SampleModel, truth: list[float], lev
         ("liquid_drop", [9.0, 1.0, 300.0]),
     ],
 )
+@pytest.mark.nightly
 def test_the_model_that_made_a_trace_is_preferred(made_by: str, truth: list[float]) -> None:
     """By AIC, each of three kinds against the others and against a simpler one."""
     names = ["kelvin_voigt", "liquid_drop", "fractional_kelvin_voigt", "fractional_maxwell"]
@@ -85,6 +87,7 @@ def test_the_model_that_made_a_trace_is_preferred(made_by: str, truth: list[floa
         assert sorted(each.delta_aic for each in tried)[1] > 5
 
 
+@pytest.mark.nightly
 def test_the_genetic_algorithm_finds_exponents_too() -> None:
     """Two digits of each parameter; none encodes an exponent of one or more."""
     clean = response(SOLID, [0.3, 10.0, 0.4])

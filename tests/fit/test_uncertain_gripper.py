@@ -95,6 +95,7 @@ def increase_at_truth(case_problem: CaseProblem, trace: Array) -> float:
     return likelihood.increase(float(fit.problem.misfit(np.exp(TRUTH)[None])[0]))
 
 
+@pytest.mark.nightly
 def test_limits_allow_for_a_gripper_that_is_wrong() -> None:
     """Length, angle and torque are off at random; Wilks' theorem holds, with 95 % confidence.
 

@@ -227,6 +227,7 @@ def test_a_wrong_model_is_doubted() -> None:
 @pytest.mark.parametrize(
     ("times", "said"), [(0.5, False), (1.5, False), (2.5, True), (27, True), (200, True)]
 )
+@pytest.mark.nightly
 def test_a_noise_that_leaves_more_than_it_is_is_doubted(times: float, said: bool) -> None:
     case_problem = problem("endothelial_cell", 1)
     found = run("least_squares", case_problem)
@@ -288,6 +289,7 @@ def test_what_is_said_is_rounded_once() -> None:
     assert wide.words() == "determined only within a factor of 20: 1.1 N/m (0.1 to 40)"
 
 
+@pytest.mark.nightly
 def test_intervals_hold_the_truth_and_estimates_reach_the_bound() -> None:
     """What the study's table says of 500 seeds, guarded at 40.
 

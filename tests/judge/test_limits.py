@@ -32,12 +32,14 @@ QUANTITIES = parameters_and_sum(MODEL)
 @pytest.mark.parametrize(
     ("case", "seed"), [("endothelial_cell", 0), ("liquid_drop_1", 4), ("liquid_drop_2", 0)]
 )
+@pytest.mark.nightly
 def test_the_rise_at_a_limit_is_the_threshold(case: str, seed: int) -> None:
     found = list(misses(likelihood_for(case, seed), QUANTITIES))
     assert len(found) >= 8
     assert [miss for miss in found if abs(miss[-1]) > ALLOWED] == []
 
 
+@pytest.mark.nightly
 def test_the_name_of_a_trace_changes_no_limit() -> None:
     """Fast limits of all names, and two profiles of the two whose optima differ most."""
     likelihoods = [example(name) for name in NAMES]

@@ -157,6 +157,7 @@ def test_limits_do_not_depend_on_the_batch() -> None:
         np.testing.assert_array_equal(apart, together[chosen])
 
 
+@pytest.mark.nightly
 def test_traces_of_any_experiments_are_judged_as_each_alone() -> None:
     """Byte for byte, in their order; and whose optimum was missed is told by its place."""
     cell, drop = likelihoods("endothelial_cell", 2), likelihoods("liquid_drop_2", 2)

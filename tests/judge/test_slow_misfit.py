@@ -42,6 +42,7 @@ def _status(times: Array, trace: Array) -> str:
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.nightly
 def test_a_filter_makes_a_fit_doubtful_and_a_late_step_wrong(seed: int) -> None:
     """Both have misfits far above the scatter of neighbouring readings."""
     times, response = clean(CASE)

@@ -110,6 +110,7 @@ def test_the_page_names_the_documentation_and_the_record(report: Path) -> None:
     assert "results/manifest.jsonl" in named
 
 
+@pytest.mark.nightly
 def test_the_manifest_has_the_code_that_the_page_was_made_by(tiny: Path) -> None:
     code = fingerprint(products()["report"].module)
     assert Manifest(tiny / "results").last("report.html").settings.endswith(f"-{code}")

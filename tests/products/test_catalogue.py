@@ -191,6 +191,7 @@ def changed(value: Any) -> Iterator[Any]:
         raise AssertionError(f"{value!r}")
 
 
+@pytest.mark.nightly
 def test_a_digest_changes_with_every_setting(everything: list[ProductRule]) -> None:
     """Of one job of each product: with each field, item and key."""
     for rule in everything:
@@ -227,6 +228,7 @@ def digests() -> str:
     return "".join(f"{rule.name} {[*map(rule.digest, rule.jobs)]}\n" for rule in rules)
 
 
+@pytest.mark.nightly
 def test_a_digest_is_the_same_in_every_process() -> None:
     """Whatever order Python keeps sets of text in."""
     seed = "2" if os.environ.get("PYTHONHASHSEED") == "1" else "1"

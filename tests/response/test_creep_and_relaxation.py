@@ -89,6 +89,7 @@ def test_responses_to_ramps_and_sinusoids_are_inverse_laplace_transforms(
 
 @EVERY_MODEL
 @pytest.mark.parametrize("end_s", [0.03, 2.0, 300.0])
+@pytest.mark.nightly
 def test_relaxation_and_creep_are_each_other_s_convolution_inverse(
     model: SampleModel, end_s: float
 ) -> None:

@@ -120,6 +120,7 @@ def notes_of(model: str, time_s: Array, level: float, truth: dict[str, float]) -
 
 
 @pytest.mark.parametrize("case", SAMPLES)
+@pytest.mark.nightly
 def test_the_default_study_does_not_show_it(case: str) -> None:
     """At 10 Hz, beside a tenth of noise, and beside a thousandth."""
     time_s = STUDY.cases[case].sampling.over(400.0)[::5]

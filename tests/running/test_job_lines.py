@@ -85,6 +85,7 @@ def on_a_terminal(folder: Path, *arguments: str) -> list[str]:
     return said.splitlines()
 
 
+@pytest.mark.nightly
 def test_a_terminal_shows_a_line_a_job_and_a_pipe_the_last_line(tmp_path: Path) -> None:
     (tmp_path / "overlay.yaml").write_text(TINY)
     shown = on_a_terminal(tmp_path, BATCH)

@@ -64,6 +64,7 @@ STAGES = ("target", "measurement", "identification", "identifications", "sweep_p
         "biogrip.figures.robustness",
     ],
 )
+@pytest.mark.nightly
 def test_no_module_that_python_loads_is_forgotten(module: str) -> None:
     """What an interpreter really imports is the independent count."""
     command = [sys.executable, "-c", STUBS, module]

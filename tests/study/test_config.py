@@ -244,6 +244,24 @@ def test_files_that_are_no_good_yaml(tmp_path: Path, text: str, message: str) ->
         load_study({}, [file])
 
 
+@pytest.mark.parametrize(
+    ("bursts", "message"),
+    [
+        ("[{from_s: 0.0, rate_Hz: 1.0, samples: 2}]", "found 2 samples"),
+        (
+            "[{from_s: 0.0, rate_Hz: 10.0, samples: 30}, {from_s: 2.0, rate_Hz: 10.0, samples: 9}]",
+            "allowed is after 2.9",
+        ),
+        ("[{from_s: 399.0, rate_Hz: 10.0, samples: 20}]", "at most until 400.0 s"),
+    ],
+)
+def test_bursts_follow_each_other_within_the_protocol(
+    tmp_path: Path, bursts: str, message: str
+) -> None:
+    with pytest.raises(BiogripError, match=re.escape(message)):
+        load(tmp_path, f"measurement: {{bursts: {bursts}}}")
+
+
 def test_missing_config_file(tmp_path: Path) -> None:
     with pytest.raises(BiogripError, match=r"nowhere.yaml: cannot be read: No such file"):
         load_study({}, [tmp_path / "nowhere.yaml"])

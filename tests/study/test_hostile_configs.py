@@ -525,6 +525,7 @@ def _replaced(config: object, rng: random.Random) -> object:
 
 
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.nightly
 def test_any_config_loads_or_is_refused_at_once(tmp_path: Path, seed: int) -> None:
     rng = random.Random(seed)
     overlays = [

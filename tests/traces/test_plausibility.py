@@ -242,6 +242,7 @@ def test_mere_noise_is_refused(
                 check(recorded(times, values), gripper, steps, FILE, SI, noise_rad)
 
 
+@pytest.mark.nightly
 def test_noise_is_taken_for_a_response_as_rarely_as_said(
     gripper: Gripper, steps: TorqueHistory
 ) -> None:

@@ -48,6 +48,7 @@ LEFT = {
     "howto/noise_kind.md": ["results/tables/verdicts_laplace_drop.md"],
     "howto/figure.md": ["results/figures/heights.png"],
 }
+TAKES_LONG = {"howto/relaxation.md", "howto/creep.md", "design.md"}
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
     "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
@@ -77,7 +78,13 @@ def test_every_howto_is_followed() -> None:
     assert howtos | {"tutorial.md", "groups.md", "design.md"} == set(LEFT)
 
 
-@pytest.mark.parametrize("document", LEFT)
+@pytest.mark.parametrize(
+    "document",
+    [
+        pytest.param(name, marks=[pytest.mark.nightly] if name in TAKES_LONG else [])
+        for name in LEFT
+    ],
+)
 def test_what_is_said_can_be_done(document: str, place: Tree) -> None:
     shutil.rmtree(place.root / "results", ignore_errors=True)
     text = (ROOT / "docs" / document).read_text(encoding="utf-8")

@@ -75,6 +75,7 @@ def test_results_folder_that_cannot_be_written(tmp_path: Path) -> None:
     assert run.output.count("\n") <= 25
 
 
+@pytest.mark.nightly
 def test_a_damaged_target_is_named_and_made_again(tiny: Path, tiny_copy: Path) -> None:
     target = tiny_copy / "results/targets/liquid_drop_2.csv"
     whole = target.read_bytes()
@@ -142,6 +143,7 @@ def test_a_killed_run_continues_with_the_same_command(tiny: Path, tmp_path: Path
     assert [name for name in ours if ours[name] != theirs[name]] == []
 
 
+@pytest.mark.nightly
 def test_a_killed_job_is_done_again_with_the_same_command(tiny: Path, tiny_copy: Path) -> None:
     """Kill -9 of an identification in mid-run."""
     for stage in ("identifications", "histories", "timings"):
@@ -172,6 +174,7 @@ def is_identification(process: psutil.Process) -> bool:
     return command[2:4] == ["make", "identification"]
 
 
+@pytest.mark.nightly
 def test_a_full_disk_is_named_and_the_run_continues(tiny: Path, tmp_path: Path) -> None:
     """Results on a file system of their own, with room for a part of them, then for nothing."""
     study = tmp_path / "study"

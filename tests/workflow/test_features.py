@@ -20,6 +20,8 @@ from tests.helpers.places import ROOT
 from tests.helpers.runs import built_once
 from tests.test_instruments import OF_A_GRIPPER
 
+pytestmark = pytest.mark.nightly
+
 CASES = """
 seeds: 2
 genetic_algorithm: {population: 300, survivors: 150}

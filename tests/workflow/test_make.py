@@ -134,6 +134,7 @@ def test_a_batch_of_another_plan_is_made(tiny_copy: Path, monkeypatch: pytest.Mo
     assert (folder / "seeds_0-1.csv").read_text().splitlines() == [*rows[0], *rows[1][1:]]
 
 
+@pytest.mark.nightly
 def test_a_command_is_typed_in_a_shell(tiny: Path, tiny_copy: Path) -> None:
     """As all tests here but in a process of its own."""
     (tiny_copy / "results" / "tables" / "errors_liquid_drop_2.csv").unlink()
@@ -253,6 +254,7 @@ def called(
 
 
 @pytest.mark.parametrize("name", JOBS)
+@pytest.mark.nightly
 def test_no_code_that_makes_a_product_is_missing_from_its_digest(
     called: dict[str, set[str]], name: str
 ) -> None:

@@ -14,6 +14,8 @@ from biogrip.running.manifest import Manifest
 from tests.helpers.runs import RECORDED, TINY, results_of, snakemake
 from tests.helpers.runs import run as biogrip_run
 
+pytestmark = pytest.mark.nightly
+
 SEEDED = f"study_seed: 2\n{TINY}"
 
 

@@ -119,6 +119,7 @@ def test_last_row_is_the_identification_that_its_own_trace_gives(
 
 
 @pytest.mark.parametrize("batch_size", [1, 3])
+@pytest.mark.nightly
 def test_batches_change_no_byte(finished: Path, tmp_path: Path, batch_size: int) -> None:
     """Whatever is put together from batches, that is, not the verdicts on single traces."""
     together = ["errors", "methods"] + ["models", "coverage"] * (batch_size == 1)

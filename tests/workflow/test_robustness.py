@@ -9,6 +9,8 @@ import pytest
 from tests.helpers.pictures import assert_drawn
 from tests.helpers.runs import replaced, snakemake, tables
 
+pytestmark = pytest.mark.nightly
+
 SWEEP = """
 seeds: 2
 measurement: {rate_Hz: 1.0}

@@ -16,6 +16,8 @@ import pytest
 from tests.helpers.places import EXAMPLE
 from tests.helpers.runs import TINY, called, started
 
+pytestmark = pytest.mark.nightly
+
 BAD = {
     "missing": (None, r"my.yaml: cannot be read: No such file"),
     "tab": ("seeds: 4\n\tx: 1\n", r"my.yaml, line 2: not valid YAML: found a tab character"),

@@ -21,6 +21,8 @@ from tests.helpers.required import cannot_run
 from tests.helpers.runs import snakemake, tables
 from tests.helpers.slurm.cluster import SlurmError, missing_packages, one_node_slurm
 
+pytestmark = pytest.mark.nightly
+
 PLUGIN = "snakemake_executor_plugin_slurm"
 REQUIRED = "BIOGRIP_REQUIRE_SLURM"
 # Of the site, not of the study: no accounting to ask, and nobody else who would mind the asking.

@@ -36,6 +36,7 @@ def identified(folder: Path) -> bytes:
     return (folder / "found.csv").read_bytes()
 
 
+@pytest.mark.nightly
 def test_batches_give_the_table_of_the_command(lab: Path) -> None:
     """To the byte; what is changed, and only that, is identified again."""
     run = snakemake(lab, TABLE, config=BLOCK)

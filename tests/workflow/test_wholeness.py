@@ -11,6 +11,8 @@ from tests.helpers import runs
 from tests.helpers.in_process import inputs_and_outputs
 from tests.helpers.runs import TINY, Run, results_of, snakemake, waited_for
 
+pytestmark = pytest.mark.nightly
+
 
 def one_of_each_kind(folder: Path) -> list[Path]:
     """One file a folder and ending."""
