@@ -5,7 +5,7 @@ import pytest
 
 from biogrip.digits import counted, rounded
 from biogrip.instrument.gripper import GRIPPER
-from biogrip.judge.whiteness import doubts_about_noise
+from biogrip.judging.whiteness import doubts_about_noise
 from biogrip.records.traces import Measurements
 from biogrip.stages.recording import notes_on_recording
 

@@ -13,10 +13,10 @@ from biogrip.identify.one_trace import IdentifyOptions, identify_trace, study_of
 from biogrip.identify.read_as import ReadAs
 from biogrip.identify.second_opinion import second_opinions
 from biogrip.identify.trace_case import TraceCase
-from biogrip.judge.diagnosis import Diagnosis, diagnose
-from biogrip.judge.fit_status import Note
-from biogrip.judge.likelihood import compute_fall
-from biogrip.judge.whiteness import wandering
+from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.judging.fit_status import Note
+from biogrip.judging.likelihood import compute_fall
+from biogrip.judging.whiteness import wandering
 from biogrip.records.traces import Measurements
 from tests.helpers.problems import clean, run
 

@@ -13,7 +13,7 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import MODELS
-from biogrip.judge.fit_status import (
+from biogrip.judging.fit_status import (
     DOUBT,
     DOUBTFUL,
     HARMLESS,

@@ -33,10 +33,10 @@ from biogrip.identify.one_trace import IdentifyOptions, identify_trace
 from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.identify.read_as import ReadAs
 from biogrip.identify.words import for_a_paper, side_by_side
-from biogrip.judge.fit_status import Note
-from biogrip.judge.profiles import Profile
-from biogrip.judge.quantities import parameters_and_sum
-from biogrip.judge.verdicts import Finding
+from biogrip.judging.fit_status import Note
+from biogrip.judging.profiles import Profile
+from biogrip.judging.quantities import parameters_and_sum
+from biogrip.judging.verdicts import Finding
 from biogrip.traces.late_onset import note_late_onset
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean

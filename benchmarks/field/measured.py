@@ -25,7 +25,7 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.fit.answer import Identification
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.identify.search_ranges import ranges_of
-from biogrip.judge.verdicts import DETERMINED
+from biogrip.judging.verdicts import DETERMINED
 from biogrip.library import Phase, Sample, hold, identify_sample, judge, simulate
 from biogrip.records.traces import Measurements
 from biogrip.stages.recording import read_checked

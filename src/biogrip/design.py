@@ -439,7 +439,7 @@ def relative_bounds(found: Array) -> Array:
     """Return standard deviations of log-parameters from information, (..., n_parameters).
 
     A parameter that is not told to a factor of e with all others known is taken as known for the
-    others, as in `biogrip.judge.fisher`, and has `NO_BOUND`.
+    others, as in `biogrip.judging.fisher`, and has `NO_BOUND`.
     """
     own = np.diagonal(found, axis1=-2, axis2=-1)
     informed = own >= 1

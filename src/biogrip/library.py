@@ -20,7 +20,7 @@ from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Arm, Gripper
 from biogrip.instrument.instrument import Instrument
 from biogrip.instrument.instruments import INSTRUMENTS
-from biogrip.judge.diagnosis import Diagnosis, diagnose
+from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.response.simulation import simulated_rotation
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from biogrip.fit.identifier import identifier
 from biogrip.fit.local_fits import FINE
 from biogrip.fit.methods import METHODS
 from biogrip.fit.problem import Problem
-from biogrip.judge.constrained_fits import ConstrainedFits
-from biogrip.judge.likelihood import Likelihood, make_likelihood
-from biogrip.judge.limits import find_limits
-from biogrip.judge.profiles import compute_profiles
-from biogrip.judge.quantities import parameters_and_sum
+from biogrip.judging.constrained_fits import ConstrainedFits
+from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.limits import find_limits
+from biogrip.judging.profiles import compute_profiles
+from biogrip.judging.quantities import parameters_and_sum
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.default import STUDY, study_of
 from tests.helpers.problems import GRIPPER, TORQUE, case_problem, clean

@@ -8,9 +8,9 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.sample import CANDIDATES, MODELS, SampleModel
 from biogrip.fit.model_choice import ranked
-from biogrip.judge.likelihood import make_likelihood
-from biogrip.judge.limits import find_limits
-from biogrip.judge.quantities import parameters_and_sum
+from biogrip.judging.likelihood import make_likelihood
+from biogrip.judging.limits import find_limits
+from biogrip.judging.quantities import parameters_and_sum
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.problems import (
     GRIPPER,

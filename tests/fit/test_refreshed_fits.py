@@ -12,9 +12,9 @@ from biogrip.fit.local_fits import LocalFits
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.problem import Problem, make_problem
 from biogrip.instrument.gripper import GRIPPER, Gripper
-from biogrip.judge.likelihood import Likelihood, make_likelihood
-from biogrip.judge.limits import find_limits
-from biogrip.judge.quantities import parameters_and_sum
+from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.limits import find_limits
+from biogrip.judging.quantities import parameters_and_sum
 from biogrip.response.nonlinear import nonlinear_rotation
 from tests.helpers.problems import condensed_of, problem_alone
 

@@ -17,7 +17,7 @@ from biogrip.fit.multi_start import identify_from
 from biogrip.fit.problem import Problem
 from biogrip.fit.trace_fit import trace_fit
 from biogrip.fit.uncertain_gripper import gripper_functions
-from biogrip.judge.likelihood import make_likelihood
+from biogrip.judging.likelihood import make_likelihood
 from biogrip.response.simulation import simulated_rotation
 from tests.helpers.default import STUDY
 

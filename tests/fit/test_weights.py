@@ -14,7 +14,7 @@ from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.problem import Problem
 from biogrip.fit.trace_fit import trace_fit
 from biogrip.instrument.gripper import Arm, Gripper
-from biogrip.judge.diagnosis import Diagnosis, diagnose
+from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.library import set_up, simulate
 from tests.helpers.problems import run
 

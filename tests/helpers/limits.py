@@ -10,10 +10,10 @@ from biogrip.experiment.random_streams import stream
 from biogrip.fit.answer import silent
 from biogrip.fit.identifier import identifier
 from biogrip.fit.problem import Problem
-from biogrip.judge.likelihood import Likelihood, make_likelihood
-from biogrip.judge.limits import find_limits
-from biogrip.judge.profiles import compute_profiles
-from biogrip.judge.quantities import Quantity
+from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.limits import find_limits
+from biogrip.judging.profiles import compute_profiles
+from biogrip.judging.quantities import Quantity
 from tests.helpers.default import STUDY
 from tests.helpers.definition import rise_at, rises_along
 from tests.helpers.places import EXAMPLE

@@ -10,7 +10,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.network import Network
 from biogrip.experiment.protocol import TorqueHistory, hold, torque_history
 from biogrip.instrument.gripper import Arm, Gripper
-from biogrip.judge.fit_status import DOUBT, REJECTED, REJECTION, Note
+from biogrip.judging.fit_status import DOUBT, REJECTED, REJECTION, Note
 from biogrip.response.inertia import VISIBLE, elapsed_s, find_ring, ring, ringing_s, while_ringing
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.default import STUDY

@@ -14,7 +14,7 @@ from biogrip.experiment.sample import MODELS
 from biogrip.figures import robustness as figure
 from biogrip.figures.style import styled
 from biogrip.instrument.gripper import Arm, Gripper
-from biogrip.judge.at_truth import headlines
+from biogrip.judging.at_truth import headlines
 from biogrip.records.identifications import columns
 from biogrip.response.linear import rotation, step_response
 from biogrip.stages import sweep_points as stage

@@ -13,7 +13,7 @@ from biogrip.experiment.sample import MODELS
 from biogrip.identify.one_trace import IdentifyOptions, identify_trace, study_of
 from biogrip.identify.read_as import ReadAs
 from biogrip.instrument.gripper import Gripper
-from biogrip.judge.diagnosis import diagnose
+from biogrip.judging.diagnosis import diagnose
 from biogrip.records.verdicts import diagnosis_data
 from biogrip.response.linear import rotation, step_response
 from biogrip.stages import judgement

@@ -20,7 +20,7 @@ from biogrip.figures.axis_limits import (
 from biogrip.figures.decades import decade_ticks
 from biogrip.figures.declared import drawing
 from biogrip.figures.style import BLUE, FITTED, GREY, SHADE, TARGET, panel, row_of_panels
-from biogrip.judge.likelihood import CERTAIN
+from biogrip.judging.likelihood import CERTAIN
 from biogrip.products.product import JUDGEMENT, the
 from biogrip.products.uses import every, from_case
 from biogrip.records.verdicts import PATH, read_verdicts

@@ -23,9 +23,9 @@ from biogrip.figures.style import (
     panel,
     row_of_panels,
 )
-from biogrip.judge.fisher import bound
-from biogrip.judge.quantities import Quantity, parameters_and_sum
-from biogrip.judge.verdicts import DETERMINED
+from biogrip.judging.fisher import bound
+from biogrip.judging.quantities import Quantity, parameters_and_sum
+from biogrip.judging.verdicts import DETERMINED
 from biogrip.products.product import JUDGEMENT, the
 from biogrip.products.uses import from_case, simulated
 from biogrip.records.identifications import PATH, read_identifications

@@ -16,7 +16,7 @@ from biogrip.figures.axis_limits import (
 )
 from biogrip.figures.results import Fit, fit_of
 from biogrip.identify.one_trace import Identified
-from biogrip.judge.likelihood import CERTAIN
+from biogrip.judging.likelihood import CERTAIN
 
 _DIGITS = 4
 # Points of a trace: some evenly, and the most extreme residuals on either side.

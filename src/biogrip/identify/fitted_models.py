@@ -21,10 +21,10 @@ from biogrip.fit.model_choice import (
 from biogrip.fit.nested_fits import fit_models, is_within
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.identify.trace_case import TraceCase
-from biogrip.judge.diagnosis import Diagnosis, diagnose
-from biogrip.judge.fit_status import DOUBT, Note
-from biogrip.judge.likelihood import MISSED
-from biogrip.judge.verdicts import Finding
+from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.judging.fit_status import DOUBT, Note
+from biogrip.judging.likelihood import MISSED
+from biogrip.judging.verdicts import Finding
 
 _MOST_SAMPLES = 50_000
 # Each of the others would take half a second to five; they are tried where the config names them.

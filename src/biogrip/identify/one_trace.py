@@ -31,9 +31,9 @@ from biogrip.identify.read_as import ReadAs, laid_over, read_trace
 from biogrip.identify.second_opinion import second_opinions
 from biogrip.identify.trace_case import TraceCase
 from biogrip.instrument.instruments import INSTRUMENTS
-from biogrip.judge.diagnosis import Diagnosis, diagnose_all
-from biogrip.judge.fit_status import HARMLESS, REJECTED, Note
-from biogrip.judge.onset_profiles import profile_over_onset
+from biogrip.judging.diagnosis import Diagnosis, diagnose_all
+from biogrip.judging.fit_status import HARMLESS, REJECTED, Note
+from biogrip.judging.onset_profiles import profile_over_onset
 from biogrip.progress import Progress
 from biogrip.records.traces import Measurements
 from biogrip.records.verdicts import exact_data

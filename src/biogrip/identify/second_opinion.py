@@ -14,11 +14,11 @@ from biogrip.fit.multi_start import fit_from
 from biogrip.fit.problem import Problem
 from biogrip.fit.trace_fit import TraceFit, fit_traces
 from biogrip.identify.trace_case import TraceCase
-from biogrip.judge.diagnosis import Diagnosis, diagnose_all
-from biogrip.judge.fit_status import DOUBT, HARMLESS, REJECTED, REJECTION, Note
-from biogrip.judge.likelihood import compute_fall
-from biogrip.judge.verdicts import Finding
-from biogrip.judge.whiteness import FALSE_ALARM, one_in
+from biogrip.judging.diagnosis import Diagnosis, diagnose_all
+from biogrip.judging.fit_status import DOUBT, HARMLESS, REJECTED, REJECTION, Note
+from biogrip.judging.likelihood import compute_fall
+from biogrip.judging.verdicts import Finding
+from biogrip.judging.whiteness import FALSE_ALARM, one_in
 from biogrip.response.flow import drift_is_flow
 
 

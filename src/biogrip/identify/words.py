@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from biogrip.digits import with_unit
-from biogrip.judge.fit_status import OK, REJECTED
-from biogrip.judge.verdicts import (
+from biogrip.judging.fit_status import OK, REJECTED
+from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
     DETERMINED,

@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 
 from biogrip.digits import with_unit
-from biogrip.judge.verdicts import DETERMINED
+from biogrip.judging.verdicts import DETERMINED
 from biogrip.tables.claim_rules import (
     FEWEST_SEEDS,
     IN_PART,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from biogrip.digits import round_increase, rounded_numbers
-from biogrip.judge.fit_status import (
+from biogrip.judging.fit_status import (
     REJECTED,
     REJECTION,
     Note,
@@ -18,8 +18,8 @@ from biogrip.judge.fit_status import (
 from biogrip.records.json_object import read_object
 
 if TYPE_CHECKING:
-    from biogrip.judge.diagnosis import Diagnosis
-    from biogrip.judge.verdicts import Finding
+    from biogrip.judging.diagnosis import Diagnosis
+    from biogrip.judging.verdicts import Finding
 
 PATH = "results/identifiability/{case}.json"
 FIT_REJECTED = "fit rejected"

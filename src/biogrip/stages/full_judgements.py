@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.fit.multi_start import fit_from
-from biogrip.judge.likelihood import MISSED, Likelihood, make_likelihood
-from biogrip.judge.profiles import compute_profiles
-from biogrip.judge.quantities import Quantity
-from biogrip.judge.verdicts import Finding
+from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
+from biogrip.judging.profiles import compute_profiles
+from biogrip.judging.quantities import Quantity
+from biogrip.judging.verdicts import Finding
 
 _MOST_RESTARTS = 3
 

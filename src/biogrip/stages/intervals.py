@@ -18,11 +18,11 @@ from biogrip.fit.methods import METHODS
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.problem import Problem
 from biogrip.fit.trace_fit import trace_fit
-from biogrip.judge.fisher import covariance
-from biogrip.judge.likelihood import Likelihood, make_likelihood
-from biogrip.judge.limits import find_limits
-from biogrip.judge.quantities import Quantity, parameters_and_sum
-from biogrip.judge.verdicts import DETERMINED
+from biogrip.judging.fisher import covariance
+from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.limits import find_limits
+from biogrip.judging.quantities import Quantity, parameters_and_sum
+from biogrip.judging.verdicts import DETERMINED
 from biogrip.products.product import Product, Weight, the
 from biogrip.products.uses import from_case, searched_for
 from biogrip.progress import Progress

@@ -16,12 +16,12 @@ from biogrip.fit.methods import METHODS
 from biogrip.fit.multi_start import fit_from, identify_from
 from biogrip.fit.problem import Problem
 from biogrip.fit.trace_fit import TraceFit, fit_traces
-from biogrip.judge.diagnosis import Diagnosis, diagnose
-from biogrip.judge.fit_status import HARMLESS, Note
-from biogrip.judge.likelihood import MISSED
-from biogrip.judge.onset_profiles import profile_over_onset
-from biogrip.judge.slow_misfit import find_slow_misfit
-from biogrip.judge.valley import compute_valley
+from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.judging.fit_status import HARMLESS, Note
+from biogrip.judging.likelihood import MISSED
+from biogrip.judging.onset_profiles import profile_over_onset
+from biogrip.judging.slow_misfit import find_slow_misfit
+from biogrip.judging.valley import compute_valley
 from biogrip.products.product import JUDGEMENT, Product, Reads, the, wildcards_of
 from biogrip.products.uses import from_case, searched_for, to_identify
 from biogrip.records.traces import MEASUREMENTS, TARGETS, read_measurements, read_target

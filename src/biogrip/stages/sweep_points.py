@@ -15,8 +15,8 @@ from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import nearest_encodable
 from biogrip.fit.success import near_noise
 from biogrip.instrument.calibrated_gripper import CALIBRATIONS
-from biogrip.judge.at_truth import bounds_percent, headlines
-from biogrip.judge.quantities import Quantity
+from biogrip.judging.at_truth import bounds_percent, headlines
+from biogrip.judging.quantities import Quantity
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, Weight
 from biogrip.products.uses import each, using

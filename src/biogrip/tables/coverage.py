@@ -9,9 +9,9 @@ import pandas as pd
 from biogrip.arrays import Array
 from biogrip.experiment.noise import standard_deviation
 from biogrip.instrument.calibrated_gripper import CALIBRATIONS
-from biogrip.judge.fisher import bound
-from biogrip.judge.quantities import parameters_and_sum
-from biogrip.judge.verdicts import (
+from biogrip.judging.fisher import bound
+from biogrip.judging.quantities import parameters_and_sum
+from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
     DETERMINED,

@@ -8,7 +8,7 @@ import pandas as pd
 
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import Method
-from biogrip.judge.at_truth import headlines
+from biogrip.judging.at_truth import headlines
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Reads
 from biogrip.products.uses import marked

@@ -3,8 +3,8 @@
 import numpy as np
 
 from biogrip.experiment.protocol import sample_times
-from biogrip.judge.at_truth import DETERMINED_PERCENT, bounds_percent
-from biogrip.judge.quantities import Quantity
+from biogrip.judging.at_truth import DETERMINED_PERCENT, bounds_percent
+from biogrip.judging.quantities import Quantity
 from biogrip.products.uses import each, from_study, published
 from biogrip.study.study import Case, Study
 from biogrip.tables.declared import table

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from biogrip.judge.quantities import Quantity, parameters_and_sum
-from biogrip.judge.verdicts import DETERMINED, NOT_DETERMINED, WIDE
+from biogrip.judging.quantities import Quantity, parameters_and_sum
+from biogrip.judging.verdicts import DETERMINED, NOT_DETERMINED, WIDE
 from biogrip.products.product import of_cases
 from biogrip.products.uses import each, from_study
 from biogrip.records.intervals import INTERVALS

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from biogrip.judge.verdicts import DETERMINED
+from biogrip.judging.verdicts import DETERMINED
 from biogrip.products.product import JUDGEMENT, the
 from biogrip.products.uses import every, from_case
 from biogrip.records.verdicts import PATH, read_verdicts

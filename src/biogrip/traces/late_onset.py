@@ -5,8 +5,8 @@ from scipy.special import chdtri
 from biogrip.arrays import Array
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFits
-from biogrip.judge.fit_status import REJECTION, Note
-from biogrip.judge.likelihood import compute_fall
+from biogrip.judging.fit_status import REJECTION, Note
+from biogrip.judging.likelihood import compute_fall
 from biogrip.traces.onset import begins_constant, guess_onset
 
 # So that correlated noise does not look like a late onset.

@@ -8,11 +8,11 @@ import pytest
 from biogrip.experiment.sample import MODELS
 from biogrip.fit.local_fits import FINE
 from biogrip.fit.multi_start import fit_from
-from biogrip.judge.constrained_fits import ConstrainedFits
-from biogrip.judge.diagnosis import diagnose
-from biogrip.judge.limits import find_limits
-from biogrip.judge.quantities import parameters_and_sum
-from biogrip.judge.verdicts import DETERMINED
+from biogrip.judging.constrained_fits import ConstrainedFits
+from biogrip.judging.diagnosis import diagnose
+from biogrip.judging.limits import find_limits
+from biogrip.judging.quantities import parameters_and_sum
+from biogrip.judging.verdicts import DETERMINED
 from tests.helpers.definition import FitConstraint
 from tests.helpers.limits import (
     ALIKE,

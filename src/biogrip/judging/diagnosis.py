@@ -13,7 +13,7 @@ from biogrip.fit.multi_start import fit_from
 from biogrip.fit.noise_growth import compute_growth
 from biogrip.fit.outliers import outliers_of
 from biogrip.fit.problem import Problem
-from biogrip.judge.fit_status import (
+from biogrip.judging.fit_status import (
     DOUBT,
     HARMLESS,
     REJECTED,
@@ -21,12 +21,12 @@ from biogrip.judge.fit_status import (
     Note,
     compute_status,
 )
-from biogrip.judge.likelihood import MISSED, Likelihood, make_likelihood
-from biogrip.judge.quantities import parameters_and_sum
-from biogrip.judge.range_ends import note_range_ends
-from biogrip.judge.slow_misfit import has_fast_noise, has_uneven_noise
-from biogrip.judge.verdicts import Finding, Trade, compute_findings, find_trade_offs
-from biogrip.judge.whiteness import FALSE_ALARM, doubts_about_noise
+from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
+from biogrip.judging.quantities import parameters_and_sum
+from biogrip.judging.range_ends import note_range_ends
+from biogrip.judging.slow_misfit import has_fast_noise, has_uneven_noise
+from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.response.grip import Grip
 from biogrip.response.noise_estimate import estimate_noise
 

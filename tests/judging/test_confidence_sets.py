@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
-from biogrip.judge.constrained_fits import ConstrainedFits
-from biogrip.judge.diagnosis import diagnose
-from biogrip.judge.limits import find_limits
-from biogrip.judge.points import Points
-from biogrip.judge.profiles import Profile, compute_profiles, find_gaps
-from biogrip.judge.quantities import parameters_and_sum
-from biogrip.judge.verdicts import Finding
+from biogrip.judging.constrained_fits import ConstrainedFits
+from biogrip.judging.diagnosis import diagnose
+from biogrip.judging.limits import find_limits
+from biogrip.judging.points import Points
+from biogrip.judging.profiles import Profile, compute_profiles, find_gaps
+from biogrip.judging.quantities import parameters_and_sum
+from biogrip.judging.verdicts import Finding
 from biogrip.stages.full_judgements import refitted, shown_of
 from tests.helpers.limits import likelihood_for
 from tests.helpers.problems import MODEL, problem, run

@@ -8,8 +8,8 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, standard_deviation
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.judge.fisher import bound
-from biogrip.judge.quantities import Quantity, parameters_and_sum
+from biogrip.judging.fisher import bound
+from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.response.sensitivity import rotation_and_sensitivity
 
 DETERMINED_PERCENT = 100.0
@@ -38,7 +38,7 @@ def bounds_percent(
     list of (Quantity, float)
         Every parameter, and the sum of the exchangeable ones, each with 100
         times the standard deviation of its logarithm; see
-        `biogrip.judge.fisher`. Without noise there are none: NaN.
+        `biogrip.judging.fisher`. Without noise there are none: NaN.
     """
     model = problem.searched
     quantities = parameters_and_sum(model)

@@ -15,10 +15,10 @@ from scipy.optimize import brentq
 
 from biogrip.arrays import Array
 from biogrip.fit.multi_start import fit_from
-from biogrip.judge.diagnosis import Diagnosis
-from biogrip.judge.likelihood import Likelihood
-from biogrip.judge.profiles import Profile, compute_profiles, find_gaps
-from biogrip.judge.verdicts import Finding
+from biogrip.judging.diagnosis import Diagnosis
+from biogrip.judging.likelihood import Likelihood
+from biogrip.judging.profiles import Profile, compute_profiles, find_gaps
+from biogrip.judging.verdicts import Finding
 
 _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
 # First change of the onset in sampling intervals, and most of it as a share of the trace.

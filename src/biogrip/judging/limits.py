@@ -10,10 +10,10 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.fit.local_fits import alike
-from biogrip.judge.constrained_fits import CLOSE, ConstrainedFits
-from biogrip.judge.crossings import Brackets, crossings
-from biogrip.judge.likelihood import Likelihood
-from biogrip.judge.quantities import Quantity
+from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
+from biogrip.judging.crossings import Brackets, crossings
+from biogrip.judging.likelihood import Likelihood
+from biogrip.judging.quantities import Quantity
 
 # Accuracy of limits, in standard deviations.
 _ACCURACY = 1e-3

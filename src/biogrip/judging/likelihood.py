@@ -18,7 +18,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.fit.problem import Problem
-from biogrip.judge.quantities import Quantity
+from biogrip.judging.quantities import Quantity
 
 CERTAIN = 0.999
 """Confidence that a profile must reach at an end of the range to have a limit on that side."""

@@ -5,7 +5,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood
 from biogrip.instrument.instrument import Instrument
-from biogrip.judge.fit_status import DOUBT, REJECTION, Note
+from biogrip.judging.fit_status import DOUBT, REJECTION, Note
 from biogrip.response.noise_estimate import estimate_noise
 from biogrip.response.residuals import Residuals
 from biogrip.response.whitening import MOST_SAMPLES, NoiseModel

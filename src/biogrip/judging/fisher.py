@@ -12,7 +12,7 @@ References
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.judge.quantities import Quantity
+from biogrip.judging.quantities import Quantity
 
 # Members with a smaller share in a sum are neglected, whatever their uncertainty.
 _NEGLIGIBLE = 1e-2

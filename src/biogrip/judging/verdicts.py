@@ -9,9 +9,9 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
-from biogrip.judge.likelihood import Likelihood
-from biogrip.judge.profiles import Profile, compute_profiles
-from biogrip.judge.quantities import Quantity, find_combinations
+from biogrip.judging.likelihood import Likelihood
+from biogrip.judging.profiles import Profile, compute_profiles
+from biogrip.judging.quantities import Quantity, find_combinations
 
 DETERMINED = "determined"
 BOUNDED_BELOW = "bounded below"

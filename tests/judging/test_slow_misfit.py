@@ -9,9 +9,9 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise_parts import draw_ornstein_uhlenbeck
 from biogrip.experiment.protocol import torque_history
 from biogrip.instrument.gripper import GRIPPER
-from biogrip.judge.diagnosis import diagnose
-from biogrip.judge.fit_status import DOUBT, DOUBTFUL, REJECTED, REJECTION, compute_status
-from biogrip.judge.slow_misfit import find_slow_misfit
+from biogrip.judging.diagnosis import diagnose
+from biogrip.judging.fit_status import DOUBT, DOUBTFUL, REJECTED, REJECTION, compute_status
+from biogrip.judging.slow_misfit import find_slow_misfit
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.whitening import NoiseModel
 from tests.helpers.default import STUDY

@@ -6,7 +6,7 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit.local_fits import FAIR
-from biogrip.judge.constrained_fits import CLOSE, ConstrainedFits
+from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
 
 HIGHEST = 16.0
 """Increase of chi^2 up to which a profile has dense points, as figures show no more."""

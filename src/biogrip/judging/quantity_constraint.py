@@ -20,7 +20,7 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit.levenberg_marquardt import Normal
-from biogrip.judge.quantities import Quantity
+from biogrip.judging.quantities import Quantity
 
 # E-folds from a bound at which a member counts as free, and by which rounding may exceed it.
 _FREE, _ROUNDING = 1e-9, 1e-7

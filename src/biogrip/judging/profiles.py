@@ -21,11 +21,11 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.fit.local_fits import FINE, alike
-from biogrip.judge.constrained_fits import ConstrainedFits
-from biogrip.judge.crossings import Brackets, crossings
-from biogrip.judge.likelihood import Likelihood
-from biogrip.judge.points import Points
-from biogrip.judge.quantities import Quantity
+from biogrip.judging.constrained_fits import ConstrainedFits
+from biogrip.judging.crossings import Brackets, crossings
+from biogrip.judging.likelihood import Likelihood
+from biogrip.judging.points import Points
+from biogrip.judging.quantities import Quantity
 
 # Points near the best fit, in standard deviations, that every profile has.
 _NEAR = np.array([z for z in np.arange(-4.0, 4.1, 0.5) if z != 0])

@@ -15,7 +15,7 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.fit.local_fits import FAIR
-from biogrip.judge.constrained_fits import ConstrainedFits
+from biogrip.judging.constrained_fits import ConstrainedFits
 
 _MOST_FITS = 40
 _CLOSEST = 1e-7

@@ -10,19 +10,19 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.sample import MODELS, Sample
 from biogrip.identify.words import limits_in_short
-from biogrip.judge.diagnosis import Diagnosis, diagnose
-from biogrip.judge.fisher import bound, covariance
-from biogrip.judge.likelihood import Likelihood, make_likelihood
-from biogrip.judge.limits import find_limits
-from biogrip.judge.profiles import compute_profiles
-from biogrip.judge.quantities import (
+from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.judging.fisher import bound, covariance
+from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.limits import find_limits
+from biogrip.judging.profiles import compute_profiles
+from biogrip.judging.quantities import (
     BranchPenalty,
     Quantity,
     find_combinations,
     parameters_and_sum,
 )
-from biogrip.judge.valley import compute_valley
-from biogrip.judge.verdicts import (
+from biogrip.judging.valley import compute_valley
+from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
     DETERMINED,

@@ -7,8 +7,8 @@ import numpy as np
 
 from biogrip.experiment.sample import SampleModel
 from biogrip.fit.multi_start import descend_from
-from biogrip.judge.fit_status import REJECTION, Note
-from biogrip.judge.likelihood import Likelihood
+from biogrip.judging.fit_status import REJECTION, Note
+from biogrip.judging.likelihood import Likelihood
 
 # Decrease of chi^2 beyond an end that is more than chance: three standard deviations squared.
 _NOTICEABLE = 9.0

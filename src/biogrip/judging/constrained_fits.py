@@ -7,9 +7,9 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit.levenberg_marquardt import Minima
 from biogrip.fit.local_fits import LocalFits
-from biogrip.judge.likelihood import MISSED, Likelihood
-from biogrip.judge.quantities import Quantity
-from biogrip.judge.quantity_constraint import QuantityConstraint
+from biogrip.judging.likelihood import MISSED, Likelihood
+from biogrip.judging.quantities import Quantity
+from biogrip.judging.quantity_constraint import QuantityConstraint
 
 CLOSE = 1e-7
 """Tolerance of fits that give chi^2 of some thousand readings to 0.001.

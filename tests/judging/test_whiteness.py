@@ -10,7 +10,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.noise_parts import AR1, Outliers
 from biogrip.instrument.gripper import GRIPPER
-from biogrip.judge.whiteness import FALSE_ALARM, doubts_about_noise, uneven
+from biogrip.judging.whiteness import FALSE_ALARM, doubts_about_noise, uneven
 
 TIMES: Array = np.linspace(0, 400, 4001)
 SAME = np.ones(4001)

@@ -9,14 +9,14 @@ from biogrip.arrays import Array, IntArray
 from biogrip.experiment.sample import MODELS, Sample, with_fixed
 from biogrip.fit.local_fits import FINE
 from biogrip.fit.multi_start import fit_from
-from biogrip.judge.constrained_fits import ConstrainedFits
-from biogrip.judge.crossings import Brackets, crossings
-from biogrip.judge.diagnosis import diagnose
-from biogrip.judge.likelihood import Likelihood, make_likelihood
-from biogrip.judge.limits import find_limits
-from biogrip.judge.profiles import compute_profiles
-from biogrip.judge.quantities import Quantity, find_combinations, parameters_and_sum
-from biogrip.judge.quantity_constraint import QuantityConstraint
+from biogrip.judging.constrained_fits import ConstrainedFits
+from biogrip.judging.crossings import Brackets, crossings
+from biogrip.judging.diagnosis import diagnose
+from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.limits import find_limits
+from biogrip.judging.profiles import compute_profiles
+from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
+from biogrip.judging.quantity_constraint import QuantityConstraint
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.definition import FitConstraint
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE, identified, of_case, posed_for, run
