@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.sample import CANDIDATES, Sample, SampleModel, with_fixed
@@ -81,6 +81,11 @@ class Case:
     """Confidence level of all intervals."""
     verdicts_every = _of_case(lambda case: case.block.identifiability.verdicts_every)
     """Seeds of the coverage test that are multiples of this get verdicts, too."""
+
+    @cached_property
+    def plain(self) -> dict[str, Any]:
+        """Config block as plain values, without keys that have their default."""
+        return plain(self.block)
 
     @property
     def title(self) -> str:
@@ -264,6 +269,11 @@ class Study:
     """The comb drive of both arms."""
     reconstructed = _of_study(lambda study: study.config.reconstructed)
     """Dotted keys, or whole blocks, whose values the paper omits."""
+
+    @cached_property
+    def plain(self) -> dict[str, Any]:
+        """Config as plain values, without keys that have their default."""
+        return plain(self.config)
 
     @cached_property
     def cases(self) -> dict[str, Case]:

@@ -1,0 +1,119 @@
+"""What a job is told of the config: some of its keys, and nothing else.
+
+A rule's ``params`` name keys of the config, a case's laid over the study's. In the job the same keys
+make a `Case` or a `Study` again, in which any other key is missing: a rule that forgets to name one
+fails, and cannot give a result that Snakemake would not renew.
+"""
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from functools import cache
+from typing import Annotated, Any, TypeVar, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, TypeAdapter
+
+from biogrip.study.case_blocks import METHOD_BLOCKS, CaseBlock
+from biogrip.study.config import StudyConfig
+from biogrip.study.plain import built
+from biogrip.study.study import Case, Study
+
+_Block = TypeVar("_Block", bound=BaseModel)
+
+
+def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any]:
+    """Return some keys of a study's config as plain values, those of a case laid over them.
+
+    Parameters
+    ----------
+    study
+        The study.
+    keys
+        Names of blocks, methods' among them, or of single keys in a block, e.g. ``measurement.noise``.
+    case
+        Name of the case, or of a point of a sweep; by default the study's own keys.
+    """
+    blocks = [study.case(case).plain, study.plain] if case else [study.plain]
+    return {key: _value(blocks, key) for key in keys}
+
+
+def case_of(name: str, given: Mapping[str, Any]) -> Case:
+    """Return a case of which some keys are given, by `settings`."""
+    return Case(name, _partial(CaseBlock, given), Study(_partial(StudyConfig, given)))
+
+
+def study_of(given: Mapping[str, Any]) -> Study:
+    """Return a study of which some keys are given, by `settings`."""
+    return Study(_partial(StudyConfig, given))
+
+
+def _value(blocks: Iterable[Mapping[str, Any]], key: str) -> Any:
+    """Return the plain value of a key in the first block that has it; None if it has its default."""
+    name, _, inner = key.partition(".")
+    for block in blocks:
+        if name in block:
+            return block[name].get(inner) if inner else block[name]
+    return None
+
+
+@cache
+def _adapter(kind: type[BaseModel], name: str) -> TypeAdapter[Any]:
+    field = kind.model_fields[name]
+    annotation: Any = field.annotation
+    for each in field.metadata:
+        annotation = Annotated[annotation, each]
+    return TypeAdapter(list[annotation], config=ConfigDict(strict=True, extra="forbid"))
+
+
+def _field(kind: type[BaseModel], name: str, value: Any) -> Any:
+    """Return a field as its class holds it, given its plain value or None for its default."""
+    if value is None:
+        return kind.model_fields[name].get_default(call_default_factory=True)
+    return _adapter(kind, name).validate_json(json.dumps([value]))[0]
+
+
+def _partial(kind: type[_Block], given: Mapping[str, Any]) -> _Block:
+    """Return a block with only the keys that are given."""
+    block = kind.model_construct()
+    values: dict[str, Any] = {}
+    parts: dict[str, dict[str, Any]] = {}
+    for key, value in given.items():
+        name, _, inner = key.partition(".")
+        if name not in kind.model_fields:
+            continue
+        if inner:
+            parts.setdefault(name, {})[inner] = value
+        else:
+            values[name] = _field(kind, name, value)
+    for name, part in parts.items():
+        values[name] = _part(kind.model_fields[name].annotation, part)
+    vars(block).clear()
+    vars(block).update(values)
+    extra = {name: given[name] or {} for name in METHOD_BLOCKS if name in given}
+    object.__setattr__(block, "__pydantic_extra__", extra)
+    return block
+
+
+def _part(kind: Any, given: Mapping[str, Any]) -> Any:
+    """Return a block of a dataclass with only the keys that are given."""
+    assert is_dataclass(kind)
+    absent = {field.name for field in fields(kind)} - given.keys()
+
+    class Part(kind):  # type: ignore[misc, valid-type]
+        def __getattribute__(self, name: str) -> Any:
+            if name in absent:
+                raise AttributeError(f"{name} is not among the keys that the rule names.")
+            return super().__getattribute__(name)
+
+    part = object.__new__(Part)
+    plain = {name: value for name, value in given.items() if value is not None}
+    hints = get_type_hints(kind, include_extras=True)
+    for field in fields(kind):
+        if field.name in plain:
+            value = built(hints[field.name], plain[field.name])
+        elif field.name in given:
+            value = field.default
+        else:
+            continue
+        object.__setattr__(part, field.name, value)
+    return part
