@@ -1,7 +1,6 @@
 """Figure 7: the comb drive to scale, and its torque against voltage."""
 
 import math
-from operator import attrgetter
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,11 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Wedge
 
 from biogrip.experiment.protocol import torque_at, torque_history
-from biogrip.figures.declared import drawing
 from biogrip.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, figure, panel
 from biogrip.instrument import actuator
 from biogrip.instrument.actuator import CombDrive
-from biogrip.products.uses import from_study
 from biogrip.study.study import Study
 
 
@@ -113,14 +110,3 @@ def _dimensions(axes: Axes, comb: CombDrive) -> None:
     axes.annotate("", (-edge, r - 2.5), (edge, r - 2.5), arrowprops=arrow)
     text = f"overlap {comb.initial_overlap_deg:g}°, $r_0$ = {r:g} µm"
     axes.annotate(text, (0, r - 5), ha="center", va="top", fontsize=7)
-
-
-COMB = drawing(
-    draw,
-    caption="Figure 7 of the paper: (a, b) the comb drive to scale, overlapping as at rest, (a) on "
-    "its side; "
-    "(c) its torque against voltage, eq. (9), with the protocol's operating points.",
-    uses=from_study("actuator phases"),
-    when=attrgetter("has_gripper"),
-    rule="study_figures",
-)

@@ -8,13 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from biogrip.figures.declared import drawing
 from biogrip.figures.results import read_history, seeds_in_words, typical_in_words
 from biogrip.figures.style import ALL_SEEDS, COLUMN_IN, FITTED, TARGET, figure
 from biogrip.fit.success import near_noise, near_noise_words, typical
-from biogrip.products.product import the
-from biogrip.products.uses import every, from_case
-from biogrip.records.identifications import HISTORIES, PATH, read_identifications
+from biogrip.records.identifications import read_identifications
 from biogrip.study.study import Case
 
 _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
@@ -78,14 +75,3 @@ def _mutation(axes: Axes, start: int, last: int) -> None:
         fontsize=7,
         path_effects=[withStroke(linewidth=2, foreground="white")],
     )
-
-
-CONVERGENCE = drawing(
-    draw,
-    caption="Figure 8 of the paper: the best misfit of every seed over the RMS of the noise in its "
-    "trace, step by step. Typical is the seed of median excess at the end.",
-    uses=from_case("title mutation_start study.shown_method study.near_noise_tolerance"),
-    reads={"identifications": the(PATH), "histories": the(HISTORIES)},
-    cases=every,
-    rule="case_figures",
-)

@@ -6,13 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from biogrip.digits import with_unit
-from biogrip.figures.declared import drawing
 from biogrip.figures.results import read_history, seeds_in_words, typical_in_words
 from biogrip.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
 from biogrip.fit.success import typical
-from biogrip.products.product import the
-from biogrip.products.uses import every, from_case
-from biogrip.records.identifications import HISTORIES, PATH, read_identifications
+from biogrip.records.identifications import read_identifications
 from biogrip.study.study import Case
 
 
@@ -77,15 +74,3 @@ def _beside(ratio: float) -> str:
     if abs(percent) < 0.05:
         return "at the target"
     return f"{abs(percent):.2g} % {'above' if percent > 0 else 'below'} the target"
-
-
-EVOLUTION = drawing(
-    draw,
-    caption="As Figure 10 of the paper: the parameters of the best individual, step by step, for "
-    "every seed. Typical is the seed of median excess of the misfit over the noise in its trace. "
-    "Named above each panel: how far from the target it ends.",
-    uses=from_case("truth study.shown_method"),
-    reads={"identifications": the(PATH), "histories": the(HISTORIES)},
-    cases=every,
-    rule="case_figures",
-)

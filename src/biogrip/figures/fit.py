@@ -9,14 +9,8 @@ from matplotlib.figure import Figure
 
 from biogrip.digits import with_unit
 from biogrip.figures.axis_limits import is_over_decades, scale_of_fit
-from biogrip.figures.declared import drawing
 from biogrip.figures.results import Fit, typical_fit
 from biogrip.figures.style import COLUMN_IN, FITTED, MEASURED, TARGET, figure
-from biogrip.products.product import of_batches, the
-from biogrip.products.uses import every, from_case
-from biogrip.records.identifications import PATH
-from biogrip.records.traces import MEASUREMENTS
-from biogrip.stages.calibrated import CALIBRATED
 from biogrip.study.study import Case
 
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
@@ -74,19 +68,3 @@ def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ())
             traces.set(yscale="log", ylim=(0.8 * factor * low, 1.25 * factor * high))
     drawn.align_ylabels()
     return drawn
-
-
-FIT = drawing(
-    draw,
-    caption="As Figures 9, 11 and 12 of the paper: target, noisy measurement and its fit, of the "
-    "seed of median excess of the misfit over the noise in its trace; and below the residuals of "
-    "the measurement (points) and of the target (line).",
-    uses=from_case("title problem published.axis_rad study.shown_method"),
-    reads={
-        "identifications": the(PATH),
-        "measurements": of_batches(MEASUREMENTS),
-        "calibrated": CALIBRATED,
-    },
-    cases=every,
-    rule="case_figures",
-)

@@ -7,12 +7,9 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import torque_history
-from biogrip.figures.declared import drawing
 from biogrip.figures.results import scale_of
 from biogrip.figures.style import BLACK, BLUE, COLUMN_IN, ORANGE, figure
-from biogrip.products.product import the
-from biogrip.products.uses import from_case, gripped
-from biogrip.records.traces import TARGETS, read_target
+from biogrip.records.traces import read_target
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.unilateral import UnilateralResponse, unilateral_response
 from biogrip.study.study import Case
@@ -71,15 +68,3 @@ def _from_loss(found: UnilateralResponse, values: Array) -> Array:
     lost = np.flatnonzero(~found.touching)
     start = max(lost[0] - 1, 0) if len(lost) else len(values)
     return np.where(np.arange(len(values)) >= start, values, np.nan)
-
-
-FORCE = drawing(
-    draw,
-    caption="The force of the jaws on the sample if they hold it throughout, as the model has it. "
-    "Where it is negative the sample would have to stick to jaws that pull it; below, the target "
-    "and, where a linear model allows, the rotation of jaws that let go there.",
-    uses=from_case("title gripper phases sample parameters nonlinear_target unilateral"),
-    reads={"target": the(TARGETS)},
-    cases=gripped,
-    rule="case_figures",
-)

@@ -4,15 +4,11 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from biogrip.figures.declared import drawing
 from biogrip.figures.fit import draw_fit
 from biogrip.figures.results import fit_of
-from biogrip.products.product import JUDGEMENT, the
-from biogrip.products.uses import every, from_case
 from biogrip.records.traces import read_measurements
-from biogrip.records.verdicts import PATH, read_verdicts
-from biogrip.stages.calibrated import CALIBRATED
-from biogrip.stages.judgement import JUDGED_TRACE, TRACE
+from biogrip.records.verdicts import read_verdicts
+from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case
 
 
@@ -25,19 +21,3 @@ def draw(case: Case, verdicts: Path, measurements: Path, calibrated: list[Path])
     fit = fit_of(problem, {**problem.fixed, **values}, recorded, TRACE)
     trace = "recorded trace" if case.recorded else f"seed {TRACE}"
     return draw_fit(fit, f"best fit ({trace})", case.title, case.published.axis_rad)
-
-
-JUDGED_FIT = drawing(
-    draw,
-    caption="The trace that this case's verdicts are about, its best fit, and below the "
-    "residuals of the trace (points) and of the target (line).",
-    uses=from_case("title problem recorded published.axis_rad"),
-    reads={
-        "verdicts": the(PATH),
-        "measurements": JUDGED_TRACE,
-        "calibrated": CALIBRATED,
-    },
-    cases=every,
-    rule="case_figures",
-    weight=JUDGEMENT,
-)

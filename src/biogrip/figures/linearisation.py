@@ -8,16 +8,13 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from biogrip.experiment.protocol import torque_history
-from biogrip.figures.declared import drawing
 from biogrip.figures.style import BLUE, PAGE_IN, TARGET, figure, panel
-from biogrip.products.product import the
-from biogrip.products.uses import each, from_study, gripped
 from biogrip.records.differences import DIFFERENCES
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
 from biogrip.stages.model_difference import network_of, scaled
 from biogrip.study.study import Case, Study
-from biogrip.tables.linearisation import CAPTION, LIMIT_PERCENT
+from biogrip.tables.linearisation import LIMIT_PERCENT
 
 _SHOWN_FACTOR = 20.0
 _MOST_CASES = 3
@@ -81,15 +78,3 @@ def _difference(axes: Axes, case: Case) -> None:
     axes.set_ylim(bottom, top + 0.08 * (top - bottom))
     peak = f"peak rotation {1e3 * np.max(np.abs(linear)):.3g} mrad"
     axes.annotate(peak, (0.98, 0.99), xycoords="axes fraction", ha="right", va="top", fontsize=7)
-
-
-LINEARISATION_FIGURE = drawing(
-    draw,
-    name="linearisation_figure",
-    file="linearisation",
-    caption=f"(a) Nonlinear minus linear rotation of one case. (b to d) {CAPTION}",
-    uses=from_study(cases=each(gripped, "title sample parameters gripper phases")),
-    reads={"differences": the(DIFFERENCES.path)},
-    when=gripped,
-    rule="study_figures",
-)

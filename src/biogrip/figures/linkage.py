@@ -1,7 +1,6 @@
 """Figures 4 to 6: the gripper as a linkage, to scale, and the sample's two networks."""
 
 import math
-from operator import attrgetter
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,13 +8,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
 from biogrip.experiment.protocol import torque_history
-from biogrip.figures.declared import drawing
 from biogrip.figures.elements import damper, spring
 from biogrip.figures.nomenclature import nomenclature
 from biogrip.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, figure, panel
 from biogrip.instrument.contact import LARGEST_M
 from biogrip.instrument.gripper import Gripper
-from biogrip.products.uses import each, from_study, gripped
 from biogrip.response.simulation import simulated_rotation
 from biogrip.stages.model_difference import network_of
 from biogrip.study.study import Study
@@ -183,19 +180,3 @@ def _networks(axes: Axes) -> None:
                 damper(axes, 0.2, 4.8, y, "$c_p$")
     axes.set(xlim=(-0.2, 5.2), ylim=(-0.5, 5.2))
     axes.set_axis_off()
-
-
-LINKAGE = drawing(
-    draw,
-    caption="Figures 4 to 6 of the paper: (a) the gripper as a linkage, to scale, holding a sample "
-    f"of {1e6 * LARGEST_M:g} µm; (b) its tips at the reference and closed as far as the study's "
-    "softest sample lets them, the rotation enlarged as it says, and their displacements along x; "
-    "(c) names of the angles and displacements: reference (hat, soft lines), deformed "
-    "(tilde, hard lines), increments theta = tilde - hat and the closing rotations phi, "
-    "displacements u of the tips and x of the node between spring and damper, all to the right; "
-    "(d) the constitutive models. Arm length and angle are those of the config; in the default "
-    "study they are reconstructed.",
-    uses=from_study("gripper", cases=each(gripped, "sample parameters gripper phases")),
-    when=attrgetter("has_gripper"),
-    rule="study_figures",
-)

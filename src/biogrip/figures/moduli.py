@@ -11,8 +11,6 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.experiment.network import complex_modulus
 from biogrip.experiment.noise import standard_deviation
 from biogrip.experiment.sample import Network, SampleModel
-from biogrip.figures.declared import drawing
-from biogrip.figures.overview import shown_cases
 from biogrip.figures.results import first_seeds
 from biogrip.figures.style import (
     BLACK,
@@ -29,10 +27,8 @@ from biogrip.figures.style import (
     panel,
 )
 from biogrip.fit.success import near_noise
-from biogrip.products.product import Weight, of_cases
-from biogrip.products.uses import each, from_study, simulated
-from biogrip.records.identifications import PATH, read_identifications
-from biogrip.records.traces import TARGETS, read_target
+from biogrip.records.identifications import read_identifications
+from biogrip.records.traces import read_target
 from biogrip.study.study import Case, Study
 
 NEAR = 0.1
@@ -136,24 +132,3 @@ def _agreed(moduli: Array) -> BoolArray:
     """Return True at frequencies where nine tenths of fits, (n, n_omega), agree on the modulus."""
     low, high = np.quantile(np.abs(moduli), (0.05, 0.95), axis=0)
     return high < (1 + NEAR) * low
-
-
-MODULI = drawing(
-    draw,
-    caption="Upper row: storage modulus G' (solid) and loss modulus G'' (dashed) of the true "
-    "sample, and of all fits to its traces; shaded is the band in which nine tenths of the fits "
-    f"near the noise agree on the modulus to {NEAR:.0%}, whatever their parameters. Lower row: how "
-    "much the trace changes with the logarithm of each parameter, in standard deviations of one "
-    "measured value's noise; within the shaded band a single value does not show it.",
-    uses=from_study(
-        "shown_method fitting_method near_noise_tolerance",
-        cases=each(shown_cases, "truth problem noise"),
-    ),
-    reads={
-        "identifications": of_cases(PATH, shown_cases),
-        "targets": of_cases(TARGETS, shown_cases),
-    },
-    when=simulated,
-    rule="study_figures",
-    weight=Weight(10, 2000),
-)

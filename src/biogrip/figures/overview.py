@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from biogrip.arrays import Array
 from biogrip.experiment.truth import Truth
-from biogrip.figures.declared import drawing
 from biogrip.figures.fit import draw_traces
 from biogrip.figures.results import (
     SHOWN_SEEDS,
@@ -30,12 +29,8 @@ from biogrip.figures.style import (
     panel,
 )
 from biogrip.fit.success import near_noise, near_noise_words
-from biogrip.products.product import Reads, Weight, of_cases
-from biogrip.products.uses import each, from_study, simulated
-from biogrip.records.identifications import PATH, read_identifications
-from biogrip.records.traces import MEASUREMENTS
-from biogrip.records.verdicts import EXPECTED, bounded_on_a_side, read_verdicts
-from biogrip.stages.calibrated import CALIBRATED
+from biogrip.records.identifications import read_identifications
+from biogrip.records.verdicts import bounded_on_a_side, read_verdicts
 from biogrip.study.study import Study
 
 _WORST = 1e3
@@ -162,21 +157,3 @@ def _points(axes: Axes, place: NDArray[np.floating], ratio: Array, color: str, l
 
 def _first(study: Study) -> str:
     return shown_cases(study)[0]
-
-
-OVERVIEW = drawing(
-    draw,
-    caption="(a) Target, noisy measurement and typical fit of the first case. (b to d) Identified "
-    "over target value of every seed of the first three cases, for c + c_p and each parameter that "
-    "traces can tell from zero; triangles at the edge stand for values off the axis.",
-    uses=from_study("shown near_noise_tolerance", cases=each(shown_cases, "truth problem")),
-    reads={
-        "identifications": of_cases(PATH, shown_cases),
-        "expected": of_cases(EXPECTED, shown_cases),
-        "measurements": Reads(lambda plan, _: plan.batch_files(MEASUREMENTS, _first(plan.study))),
-        "calibrated": Reads(lambda plan, _: CALIBRATED.files(plan, {"case": _first(plan.study)})),
-    },
-    when=simulated,
-    rule="study_figures",
-    weight=Weight(10, 2000),
-)

@@ -18,13 +18,9 @@ from biogrip.figures.axis_limits import (
     profile_limits,
 )
 from biogrip.figures.decades import decade_ticks
-from biogrip.figures.declared import drawing
 from biogrip.figures.style import BLUE, FITTED, GREY, SHADE, TARGET, panel, row_of_panels
 from biogrip.judging.likelihood import CERTAIN
-from biogrip.products.product import JUDGEMENT, the
-from biogrip.products.uses import every, from_case
-from biogrip.records.verdicts import PATH, read_verdicts
-from biogrip.stages.expected import VERDICTS_EXPECTED
+from biogrip.records.verdicts import read_verdicts
 from biogrip.study.study import Case
 
 
@@ -104,16 +100,3 @@ def _limits(axes: Axes, item: dict[str, Any]) -> None:
     for limit in (low, high):
         if limit is not None:
             axes.axvline(limit, color=BLUE, linewidth=0.7)
-
-
-PROFILES = drawing(
-    draw,
-    caption="Profile likelihoods of one seed, and without noise (grey); shaded: the confidence "
-    "interval; dashed: its threshold; dotted: the increase at an end of the search range above "
-    "which the interval has a limit on that side.",
-    uses=from_case("title parameters"),
-    reads={"measured": the(PATH), "expected": VERDICTS_EXPECTED},
-    cases=every,
-    rule="case_figures",
-    weight=JUDGEMENT,
-)

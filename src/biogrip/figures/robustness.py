@@ -11,14 +11,10 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.figures.declared import drawing
 from biogrip.figures.style import PAGE_IN, figure, panel
 from biogrip.tables.heat_maps import (
-    CAPTION,
-    POINTS_OF_CASES,
     HeatMaps,
     headlines_of,
-    heat_maps,
     read_points,
 )
 
@@ -148,14 +144,3 @@ def _short(number: float) -> str:
 def _symbol(quantity: str) -> str:
     """Return a quantity's label as mathtext."""
     return "$" + re.sub(r"_(\w+)", r"_{\1}", quantity) + "$"
-
-
-ROBUSTNESS_FIGURE = drawing(
-    draw,
-    name="robustness_figure",
-    file="robustness",
-    caption=CAPTION,
-    uses=heat_maps,
-    reads={"points": POINTS_OF_CASES},
-    sweeps=True,
-)

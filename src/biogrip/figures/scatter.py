@@ -13,7 +13,6 @@ from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise import standard_deviation
-from biogrip.figures.declared import drawing
 from biogrip.figures.results import SHOWN_SEEDS, seeds_in_words
 from biogrip.figures.style import (
     PAPER,
@@ -26,12 +25,9 @@ from biogrip.figures.style import (
 from biogrip.judging.fisher import bound
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.products.product import JUDGEMENT, the
-from biogrip.products.uses import from_case, simulated
-from biogrip.records.identifications import PATH, read_identifications
-from biogrip.records.traces import TARGETS, read_target
-from biogrip.records.verdicts import EXPECTED, read_verdicts
-from biogrip.stages.calibrated import CALIBRATED
+from biogrip.records.identifications import read_identifications
+from biogrip.records.traces import read_target
+from biogrip.records.verdicts import read_verdicts
 from biogrip.study.study import Case
 
 # Bound of a logarithm above which an axis shows decades instead of percent.
@@ -158,22 +154,3 @@ def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
     drawn.legend(handles=handles, loc="outside lower left", ncols=3)
     few = "" if seeds <= SHOWN_SEEDS else f": {seeds_in_words(seeds)}, quartiles of all"
     drawn.suptitle(truth.title + few, x=0.01, ha="left", fontsize=8)
-
-
-SCATTER = drawing(
-    draw,
-    caption="Identified over target values for every method and seed; shaded, where "
-    "traces determine it: the confidence interval by the Cramér-Rao bound, with parameters "
-    "without information fixed; dashed: the paper. Bars are quartiles, triangles "
-    "stand for values beyond the axis.",
-    uses=from_case("truth problem noise confidence study.identifiers"),
-    reads={
-        "identifications": the(PATH),
-        "target": the(TARGETS),
-        "expected": the(EXPECTED),
-        "calibrated": CALIBRATED,
-    },
-    cases=simulated,
-    rule="case_figures",
-    weight=JUDGEMENT,
-)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
-from operator import attrgetter
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,11 +10,9 @@ from matplotlib.figure import Figure
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import torque_at, torque_history
-from biogrip.figures.declared import drawing
 from biogrip.figures.style import BLUE, COLUMN_IN, GREEN, ORANGE, PURPLE, figure
 from biogrip.instrument import actuator
 from biogrip.instrument.contact import LARGEST_M, SMALLEST_M, contact
-from biogrip.products.uses import from_study
 from biogrip.study.study import Study
 
 
@@ -87,14 +84,3 @@ def _line(
                 ha="center",
                 fontsize=7,
             )
-
-
-TORQUE = drawing(
-    draw,
-    caption="Figure 3 of the paper: torque of each comb drive against time, and the voltage it "
-    "takes by eq. (9): counted from contact, as the paper does, and with what holds the jaws at "
-    "the smallest and at the largest sample that the gripper takes.",
-    uses=from_study("phases actuator gripper jaw_gap_m"),
-    when=attrgetter("has_gripper"),
-    rule="study_figures",
-)

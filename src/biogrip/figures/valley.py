@@ -9,14 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.figures.declared import drawing
 from biogrip.figures.results import first_seeds, seeds_in_words
 from biogrip.figures.style import COLUMN_IN, FITTED, PAPER, TARGET, figure
-from biogrip.products.product import JUDGEMENT, the
-from biogrip.products.uses import from_case
-from biogrip.records.identifications import PATH as IDENTIFICATIONS
 from biogrip.records.identifications import read_identifications
-from biogrip.records.verdicts import PATH as VERDICTS
 from biogrip.records.verdicts import read_verdicts
 from biogrip.study.study import Case
 
@@ -114,17 +109,3 @@ def _points(axes: Axes, points: Array, ends: Array, style: dict[str, Any], label
             at = np.minimum(points[outside], ends).T
             beyond = style | {"marker": marker, "markersize": 4.5}
             axes.plot(*at, **beyond, label="beyond the axis")
-
-
-VALLEY = drawing(
-    draw,
-    caption="Rise of χ² over c and c_p, all else fitted, around the fits of all seeds and where it "
-    f"is below {_DEEP:g}: the valley along which they trade against each other and, if it is that "
-    "deep, its arm along which c is that of a branch too weak and slow to be seen (it goes on "
-    "further). White: not computed.",
-    uses=from_case("title parameters published.identified study.fitting_method"),
-    reads={"measured": the(VERDICTS), "identifications": the(IDENTIFICATIONS)},
-    cases=lambda study: [name for name, case in study.cases.items() if case.has_valley],
-    rule="case_figures",
-    weight=JUDGEMENT,
-)

@@ -6,12 +6,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from biogrip.figures.declared import drawing
 from biogrip.figures.style import COLUMN_IN, TARGET, figure, line_of
 from biogrip.fit.success import chi_square_increase, near_noise_words
-from biogrip.products.product import the
-from biogrip.products.uses import from_case, simulated
-from biogrip.records.identifications import PATH, read_identifications
+from biogrip.records.identifications import read_identifications
 from biogrip.study.study import Case
 
 _LOWEST = 1e-3
@@ -55,16 +52,3 @@ def draw(case: Case, identifications: Path) -> Figure:
     handles = [*curves[:half], limits[0], *curves[half:], limits[1]]
     drawn.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.0)
     return drawn
-
-
-WATERFALL = drawing(
-    draw,
-    caption="Increase of χ² over the global optimum at the end of each method, sorted over seeds. "
-    "Dashed: tolerance of the optimum; dotted: the study's much larger tolerance of the noise.",
-    uses=from_case(
-        "title samples study.identifiers study.optimum_tolerance study.near_noise_tolerance"
-    ),
-    reads={"identifications": the(PATH)},
-    cases=simulated,
-    rule="case_figures",
-)

@@ -6,11 +6,8 @@ from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.protocol import sample_times
 from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
-from biogrip.instrument.calibrated_gripper import CALIBRATIONS, calibration_yaml
+from biogrip.instrument.calibrated_gripper import calibration_yaml
 from biogrip.instrument.calibration import FreeMotion, calibrate, free_motion
-from biogrip.products.plan import Plan, Wildcards
-from biogrip.products.product import Product, Weight
-from biogrip.products.uses import from_case
 from biogrip.records.parquet import table_of, write_tables
 from biogrip.study.study import Case
 
@@ -34,19 +31,3 @@ def run(case: Case, gripper: Path, records: Path) -> None:
         found[name] = calibrate(record, *causes)
     write_tables(records, [table_of(columns, len(time_s))], dictionary=False)
     write_text(gripper, calibration_yaml(found["left"], found["right"]))
-
-
-def _jobs(plan: Plan) -> list[Wildcards]:
-    cases = [*plan.study.cases.values(), *plan.study.points.values()]
-    return [{"case": case.name} for case in cases if case.is_calibrated]
-
-
-CALIBRATION = Product(
-    "calibration",
-    {"gripper": CALIBRATIONS, "records": CALIBRATIONS.replace(".yaml", ".parquet")},
-    run,
-    from_case("name gripper calibration study.study_seed"),
-    _jobs,
-    message="Calibrating the gripper of {case} without a sample",
-    weight=Weight(30, 1000),
-)

@@ -7,21 +7,14 @@ from pathlib import Path
 from biogrip.experiment.noise import rms
 from biogrip.experiment.random_streams import stream
 from biogrip.fit.identifier import identifier
-from biogrip.fit.methods import METHODS
-from biogrip.products.product import Product, Weight, the
-from biogrip.products.uses import from_case, to_identify
 from biogrip.progress import Progress
 from biogrip.records.identifications import (
-    BATCHES,
-    HISTORY_BATCHES,
-    TIMINGS,
     Record,
     write_histories,
     write_identifications,
     write_timings,
 )
-from biogrip.records.traces import MEASUREMENTS, read_measurements
-from biogrip.stages.calibrated import CALIBRATED
+from biogrip.records.traces import read_measurements
 from biogrip.stages.groups import groups
 from biogrip.study.study import Case
 
@@ -58,16 +51,3 @@ def identify(
     write_identifications(parameters, records)
     write_histories(history, records)
     write_timings(timing, records)
-
-
-IDENTIFICATION = Product(
-    "identification",
-    {"parameters": BATCHES, "history": HISTORY_BATCHES, "timing": TIMINGS.batch_path},
-    identify,
-    from_case("name study.study_seed methods.{method}", problem=to_identify),
-    lambda plan: plan.method_jobs([*plan.study.cases, *plan.study.points]),
-    message="Identifying {case} by {method}, {batch}",
-    reads={"measurements": the(MEASUREMENTS), "calibrated": CALIBRATED},
-    weight=Weight(120, 1000, group="batch"),
-    modules=lambda job: (METHODS[job["method"]].module,),
-)

@@ -7,13 +7,7 @@ import pyarrow.parquet as pq
 
 from biogrip.errors import BiogripError
 from biogrip.files import atomic_write
-from biogrip.products.product import Product, Weight, of_batches, wildcards_of
-from biogrip.products.uses import from_case
 from biogrip.records.identifications import (
-    BATCHES,
-    HISTORIES,
-    HISTORY_BATCHES,
-    PATH,
     columns,
 )
 from biogrip.records.rows import read_rows, write_rows
@@ -55,15 +49,3 @@ def join(
                 with pq.ParquetFile(batch) as file:
                     table = file.read()
                 joined.write_table(table.filter(pc.less(table["seed"], case.seeds)))
-
-
-IDENTIFICATIONS = Product(
-    "identifications",
-    {"parameters": PATH, "history": HISTORIES},
-    join,
-    from_case("seeds sample study.methods"),
-    lambda plan: wildcards_of([*plan.study.cases, *plan.study.points]),
-    message="Putting together the identifications of {case}",
-    reads={"batches": of_batches(BATCHES), "history_batches": of_batches(HISTORY_BATCHES)},
-    weight=Weight(10, 2000, group="case"),
-)

@@ -11,11 +11,10 @@ from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.fit.answer import Identification
 from biogrip.fit.genetic import identify_many
-from biogrip.products.product import Product, Weight, the, wildcards_of
-from biogrip.products.uses import from_case, using
+from biogrip.products.uses import using
 from biogrip.progress import Progress
 from biogrip.records.interpretations import INTERPRETATIONS
-from biogrip.records.traces import TARGETS, read_target
+from biogrip.records.traces import read_target
 from biogrip.stages.groups import groups
 from biogrip.study.study import Case, Study
 
@@ -75,15 +74,3 @@ def read_cases(study: Study) -> list[str]:
     ours = {parameter.name for parameter in SINGLE_BRANCH}
     names = study.simulated if study.interpretations else []
     return [name for name in names if set(study.case(name).sample.model.names) <= ours]
-
-
-READ = Product(
-    "interpretations_of_case",
-    {"rows": INTERPRETATIONS.path},
-    read,
-    from_case("name seeds study.study_seed", interpretations=_interpretations),
-    lambda plan: wildcards_of(read_cases(plan.study)),
-    message="Identifying {case} under every interpretation of the paper",
-    reads={"target": the(TARGETS)},
-    weight=Weight(120, 1000),
-)

@@ -14,7 +14,6 @@ from biogrip.experiment.sample import SampleModel, with_fixed
 from biogrip.fit.answer import Identification, silent
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.identifier import best_fit, identifier
-from biogrip.fit.methods import METHODS
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.problem import Problem
 from biogrip.fit.trace_fit import trace_fit
@@ -23,13 +22,10 @@ from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.products.product import Product, Weight, the
-from biogrip.products.uses import from_case, searched_for
 from biogrip.progress import Progress
 from biogrip.records.intervals import INTERVALS
-from biogrip.records.traces import TARGETS, read_target
-from biogrip.records.verdicts import EXPECTED, read_verdicts
-from biogrip.stages.calibrated import CALIBRATED
+from biogrip.records.traces import read_target
+from biogrip.records.verdicts import read_verdicts
 from biogrip.stages.full_judgements import Shown, refitted, shown_of
 from biogrip.stages.groups import groups
 from biogrip.study.study import Case
@@ -199,19 +195,3 @@ def _text(logarithm: float, digits: int) -> str:
 def _determined(expected: Path) -> set[str]:
     found = read_verdicts(expected)["quantities"]
     return {item["quantity"] for item in found if item["verdict"] == DETERMINED}
-
-
-INTERVAL = Product(
-    "intervals",
-    {"intervals": INTERVALS.batch_path},
-    estimate,
-    from_case(
-        "name least_squares parameters noise confidence verdicts_every study.study_seed",
-        problem=searched_for,
-    ),
-    lambda plan: plan.batch_jobs("coverage", plan.study.covered),
-    message="Estimates and intervals of {case}, {batch}",
-    reads={"target": the(TARGETS), "expected": the(EXPECTED), "calibrated": CALIBRATED},
-    weight=Weight(120, 1000),
-    modules=lambda _: (METHODS["least_squares"].module,),
-)

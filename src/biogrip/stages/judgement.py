@@ -12,7 +12,6 @@ from biogrip.files import write_text
 from biogrip.fit.answer import Identification, Progress, silent
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.identifier import identifier
-from biogrip.fit.methods import METHODS
 from biogrip.fit.multi_start import fit_from, identify_from
 from biogrip.fit.problem import Problem
 from biogrip.fit.trace_fit import TraceFit, fit_traces
@@ -22,20 +21,14 @@ from biogrip.judging.likelihood import MISSED
 from biogrip.judging.onset_profiles import profile_over_onset
 from biogrip.judging.slow_misfit import find_slow_misfit
 from biogrip.judging.valley import compute_valley
-from biogrip.products.product import JUDGEMENT, Product, Reads, the, wildcards_of
-from biogrip.products.uses import from_case, searched_for, to_identify
-from biogrip.records.traces import MEASUREMENTS, TARGETS, read_measurements, read_target
-from biogrip.records.verdicts import EXPECTED, PATH, diagnosis_data
-from biogrip.stages.calibrated import CALIBRATED
+from biogrip.records.traces import read_measurements, read_target
+from biogrip.records.verdicts import diagnosis_data
 from biogrip.study.study import Case
 from biogrip.traces.late_onset import note_late_onset
 
 TRACE = 0
 """Seed of the trace that is judged."""
 
-JUDGED_TRACE = Reads(
-    lambda plan, job: [plan.batch_of_seed(MEASUREMENTS, job["case"], TRACE)], one=True
-)
 """The measurements with that trace."""
 
 
@@ -135,32 +128,3 @@ def expect(case: Case, target: Path, calibrated: list[Path], verdicts: Path) -> 
 def _write(verdicts: Path, case: Case, said: dict[str, Any]) -> None:
     head = {"case": case.name, "model": case.problem.model.name, "confidence": case.confidence}
     write_text(verdicts, json.dumps(head | said, indent=1) + "\n")
-
-
-JUDGED = Product(
-    "judgement",
-    {"verdicts": PATH},
-    judge,
-    from_case(
-        "name least_squares confidence may_start_late study.study_seed", problem=searched_for
-    ),
-    lambda plan: wildcards_of(plan.study.cases),
-    message="Computing confidence limits for the first trace of {case}",
-    reads={
-        "measurements": JUDGED_TRACE,
-        "calibrated": CALIBRATED,
-    },
-    weight=JUDGEMENT,
-    modules=lambda _: (METHODS["least_squares"].module,),
-)
-
-EXPECTATION = Product(
-    "expectation",
-    {"verdicts": EXPECTED},
-    expect,
-    from_case("name confidence parameters noise", problem=to_identify),
-    lambda plan: wildcards_of(plan.study.simulated),
-    message="Computing expected confidence limits for {case}",
-    reads={"target": the(TARGETS), "calibrated": CALIBRATED},
-    weight=JUDGEMENT,
-)

@@ -5,12 +5,7 @@ from pathlib import Path
 
 from biogrip.experiment.noise import add_noise
 from biogrip.experiment.random_streams import stream
-from biogrip.products.plan import Plan, Wildcards
-from biogrip.products.product import Product, Weight, the
-from biogrip.products.uses import from_case
 from biogrip.records.traces import (
-    MEASUREMENTS,
-    TARGETS,
     Measurements,
     read_target,
     write_measurements,
@@ -31,24 +26,3 @@ def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) 
         for seed in seeds
     }
     write_measurements(measurements, Measurements(time_s, rotation, traces))
-
-
-def _jobs(plan: Plan) -> list[Wildcards]:
-    cases = [*plan.study.simulated, *plan.study.points]
-    return [
-        {"case": case, "batch": batch.name}
-        for case in cases
-        for batch in plan.batches("identifications", case, plan.study.shown)
-    ]
-
-
-MEASUREMENT = Product(
-    "measurement",
-    {"measurements": MEASUREMENTS},
-    measure,
-    from_case("name noise study.study_seed"),
-    _jobs,
-    message="Adding noise to {case}, {batch}",
-    reads={"target": the(TARGETS)},
-    weight=Weight(10, 1000, group="batch"),
-)

@@ -10,8 +10,6 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory, torque_history
 from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Gripper
-from biogrip.products.product import Product, Weight
-from biogrip.products.uses import each, from_study, gripped
 from biogrip.records.differences import DIFFERENCES
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
@@ -79,14 +77,3 @@ def _times(torque: TorqueHistory) -> Array:
         for start, end in zip(torque.time_s, ends, strict=True)
     ]
     return np.concatenate(pieces)
-
-
-MODEL_DIFFERENCE = Product(
-    "model_difference",
-    {"differences": DIFFERENCES.path},
-    compare,
-    from_study(cases=each(gripped, "sample parameters gripper phases")),
-    lambda plan: [{}] if plan.study.gripped else [],
-    message="Comparing the linear and the nonlinear model",
-    weight=Weight(30, 1000),
-)

@@ -7,15 +7,10 @@ from pathlib import Path
 from biogrip.experiment.nesting import Way, contained
 from biogrip.experiment.random_streams import stream
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.methods import METHODS
 from biogrip.fit.nested_fits import fit_models
-from biogrip.products.plan import Plan, Wildcards
-from biogrip.products.product import Product, Weight, the
-from biogrip.products.uses import from_case
 from biogrip.progress import Progress
 from biogrip.records.model_fits import MODEL_FITS
-from biogrip.records.traces import MEASUREMENTS, Measurements, read_measurements
-from biogrip.stages.calibrated import CALIBRATED
+from biogrip.records.traces import Measurements, read_measurements
 from biogrip.stages.groups import groups
 from biogrip.study.study import Case
 
@@ -81,24 +76,3 @@ def _rows(
             ]
     for of_model in rows.values():
         yield from of_model
-
-
-def _jobs(plan: Plan) -> list[Wildcards]:
-    return plan.batch_jobs("selection", plan.study.cases) if plan.study.selects_models else []
-
-
-MODEL_FIT = Product(
-    "model_fits",
-    {"fits": MODEL_FITS.batch_path},
-    fit,
-    from_case(
-        "name least_squares models study.study_seed",
-        problem=_problem,
-        contained=_contained,
-    ),
-    _jobs,
-    message="Fitting every sample model to {case}, {batch}",
-    reads={"measurements": the(MEASUREMENTS), "calibrated": CALIBRATED},
-    weight=Weight(240, 1000, group="batch"),
-    modules=lambda _: (METHODS["least_squares"].module,),
-)

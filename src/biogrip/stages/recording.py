@@ -14,10 +14,8 @@ from biogrip.experiment.protocol import TorqueHistory
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFits
 from biogrip.instrument.gripper import Gripper
-from biogrip.products.product import Product, Reads, wildcards_of
-from biogrip.products.uses import from_case
 from biogrip.progress import warn
-from biogrip.records.traces import MEASUREMENTS, Measurements, write_measurements
+from biogrip.records.traces import Measurements, write_measurements
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
 from biogrip.traces.columns import Columns, place
@@ -195,14 +193,3 @@ def check_traces(study: Study) -> None:
             problems.append(f"cases.{name}: {error}")
     if problems:
         raise BiogripError("\n".join(problems))
-
-
-RECORDING = Product(
-    "recording",
-    {"measurements": MEASUREMENTS.replace("{batch}", "seeds_0-0")},
-    record,
-    from_case("gripper problem columns"),
-    lambda plan: wildcards_of(plan.study.recorded),
-    message="Reading the recorded trace of {case}",
-    reads={"recorded": Reads(lambda plan, job: [plan.study.case(job["case"]).file], one=True)},
-)

@@ -14,13 +14,9 @@ from biogrip.experiment.noise import rms
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import nearest_encodable
 from biogrip.fit.success import near_noise
-from biogrip.instrument.calibrated_gripper import CALIBRATIONS
 from biogrip.judging.at_truth import bounds_percent, headlines
 from biogrip.judging.quantities import Quantity
-from biogrip.products.plan import Plan, Wildcards
-from biogrip.products.product import Product, Reads, Weight
-from biogrip.products.uses import each, using
-from biogrip.records.identifications import PATH, read_identifications
+from biogrip.records.identifications import read_identifications
 from biogrip.records.rows import RowFile
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.study import Case, Study
@@ -50,15 +46,6 @@ class SweepContent:
     """True values by name, SI units."""
     places: Mapping[str, tuple[str, str]]
     """Values on the axes by point, as text in files."""
-
-
-def describe_sweep(study: Study, job: Wildcards) -> SweepContent:
-    """Return the sweep of a job's case."""
-    points = study.sweeps[job["sweep"]].points(job["sweep"], job["case"])
-    places = {point.name: (point.row.text, point.column.text) for point in points}
-    shown = each(lambda _: places, "problem noise sampling")
-    view = using("methods near_noise_tolerance", points=shown)
-    return SweepContent(view(study), study.cases[job["case"]].parameters, places)
 
 
 def judge(
@@ -184,31 +171,3 @@ def _resolution_rad(problem: CaseProblem, parameters: Mapping[str, float], time_
 
 def _text(number: float) -> str:
     return "" if np.isnan(number) else f"{number:.6g}"
-
-
-def _jobs(plan: Plan) -> list[Wildcards]:
-    sweeps = plan.study.sweeps.items()
-    return [{"sweep": name, "case": case} for name, sweep in sweeps for case in sweep.cases]
-
-
-def _identifications(plan: Plan, job: Wildcards) -> list[str]:
-    points = plan.study.sweeps[job["sweep"]].points(job["sweep"], job["case"])
-    return [PATH.format(case=point.name) for point in points]
-
-
-def _calibrations(plan: Plan, job: Wildcards) -> list[str]:
-    points = plan.study.sweeps[job["sweep"]].points(job["sweep"], job["case"])
-    relying = [point.name for point in points if plan.study.points[point.name].is_calibrated]
-    return [CALIBRATIONS.format(case=name) for name in relying]
-
-
-SWEEP_POINTS = Product(
-    "sweep_points",
-    {"points": POINTS.path},
-    judge,
-    describe_sweep,
-    _jobs,
-    message="Judging the sweep {sweep} over {case}",
-    reads={"identifications": Reads(_identifications), "calibrated": Reads(_calibrations)},
-    weight=Weight(30, 1000),
-)

@@ -8,10 +8,8 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import TorqueHistory, torque_at, torque_history
 from biogrip.experiment.sample import Network
-from biogrip.products.product import Product, wildcards_of
-from biogrip.products.uses import from_case
 from biogrip.progress import warn
-from biogrip.records.traces import TARGETS, write_target, write_target_without_jaws
+from biogrip.records.traces import write_target, write_target_without_jaws
 from biogrip.response.grip import compute_grip
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.simulation import simulated_rotation
@@ -87,16 +85,3 @@ def _check(case: Case, time_s: Array, simulated: Array) -> None:
             f"the protocol turns the arms by {1e3 * largest:.4g} mrad, allowed is what the comb "
             f"drive's stroke leaves, {1e3 * case.stroke_rad:.4g} mrad."
         )
-
-
-TARGET = Product(
-    "target",
-    {"target": TARGETS},
-    simulate,
-    from_case(
-        "name instrument gripper phases sampling sample parameters nonlinear_target "
-        "unilateral stroke_rad"
-    ),
-    lambda plan: wildcards_of([*plan.study.simulated, *plan.study.points]),
-    message="Simulating the response of {case}",
-)

@@ -5,10 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from biogrip.products.plan import Plan, Wildcards
-from biogrip.products.product import Product, Reads, of_cases
-from biogrip.products.uses import each, from_study, published
-from biogrip.records.identifications import HISTORIES, PATH
+from biogrip.products.product import Product
 from biogrip.study.defaults import shipped
 from biogrip.study.study import Study
 from biogrip.tables import claims_on_algorithm as algorithm
@@ -18,7 +15,6 @@ from biogrip.tables.claim_results import LackingError, Results, read_results
 from biogrip.tables.claim_rules import RULES, UNDECIDED, Judged
 from biogrip.tables.contact import CONTACT
 from biogrip.tables.coverage import COVERAGE
-from biogrip.tables.declared import table
 from biogrip.tables.errors_of_case import ERRORS
 from biogrip.tables.evidence import EVIDENCE
 from biogrip.tables.inputs import INPUTS
@@ -220,27 +216,6 @@ def claims(
     return Table(caption, _COLUMNS, rows)
 
 
-def _tables(plan: Plan, _: Wildcards) -> list[str]:
-    return [product.outputs(job)["csv"] for product in _READ for job in product.jobs(plan)]
-
-
 def _sweeps(_: Study) -> dict[str, str]:
     files = map(shipped, SWEEPS)
     return {file.stem: file.read_text(encoding="utf-8") for file in files}
-
-
-CLAIMS_JUDGED = table(
-    claims,
-    caption=f"What the paper claims, with a verdict and the evidence. {RULES}",
-    uses=from_study(
-        "shown gripper actuator study_seed near_noise_tolerance",
-        cases=each(published, "truth noise phases gripper calibration"),
-        published_sweeps=_sweeps,
-    ),
-    reads={
-        "identifications": of_cases(PATH, published),
-        "histories": of_cases(HISTORIES, published),
-        "tables": Reads(_tables),
-    },
-    when=published,
-)

@@ -1,7 +1,5 @@
 """Table of rotation, torque and voltage at contact with samples of several sizes."""
 
-from operator import attrgetter
-
 import numpy as np
 
 from biogrip.errors import BiogripError
@@ -9,9 +7,7 @@ from biogrip.experiment.protocol import largest_load
 from biogrip.instrument import actuator
 from biogrip.instrument.contact import LARGEST_M, SMALLEST_M, contact
 from biogrip.instrument.gripper import Gripper
-from biogrip.products.uses import from_study
 from biogrip.study.study import Study
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 _COLUMNS = (
@@ -59,13 +55,3 @@ def _off_percent(neutral: Gripper, angle_deg: float) -> float:
     """Return the error of values that are found with the neutral angle, and not this one."""
     sines = np.sin(np.radians([angle_deg, neutral.reference_angle_deg]))
     return float(100 * ((sines[0] / sines[1]) ** 2 - 1))
-
-
-CONTACT = table(
-    contacts,
-    item="input: contact",
-    caption="Rotation, torque and voltage that close the jaws onto samples of several sizes.",
-    uses=from_study("gripper jaw_gap_m actuator phases"),
-    when=attrgetter("has_gripper"),
-    rule="tables",
-)

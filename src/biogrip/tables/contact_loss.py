@@ -10,14 +10,11 @@ from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.random_streams import stream
 from biogrip.fit.answer import Identification
 from biogrip.fit.least_squares import identify_many
-from biogrip.products.product import Weight
-from biogrip.products.uses import each, from_study, to_identify
 from biogrip.records.traces import as_written
 from biogrip.response.grip import compute_grip
 from biogrip.response.simulation import simulated_rotation
 from biogrip.response.unilateral import unilateral_response
 from biogrip.study.study import Case, Study
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 _MOST_SEEDS = 20
@@ -129,21 +126,3 @@ def _medians(
 def _error(target: float, value: float | None) -> float | None:
     error = 100 * (target - value) / target if target and value is not None else None
     return None if error is None or abs(error) > _MEANS_LITTLE else error
-
-
-CONTACT_LOSS = table(
-    contact_loss,
-    caption="Errors of identifications that assume bilateral contact in traces with loss of "
-    "contact, and in the readings before the loss.",
-    uses=from_study(
-        "study_seed",
-        cases=each(
-            _linear,
-            "sample parameters gripper phases sampling noise least_squares",
-            problem=to_identify,
-            seeds=_few,
-        ),
-    ),
-    when=_linear,
-    weight=Weight(60, 1000),
-)

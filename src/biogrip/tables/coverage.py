@@ -8,7 +8,6 @@ import pandas as pd
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise import standard_deviation
-from biogrip.instrument.calibrated_gripper import CALIBRATIONS
 from biogrip.judging.fisher import bound
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import (
@@ -17,12 +16,9 @@ from biogrip.judging.verdicts import (
     DETERMINED,
     NOT_DETERMINED,
 )
-from biogrip.products.product import of_cases
-from biogrip.products.uses import covered, each, from_study
 from biogrip.records.intervals import INTERVALS
-from biogrip.records.traces import TARGETS, read_target
+from biogrip.records.traces import read_target
 from biogrip.study.study import Study
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 _COLUMNS = (
@@ -136,20 +132,3 @@ def holds(found: pd.DataFrame, truth: float, which: str = "") -> Array:
 
 def _calibrated(study: Study) -> list[str]:
     return [name for name in study.covered if study.cases[name].is_calibrated]
-
-
-COVERAGE = table(
-    coverage,
-    caption="Estimates of least squares over many seeds beside the Cramér-Rao bound, and how often "
-    "their intervals, and the verdicts that users are shown, hold the truth.",
-    rule="tables",
-    uses=from_study(
-        cases=each(covered, "problem parameters noise confidence verdicts_every is_calibrated")
-    ),
-    reads={
-        "targets": of_cases(TARGETS, covered),
-        "intervals": of_cases(INTERVALS.path, covered),
-        "calibrated": of_cases(CALIBRATIONS, _calibrated),
-    },
-    when=covered,
-)

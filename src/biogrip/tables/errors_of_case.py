@@ -9,12 +9,9 @@ from biogrip.digits import counted
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Truth
 from biogrip.fit.success import near_noise, near_noise_words, typical
-from biogrip.products.product import EVALUATION, of_cases, the
-from biogrip.products.uses import every, from_case, from_study
-from biogrip.records.identifications import PATH, read_identifications
+from biogrip.records.identifications import read_identifications
 from biogrip.records.rows import read_rows
 from biogrip.study.study import Case, Study
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 _COLUMNS = (
@@ -142,23 +139,4 @@ _CAPTION = (
     "the median absolute error, and the share of seeds whose misfit is within the study's "
     "tolerance of the noise. Errors are (target - identified) / target. Where c and c_p trade "
     "against each other, only the row c + c_p is determined."
-)
-
-ERRORS = table(
-    errors,
-    name="errors",
-    caption=_CAPTION,
-    uses=from_study("near_noise_tolerance"),
-    reads={"tables": of_cases(_STEM + "_{case}.csv", every)},
-)
-
-ERRORS_OF_CASE = table(
-    errors_of_case,
-    stem=_STEM,
-    item="errors",
-    caption=_CAPTION,
-    uses=from_case("name truth study.shown study.near_noise_tolerance"),
-    reads={"identifications": the(PATH)},
-    cases=every,
-    weight=EVALUATION,
 )

@@ -9,17 +9,12 @@ from biogrip.digits import counted
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.experiment.truth import Truth
 from biogrip.instrument import actuator
-from biogrip.products.product import Weight, of_cases
-from biogrip.products.uses import each, from_study, published
-from biogrip.records.identifications import PATH, read_identifications
+from biogrip.records.identifications import read_identifications
 from biogrip.records.traces import (
-    MEASUREMENTS,
-    TARGETS,
     each_trace,
     read_jaw_force,
 )
 from biogrip.study.study import Study
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 _COLUMNS = (
@@ -135,26 +130,3 @@ def _generation_rows(case: Truth, identified: list[Path]) -> list[tuple[Cell, ..
     median = float(np.median(found["generations"]))
     quantity = f"{case.title}: generation of the fit"
     return [(quantity, "", str(generation), median, "median generation at which ours stops")]
-
-
-EVIDENCE = table(
-    evidence,
-    caption="Statements of the paper beside what the study computes, and what speaks for the "
-    "reconstructed values.",
-    rule="tables",
-    uses=from_study("shown gripper actuator ranges", cases=each(published, "truth")),
-    reads={
-        "identifications": of_cases(PATH, published),
-        "targets": of_cases(
-            TARGETS, lambda study: [name for name in study.published if name in study.simulated]
-        ),
-        "measurements": of_cases(
-            MEASUREMENTS,
-            lambda study: [
-                name for name in study.published if study.cases[name].published.axis_rad
-            ],
-        ),
-    },
-    when=published,
-    weight=Weight(60, 1000),
-)

@@ -9,9 +9,6 @@ import pandas as pd
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import Method
 from biogrip.judging.at_truth import headlines
-from biogrip.products.plan import Wildcards
-from biogrip.products.product import Reads
-from biogrip.products.uses import marked
 from biogrip.stages.sweep_points import POINTS
 from biogrip.study.study import Study
 from biogrip.study.sweeps import AxisBlock
@@ -45,33 +42,12 @@ class HeatMaps:
     """Keys of the gripper that the paper does not give."""
 
 
-def heat_maps(study: Study, job: Wildcards) -> HeatMaps:
-    """Return the settings that the table and the heat maps of a sweep depend on."""
-    sweep = study.sweeps[job["sweep"]]
-    titles = {name: study.cases[name].title for name in sweep.cases}
-    return HeatMaps(
-        sweep.title or job["sweep"],
-        titles,
-        study.identifiers,
-        _shown(study, sweep.rows),
-        _shown(study, sweep.columns),
-        study.near_noise_tolerance,
-        marked("gripper")(study),
-    )
-
-
 def _shown(study: Study, axis: AxisBlock) -> ShownAxis:
     keys = {key for value in axis.levels for key in value.overrides}
     title = axis.title + ", reconstructed" * any(map(study.is_reconstructed, keys))
     return ShownAxis(title, {value.text: value.shown for value in axis.levels})
 
 
-POINTS_OF_CASES = Reads(
-    lambda plan, job: [
-        POINTS.path.format(sweep=job["sweep"], case=case)
-        for case in plan.study.sweeps[job["sweep"]].cases
-    ]
-)
 """The input files with judged points, one per case of the job's sweep."""
 
 

@@ -8,13 +8,9 @@ import pandas as pd
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.experiment.truth import Truth
 from biogrip.fit.success import near_noise, near_noise_words
-from biogrip.products.product import of_cases
-from biogrip.products.uses import each, from_study
 from biogrip.records.interpretations import INTERPRETATIONS
-from biogrip.stages.interpretations import read_cases
 from biogrip.study.study import Study
 from biogrip.tables.closeness import COMPARED, as_small, compared_parameters
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 
@@ -70,13 +66,3 @@ def _rows(study: Study, case: str, truth: Truth, found: pd.DataFrame) -> list[tu
 
 def _median(errors: "np.ndarray | None") -> float | None:
     return None if errors is None else float(np.median(errors))
-
-
-INTERPRETATIONS_TABLE = table(
-    interpretations,
-    caption="How often the genetic algorithm finds the samples under other interpretations of the "
-    "paper's section 4, and in which generation it improves for the last time.",
-    uses=from_study("interpretation_titles near_noise_tolerance", cases=each(read_cases, "truth")),
-    reads={"found": of_cases(INTERPRETATIONS.path, read_cases)},
-    when=lambda study: study.interpretations,
-)

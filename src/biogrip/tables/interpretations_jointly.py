@@ -11,10 +11,7 @@ from scipy.stats import qmc
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.experiment.truth import Truth
-from biogrip.products.product import of_cases
-from biogrip.products.uses import each, from_study
 from biogrip.records.interpretations import INTERPRETATIONS
-from biogrip.stages.interpretations import read_cases
 from biogrip.study.study import Study
 from biogrip.tables.closeness import (
     COMPARED,
@@ -23,7 +20,6 @@ from biogrip.tables.closeness import (
     of_same_order,
     relative_errors,
 )
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 ALL = "all"
@@ -134,13 +130,3 @@ def share_not_larger(shares: list[Array], product: float) -> float:
     allowed = product * (1 + _ROUNDING) / of_others
     ranks = np.searchsorted(np.sort(last), allowed, side="right")
     return float(ranks.mean() / len(last))
-
-
-INTERPRETATIONS_JOINTLY = table(
-    interpretations_jointly,
-    caption="How probable the errors of the paper's Tables 5 to 7 are, each and together, under "
-    "other interpretations of its section 4.",
-    uses=from_study("interpretation_titles", cases=each(read_cases, "truth")),
-    reads={"found": of_cases(INTERPRETATIONS.path, read_cases)},
-    when=lambda study: study.interpretations,
-)

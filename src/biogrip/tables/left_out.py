@@ -1,7 +1,5 @@
 """Size of the physical effects that the model leaves out."""
 
-from operator import attrgetter
-
 from biogrip.experiment.protocol import largest_load
 from biogrip.instrument.contact import LARGEST_M
 from biogrip.instrument.left_out import (
@@ -11,9 +9,7 @@ from biogrip.instrument.left_out import (
     mass_of_sample,
     rolling_of_contact,
 )
-from biogrip.products.uses import each, from_study, gripped
 from biogrip.study.study import Case, Study
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 _COLUMNS = (
@@ -79,13 +75,3 @@ def _row(
     effect: str, size: float, unit: str, beside: str, whole: float, remark: str
 ) -> tuple[Cell, ...]:
     return effect, size, unit, beside, whole, 100 * size / whole, remark
-
-
-LEFT_OUT = table(
-    left_out,
-    caption="Size of effects that the model leaves out: drag, rolling, fringing, the sample's "
-    "inertia.",
-    uses=from_study("gripper actuator phases", cases=each(gripped, "sample parameters")),
-    when=attrgetter("has_gripper"),
-    rule="tables",
-)

@@ -4,11 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from biogrip.products.product import the
-from biogrip.products.uses import gripped
 from biogrip.records.differences import DIFFERENCES
 from biogrip.study.study import Study
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 LIMIT_PERCENT = 1.0
@@ -55,12 +52,4 @@ CAPTION = (
     "The largest difference of the linear from the nonlinear model over the protocol, as a share "
     "of the peak, over the reference angle and multiples of the torque of the case's protocol. "
     f"Left of and above the {LIMIT_PERCENT:g} % line the paper's linearisation is worse than that."
-)
-
-LINEARISATION = table(
-    linearisation,
-    caption=CAPTION,
-    rule="tables",
-    reads={"differences": the(DIFFERENCES.path)},
-    when=gripped,
 )

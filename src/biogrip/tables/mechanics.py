@@ -5,12 +5,10 @@ import numpy as np
 from biogrip.experiment.apparent_modulus import apparent_modulus
 from biogrip.experiment.protocol import torque_history
 from biogrip.instrument.contact import LARGEST_M, SMALLEST_M
-from biogrip.products.uses import each, from_study, gripped
 from biogrip.response.grip import compute_grip
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.simulation import simulated_shortening
 from biogrip.study.study import Case, Study
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 _COLUMNS = (
@@ -78,15 +76,3 @@ def _rows(case: Case) -> list[tuple[Cell, ...]]:
             )
         )
     return rows
-
-
-MECHANICS = table(
-    mechanics,
-    caption="Strain, force, stiffness and apparent modulus of every simulated sample, beside the "
-    "gripper's own stiffness.",
-    uses=from_study(
-        cases=each(gripped, "title gripper phases sample parameters nonlinear_target size_m")
-    ),
-    rule="tables",
-    when=gripped,
-)

@@ -9,11 +9,8 @@ import pandas as pd
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Truth
 from biogrip.fit.success import chi_square_increase, near_noise, near_noise_words
-from biogrip.products.product import of_cases
-from biogrip.products.uses import each, from_study, simulated
-from biogrip.records.identifications import PATH, read_identifications
+from biogrip.records.identifications import read_identifications
 from biogrip.study.study import Study
-from biogrip.tables.declared import table
 from biogrip.tables.errors_of_case import error_percent
 from biogrip.tables.layout import Cell, Column, Table
 
@@ -79,17 +76,3 @@ def _errors(found: pd.DataFrame, truth: Truth, labels: list[str]) -> list[Cell]:
 
 def _label(quantity: list[Parameter]) -> str:
     return " + ".join(parameter.name for parameter in quantity)
-
-
-METHODS_COMPARED = table(
-    methods,
-    caption="The identifiers on the same traces: share of seeds at the global optimum and within "
-    "the study's tolerance of the noise, responses simulated, errors.",
-    rule="tables",
-    uses=from_study(
-        "identifiers optimum_tolerance near_noise_tolerance",
-        cases=each(simulated, "truth samples"),
-    ),
-    reads={"identifications": of_cases(PATH, simulated)},
-    when=simulated,
-)

@@ -5,11 +5,8 @@ from pathlib import Path
 import pandas as pd
 
 from biogrip.fit.model_choice import aic_and_bic
-from biogrip.products.product import of_cases
-from biogrip.products.uses import each, every, from_study
 from biogrip.records.model_fits import MODEL_FITS
 from biogrip.study.study import Study
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 _COLUMNS = (
@@ -49,14 +46,3 @@ def models(study: Study, fits: list[Path]) -> Table:
         "how many seeds it has the lowest."
     )
     return Table(caption, _COLUMNS, rows)
-
-
-MODELS_COMPARED = table(
-    models,
-    item="sample models",
-    caption="Number of seeds in which each sample model has the lowest AIC and BIC.",
-    rule="tables",
-    uses=from_study(cases=each(every, "recorded sample models")),
-    reads={"fits": of_cases(MODEL_FITS.path, every)},
-    when=lambda study: study.selects_models,
-)

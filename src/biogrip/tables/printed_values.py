@@ -3,9 +3,7 @@
 import numpy as np
 
 from biogrip.fit.genome import nearest_encodable
-from biogrip.products.uses import each, from_study, published
 from biogrip.study.study import Study
-from biogrip.tables.declared import table
 from biogrip.tables.errors_of_case import error_percent
 from biogrip.tables.layout import Cell, Column, Table
 
@@ -51,13 +49,3 @@ def printed_values(study: Study) -> Table:
         "of Table 4, and the printed errors against (target - identified) / target."
     )
     return Table(caption, _COLUMNS, rows)
-
-
-PRINTED_VALUES = table(
-    printed_values,
-    caption="The numbers printed in Tables 5 to 7, held against the paper's own two-digit "
-    "encoding, ranges and error formula.",
-    rule="tables",
-    uses=from_study("ranges", cases=each(published, "truth")),
-    when=published,
-)

@@ -3,13 +3,9 @@
 from pathlib import Path
 
 from biogrip.fit.success import near_noise_words
-from biogrip.tables.declared import table
 from biogrip.tables.heat_maps import (
-    CAPTION,
-    POINTS_OF_CASES,
     HeatMaps,
     headlines_of,
-    heat_maps,
     read_points,
 )
 from biogrip.tables.layout import Cell, Column, Table
@@ -73,13 +69,3 @@ def robustness(maps: HeatMaps, points: list[Path]) -> Table:
 
 def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
-
-
-ROBUSTNESS = table(
-    robustness,
-    item="robustness: {sweep}",
-    caption=CAPTION,
-    uses=heat_maps,
-    reads={"points": POINTS_OF_CASES},
-    sweeps=True,
-)

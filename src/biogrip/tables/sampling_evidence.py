@@ -5,9 +5,7 @@ import numpy as np
 from biogrip.experiment.protocol import sample_times
 from biogrip.judging.at_truth import DETERMINED_PERCENT, bounds_percent
 from biogrip.judging.quantities import Quantity
-from biogrip.products.uses import each, from_study, published
 from biogrip.study.study import Case, Study
-from biogrip.tables.declared import table
 from biogrip.tables.errors_of_case import error_percent
 from biogrip.tables.layout import Cell, Column, Table
 
@@ -76,16 +74,3 @@ def _drop_redundant(bounds: list[tuple[Quantity, float]]) -> list[Quantity]:
         else:
             left_out.append(total)
     return [q for q, _ in bounds if q not in left_out]
-
-
-SAMPLING_EVIDENCE = table(
-    sampling_evidence,
-    item="evidence: sampling",
-    caption="The errors that the paper prints, beside the standard deviations that the study's "
-    "noise leaves at least at several sampling rates. Only near the rate at which the two are "
-    "alike, on average over the rows, can the paper's traces have been sampled; that rate is "
-    "reconstructed.",
-    rule="tables",
-    uses=from_study(cases=each(published, "truth problem noise")),
-    when=published,
-)

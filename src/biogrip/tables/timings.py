@@ -4,11 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from biogrip.products.product import of_cases
-from biogrip.products.uses import every, from_study
 from biogrip.records.identifications import TIMINGS
 from biogrip.study.study import Study
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 _COLUMNS = (
@@ -37,12 +34,3 @@ def timings(study: Study, times: list[Path]) -> Table:
 
 
 # Not in tables/, since times are not reproducible.
-TIMES = table(
-    timings,
-    stem="results/timings",
-    item="processor times",
-    caption="Processor time of the identifications on the machine that made this report.",
-    rule="tables",
-    uses=from_study("identifiers"),
-    reads={"times": of_cases(TIMINGS.path, every)},
-)

@@ -8,12 +8,9 @@ import pandas as pd
 
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, NOT_DETERMINED, WIDE
-from biogrip.products.product import of_cases
-from biogrip.products.uses import each, from_study
 from biogrip.records.intervals import INTERVALS
 from biogrip.study.study import Study
 from biogrip.tables.coverage import holds
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 from biogrip.tables.verdicts import target_of
 
@@ -77,13 +74,3 @@ def _interval_percent(count: int, tried: int) -> tuple[float, float]:
 
 def _judged(study: Study) -> list[str]:
     return [name for name in study.covered if study.case(name).verdicts_every == 1]
-
-
-VERDICT_COUNTS = table(
-    verdict_counts,
-    caption="How often whole profiles call each quantity determined, bounded or not determined, "
-    "and how often the limits that users are shown hold the true value.",
-    uses=from_study(cases=each(_judged, "problem parameters confidence")),
-    reads={"intervals": of_cases(INTERVALS.path, _judged)},
-    when=_judged,
-)

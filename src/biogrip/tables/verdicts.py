@@ -5,12 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.products.product import JUDGEMENT, the
-from biogrip.products.uses import every, from_case
-from biogrip.records.verdicts import PATH, read_verdicts
-from biogrip.stages.expected import VERDICTS_EXPECTED
+from biogrip.records.verdicts import read_verdicts
 from biogrip.study.study import Case
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Cell, Column, Table
 
 _COLUMNS = (
@@ -75,14 +71,3 @@ def target_of(quantity: str, parameters: Mapping[str, float]) -> float | None:
     """Return the true value of a parameter or a sum, None if unknown."""
     names = quantity.split(" + ")
     return sum(parameters[name] for name in names) if set(names) <= set(parameters) else None
-
-
-VERDICTS = table(
-    verdicts,
-    caption="Verdicts on every quantity from profile likelihoods of one seed's trace, with "
-    "confidence limits, beside those expected from the trace without noise.",
-    uses=from_case("name title parameters"),
-    reads={"measured": the(PATH), "expected": VERDICTS_EXPECTED},
-    cases=every,
-    weight=JUDGEMENT,
-)
