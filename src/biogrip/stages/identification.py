@@ -30,8 +30,8 @@ def identify(
     timing: Path,
 ) -> None:
     """Identify a batch of seeds with one method; traces identified together share their time."""
-    case_problem = case.problem.calibrated(calibrated)
-    identified = identifier(method, case.methods[method])
+    case_problem = case.problem.to_identify().calibrated(calibrated)
+    identified = identifier(method, case.method(method))
     recorded = read_measurements(measurements, list(seeds))
     case_problem = case_problem.weighted(recorded.sd_rad)
     progress = Progress(f"{case.name}, {method}", len(seeds))

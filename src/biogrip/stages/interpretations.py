@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.fit.answer import Identification
 from biogrip.fit.genetic import identify_many
-from biogrip.products.uses import using
 from biogrip.progress import Progress
 from biogrip.records.interpretations import INTERPRETATIONS
 from biogrip.records.traces import read_target
@@ -62,11 +60,6 @@ def _last_improvement(answer: Identification) -> int:
     """Return the last generation in which the best misfit fell."""
     falls = np.flatnonzero(np.diff(answer.history.best_misfit) < 0)
     return int(falls[-1]) + 1 if len(falls) else 0
-
-
-def _interpretations(case: Case) -> dict[str, Any]:
-    view = using("problem genetic noise")
-    return {name: view(read) for name, read in case.interpretations.items()}
 
 
 def read_cases(study: Study) -> list[str]:

@@ -114,7 +114,7 @@ def expect(case: Case, target: Path, calibrated: list[Path], verdicts: Path) -> 
     They are what to expect of any trace of the case. Without noise, the rounding of the
     target's digits takes its place.
     """
-    case_problem = case.problem.calibrated(calibrated)
+    case_problem = case.problem.to_identify().calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     noise_rad = rms(standard_deviation(rotation, case.noise)) or None
     problem = case_problem.of(time_s, rotation, noise_rad=noise_rad)

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from biogrip.experiment.nesting import Way, contained
 from biogrip.experiment.random_streams import stream
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.nested_fits import fit_models
@@ -19,14 +18,6 @@ def _problem(case: Case) -> CaseProblem:
     return case.problem.to_identify(*(sample.model for sample in case.models.values()))
 
 
-def _contained(case: Case) -> dict[str, dict[str, Way]]:
-    """Return, of each model, those of the others that it contains: fits of it begin at theirs."""
-    return {
-        name: {other: way for other, way in contained(name).items() if other in case.models}
-        for name in case.models
-    }
-
-
 def fit(
     case: Case,
     seeds: Sequence[int],
@@ -35,7 +26,7 @@ def fit(
     fits: Path,
 ) -> None:
     """Fit a batch of seeds by least squares with each model."""
-    case_problem = case.problem.calibrated(calibrated)
+    case_problem = _problem(case).calibrated(calibrated)
     recorded = read_measurements(measurements, list(seeds))
     weighted = case_problem.weighted(recorded.sd_rad)
     MODEL_FITS.write(fits, _rows(case, weighted, seeds, recorded))

@@ -70,3 +70,8 @@ def _cut(start: int, stop: int, size: int) -> list[Batch]:
     """Cut seeds start to stop - 1 at multiples of size."""
     edges = [start, *range((start // size + 1) * size, stop, size), stop]
     return [Batch(a, b - 1) for a, b in pairwise(edges) if a < b]
+
+
+def batch_names(seeds: int) -> list[str]:
+    """Return the names of the batches of a case."""
+    return [batch.name for batch in plan_batches(seeds, seeds_a_batch(seeds))]

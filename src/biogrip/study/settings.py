@@ -5,14 +5,18 @@ make a `Case` or a `Study` again, in which any other key is missing: a rule that
 fails, and cannot give a result that Snakemake would not renew.
 """
 
+import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
+from importlib.metadata import version
+from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
+import biogrip
 from biogrip.study.case_blocks import METHOD_BLOCKS, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.plain import built
@@ -117,3 +121,15 @@ def _part(kind: Any, given: Mapping[str, Any]) -> Any:
             continue
         object.__setattr__(part, field.name, value)
     return part
+
+
+def software() -> dict[str, str]:
+    """Return what results could depend on besides the config: versions, and a digest of our source."""
+    folder = Path(biogrip.__file__).parent
+    sources = sorted(file for file in folder.rglob("*") if file.suffix in (".py", ".j2", ".css"))
+    digest = hashlib.sha256()
+    for file in sources:
+        digest.update(f"{file.relative_to(folder)}\n".encode())
+        digest.update(file.read_bytes())
+    versions = {name: version(name) for name in ("numpy", "scipy")}
+    return {"biogrip": biogrip.__version__, **versions, "source": digest.hexdigest()[:12]}

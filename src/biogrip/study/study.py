@@ -1,7 +1,7 @@
 """Typed access to a checked config: the study and its cases."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -295,6 +295,15 @@ class Study:
         ):
             found[interpretation] |= self._cases({name: built(CaseBlock, block)})
         return found
+
+    def of(self, names: Iterable[str]) -> "Study":
+        """Return the study of some of its cases."""
+        cases = {name: self.config.cases[name] for name in names}
+        config = type(self.config).model_construct()
+        vars(config).clear()
+        vars(config).update({**vars(self.config), "cases": cases})
+        object.__setattr__(config, "__pydantic_extra__", self.config.__pydantic_extra__)
+        return Study(config)
 
     def _cases(self, blocks: Mapping[str, CaseBlock]) -> dict[str, Case]:
         return {name: Case(name, block, self) for name, block in blocks.items()}

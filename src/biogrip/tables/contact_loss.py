@@ -75,7 +75,7 @@ def _rows(study_seed: int, name: str, case: Case) -> list[tuple[Cell, ...]]:
         return []
     noise = [
         add_noise(held, case.noise, stream(study_seed, name, seed, "noise"), time_s) - held
-        for seed in range(case.seeds)
+        for seed in range(_few(case))
     ]
     lost = free.parted_s[0]
     whole, until = np.ones(len(time_s), dtype=bool), time_s < lost
@@ -105,16 +105,16 @@ def _medians(
     study_seed: int, name: str, case: Case, time_s: Array, traces: Sequence[Array]
 ) -> list[float] | None:
     """Return the median of every quantity and of the misfit in rad; None for too few samples."""
-    searched, model = case.problem.searched, case.problem.model
-    nuisance = case.problem.offset + case.problem.drift
+    problem = case.problem.to_identify()
+    searched, model = problem.searched, problem.model
+    nuisance = problem.offset + problem.drift
     if len(time_s) <= len(searched.names) + nuisance + 1:
         return None
-    problems = [case.problem.of(time_s, trace) for trace in traces]
+    problems = [problem.of(time_s, trace) for trace in traces]
     rngs = [stream(study_seed, name, seed, "contact_loss") for seed in range(len(traces))]
     found: list[Identification] = identify_many(problems, case.least_squares, rngs)
     values = [
-        {**case.problem.fixed, **dict(zip(searched.names, one.parameters, strict=True))}
-        for one in found
+        {**problem.fixed, **dict(zip(searched.names, one.parameters, strict=True))} for one in found
     ]
     medians = [
         float(np.median([sum(value[p.name] for p in quantity) for value in values]))

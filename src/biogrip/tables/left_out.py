@@ -34,7 +34,7 @@ def _damping(case: Case) -> float:
 def left_out(study: Study) -> Table:
     """Estimate effects that the model leaves out, for the largest sample."""
     gripper, comb = study.gripper, study.actuator
-    dampings = [damping for case in study.cases.values() if (damping := _damping(case)) > 0]
+    dampings = [damping for name in study.gripped if (damping := _damping(study.cases[name])) > 0]
     least = min(dampings, default=None)
     b, arm = gripper.lever_m, gripper.left
     turn = largest_load(study.phases) / arm.stiffness_Nm_per_rad

@@ -1,0 +1,51 @@
+"""What a script of the workflow does around its work: it reads its params, and says what failed."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr
+from pathlib import Path
+from typing import Any
+
+from biogrip.errors import BiogripError
+from biogrip.study.batches import parse_batch
+from biogrip.study.settings import case_of, study_of
+from biogrip.study.study import Case, Study
+
+
+@contextmanager
+def logged(job: Any) -> Iterator[None]:
+    """Write what is said to the job's log; an error of ours ends it with its message alone."""
+    log = Path(job.log[0])
+    with log.open("w", encoding="utf-8") as stream, redirect_stderr(stream):
+        try:
+            yield
+        except BiogripError as error:
+            print(f"biogrip: {error}", file=stream)
+            print(f"biogrip: {error}", file=sys.__stderr__)
+            raise SystemExit(1) from error
+
+
+def job_case(job: Any) -> Case:
+    """Return the case of a job, with the keys of the config that its rule names."""
+    return case_of(job.wildcards.case, _given(job))
+
+
+def job_study(job: Any) -> Study:
+    """Return the study of a job, with the keys of the config that its rule names."""
+    return study_of(_given(job))
+
+
+def job_seeds(job: Any) -> list[int]:
+    """Return the seeds of a job's batch."""
+    batch = parse_batch(job.wildcards.batch)
+    assert batch is not None
+    return batch.seeds
+
+
+def paths(files: Any) -> list[Path]:
+    """Return files of Snakemake as paths; one file is a list of one."""
+    return [Path(files)] if isinstance(files, str) else [Path(file) for file in files]
+
+
+def _given(job: Any) -> dict[str, Any]:
+    return {key: value for param in job.params for key, value in param.items()}
