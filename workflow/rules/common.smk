@@ -53,6 +53,13 @@ def of_batches(pattern):
     )
 
 
+def first_batch(pattern):
+    """The file of the batch that has the first seed of a case, which is judged."""
+    return lambda wildcards: expand(
+        pattern, batch=batch_names(STUDY.case(wildcards.case).seeds)[0], allow_missing=True
+    )
+
+
 def calibration_of(wildcards):
     """The calibration of the gripper, for a case that uses one."""
     used = STUDY.case(wildcards.case).is_calibrated

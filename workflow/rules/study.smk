@@ -57,3 +57,109 @@ rule identification:
         "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
     script:
         "../scripts/identification.py"
+
+
+rule recording:
+    input:
+        recorded=lambda wildcards: STUDY.case(wildcards.case).file,
+    output:
+        measurements="results/measurements/{case}/seeds_0-0.parquet",
+    log:
+        "results/logs/recording/{case}.log",
+    wildcard_constraints:
+        case=names(STUDY.recorded),
+    params:
+        **settings_of(*PROBLEM),
+        software=SOFTWARE,
+    message:
+        "Reading the recorded trace of {wildcards.case}"
+    script:
+        "../scripts/recording.py"
+
+
+rule calibration:
+    output:
+        gripper="results/calibrations/{case}.yaml",
+        records="results/calibrations/{case}.parquet",
+    log:
+        "results/logs/calibration/{case}.log",
+    params:
+        **settings_of("study_seed", "instrument", "gripper", "actuator", "protocol", "sample", "calibration"),
+        software=SOFTWARE,
+    message:
+        "Calibrating the gripper of {wildcards.case} without a sample"
+    script:
+        "../scripts/calibration.py"
+
+
+rule judgement:
+    input:
+        measurements=first_batch("results/measurements/{case}/{batch}.parquet"),
+        calibrated=calibration_of,
+    output:
+        verdicts="results/identifiability/{case}.json",
+    log:
+        "results/logs/judgement/{case}.log",
+    params:
+        **settings_of("study_seed", *PROBLEM, "identifiability", "least_squares"),
+        software=SOFTWARE,
+    message:
+        "Computing confidence limits for the first trace of {wildcards.case}"
+    script:
+        "../scripts/judgement.py"
+
+
+rule expectation:
+    input:
+        target="results/targets/{case}.csv",
+        calibrated=calibration_of,
+    output:
+        verdicts="results/identifiability/expected/{case}.json",
+    log:
+        "results/logs/expectation/{case}.log",
+    wildcard_constraints:
+        case=names(STUDY.simulated),
+    params:
+        **settings_of(*PROBLEM, "identifiability"),
+        software=SOFTWARE,
+    message:
+        "Computing expected confidence limits for {wildcards.case}"
+    script:
+        "../scripts/expectation.py"
+
+
+rule intervals:
+    input:
+        target="results/targets/{case}.csv",
+        expected="results/identifiability/expected/{case}.json",
+        calibrated=calibration_of,
+    output:
+        intervals="results/coverage/{case}/{batch}.csv",
+    log:
+        "results/logs/intervals/{case}/{batch}.log",
+    wildcard_constraints:
+        case=names(STUDY.covered),
+    params:
+        **settings_of("study_seed", *PROBLEM, "identifiability", "least_squares"),
+        software=SOFTWARE,
+    message:
+        "Estimates and intervals of {wildcards.case}, {wildcards.batch}"
+    script:
+        "../scripts/intervals.py"
+
+
+rule model_fits:
+    input:
+        measurements="results/measurements/{case}/{batch}.parquet",
+        calibrated=calibration_of,
+    output:
+        fits="results/selection/{case}/{batch}.csv",
+    log:
+        "results/logs/model_fits/{case}/{batch}.log",
+    params:
+        **settings_of("study_seed", *PROBLEM, "model_selection", "least_squares"),
+        software=SOFTWARE,
+    message:
+        "Fitting every sample model to {wildcards.case}, {wildcards.batch}"
+    script:
+        "../scripts/model_fits.py"
