@@ -5,7 +5,7 @@ from snakemake.exceptions import WorkflowError
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
 from biogrip.study.batches import batch_names
-from biogrip.study.defaults import default_config
+from biogrip.study.defaults import default_config, shipped
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.settings import settings, software
 from biogrip.study.source import overlaid
@@ -77,3 +77,84 @@ SIMULATED = [*STUDY.simulated, *STUDY.points]
 wildcard_constraints:
     batch=r"seeds_\d+-\d+",
     method="|".join(METHODS),
+
+
+# Cases that have what only some have.
+CALIBRATED = [name for name in STUDY.cases if STUDY.case(name).is_calibrated]
+SELECTING = list(STUDY.cases) if STUDY.selects_models else []
+# Tables of the study, of what there is in it.
+TABLES = ["errors", "gene_ranges", "parameter_ranges"]
+if STUDY.has_gripper:
+    TABLES += ["gripper", "actuator", "contact", "left_out"]
+if STUDY.gripped:
+    TABLES += ["linearisation", "mechanics"]
+if STUDY.simulated:
+    TABLES += ["methods"]
+if STUDY.covered:
+    TABLES += ["coverage"]
+if SELECTING:
+    TABLES += ["models"]
+if STUDY.published:
+    TABLES += ["evidence", "printed_values", "sampling_evidence"]
+# Of the whole study, what its tables and figures use.
+WHOLE = (
+    *("study_seed", "seeds", "methods", "cases", "gripper", "actuator", "protocol"),
+    *("search_range", "model_selection", "evaluation", "reconstructed"),
+)
+
+
+def table(path, caption=""):
+    """The files of a table, of which the last is in Snakemake's report."""
+    case = "{case}" if "{case}" in path else "all"
+    name = caption or path
+    page = report(
+        f"results/tables/{path}.html",
+        caption=f"../report/{name}.rst",
+        category="Tables",
+        labels={"case": case, "item": name.replace("_", " "), "format": "table"},
+    )
+    return [f"results/tables/{path}.{kind}" for kind in ("csv", "md", "tex")] + [page]
+
+
+def of_cases(pattern, cases):
+    """The files of some cases."""
+    return expand(pattern, case=cases)
+
+
+def of_all_batches(pattern, cases):
+    """The files of all batches of some cases, method by method if the pattern has it."""
+    return [
+        file
+        for case in cases
+        for file in expand(pattern, case=case, method=STUDY.methods, batch=batches_of(case, pattern))
+    ]
+
+
+def batches_of(case, pattern):
+    """The batches of the traces of a case, or of those that its intervals are tested with."""
+    chosen = STUDY.case(case)
+    return batch_names(chosen.coverage_seeds if "coverage" in pattern else chosen.seeds)
+
+
+def of_methods(pattern):
+    """The files of all methods and batches of a case."""
+    return lambda wildcards: of_all_batches(pattern, [wildcards.case])
+
+
+def expectation_of(wildcards):
+    """What to expect of the traces of a case, if it is simulated."""
+    expected = wildcards.case in STUDY.simulated
+    return "results/identifiability/expected/{case}.json" if expected else []
+
+
+# What claims of the paper are judged by; published, as sweeps take longer than the study.
+JUDGED_BY = [f"results/tables/{name}.csv" for name in TABLES]
+JUDGED_BY += of_cases("results/tables/verdicts_{case}.csv", STUDY.cases)
+PUBLISHED_SWEEPS = [
+    str(shipped(f"results/published/{name}.csv"))
+    for name in (
+        "robustness/tables/robustness_noise",
+        "robustness/tables/robustness_gripper",
+        "interpretations/tables/interpretations",
+    )
+]

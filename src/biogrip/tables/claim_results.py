@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +62,8 @@ class Results:
     """Tables of the study by name."""
     runs: Mapping[int, Runs]
     """Runs by number of the paper's table."""
+    sweeps: Mapping[str, Path]
+    """Published tables of sweeps by name."""
 
     def table(self, name: str) -> pd.DataFrame:
         """Return a table.
@@ -78,7 +79,7 @@ class Results:
 
     def of_sweep(self, name: str) -> pd.DataFrame:
         """Return a published table of a sweep."""
-        return pd.read_csv(StringIO(self.study.published_sweeps[name]))
+        return pd.read_csv(self.sweeps[name])
 
     def runs_of(self, number: int) -> Runs:
         """Return the runs on the sample of a table of the paper.
@@ -109,7 +110,11 @@ class Results:
 
 
 def read_results(
-    study: Study, identifications: list[Path], histories: list[Path], tables: list[Path]
+    study: Study,
+    identifications: list[Path],
+    histories: list[Path],
+    tables: list[Path],
+    sweeps: list[Path],
 ) -> Results:
     """Read results from the files of all the paper's cases, in their order, and from tables."""
     found = {path.stem: read_frame(path, "a table", ()) for path in tables}
@@ -120,7 +125,7 @@ def read_results(
         number = case.truth.published.table
         if study.shown == "genetic" and number is not None:
             runs[number] = _runs(name, case.truth, identified, history)
-    return Results(study, found, runs)
+    return Results(study, found, runs, {file.stem: file for file in sweeps})
 
 
 def _runs(name: str, truth: Truth, identified: Path, history: Path) -> Runs:

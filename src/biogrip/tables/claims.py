@@ -5,26 +5,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from biogrip.products.product import Product
-from biogrip.study.defaults import shipped
 from biogrip.study.study import Study
 from biogrip.tables import claims_on_algorithm as algorithm
 from biogrip.tables import claims_on_instrument as instrument
 from biogrip.tables import claims_on_values as values
 from biogrip.tables.claim_results import LackingError, Results, read_results
 from biogrip.tables.claim_rules import RULES, UNDECIDED, Judged
-from biogrip.tables.contact import CONTACT
-from biogrip.tables.coverage import COVERAGE
-from biogrip.tables.errors_of_case import ERRORS
-from biogrip.tables.evidence import EVIDENCE
-from biogrip.tables.inputs import INPUTS
 from biogrip.tables.layout import Column, Table
-from biogrip.tables.linearisation import LINEARISATION
-from biogrip.tables.mechanics import MECHANICS
-from biogrip.tables.methods import METHODS_COMPARED
-from biogrip.tables.models import MODELS_COMPARED
-from biogrip.tables.printed_values import PRINTED_VALUES
-from biogrip.tables.verdicts import VERDICTS
 
 
 @dataclass(frozen=True)
@@ -186,22 +173,15 @@ _COLUMNS = (
 )
 
 
-SWEEPS = (
-    "results/published/robustness/tables/robustness_noise.csv",
-    "results/published/robustness/tables/robustness_gripper.csv",
-    "results/published/interpretations/tables/interpretations.csv",
-)
-_READ: tuple[Product, ...] = (
-    *(CONTACT, COVERAGE, ERRORS, EVIDENCE, LINEARISATION, MECHANICS, METHODS_COMPARED),
-    *(MODELS_COMPARED, PRINTED_VALUES, VERDICTS, *INPUTS),
-)
-
-
 def claims(
-    study: Study, identifications: list[Path], histories: list[Path], tables: list[Path]
+    study: Study,
+    identifications: list[Path],
+    histories: list[Path],
+    tables: list[Path],
+    sweeps: list[Path],
 ) -> Table:
     """Judge every claim."""
-    results = read_results(study, identifications, histories, tables)
+    results = read_results(study, identifications, histories, tables, sweeps)
     rows = []
     for claim in CLAIMS:
         try:
@@ -214,8 +194,3 @@ def claims(
         f"of novelty and on related work are left out. {RULES} Sweeps are the published ones."
     )
     return Table(caption, _COLUMNS, rows)
-
-
-def _sweeps(_: Study) -> dict[str, str]:
-    files = map(shipped, SWEEPS)
-    return {file.stem: file.read_text(encoding="utf-8") for file in files}

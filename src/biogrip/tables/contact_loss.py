@@ -33,7 +33,7 @@ _COLUMNS = (
 )
 
 
-def _linear(study: Study) -> list[str]:
+def linear_cases(study: Study) -> list[str]:
     """Return the simulated cases whose target and identification are linear."""
     return [
         name

@@ -51,10 +51,11 @@ def coverage(
     """Compare estimates and intervals of many seeds with the true values and the bound."""
     calibrations = iter(calibrated)
     rows: list[tuple[Cell, ...]] = []
-    for (name, case), target, file in zip(study.cases.items(), targets, intervals, strict=True):
+    estimated = pd.concat([INTERVALS.read(file) for file in intervals])
+    for (name, case), target in zip(study.cases.items(), targets, strict=True):
         case_problem = case.problem.calibrated([next(calibrations)] if case.is_calibrated else [])
         log_truth = case_problem.logs(case.parameters)
-        found = INTERVALS.read(file)
+        found = estimated[estimated["case"] == name]
         time_s, _, rotation = read_target(target)
         _, sensitivity = case_problem.of(time_s, rotation).residuals(log_truth)
         noise_rad = standard_deviation(rotation, case.noise)
@@ -128,7 +129,3 @@ def holds(found: pd.DataFrame, truth: float, which: str = "") -> Array:
     low = found[f"{which}low"].fillna(0.0).to_numpy(float)
     high = found[f"{which}high"].fillna(np.inf).to_numpy(float)
     return ((low <= truth) & (truth <= high)).astype(float)
-
-
-def _calibrated(study: Study) -> list[str]:
-    return [name for name in study.covered if study.cases[name].is_calibrated]

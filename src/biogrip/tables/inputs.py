@@ -1,13 +1,7 @@
 """Tables 1 to 4: inputs of the study, from its config."""
 
-from collections.abc import Callable
-from operator import attrgetter
-
 from biogrip.experiment.sample import SINGLE_BRANCH
-from biogrip.products.product import Product
-from biogrip.products.uses import Uses, from_study, marked
 from biogrip.study.study import Study
-from biogrip.tables.declared import table
 from biogrip.tables.layout import Column, Table
 
 _SOURCE = Column("source", "Source")
@@ -114,36 +108,3 @@ def _quantities(
     )
     sourced = [(*row[1:], _source(study.reconstructed, f"{block}.{row[0]}")) for row in rows]
     return Table(caption + _LEGEND, columns, sourced)
-
-
-def _input(
-    make: Callable[[Study], Table],
-    name: str,
-    number: int,
-    uses: Uses,
-    when: Callable[[Study], object] = lambda _: True,
-) -> Product:
-    return table(
-        make,
-        name=name,
-        item=f"input: {name.replace('_', ' ')}",
-        caption=f"Table {number} of the paper. From the study's configuration. Values marked as "
-        "reconstructed are not given by the paper.",
-        uses=uses,
-        rule="tables",
-        when=when,
-    )
-
-
-_GRIPS = attrgetter("has_gripper")
-
-INPUTS = (
-    _input(gripper, "gripper", 1, from_study("gripper", reconstructed=marked("gripper")), _GRIPS),
-    _input(
-        actuator, "actuator", 2, from_study("actuator", reconstructed=marked("actuator")), _GRIPS
-    ),
-    _input(
-        gene_ranges, "gene_ranges", 3, from_study("ranges", reconstructed=marked("search_range"))
-    ),
-    _input(parameter_ranges, "parameter_ranges", 4, from_study("ranges")),
-)
