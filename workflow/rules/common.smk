@@ -75,6 +75,7 @@ SIMULATED = [*STUDY.simulated, *STUDY.points]
 
 
 wildcard_constraints:
+    case="[^/]+",
     batch=r"seeds_\d+-\d+",
     method="|".join(METHODS),
 
