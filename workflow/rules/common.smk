@@ -124,10 +124,11 @@ def of_cases(pattern, cases):
 
 def of_all_batches(pattern, cases):
     """The files of all batches of some cases, method by method if the pattern has it."""
+    methods = STUDY.methods if "{method}" in pattern else [""]
     return [
         file
         for case in cases
-        for file in expand(pattern, case=case, method=STUDY.methods, batch=batches_of(case, pattern))
+        for file in expand(pattern, case=case, method=methods, batch=batches_of(case, pattern))
     ]
 
 
@@ -159,3 +160,43 @@ PUBLISHED_SWEEPS = [
         "interpretations/tables/interpretations",
     )
 ]
+
+
+CASE_FIGURES = ("title", "methods", "seeds", "published", "evaluation", "contact", *PROBLEM)
+CASE_FIGURES += ("identifiability", "genetic_algorithm")
+
+
+def figure(path, name):
+    """The files of a figure, of which the first is in Snakemake's report."""
+    case = "{case}" if "{case}" in path else "all"
+    png = report(
+        f"results/figures/{path}.png",
+        caption=f"../report/{name}.rst",
+        category="Figures",
+        labels={"case": case, "item": name.replace("_", " "), "format": "figure"},
+    )
+    return [png, f"results/figures/{path}.pdf"]
+
+
+def case_figures(simulated, valley):
+    """The files of the figures of a case, and its summary."""
+    drawn = ["convergence", "evolution", "fit", "judged_fit", "profiles"]
+    drawn += ["force", "scatter", "waterfall"] if simulated else []
+    drawn += ["valley"] if valley else []
+    summary = report(
+        "results/summaries/{case}.html",
+        caption="../report/summary.rst",
+        category="Summaries",
+        labels={"case": "{case}", "item": "summary", "format": "page"},
+    )
+    return [*(file for name in drawn for file in figure(f"{name}_{{case}}", name)), summary]
+
+
+def all_batches(pattern):
+    """The files of all batches of the traces of a case."""
+    return lambda wildcards: of_all_batches(pattern, [wildcards.case])
+
+
+def target_of(wildcards):
+    """The target of a case, if it is simulated."""
+    return "results/targets/{case}.csv" if wildcards.case in STUDY.simulated else []

@@ -5,15 +5,9 @@ from pathlib import Path
 import jinja2
 
 from biogrip.errors import BiogripError
-from biogrip.figures.judged_fit import JUDGED_FIT
-from biogrip.figures.profiles import PROFILES
-from biogrip.figures.valley import VALLEY
 from biogrip.files import write_text
 from biogrip.page.png_address import png_address
-from biogrip.products.plan import Plan, Wildcards
-from biogrip.products.product import Product, Reads, the, wildcards_of
-from biogrip.products.uses import from_case
-from biogrip.records.verdicts import PATH, read_verdicts
+from biogrip.records.verdicts import read_verdicts
 from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case
 
@@ -68,23 +62,3 @@ def embedded(path: Path) -> str:
         return png_address(path.read_bytes())
     except OSError as error:
         raise BiogripError(f"{path}: cannot be read: {error.strerror}.") from error
-
-
-def _figures(plan: Plan, job: Wildcards) -> list[str]:
-    valley = [VALLEY] if plan.study.case(job["case"]).has_valley else []
-    return [figure.writes["png"].format(**job) for figure in (JUDGED_FIT, PROFILES, *valley)]
-
-
-SUMMARY = Product(
-    "summary",
-    {"page": "results/summaries/{case}.html"},
-    write,
-    from_case("title sample file instrument", template=_template),
-    lambda plan: wildcards_of(plan.study.cases),
-    message="Writing the summary page of {case}",
-    reads={"verdicts": the(PATH), "figures": Reads(_figures)},
-    rule="case_figures",
-    category="Summaries",
-    item="summary",
-    caption="Verdicts, notes and figures for one trace of this case.",
-)
