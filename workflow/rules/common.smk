@@ -200,3 +200,13 @@ def all_batches(pattern):
 def target_of(wildcards):
     """The target of a case, if it is simulated."""
     return "results/targets/{case}.csv" if wildcards.case in STUDY.simulated else []
+
+
+# Figures of the study, of what there is in it.
+FIGURES = []
+if STUDY.has_gripper:
+    FIGURES += ["comb", "linkage", "torque"]
+if STUDY.gripped:
+    FIGURES += ["linearisation"]
+if STUDY.simulated:
+    FIGURES += ["moduli", "overview"]

@@ -45,3 +45,24 @@ use rule case_figures as recorded_case_figures_without_valley with:
         *case_figures(simulated=False, valley=False),
     wildcard_constraints:
         case=names(case for case in STUDY.recorded if not STUDY.case(case).has_valley),
+
+
+rule figures:
+    input:
+        identifications=of_cases("results/identifications/{case}.csv", STUDY.simulated),
+        targets=of_cases("results/targets/{case}.csv", STUDY.simulated),
+        expected=of_cases("results/identifiability/expected/{case}.json", STUDY.simulated),
+        measurements=of_all_batches("results/measurements/{case}/{batch}.parquet", STUDY.simulated[:1]),
+        calibrated=of_cases("results/calibrations/{case}.yaml", CALIBRATED),
+        differences="results/linearisation.csv" if STUDY.gripped else [],
+    output:
+        [file for name in FIGURES for file in figure(name, name)],
+    log:
+        "results/logs/figures.log",
+    params:
+        **settings_of(*WHOLE),
+        software=SOFTWARE,
+    message:
+        "Drawing the figures of the study"
+    script:
+        "../scripts/figures.py"
