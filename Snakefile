@@ -2,3 +2,10 @@
 
 
 include: "workflow/Snakefile"
+
+
+# The default target of an included file does not count.
+rule study:
+    default_target: True
+    input:
+        rules.all.input,

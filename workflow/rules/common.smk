@@ -5,6 +5,8 @@ from snakemake.exceptions import WorkflowError
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
 from biogrip.study.batches import batch_names
+from biogrip.study.case_blocks import METHOD_BLOCKS
+from biogrip.study.config import StudyConfig
 from biogrip.study.defaults import default_config, shipped
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.settings import settings, software
@@ -178,11 +180,21 @@ def figure(path, name):
     return [png, f"results/figures/{path}.pdf"]
 
 
-def case_figures(simulated, valley):
-    """The files of the figures of a case, and its summary."""
+def case_figure_names(simulated, valley):
+    """Names of the figures of a case, by whether it is simulated, and searched for c and c_p."""
     drawn = ["convergence", "evolution", "fit", "judged_fit", "profiles"]
     drawn += ["force", "scatter", "waterfall"] if simulated else []
-    drawn += ["valley"] if valley else []
+    return drawn + ["valley"] if valley else drawn
+
+
+def figures_of(case):
+    """Names of the figures of a case."""
+    return case_figure_names(case in STUDY.simulated, STUDY.case(case).has_valley)
+
+
+def case_figures(simulated, valley):
+    """The files of the figures of a case, and its summary."""
+    drawn = case_figure_names(simulated, valley)
     summary = report(
         "results/summaries/{case}.html",
         caption="../report/summary.rst",
@@ -210,3 +222,23 @@ if STUDY.gripped:
     FIGURES += ["linearisation"]
 if STUDY.simulated:
     FIGURES += ["moduli", "overview"]
+
+
+def first_batches(pattern):
+    """The files of all cases with the trace that is judged."""
+    return [
+        file
+        for case in STUDY.cases
+        for file in expand(pattern, case=case, batch=batch_names(STUDY.case(case).seeds)[0])
+    ]
+
+
+# What the page shows.
+PAGE_FIGURES = [*FIGURES]
+PAGE_FIGURES += [f"{name}_{case}" for case in STUDY.cases for name in figures_of(case)]
+PAGE_TABLES = [*TABLES]
+PAGE_TABLES += ["contact_loss"] if STUDY.gripped else []
+PAGE_TABLES += ["claims"] if STUDY.published else []
+PAGE_TABLES += [f"{name}_{case}" for case in STUDY.cases for name in ("errors", "verdicts")]
+CAPTIONS = [*FIGURES, *TABLES, "contact_loss", "claims", "errors", "verdicts"]
+CAPTIONS += sorted({name for case in STUDY.cases for name in figures_of(case)})

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
-import yaml
 
 from biogrip.errors import BiogripError
 from biogrip.files import atomic_write
@@ -22,31 +21,16 @@ from biogrip.page.answers import (
     say_what_traces_tell,
     say_which_method_finds_it,
 )
-from biogrip.page.entries import Entry, entries, files_shown, rules_of
 from biogrip.page.explorer import explorer, fits_of
 from biogrip.page.png_address import png_address
-from biogrip.products.plan import Plan, Wildcards
-from biogrip.products.product import Product, Reads, Weight, of_cases
-from biogrip.products.uses import each, every, using
-from biogrip.records.identifications import PATH as IDENTIFICATIONS
 from biogrip.records.rows import read_table
-from biogrip.records.traces import MEASUREMENTS
-from biogrip.records.verdicts import PATH as VERDICTS
 from biogrip.records.verdicts import read_verdicts
-from biogrip.stages.calibrated import CALIBRATED
-from biogrip.stages.judgement import TRACE
-from biogrip.study.plain import plain
 from biogrip.study.study import Case, Study
 from biogrip.tables.verdicts import target_of
 
-PAGE = "results/report.html"
-
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
-_SOURCES = ("report.html.j2", "report.css")
 _LIBRARIES = ("biogrip", "numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
-# Category, and which of a product's files is shown.
-_FIGURES, _TABLES, _DOWNLOADS = ("Figures", "png"), ("Tables", "html"), ("Tables", "csv")
 _STORY = ("moduli",)
 _SHOWN = ("overview", "linkage", "torque")
 _FIRST = ("errors", "claims", "methods", "coverage", "models")
@@ -54,40 +38,22 @@ _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 
 
 @dataclass(frozen=True)
-class Content:
-    """Content of the report, except results."""
+class Entry:
+    """A figure or a table on the page."""
 
-    study: Study
-    """The study with the cases of the explorer and the methods."""
-    figures: tuple[Entry, ...]
-    tables: tuple[Entry, ...]
-    config: str
-    """The whole config, YAML."""
-    sources: Mapping[str, str]
-    """Sources of the page, by file name."""
-
-
-_STUDY = using(
-    "identifiers shown has_gripper",
-    cases=each(every, "name title instrument parameters problem recorded truth"),
-)
-
-
-def content(study: Study, _: Wildcards) -> Content:
-    """Return the content of the report, except results."""
-    plan = Plan(study, Path("results"))
-    rules = rules_of(plan)
-    return Content(
-        _STUDY(study),
-        tuple(entries(plan, _FIGURES, rules)),
-        tuple(entries(plan, _TABLES, rules)),
-        yaml.safe_dump(plain(study.config), allow_unicode=True),
-        {name: Path(__file__).with_name(name).read_text(encoding="utf-8") for name in _SOURCES},
-    )
+    name: str
+    """What it shows."""
+    whose: str
+    """Name of its case or sweep, if any."""
+    caption: str
+    file: str
+    """Path among the results."""
 
 
 def write(
-    shown: Content,
+    study: Study,
+    config: str,
+    captions: list[Path],
     figures: list[Path],
     tables: list[Path],
     downloads: list[Path],
@@ -97,16 +63,20 @@ def write(
     calibrated: list[Path],
     page: Path,
 ) -> None:
-    """Write the report.
+    """Write the page.
 
     Parameters
     ----------
-    shown
-        Content, except results.
+    study
+        The study.
+    config
+        The whole config, YAML.
+    captions
+        Text of the caption of each kind of figure and table, named like it.
     figures, tables
-        PNG and HTML files, in the order of the entries.
+        PNG and HTML files.
     downloads
-        CSV files of the tables.
+        CSV files of the tables, in their order.
     identifications, verdicts, measurements
         Files of all cases, in their order; of the measurements those with the judged trace.
     calibrated
@@ -119,34 +89,37 @@ def write(
     BiogripError
         If an input cannot be read.
     """
-    cases = list(shown.study.cases.values())
-    methods = list(shown.study.identifiers.values())
+    texts = {path.stem: " ".join(path.read_text(encoding="utf-8").split()) for path in captions}
+    owners = [*study.cases, *study.sweeps]
+    cases = list(study.cases.values())
+    methods = list(study.identifiers.values())
     fits = [
         fits_of(case, methods, found, measured, [p for p in calibrated if p.stem == case.name])
         for case, found, measured in zip(cases, identifications, measurements, strict=True)
     ]
     shown_tables: list[dict[str, Any]] = [
         {"entry": entry, "html": _table(path, entry.caption), "download": _download(csv)}
-        for entry, path, csv in zip(shown.tables, tables, downloads, strict=True)
+        for path, csv in zip(tables, downloads, strict=True)
+        for entry in [_entry(path, owners, texts)]
     ]
     errors, judged, compared = (
         [row for path in downloads if path.name.startswith(name) for row in read_table(path)]
         for name in ("errors.csv", "verdicts_", "methods.csv")
     )
     shown_figures = [
-        {"entry": entry, "image": image}
-        for entry, image in zip(shown.figures, _images(figures), strict=True)
+        {"entry": _entry(path, owners, texts), "image": image}
+        for path, image in zip(figures, _images(figures), strict=True)
     ]
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    parts = environment.from_string(shown.sources["report.html.j2"]).stream(
-        style=shown.sources["report.css"],
+    parts = environment.from_string(_source("report.html.j2")).stream(
+        style=_source("report.css"),
         explorer=explorer([(case.title, own) for case, own in zip(cases, fits, strict=True)]),
         answers=[
             compare_with_paper(errors, judged, {case.name: _whose(case) for case in cases}),
             say_what_traces_tell(judged),
-            say_which_method_finds_it(compared, shown.study.identifiers[shown.study.shown].title),
+            say_which_method_finds_it(compared, study.identifiers[study.shown].title),
         ],
         compared=compared_rows(errors, judged),
         cases=[_card(case, v) for case, v in zip(cases, verdicts, strict=True)],
@@ -158,13 +131,24 @@ def write(
         other_tables=[
             item for item in shown_tables if item["entry"].name not in (*_FIRST, *_EVIDENCE)
         ],
-        config=shown.config,
-        grips=shown.study.has_gripper,
+        config=config,
+        grips=study.has_gripper,
         versions={"Python": platform.python_version()}
         | {name: version(name) for name in _LIBRARIES},
     )
     with atomic_write(page) as scratch, scratch.open("wb") as file:
         parts.dump(file, encoding="utf-8")
+
+
+def _source(name: str) -> str:
+    return Path(__file__).with_name(name).read_text(encoding="utf-8")
+
+
+def _entry(file: Path, owners: Sequence[str], captions: Mapping[str, str]) -> Entry:
+    """Return the entry of a file that is named after what it shows, and its case or sweep."""
+    whose = next((name for name in owners if file.stem.endswith(f"_{name}")), "")
+    name = file.stem.removesuffix(f"_{whose}")
+    return Entry(name, whose, captions[name], str(file))
 
 
 def _images(paths: Sequence[Path]) -> Iterable[str | None]:
@@ -243,34 +227,3 @@ def _by_sample(
             whose = item["entry"].whose
             found.setdefault(titles.get(whose, whose or "The study"), []).append(item)
     return found
-
-
-def _judged_traces(plan: Plan, _: Wildcards) -> list[str]:
-    return [plan.batch_of_seed(MEASUREMENTS, name, TRACE) for name in plan.study.cases]
-
-
-def _calibrated(plan: Plan, _: Wildcards) -> list[str]:
-    return [file for name in plan.study.cases for file in CALIBRATED.files(plan, {"case": name})]
-
-
-REPORT = Product(
-    "report",
-    {"page": PAGE},
-    write,
-    content,
-    lambda plan: [{}],
-    message="Writing the page of the study",
-    reads={
-        "figures": files_shown(_FIGURES),
-        "tables": files_shown(_TABLES),
-        "downloads": files_shown(_DOWNLOADS),
-        "identifications": of_cases(IDENTIFICATIONS, every),
-        "verdicts": of_cases(VERDICTS, every),
-        "measurements": Reads(_judged_traces),
-        "calibrated": Reads(_calibrated),
-    },
-    weight=Weight(10, 2000),
-    category="Summaries",
-    item="report",
-    caption="Results of the study with an interactive explorer, on one page.",
-)

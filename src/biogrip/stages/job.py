@@ -27,12 +27,12 @@ def logged(job: Any) -> Iterator[None]:
 
 def job_case(job: Any) -> Case:
     """Return the case of a job, with the keys of the config that its rule names."""
-    return case_of(job.wildcards.case, _given(job))
+    return case_of(job.wildcards.case, job_settings(job))
 
 
 def job_study(job: Any) -> Study:
     """Return the study of a job, with the keys of the config that its rule names."""
-    return study_of(_given(job))
+    return study_of(job_settings(job))
 
 
 def job_seeds(job: Any) -> list[int]:
@@ -47,5 +47,8 @@ def paths(files: Any) -> list[Path]:
     return [Path(files)] if isinstance(files, str) else [Path(file) for file in files]
 
 
-def _given(job: Any) -> dict[str, Any]:
-    return {key: value for param in job.params for key, value in param.items()}
+def job_settings(job: Any) -> dict[str, Any]:
+    """Return the keys of the config that a job's rule names, as plain values."""
+    given = {key: value for param in job.params for key, value in param.items()}
+    del given["software"]
+    return given
