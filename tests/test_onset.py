@@ -142,7 +142,6 @@ CLOCKS = {
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
-@pytest.mark.nightly
 def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
     """Its misfit is no higher than with the onset of the simulation."""
     times = CLOCKS[clock]
