@@ -1,15 +1,18 @@
 """The config, checked, and what the rules are told of it."""
 
+from functools import cache
+from pathlib import Path
+
 from snakemake.exceptions import WorkflowError
 
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
 from biogrip.study.batches import batch_names
-from biogrip.study.case_blocks import METHOD_BLOCKS
+from biogrip.study.case_blocks import METHOD_BLOCKS, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.defaults import default_config, shipped
 from biogrip.study.load import load_study, read_configs
-from biogrip.study.settings import settings, software
+from biogrip.study.settings import keys_of_cases, settings, software
 from biogrip.study.source import overlaid
 
 try:
@@ -24,21 +27,39 @@ except BiogripError as error:
 
 # A job runs again if the config keys that its rule names change, or the software.
 SOFTWARE = {"software": software()}
-# What a fit assumes of the instrument and of the sample.
+# Keys that say what a fit assumes of the instrument and of the sample.
 PROBLEM = (
-    *("instrument", "gripper", "actuator", "assumed_gripper", "protocol", "measurement"),
+    *(
+        "instrument",
+        "gripper",
+        "actuator",
+        "assumed_gripper",
+        "protocol",
+        "measurement",
+    ),
     *("sample", "fixed", "search_range", "models"),
+)
+# Keys that tables and figures of the whole study use.
+WHOLE = (
+    *(
+        "study_seed",
+        "seeds",
+        "methods",
+        "gripper",
+        "actuator",
+        "protocol",
+        "search_range",
+    ),
+    *("model_selection", "evaluation", "reconstructed"),
+    *keys_of_cases(STUDY),
 )
 
 
 def settings_of(*keys):
-    """Params by key of the config, the case's laid over the study's; `method` is that of the job."""
+    """Params by key of the config; a key of the job's case goes before the study's."""
 
     def of(key):
-        def value(wildcards):
-            return settings(STUDY, [key], wildcards.get("case", ""))
-
-        return value
+        return lambda wildcards: settings(STUDY, [key], wildcards.get("case", ""))
 
     return {key: of(key) for key in keys}
 
@@ -48,24 +69,43 @@ def method_settings(wildcards):
     return settings(STUDY, METHODS[wildcards.method].blocks, wildcards.case)
 
 
-def of_batches(pattern):
-    """The files of all batches of seeds of a case."""
-    return lambda wildcards: expand(
-        pattern, batch=batch_names(STUDY.case(wildcards.case).seeds), allow_missing=True
+@cache
+def batches(case, stage):
+    """The batches of the traces of a case, or of those that its intervals are tested with."""
+    chosen = STUDY.case(case)
+    seeds = chosen.coverage_seeds if stage == "coverage" else chosen.seeds
+    return batch_names(seeds, STUDY.batch_size, Path("results", stage, case))
+
+
+def files(pattern, cases):
+    """The files of some cases, of every method and batch if the pattern has them."""
+    stage = "coverage" if "coverage" in pattern else "measurements"
+    return [
+        pattern.format(case=case, method=method, batch=batch)
+        for case in cases
+        for method in (STUDY.methods if "{method}" in pattern else [""])
+        for batch in (batches(case, stage) if "{batch}" in pattern else [""])
+    ]
+
+
+def of_case(pattern):
+    """The files of the case of a job."""
+    return lambda wildcards: files(pattern, [wildcards.case])
+
+
+def first_traces(cases):
+    """The files of measurements with the traces that are judged."""
+    return [
+        files("results/measurements/{case}/{batch}.parquet", [case])[0]
+        for case in cases
+    ]
+
+
+def only_of(cases, pattern):
+    """The file of a job's case, if it is one of some cases."""
+    return lambda wildcards: (
+        files(pattern, [wildcards.case]) if wildcards.case in cases else []
     )
-
-
-def first_batch(pattern):
-    """The file of the batch that has the first seed of a case, which is judged."""
-    return lambda wildcards: expand(
-        pattern, batch=batch_names(STUDY.case(wildcards.case).seeds)[0], allow_missing=True
-    )
-
-
-def calibration_of(wildcards):
-    """The calibration of the gripper, for a case that uses one."""
-    used = STUDY.case(wildcards.case).is_calibrated
-    return "results/calibrations/{case}.yaml" if used else []
 
 
 def names(cases):
@@ -73,111 +113,32 @@ def names(cases):
     return "|".join(cases) or "(?!)"
 
 
+# Cases that have what only some have, those of sweeps' points among them.
 SIMULATED = [*STUDY.simulated, *STUDY.points]
-
-
-wildcard_constraints:
-    case="[^/]+",
-    batch=r"seeds_\d+-\d+",
-    method="|".join(METHODS),
-
-
-# Cases that have what only some have.
-CALIBRATED = [name for name in STUDY.cases if STUDY.case(name).is_calibrated]
+CALIBRATED = [n for n in [*STUDY.cases, *STUDY.points] if STUDY.case(n).is_calibrated]
 SELECTING = list(STUDY.cases) if STUDY.selects_models else []
-# Tables of the study, of what there is in it.
+COUNTED = [name for name in STUDY.covered if STUDY.case(name).verdicts_every == 1]
+calibration_of = only_of(CALIBRATED, "results/calibrations/{case}.yaml")
+
+# Tables and figures of the study, of what there is in it, and those of a case.
 TABLES = ["errors", "gene_ranges", "parameter_ranges"]
-if STUDY.has_gripper:
-    TABLES += ["gripper", "actuator", "contact", "left_out"]
-if STUDY.gripped:
-    TABLES += ["linearisation", "mechanics"]
-if STUDY.simulated:
-    TABLES += ["methods"]
-if STUDY.covered:
-    TABLES += ["coverage"]
-if SELECTING:
-    TABLES += ["models"]
-if STUDY.published:
-    TABLES += ["evidence", "printed_values", "sampling_evidence"]
-# Of the whole study, what its tables and figures use.
-WHOLE = (
-    *("study_seed", "seeds", "methods", "cases", "gripper", "actuator", "protocol"),
-    *("search_range", "model_selection", "evaluation", "reconstructed"),
+TABLES += ["gripper", "actuator", "contact", "left_out"] if STUDY.has_gripper else []
+TABLES += ["linearisation", "mechanics"] if STUDY.gripped else []
+TABLES += ["methods"] if STUDY.simulated else []
+TABLES += ["coverage"] if STUDY.covered else []
+TABLES += ["models"] if SELECTING else []
+TABLES += ["evidence", "printed_values", "sampling_evidence"] if STUDY.published else []
+TABLES += ["verdict_counts"] if COUNTED else []
+OTHER_TABLES = ["contact_loss"] if STUDY.gripped else []
+OTHER_TABLES += ["claims"] if STUDY.published else []
+OTHER_TABLES += (
+    ["interpretations", "interpretations_jointly"]
+    if STUDY.config.interpretations
+    else []
 )
-
-
-def table(path, caption=""):
-    """The files of a table, of which the last is in Snakemake's report."""
-    case = "{case}" if "{case}" in path else "all"
-    name = caption or path
-    page = report(
-        f"results/tables/{path}.html",
-        caption=f"../report/{name}.rst",
-        category="Tables",
-        labels={"case": case, "item": name.replace("_", " "), "format": "table"},
-    )
-    return [f"results/tables/{path}.{kind}" for kind in ("csv", "md", "tex")] + [page]
-
-
-def of_cases(pattern, cases):
-    """The files of some cases."""
-    return expand(pattern, case=cases)
-
-
-def of_all_batches(pattern, cases):
-    """The files of all batches of some cases, method by method if the pattern has it."""
-    methods = STUDY.methods if "{method}" in pattern else [""]
-    return [
-        file
-        for case in cases
-        for file in expand(pattern, case=case, method=methods, batch=batches_of(case, pattern))
-    ]
-
-
-def batches_of(case, pattern):
-    """The batches of the traces of a case, or of those that its intervals are tested with."""
-    chosen = STUDY.case(case)
-    return batch_names(chosen.coverage_seeds if "coverage" in pattern else chosen.seeds)
-
-
-def of_methods(pattern):
-    """The files of all methods and batches of a case."""
-    return lambda wildcards: of_all_batches(pattern, [wildcards.case])
-
-
-def expectation_of(wildcards):
-    """What to expect of the traces of a case, if it is simulated."""
-    expected = wildcards.case in STUDY.simulated
-    return "results/identifiability/expected/{case}.json" if expected else []
-
-
-# What claims of the paper are judged by; published, as sweeps take longer than the study.
-JUDGED_BY = [f"results/tables/{name}.csv" for name in TABLES]
-JUDGED_BY += of_cases("results/tables/verdicts_{case}.csv", STUDY.cases)
-PUBLISHED_SWEEPS = [
-    str(shipped(f"results/published/{name}.csv"))
-    for name in (
-        "robustness/tables/robustness_noise",
-        "robustness/tables/robustness_gripper",
-        "interpretations/tables/interpretations",
-    )
-]
-
-
-CASE_FIGURES = ("title", "methods", "seeds", "published", "evaluation", "contact", *PROBLEM)
-CASE_FIGURES += ("identifiability", "genetic_algorithm")
-
-
-def figure(path, name):
-    """The files of a figure, of which the first is in Snakemake's report."""
-    case = "{case}" if "{case}" in path else "all"
-    png = report(
-        f"results/figures/{path}.png",
-        caption=f"../report/{name}.rst",
-        category="Figures",
-        labels={"case": case, "item": name.replace("_", " "), "format": "figure"},
-    )
-    return [png, f"results/figures/{path}.pdf"]
+FIGURES = ["comb", "linkage", "torque"] if STUDY.has_gripper else []
+FIGURES += ["linearisation"] if STUDY.gripped else []
+FIGURES += ["moduli", "overview"] if STUDY.simulated else []
 
 
 def case_figure_names(simulated, valley):
@@ -192,53 +153,66 @@ def figures_of(case):
     return case_figure_names(case in STUDY.simulated, STUDY.case(case).has_valley)
 
 
-def case_figures(simulated, valley):
-    """The files of the figures of a case, and its summary."""
-    drawn = case_figure_names(simulated, valley)
-    summary = report(
-        "results/summaries/{case}.html",
-        caption="../report/summary.rst",
-        category="Summaries",
-        labels={"case": "{case}", "item": "summary", "format": "page"},
-    )
-    return [*(file for name in drawn for file in figure(f"{name}_{{case}}", name)), summary]
+# All of them with the case or the sweep that they are of.
+SHOWN = {
+    "tables": [
+        *((name, "") for name in [*TABLES, *OTHER_TABLES]),
+        *((name, case) for case in STUDY.cases for name in ("errors", "verdicts")),
+        *(("robustness", sweep) for sweep in STUDY.sweeps),
+    ],
+    "figures": [
+        *((name, "") for name in FIGURES),
+        *((name, case) for case in STUDY.cases for name in figures_of(case)),
+        *(("robustness", sweep) for sweep in STUDY.sweeps),
+    ],
+}
 
 
-def all_batches(pattern):
-    """The files of all batches of the traces of a case."""
-    return lambda wildcards: of_all_batches(pattern, [wildcards.case])
+def stem(name, whose=""):
+    """The name of a table's or a figure's files, which ends with that of its case or sweep."""
+    return f"{name}_{whose}" if whose else name
 
 
-def target_of(wildcards):
-    """The target of a case, if it is simulated."""
-    return "results/targets/{case}.csv" if wildcards.case in STUDY.simulated else []
+def made(kind, suffix):
+    """The files of all tables or figures, of one format."""
+    return [f"results/{kind}/{stem(*item)}{suffix}" for item in SHOWN[kind]]
 
 
-# Figures of the study, of what there is in it.
-FIGURES = []
-if STUDY.has_gripper:
-    FIGURES += ["comb", "linkage", "torque"]
-if STUDY.gripped:
-    FIGURES += ["linearisation"]
-if STUDY.simulated:
-    FIGURES += ["moduli", "overview"]
+def shown(path, kind, item, whose):
+    """A file of Snakemake's report, with its caption."""
+    caption = f"../report/{kind}/{item}.rst"
+    labels = {
+        "case": whose or "all",
+        "item": item.replace("_", " "),
+        "format": kind[:-1],
+    }
+    return report(path, caption=caption, category=kind.title(), labels=labels)
 
 
-def first_batches(pattern):
-    """The files of all cases with the trace that is judged."""
+def table(name, whose=""):
+    """The files of a table, of which the last is in Snakemake's report."""
+    path = f"results/tables/{stem(name, whose)}"
     return [
-        file
-        for case in STUDY.cases
-        for file in expand(pattern, case=case, batch=batch_names(STUDY.case(case).seeds)[0])
+        *multiext(path, ".csv", ".md", ".tex"),
+        shown(f"{path}.html", "tables", name, whose),
     ]
 
 
-# What the page shows.
-PAGE_FIGURES = [*FIGURES]
-PAGE_FIGURES += [f"{name}_{case}" for case in STUDY.cases for name in figures_of(case)]
-PAGE_TABLES = [*TABLES]
-PAGE_TABLES += ["contact_loss"] if STUDY.gripped else []
-PAGE_TABLES += ["claims"] if STUDY.published else []
-PAGE_TABLES += [f"{name}_{case}" for case in STUDY.cases for name in ("errors", "verdicts")]
-CAPTIONS = [*FIGURES, *TABLES, "contact_loss", "claims", "errors", "verdicts"]
-CAPTIONS += sorted({name for case in STUDY.cases for name in figures_of(case)})
+def figure(name, whose=""):
+    """The files of a figure, of which the first is in Snakemake's report."""
+    path = f"results/figures/{stem(name, whose)}"
+    return [shown(f"{path}.png", "figures", name, whose), f"{path}.pdf"]
+
+
+def page(path, item, whose="all"):
+    """A page of Snakemake's report."""
+    labels = {"case": whose, "item": item, "format": "page"}
+    caption = f"../report/{item}.rst"
+    return report(path, caption=caption, category="Summaries", labels=labels)
+
+
+wildcard_constraints:
+    case="[^/]+",
+    batch=r"seeds_\d+-\d+",
+    method="|".join(METHODS),
+    sweep=names(STUDY.sweeps),

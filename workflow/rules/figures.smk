@@ -1,4 +1,11 @@
-"""The figures: of each case with its summary, and of the study."""
+"""The figures: of each case with its summary, and of the study; and the page with all of them."""
+
+
+def case_figures(simulated, valley):
+    """The files of the figures of a case, and its summary."""
+    drawn = case_figure_names(simulated, valley)
+    summary = page("results/summaries/{case}.html", "summary", "{case}")
+    return [*(file for name in drawn for file in figure(name, "{case}")), summary]
 
 
 # Of a recorded trace nobody knows the target; a valley has who searches for c and c_p.
@@ -6,10 +13,12 @@ rule case_figures:
     input:
         identifications="results/identifications/{case}.csv",
         history="results/histories/{case}.parquet",
-        measurements=all_batches("results/measurements/{case}/{batch}.parquet"),
+        measurements=of_case("results/measurements/{case}/{batch}.parquet"),
         verdicts="results/identifiability/{case}.json",
-        expected=expectation_of,
-        target=target_of,
+        expected=only_of(
+            STUDY.simulated, "results/identifiability/expected/{case}.json"
+        ),
+        target=only_of(STUDY.simulated, "results/targets/{case}.csv"),
         calibrated=calibration_of,
     output:
         *case_figures(simulated=True, valley=True),
@@ -18,7 +27,10 @@ rule case_figures:
     wildcard_constraints:
         case=names(case for case in STUDY.simulated if STUDY.case(case).has_valley),
     params:
-        **settings_of(*CASE_FIGURES),
+        **settings_of(
+            "title", "methods", "seeds", "published", "evaluation", "contact", *PROBLEM
+        ),
+        **settings_of("identifiability", "genetic_algorithm"),
         software=SOFTWARE,
     message:
         "Drawing {wildcards.case}"
@@ -49,14 +61,16 @@ use rule case_figures as recorded_case_figures_without_valley with:
 
 rule figures:
     input:
-        identifications=of_cases("results/identifications/{case}.csv", STUDY.simulated),
-        targets=of_cases("results/targets/{case}.csv", STUDY.simulated),
-        expected=of_cases("results/identifiability/expected/{case}.json", STUDY.simulated),
-        measurements=of_all_batches("results/measurements/{case}/{batch}.parquet", STUDY.simulated[:1]),
-        calibrated=of_cases("results/calibrations/{case}.yaml", CALIBRATED),
+        identifications=files("results/identifications/{case}.csv", STUDY.simulated),
+        targets=files("results/targets/{case}.csv", STUDY.simulated),
+        expected=files("results/identifiability/expected/{case}.json", STUDY.simulated),
+        measurements=files(
+            "results/measurements/{case}/{batch}.parquet", STUDY.simulated[:1]
+        ),
+        calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
         differences="results/linearisation.csv" if STUDY.gripped else [],
     output:
-        [file for name in FIGURES for file in figure(name, name)],
+        [file for name in FIGURES for file in figure(name)],
     log:
         "results/logs/figures.log",
     params:
@@ -66,3 +80,31 @@ rule figures:
         "Drawing the figures of the study"
     script:
         "../scripts/figures.py"
+
+
+rule page:
+    input:
+        captions=[
+            workflow.source_path(f"../report/{kind}/{name}.rst")
+            for kind, items in SHOWN.items()
+            for name in dict.fromkeys(name for name, _ in items)
+        ],
+        figures=made("figures", ".png"),
+        tables=made("tables", ".html"),
+        downloads=made("tables", ".csv"),
+        identifications=files("results/identifications/{case}.csv", STUDY.cases),
+        verdicts=files("results/identifiability/{case}.json", STUDY.cases),
+        measurements=first_traces(STUDY.cases),
+        calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
+    output:
+        page=page("results/report.html", "report"),
+    log:
+        "results/logs/page.log",
+    params:
+        **settings_of(*(key for key in StudyConfig.model_fields if key != "cases")),
+        **settings_of(*METHOD_BLOCKS, *keys_of_cases(STUDY)),
+        software=SOFTWARE,
+    message:
+        "Writing the page of the study"
+    script:
+        "../scripts/page.py"

@@ -10,8 +10,21 @@ rule target:
         case=names(SIMULATED),
     params:
         **settings_of(
-            *("instrument", "gripper", "actuator", "protocol", "sample", "fixed", "contact"),
-            *("measurement.rate_Hz", "measurement.times_s", "measurement.bursts", "models"),
+            *(
+                "instrument",
+                "gripper",
+                "actuator",
+                "protocol",
+                "sample",
+                "fixed",
+                "contact",
+            ),
+            *(
+                "measurement.rate_Hz",
+                "measurement.times_s",
+                "measurement.bursts",
+                "models",
+            ),
         ),
         software=SOFTWARE,
     message:
@@ -39,26 +52,6 @@ rule measurement:
         "../scripts/measurement.py"
 
 
-rule identification:
-    input:
-        measurements="results/measurements/{case}/{batch}.parquet",
-        calibrated=calibration_of,
-    output:
-        parameters="results/identifications/{case}/{method}/{batch}.csv",
-        history="results/histories/{case}/{method}/{batch}.parquet",
-        timing="results/timings/{case}/{method}/{batch}.csv",
-    log:
-        "results/logs/identification/{case}/{method}/{batch}.log",
-    params:
-        **settings_of("study_seed", *PROBLEM),
-        method=method_settings,
-        software=SOFTWARE,
-    message:
-        "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
-    script:
-        "../scripts/identification.py"
-
-
 rule recording:
     input:
         recorded=lambda wildcards: STUDY.case(wildcards.case).file,
@@ -84,7 +77,10 @@ rule calibration:
     log:
         "results/logs/calibration/{case}.log",
     params:
-        **settings_of("study_seed", "instrument", "gripper", "actuator", "protocol", "sample", "calibration"),
+        **settings_of(
+            "study_seed", "instrument", "gripper", "actuator", "protocol", "sample"
+        ),
+        **settings_of("calibration"),
         software=SOFTWARE,
     message:
         "Calibrating the gripper of {wildcards.case} without a sample"
@@ -92,14 +88,42 @@ rule calibration:
         "../scripts/calibration.py"
 
 
+rule identification:
+    input:
+        measurements="results/measurements/{case}/{batch}.parquet",
+        calibrated=calibration_of,
+    output:
+        parameters="results/identifications/{case}/{method}/{batch}.csv",
+        history="results/histories/{case}/{method}/{batch}.parquet",
+        timing="results/timings/{case}/{method}/{batch}.csv",
+    log:
+        "results/logs/identification/{case}/{method}/{batch}.log",
+    resources:
+        runtime=120,
+    params:
+        **settings_of("study_seed", *PROBLEM),
+        method=method_settings,
+        software=SOFTWARE,
+    message:
+        "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
+    script:
+        "../scripts/identification.py"
+
+
 rule judgement:
     input:
-        measurements=first_batch("results/measurements/{case}/{batch}.parquet"),
+        measurements=lambda wildcards: first_traces([wildcards.case]),
+        target=only_of(STUDY.simulated, "results/targets/{case}.csv"),
         calibrated=calibration_of,
     output:
         verdicts="results/identifiability/{case}.json",
+        expected="results/identifiability/expected/{case}.json",
     log:
         "results/logs/judgement/{case}.log",
+    wildcard_constraints:
+        case=names(STUDY.simulated),
+    resources:
+        runtime=60,
     params:
         **settings_of("study_seed", *PROBLEM, "identifiability", "least_squares"),
         software=SOFTWARE,
@@ -109,23 +133,12 @@ rule judgement:
         "../scripts/judgement.py"
 
 
-rule expectation:
-    input:
-        target="results/targets/{case}.csv",
-        calibrated=calibration_of,
+# Without a target nobody knows what to expect.
+use rule judgement as recorded_judgement with:
     output:
-        verdicts="results/identifiability/expected/{case}.json",
-    log:
-        "results/logs/expectation/{case}.log",
+        verdicts="results/identifiability/{case}.json",
     wildcard_constraints:
-        case=names(STUDY.simulated),
-    params:
-        **settings_of(*PROBLEM, "identifiability"),
-        software=SOFTWARE,
-    message:
-        "Computing expected confidence limits for {wildcards.case}"
-    script:
-        "../scripts/expectation.py"
+        case=names(STUDY.recorded),
 
 
 rule intervals:
@@ -139,11 +152,13 @@ rule intervals:
         "results/logs/intervals/{case}/{batch}.log",
     wildcard_constraints:
         case=names(STUDY.covered),
+    resources:
+        runtime=120,
     params:
         **settings_of("study_seed", *PROBLEM, "identifiability", "least_squares"),
         software=SOFTWARE,
     message:
-        "Estimates and intervals of {wildcards.case}, {wildcards.batch}"
+        "Estimating intervals of {wildcards.case}, {wildcards.batch}"
     script:
         "../scripts/intervals.py"
 
@@ -156,6 +171,8 @@ rule model_fits:
         fits="results/selection/{case}/{batch}.csv",
     log:
         "results/logs/model_fits/{case}/{batch}.log",
+    resources:
+        runtime=60,
     params:
         **settings_of("study_seed", *PROBLEM, "model_selection", "least_squares"),
         software=SOFTWARE,

@@ -3,15 +3,17 @@
 
 rule case_tables:
     input:
-        batches=of_methods("results/identifications/{case}/{method}/{batch}.csv"),
-        histories=of_methods("results/histories/{case}/{method}/{batch}.parquet"),
+        batches=of_case("results/identifications/{case}/{method}/{batch}.csv"),
+        histories=of_case("results/histories/{case}/{method}/{batch}.parquet"),
         verdicts="results/identifiability/{case}.json",
-        expected=expectation_of,
+        expected=only_of(
+            STUDY.simulated, "results/identifiability/expected/{case}.json"
+        ),
     output:
         identifications="results/identifications/{case}.csv",
         history="results/histories/{case}.parquet",
-        errors=table("errors_{case}", "errors"),
-        verdicts=table("verdicts_{case}", "verdicts"),
+        errors=table("errors", "{case}"),
+        verdicts=table("verdicts", "{case}"),
     log:
         "results/logs/case_tables/{case}.log",
     wildcard_constraints:
@@ -25,16 +27,31 @@ rule case_tables:
         "../scripts/case_tables.py"
 
 
+rule model_errors:
+    output:
+        differences="results/linearisation.csv",
+        contact_loss=table("contact_loss"),
+    log:
+        "results/logs/model_errors.log",
+    params:
+        **settings_of("study_seed", "seeds", "actuator", *keys_of_cases(STUDY)),
+        software=SOFTWARE,
+    message:
+        "Comparing the linear model with the nonlinear one, and with loss of contact"
+    script:
+        "../scripts/model_errors.py"
+
+
 rule tables:
     input:
-        errors=of_cases("results/tables/errors_{case}.csv", STUDY.cases),
-        times=of_all_batches("results/timings/{case}/{method}/{batch}.csv", STUDY.cases),
-        fits=of_all_batches("results/selection/{case}/{batch}.csv", SELECTING),
-        identifications=of_cases("results/identifications/{case}.csv", STUDY.cases),
-        targets=of_cases("results/targets/{case}.csv", STUDY.simulated),
-        intervals=of_all_batches("results/coverage/{case}/{batch}.csv", STUDY.covered),
-        measurements=of_all_batches("results/measurements/{case}/{batch}.parquet", STUDY.cases),
-        calibrated=of_cases("results/calibrations/{case}.yaml", CALIBRATED),
+        errors=files("results/tables/errors_{case}.csv", STUDY.cases),
+        times=files("results/timings/{case}/{method}/{batch}.csv", STUDY.cases),
+        fits=files("results/selection/{case}/{batch}.csv", SELECTING),
+        identifications=files("results/identifications/{case}.csv", STUDY.cases),
+        targets=files("results/targets/{case}.csv", STUDY.simulated),
+        intervals=files("results/coverage/{case}/{batch}.csv", STUDY.covered),
+        measurements=files("results/measurements/{case}/{batch}.parquet", STUDY.cases),
+        calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
         differences="results/linearisation.csv" if STUDY.gripped else [],
     output:
         [file for name in TABLES for file in table(name)],
@@ -51,40 +68,21 @@ rule tables:
         "../scripts/tables.py"
 
 
-rule linearisation:
-    output:
-        differences="results/linearisation.csv",
-    log:
-        "results/logs/linearisation.log",
-    params:
-        **settings_of("cases", "actuator"),
-        software=SOFTWARE,
-    message:
-        "Comparing the linear and the nonlinear model"
-    script:
-        "../scripts/linearisation.py"
-
-
-rule contact_loss:
-    output:
-        *table("contact_loss"),
-    log:
-        "results/logs/contact_loss.log",
-    params:
-        **settings_of("study_seed", "seeds", "cases", "actuator"),
-        software=SOFTWARE,
-    message:
-        "Identifying samples whose jaws would have to pull"
-    script:
-        "../scripts/contact_loss.py"
-
-
 rule claims:
     input:
-        identifications=of_cases("results/identifications/{case}.csv", STUDY.published),
-        histories=of_cases("results/histories/{case}.parquet", STUDY.published),
-        tables=JUDGED_BY,
-        sweeps=PUBLISHED_SWEEPS,
+        identifications=files("results/identifications/{case}.csv", STUDY.published),
+        histories=files("results/histories/{case}.parquet", STUDY.published),
+        tables=[f"results/tables/{name}.csv" for name in TABLES]
+        + files("results/tables/verdicts_{case}.csv", STUDY.cases),
+        # As published, since these sweeps take longer than the study.
+        sweeps=[
+            str(shipped(f"results/published/{name}.csv"))
+            for name in (
+                "robustness/tables/robustness_noise",
+                "robustness/tables/robustness_gripper",
+                "interpretations/tables/interpretations",
+            )
+        ],
     output:
         *table("claims"),
     log:

@@ -5,13 +5,13 @@ from pathlib import Path
 import yaml
 
 from biogrip.page.page import write
-from biogrip.stages.job import job_settings, job_study, logged, paths
+from biogrip.stages.job import job_study, logged, paths
 
 with logged(snakemake):
-    known = {key: value for key, value in job_settings(snakemake).items() if value is not None}
+    study = job_study(snakemake)
     write(
-        job_study(snakemake),
-        yaml.safe_dump(known, allow_unicode=True),
+        study,
+        yaml.safe_dump(study.plain, allow_unicode=True),
         *(paths(files) for _, files in snakemake.input.items()),
         Path(snakemake.output.page),
     )

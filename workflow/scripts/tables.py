@@ -17,6 +17,7 @@ from biogrip.tables import (
     printed_values,
     sampling_evidence,
     timings,
+    verdict_counts,
 )
 from biogrip.tables.layout import write
 
@@ -25,7 +26,8 @@ with logged(snakemake):
     given = {name: paths(files) for name, files in snakemake.input.items()}
     gripped, simulated = study.of(study.gripped), study.of(study.simulated)
     published, covered = study.of(study.published), study.of(study.covered)
-
+    every = [name for name in study.covered if study.case(name).verdicts_every == 1]
+    counted = study.of(every)
     axes = [name for name in study.published if study.cases[name].published.axis_rad]
 
     def of(study, name):
@@ -45,6 +47,9 @@ with logged(snakemake):
         "methods": lambda: methods.methods(simulated, of(simulated, "identifications")),
         "coverage": lambda: coverage.coverage(
             covered, of(covered, "targets"), given["intervals"], of(covered, "calibrated")
+        ),
+        "verdict_counts": lambda: verdict_counts.verdict_counts(
+            counted, [file for file in given["intervals"] if file.parent.name in counted.cases]
         ),
         "models": lambda: models.models(study, given["fits"]),
         "evidence": lambda: evidence.evidence(

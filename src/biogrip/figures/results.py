@@ -17,7 +17,7 @@ from biogrip.records.identifications import read_histories, read_identifications
 from biogrip.records.traces import Measurements, read_measurements
 from biogrip.response.nuisance import within
 from biogrip.response.simulation import simulated_rotation
-from biogrip.study.batches import parse_batch
+from biogrip.study.batches import seeds_of
 
 SHOWN_SEEDS = 100
 """Most seeds drawn individually; figures show the first ones."""
@@ -113,7 +113,6 @@ def scale_of(values: Array, unit: str) -> tuple[float, str]:
 
 def _holding(seed: int, measurements: list[Path]) -> Path:
     for path in measurements:
-        batch = parse_batch(path.stem)
-        if batch and batch.first <= seed <= batch.last:
+        if seed in seeds_of(path.stem):
             return path
     raise BiogripError(f"no measurement file holds seed {seed}.")

@@ -89,7 +89,10 @@ def write(
     BiogripError
         If an input cannot be read.
     """
-    texts = {path.stem: " ".join(path.read_text(encoding="utf-8").split()) for path in captions}
+    texts = {
+        (path.parent.name, path.stem): " ".join(path.read_text(encoding="utf-8").split())
+        for path in captions
+    }
     owners = [*study.cases, *study.sweeps]
     cases = list(study.cases.values())
     methods = list(study.identifiers.values())
@@ -144,11 +147,14 @@ def _source(name: str) -> str:
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
-def _entry(file: Path, owners: Sequence[str], captions: Mapping[str, str]) -> Entry:
-    """Return the entry of a file that is named after what it shows, and its case or sweep."""
+def _entry(file: Path, owners: Sequence[str], texts: Mapping[tuple[str, str], str]) -> Entry:
+    """Return the entry of a file that is named after what it shows, and its case or sweep.
+
+    Captions are in folders named like those of the files.
+    """
     whose = next((name for name in owners if file.stem.endswith(f"_{name}")), "")
     name = file.stem.removesuffix(f"_{whose}")
-    return Entry(name, whose, captions[name], str(file))
+    return Entry(name, whose, texts[file.parent.name, name], str(file))
 
 
 def _images(paths: Sequence[Path]) -> Iterable[str | None]:

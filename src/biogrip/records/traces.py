@@ -168,9 +168,3 @@ def each_trace(path: Path) -> Iterator[Array]:
     seeds = seeds_in(path)
     for some in parts(len(seeds), _READ_AT_ONCE):
         yield from read_measurements(path, seeds[some]).rotation_rad.values()
-
-
-def write_single_trace(path: Path, time_s: Array, readings: Array, column: str) -> None:
-    """Write one noisy trace as CSV in the format of recorded traces."""
-    samples = zip(time_s, readings, strict=True)
-    write_rows(path, ("time_s", column), ((f"{t:.10g}", f"{x:.6e}") for t, x in samples))

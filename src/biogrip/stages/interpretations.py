@@ -14,7 +14,7 @@ from biogrip.progress import Progress
 from biogrip.records.interpretations import INTERPRETATIONS
 from biogrip.records.traces import read_target
 from biogrip.stages.groups import groups
-from biogrip.study.study import Case, Study
+from biogrip.study.study import Case
 
 
 def read(case: Case, target: Path, rows: Path) -> None:
@@ -60,10 +60,3 @@ def _last_improvement(answer: Identification) -> int:
     """Return the last generation in which the best misfit fell."""
     falls = np.flatnonzero(np.diff(answer.history.best_misfit) < 0)
     return int(falls[-1]) + 1 if len(falls) else 0
-
-
-def read_cases(study: Study) -> list[str]:
-    """Return the simulated cases to interpret: those whose model has the paper's parameters."""
-    ours = {parameter.name for parameter in SINGLE_BRANCH}
-    names = study.simulated if study.interpretations else []
-    return [name for name in names if set(study.case(name).sample.model.names) <= ours]

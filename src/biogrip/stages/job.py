@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.errors import BiogripError
-from biogrip.study.batches import parse_batch
+from biogrip.study.batches import seeds_of
 from biogrip.study.settings import case_of, study_of
 from biogrip.study.study import Case, Study
 
@@ -37,9 +37,7 @@ def job_study(job: Any) -> Study:
 
 def job_seeds(job: Any) -> list[int]:
     """Return the seeds of a job's batch."""
-    batch = parse_batch(job.wildcards.batch)
-    assert batch is not None
-    return batch.seeds
+    return list(seeds_of(job.wildcards.batch))
 
 
 def paths(files: Any) -> list[Path]:

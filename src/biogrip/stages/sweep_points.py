@@ -2,16 +2,13 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.errors import BiogripError
 from biogrip.experiment.noise import rms
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import nearest_encodable
 from biogrip.fit.success import near_noise
 from biogrip.judging.at_truth import bounds_percent, headlines
@@ -20,6 +17,7 @@ from biogrip.records.identifications import read_identifications
 from biogrip.records.rows import RowFile
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.study import Case, Study
+from biogrip.study.sweeps import Point
 
 POINTS = RowFile(
     "a sweep",
@@ -36,87 +34,89 @@ POINTS = RowFile(
 _FACTOR, _BOUNDS = math.log(2), 4.0
 
 
-@dataclass(frozen=True)
-class SweepContent:
-    """The sweep of a case."""
-
-    study: Study
-    """The study with the points as cases."""
-    parameters: Mapping[str, float]
-    """True values by name, SI units."""
-    places: Mapping[str, tuple[str, str]]
-    """Values on the axes by point, as text in files."""
-
-
 def judge(
-    sweep: SweepContent, identifications: list[Path], calibrated: list[Path], points: Path
+    study: Study,
+    sweep: str,
+    case: str,
+    identifications: list[Path],
+    calibrated: list[Path],
+    points: Path,
 ) -> None:
     """Compute errors and shares of successful seeds at every point of a case's sweep.
 
-    Files are named like their point.
-
-    Raises
-    ------
-    BiogripError
-        If a point has no identifications.
+    Parameters
+    ----------
+    study
+        The study.
+    sweep, case
+        Names of the sweep and of the case that it is laid over.
+    identifications
+        Batches of the points, in folders named like point and method.
+    calibrated
+        Calibrations, named like their point.
+    points
+        The file to write.
     """
-    POINTS.write(points, _rows(sweep, {path.stem: path for path in identifications}, calibrated))
+    files: dict[tuple[str, str], list[Path]] = {}
+    for path in identifications:
+        files.setdefault((path.parts[-3], path.parts[-2]), []).append(path)
+    calibrations = {path.stem: [path] for path in calibrated}
+    rows = _rows(study, study.sweeps[sweep].points(sweep, case), files, calibrations)
+    POINTS.write(points, rows)
 
 
 def _rows(
-    sweep: SweepContent, files: Mapping[str, Path], calibrated: list[Path]
+    study: Study,
+    points: list[Point],
+    files: Mapping[tuple[str, str], list[Path]],
+    calibrations: Mapping[str, list[Path]],
 ) -> Iterator[tuple[str | int, ...]]:
-    calibrations = {path.stem: path for path in calibrated}
-    bounds = {
-        name: _bounds(sweep, point, [calibrations[name]] if name in calibrations else [])
-        for name, point in sweep.study.points.items()
-    }
+    """Yield a row for every point, method and quantity."""
+    true = study.cases[points[0].case].parameters
+    bounds = {}
+    for point in points:
+        case = study.points[point.name]
+        problem = case.problem.calibrated(calibrations.get(point.name, []))
+        time_s = case.sampling.over(problem.torque.end_s)
+        bounds[point.name] = bounds_percent(problem, case.noise, true, time_s)
     heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
-    for name, point in sweep.study.points.items():
-        if name not in files:
-            raise BiogripError(f"{name}: no file of identifications is given.")
-        for judged in _judged(sweep, point, files[name], bounds[name], heads):
-            yield name, *sweep.places[name], *judged
-
-
-def _bounds(
-    sweep: SweepContent, point: Case, calibrated: list[Path]
-) -> list[tuple[Quantity, float]]:
-    problem = point.problem.calibrated(calibrated)
-    time_s = point.sampling.over(problem.torque.end_s)
-    return bounds_percent(problem, point.noise, sweep.parameters, time_s)
+    for point in points:
+        case = study.points[point.name]
+        for method in study.methods:
+            batches = files[point.name, method]
+            found = pd.concat([read_identifications(path, method) for path in batches])
+            tolerance = study.near_noise_tolerance
+            for judged in _judged(case, true, found, bounds[point.name], heads, tolerance):
+                yield point.name, point.row.text, point.column.text, method, *judged
 
 
 def _judged(
-    sweep: SweepContent,
     point: Case,
-    path: Path,
+    true: Mapping[str, float],
+    found: pd.DataFrame,
     bounds: list[tuple[Quantity, float]],
     heads: list[str],
+    tolerance: float,
 ) -> Iterator[tuple[str | int, ...]]:
-    """Yield rows for one point, for every method and quantity."""
-    problem, parameters = point.problem, sweep.parameters
-    time_s = point.sampling.over(problem.torque.end_s)
-    searched = problem.searched.parameters
+    """Yield what one method finds at a point, for every quantity."""
+    searched = point.searched.parameters
     members = {q.label: [searched[index] for index in q.members] for q, _ in bounds}
-    truths = {label: sum(parameters[p.name] for p in of) for label, of in members.items()}
-    for method in sweep.study.methods:
-        found = read_identifications(path, method)
-        values = {
-            label: found[[p.column for p in of]].sum(axis=1).to_numpy(float)
-            for label, of in members.items()
-        }
-        near = float(np.mean(_succeeded(sweep, point, time_s, found)))
-        inside = np.ones(len(found), dtype=bool)
-        for q, percent in bounds:
-            if q.label in heads:
-                inside &= in_basin(values[q.label], truths[q.label], percent / 100)
-        for q, percent in bounds:
-            errors = _errors_percent(values[q.label], truths[q.label])
-            within = _median(errors[inside])
-            share = float(np.mean(inside)) if heads else np.nan
-            numbers = (near, share, _median(errors), within, percent)
-            yield method, q.label, len(found), *(_text(number) for number in numbers)
+    truths = {label: sum(true[p.name] for p in of) for label, of in members.items()}
+    values = {
+        label: found[[p.column for p in of]].sum(axis=1).to_numpy(float)
+        for label, of in members.items()
+    }
+    near = float(np.mean(_succeeded(point, true, found, tolerance)))
+    inside = np.ones(len(found), dtype=bool)
+    for q, percent in bounds:
+        if q.label in heads:
+            inside &= in_basin(values[q.label], truths[q.label], percent / 100)
+    for q, percent in bounds:
+        errors = _errors_percent(values[q.label], truths[q.label])
+        within = _median(errors[inside])
+        share = float(np.mean(inside)) if heads else np.nan
+        numbers = (near, share, _median(errors), within, percent)
+        yield q.label, len(found), *(_text(number) for number in numbers)
 
 
 def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
@@ -140,21 +140,24 @@ def _median(values: Array) -> float:
     return float(np.median(values)) if len(values) else np.nan
 
 
-def _succeeded(sweep: SweepContent, point: Case, time_s: Array, found: pd.DataFrame) -> np.ndarray:
+def _succeeded(
+    point: Case, true: Mapping[str, float], found: pd.DataFrame, tolerance: float
+) -> np.ndarray:
     """Return True for each seed near the noise, (n_seeds,).
 
     Without noise, the misfit of the true values rounded to the genes' two digits takes its
     place.
     """
     if point.noise.absent:
-        resolution = _resolution_rad(point.problem, sweep.parameters, time_s)
-        found = found.assign(noise_rms=resolution)
-    return near_noise(found, sweep.study.near_noise_tolerance)
+        found = found.assign(noise_rms=_resolution_rad(point, true))
+    return near_noise(found, tolerance)
 
 
-def _resolution_rad(problem: CaseProblem, parameters: Mapping[str, float], time_s: Array) -> float:
+def _resolution_rad(point: Case, true: Mapping[str, float]) -> float:
     """Return the noise-free RMS misfit of the encodable parameters nearest to the truth."""
-    truth = [parameters[p.name] for p in problem.model.parameters]
+    problem = point.problem
+    time_s = point.sampling.over(problem.torque.end_s)
+    truth = [true[p.name] for p in problem.model.parameters]
     rounded = [
         problem.fixed.get(p.name, nearest_encodable(value, problem.ranges[p.range_name]))
         for p, value in zip(problem.model.parameters, truth, strict=True)

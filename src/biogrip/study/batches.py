@@ -4,74 +4,42 @@ import re
 from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 from biogrip.study.config import LARGEST_BATCH, SMALLEST_BATCH, USUAL_BATCHES
 
-
-class Batch(NamedTuple):
-    """A range of seeds from first to last, both included."""
-
-    first: int
-    last: int
-
-    @property
-    def name(self) -> str:
-        """Name used in files, e.g. ``seeds_0-24``."""
-        return f"seeds_{self.first}-{self.last}"
-
-    @property
-    def seeds(self) -> list[int]:
-        """All seeds of the batch."""
-        return list(range(self.first, self.last + 1))
+_NAME = re.compile(r"seeds_(\d+)-(\d+)")
 
 
-def parse_batch(name: str) -> Batch | None:
-    """Return the batch that a name stands for, or None if the name has another form."""
-    match = re.fullmatch(r"seeds_(\d+)-(\d+)", name)
-    return Batch(int(match[1]), int(match[2])) if match else None
+def seeds_of(batch: str) -> range:
+    """Return the seeds of a batch, whose name has the first and the last, e.g. ``seeds_0-24``."""
+    found = _NAME.fullmatch(batch)
+    assert found, batch
+    return range(int(found[1]), int(found[2]) + 1)
 
 
-def plan_batches(seeds: int, batch_size: int, existing: Iterable[Batch] = ()) -> list[Batch]:
-    """Divide seeds 0 to ``seeds - 1`` into batches, keeping existing ones.
+def batch_names(seeds: int, batch_size: int | None = None, folder: Path | None = None) -> list[str]:
+    """Return the names of the batches of a case.
 
-    Seeds without a batch are cut at multiples of the batch size. Existing batches are kept
-    whole, so raising the number of seeds recomputes none of them, and an interrupted run continues
-    with the batches it started with. Of two that overlap, the one that starts first is kept.
+    Seeds are cut at multiples of the batch size, by default one that makes start-up a small part of
+    a job. Batches that a folder has files of are kept, so that more seeds renew none of them.
     """
-    plan: list[Batch] = []
-    covered = 0
-    for batch in sorted(existing):
-        if batch.first >= seeds:
-            break
-        if covered <= batch.first <= batch.last:
-            plan += _cut(covered, batch.first, batch_size)
-            plan.append(batch)
-            covered = batch.last + 1
-    return plan + _cut(covered, seeds, batch_size)
+    size = batch_size or min(max(SMALLEST_BATCH, -(-seeds // USUAL_BATCHES)), LARGEST_BATCH)
+    there = folder.glob("seeds_*") if folder else ()
+    existing = sorted((r.start, r.stop) for r in map(seeds_of, _stems(there)))
+    edges, covered = [], 0
+    for first, stop in existing:
+        if covered <= first < stop and first < seeds:
+            edges += [*_cut(covered, first, size), (first, stop)]
+            covered = stop
+    edges += _cut(covered, seeds, size)
+    return [f"seeds_{first}-{stop - 1}" for first, stop in edges]
 
 
-def seeds_a_batch(seeds: int) -> int:
-    """Return the default number of seeds per batch.
-
-    It is large enough that start-up is a small part of a job and that jobs are not too many, and
-    small enough for little memory.
-    """
-    return min(max(SMALLEST_BATCH, -(-seeds // USUAL_BATCHES)), LARGEST_BATCH)
+def _stems(files: Iterable[Path]) -> list[str]:
+    return [file.stem for file in files if _NAME.fullmatch(file.stem)]
 
 
-def existing_batches(folder: Path) -> list[Batch]:
-    """Return the batches that have a result file in a folder."""
-    found = (parse_batch(file.stem) for file in folder.glob("seeds_*.csv"))
-    return [batch for batch in found if batch]
-
-
-def _cut(start: int, stop: int, size: int) -> list[Batch]:
+def _cut(start: int, stop: int, size: int) -> list[tuple[int, int]]:
     """Cut seeds start to stop - 1 at multiples of size."""
     edges = [start, *range((start // size + 1) * size, stop, size), stop]
-    return [Batch(a, b - 1) for a, b in pairwise(edges) if a < b]
-
-
-def batch_names(seeds: int) -> list[str]:
-    """Return the names of the batches of a case."""
-    return [batch.name for batch in plan_batches(seeds, seeds_a_batch(seeds))]
+    return [(a, b) for a, b in pairwise(edges) if a < b]

@@ -18,7 +18,7 @@ from biogrip.study.interpretations import InterpretationBlock
 from biogrip.study.sweeps import MOST_POINTS, SweepBlock
 from biogrip.study.traces_block import TracesBlock
 
-SMALLEST_BATCH, LARGEST_BATCH, USUAL_BATCHES = 250, 1000, 8
+SMALLEST_BATCH, LARGEST_BATCH, USUAL_BATCHES = 500, 1000, 8
 """Least and most seeds of a job, and the number of jobs aimed at in between, by default."""
 
 _MOST_BATCHES = 10_000

@@ -1,8 +1,8 @@
 """What a job is told of the config: some of its keys, and nothing else.
 
-A rule's ``params`` name keys of the config, a case's laid over the study's. In the job the same keys
-make a `Case` or a `Study` again, in which any other key is missing: a rule that forgets to name one
-fails, and cannot give a result that Snakemake would not renew.
+A rule's ``params`` name keys of the config, a case's laid over the study's. In the job the same
+keys make a `Case` or a `Study` again, in which any other key is missing: a rule that forgets to
+name one fails, and cannot give a result that Snakemake would not renew.
 """
 
 import hashlib
@@ -33,12 +33,26 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
     study
         The study.
     keys
-        Names of blocks, methods' among them, or of single keys in a block, e.g. ``measurement.noise``.
+        Names of blocks, methods' among them, or of single keys in a block, e.g.
+        ``measurement.noise``; or ``cases.NAME.KEY`` for a key of a case with the study's blocks
+        merged in.
     case
         Name of the case, or of a point of a sweep; by default the study's own keys.
     """
-    blocks = [study.case(case).plain, study.plain] if case else [study.plain]
-    return {key: _value(blocks, key) for key in keys}
+    found = {}
+    for key in keys:
+        of, name, inner = (*key.split(".", 2), "", "")[:3]
+        if of == "cases":
+            found[key] = study.cases[name].plain[inner]
+        else:
+            blocks = [study.case(case).plain, study.plain] if case else [study.plain]
+            found[key] = _value(blocks, key)
+    return found
+
+
+def keys_of_cases(study: Study) -> list[str]:
+    """Return the keys of all cases, as ``cases.NAME.KEY``."""
+    return [f"cases.{name}.{key}" for name, case in study.cases.items() for key in case.plain]
 
 
 def case_of(name: str, given: Mapping[str, Any]) -> Case:
@@ -48,11 +62,19 @@ def case_of(name: str, given: Mapping[str, Any]) -> Case:
 
 def study_of(given: Mapping[str, Any]) -> Study:
     """Return a study of which some keys are given, by `settings`."""
-    return Study(_partial(StudyConfig, given))
+    cases: dict[str, dict[str, Any]] = {}
+    rest = {}
+    for key, value in given.items():
+        of, name, inner = (*key.split(".", 2), "", "")[:3]
+        if of == "cases":
+            cases.setdefault(name, {})[inner] = value
+        else:
+            rest[key] = value
+    return Study(_partial(StudyConfig, rest | ({"cases": cases} if cases else {})))
 
 
 def _value(blocks: Iterable[Mapping[str, Any]], key: str) -> Any:
-    """Return the plain value of a key in the first block that has it; None if it has its default."""
+    """Return the plain value of a key in the first block that has it; None for its default."""
     name, _, inner = key.partition(".")
     for block in blocks:
         if name in block:
@@ -124,7 +146,7 @@ def _part(kind: Any, given: Mapping[str, Any]) -> Any:
 
 
 def software() -> dict[str, str]:
-    """Return what results could depend on besides the config: versions, and a digest of our source."""
+    """Return versions of what computes results, and a digest of our source."""
     folder = Path(biogrip.__file__).parent
     sources = sorted(file for file in folder.rglob("*") if file.suffix in (".py", ".j2", ".css"))
     digest = hashlib.sha256()

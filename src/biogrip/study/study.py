@@ -16,7 +16,6 @@ from biogrip.fit.methods import METHODS, Method
 from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Gripper
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
-from biogrip.study.interpretations import read_blocks
 from biogrip.study.plain import built, plain
 from biogrip.study.source import overlaid
 from biogrip.study.sweeps import point_blocks
@@ -217,7 +216,11 @@ class Case:
     @property
     def interpretations(self) -> dict[str, "Case"]:
         """The case under each interpretation of the paper, by the interpretation's name."""
-        return {name: cases[self.name] for name, cases in self.study.interpretations.items()}
+        blocks = self.study.config.interpretations
+        return {
+            name: replace(self, block=built(CaseBlock, overlaid(self.plain, block.changes)))
+            for name, block in blocks.items()
+        }
 
     @property
     def models(self) -> dict[str, Sample]:
@@ -285,16 +288,6 @@ class Study:
         """Cases of all points of the sweeps, by name."""
         blocks = point_blocks(self.sweeps, self.config.cases)
         return self._cases({name: built(CaseBlock, block) for name, block in blocks.items()})
-
-    @cached_property
-    def interpretations(self) -> dict[str, dict[str, Case]]:
-        """Simulated cases under each interpretation, by name of interpretation and case."""
-        found: dict[str, dict[str, Case]] = {name: {} for name in self.config.interpretations}
-        for interpretation, name, block in read_blocks(
-            self.config.interpretations, self.config.cases
-        ):
-            found[interpretation] |= self._cases({name: built(CaseBlock, block)})
-        return found
 
     def of(self, names: Iterable[str]) -> "Study":
         """Return the study of some of its cases."""

@@ -42,13 +42,24 @@ class HeatMaps:
     """Keys of the gripper that the paper does not give."""
 
 
+def heat_maps(study: Study, name: str) -> HeatMaps:
+    """Return the settings that the table and the heat maps of a sweep depend on."""
+    sweep = study.sweeps[name]
+    return HeatMaps(
+        sweep.title or name,
+        {case: study.cases[case].title for case in sweep.cases},
+        study.identifiers,
+        _shown(study, sweep.rows),
+        _shown(study, sweep.columns),
+        study.near_noise_tolerance,
+        tuple(key for key in study.reconstructed if key.split(".")[0] == "gripper"),
+    )
+
+
 def _shown(study: Study, axis: AxisBlock) -> ShownAxis:
     keys = {key for value in axis.levels for key in value.overrides}
     title = axis.title + ", reconstructed" * any(map(study.is_reconstructed, keys))
     return ShownAxis(title, {value.text: value.shown for value in axis.levels})
-
-
-"""The input files with judged points, one per case of the job's sweep."""
 
 
 def read_points(paths: list[Path], case: str) -> pd.DataFrame:
@@ -64,13 +75,3 @@ def headlines_of(points: pd.DataFrame) -> list[str]:
     first = points[points["method"] == points["method"].iloc[0]]
     pairs = zip(first["quantity"], first["bound_percent"].astype(float), strict=True)
     return headlines(list(pairs))
-
-
-CAPTION = (
-    "How well every case is identified from point to point of the sweep. First the share of seeds "
-    "that end in the basin of the truth: within a factor of two of it, or four times the bound if "
-    "that is more, in both quantities below. Then, for the best and for the worst determined "
-    "quantity, the median absolute error of these seeds, beside the standard deviation that noise "
-    "leaves at least (the Cramer-Rao bound, to first order, rest known). A median over all seeds "
-    "would jump with the share."
-)

@@ -33,8 +33,9 @@ _COLUMNS = (
 def verdict_counts(study: Study, intervals: list[Path]) -> Table:
     """Count verdicts of whole profiles, and those whose limits hold the true value."""
     rows: list[tuple[Cell, ...]] = []
-    for (name, case), file in zip(study.cases.items(), intervals, strict=True):
-        found = INTERVALS.read(file)
+    estimated = pd.concat([INTERVALS.read(file) for file in intervals])
+    for name, case in study.cases.items():
+        found = estimated[estimated["case"] == name]
         for quantity in parameters_and_sum(case.problem.searched):
             mine = found[(found["quantity"] == quantity.label) & found["verdict"].notna()]
             truth = target_of(quantity.label, case.parameters)
@@ -70,7 +71,3 @@ def _interval_percent(count: int, tried: int) -> tuple[float, float]:
 
     low, high = binomtest(count, tried).proportion_ci(0.95, method="exact")
     return 100 * low, 100 * high
-
-
-def _judged(study: Study) -> list[str]:
-    return [name for name in study.covered if study.case(name).verdicts_every == 1]

@@ -1,0 +1,158 @@
+"""What only some configs have: sweeps, interpretations of the paper, and tables of recorded traces."""
+
+from biogrip.experiment.sample import SINGLE_BRANCH
+from biogrip.identify.table_of_traces import read_table
+
+OURS = {parameter.name for parameter in SINGLE_BRANCH}
+# Simulated cases whose model has the paper's parameters.
+INTERPRETED = [
+    n for n in STUDY.simulated if set(STUDY.case(n).sample.model.names) <= OURS
+]
+
+
+# The points of a sweep are cases of their own, which the rules of the study identify.
+def points(sweep, case):
+    """The names of the points of a sweep of a case."""
+    return [point.name for point in STUDY.sweeps[sweep].points(sweep, case)]
+
+
+rule sweep_points:
+    input:
+        identifications=lambda wildcards: files(
+            "results/identifications/{case}/{method}/{batch}.csv",
+            points(wildcards.sweep, wildcards.case),
+        ),
+        calibrated=lambda wildcards: files(
+            "results/calibrations/{case}.yaml",
+            [
+                name
+                for name in points(wildcards.sweep, wildcards.case)
+                if name in CALIBRATED
+            ],
+        ),
+    output:
+        points="results/robustness/{sweep}/{case}.csv",
+    log:
+        "results/logs/sweep_points/{sweep}/{case}.log",
+    params:
+        **settings_of(
+            "sweeps", "methods", "evaluation", "actuator", *keys_of_cases(STUDY)
+        ),
+        software=SOFTWARE,
+    message:
+        "Judging the sweep {wildcards.sweep} over {wildcards.case}"
+    script:
+        "../scripts/sweep_points.py"
+
+
+rule sweep:
+    input:
+        points=lambda wildcards: files(
+            f"results/robustness/{wildcards.sweep}/{{case}}.csv",
+            STUDY.sweeps[wildcards.sweep].cases,
+        ),
+    output:
+        table=table("robustness", "{sweep}"),
+        figure=figure("robustness", "{sweep}"),
+    log:
+        "results/logs/sweep/{sweep}.log",
+    params:
+        **settings_of(
+            "sweeps", "methods", "evaluation", "reconstructed", *keys_of_cases(STUDY)
+        ),
+        software=SOFTWARE,
+    message:
+        "Writing and drawing the sweep {wildcards.sweep}"
+    script:
+        "../scripts/sweep.py"
+
+
+rule interpretations_of_case:
+    input:
+        target="results/targets/{case}.csv",
+    output:
+        rows="results/interpretations/{case}.csv",
+    log:
+        "results/logs/interpretations_of_case/{case}.log",
+    resources:
+        runtime=120,
+    params:
+        **settings_of(
+            "study_seed",
+            "seeds",
+            "interpretations",
+            "actuator",
+            *CaseBlock.model_fields,
+        ),
+        **settings_of("genetic_algorithm"),
+        software=SOFTWARE,
+    message:
+        "Identifying {wildcards.case} under every interpretation of the paper"
+    script:
+        "../scripts/interpretations_of_case.py"
+
+
+rule interpretations:
+    input:
+        found=files("results/interpretations/{case}.csv", INTERPRETED),
+    output:
+        apart=table("interpretations"),
+        jointly=table("interpretations_jointly"),
+    log:
+        "results/logs/interpretations.log",
+    params:
+        **settings_of("interpretations", "evaluation", *keys_of_cases(STUDY)),
+        software=SOFTWARE,
+    message:
+        "Comparing the interpretations of the paper"
+    script:
+        "../scripts/interpretations.py"
+
+
+if STUDY.traces:
+    ROWS = read_table(Path(STUDY.traces.table), for_workflow=True)
+
+    # Batches have fixed rows, so that more rows redo the last at most.
+    rule traces_batch:
+        input:
+            lambda wildcards: [
+                str(row.file) for row in rows_of(wildcards) if row.file.is_file()
+            ],
+            config=STUDY.traces.config or [],
+            table=ancient(STUDY.traces.table),
+        output:
+            found="results/traces/batches/{rows}.csv",
+        log:
+            "results/logs/traces_batch/{rows}.log",
+        resources:
+            runtime=120,
+        params:
+            config=lambda wildcards, input: (
+                f"--config {input.config}" if input.config else ""
+            ),
+            model=STUDY.traces.model,
+            rows=lambda wildcards: [
+                [str(r.file), r.settings, r.copied] for r in rows_of(wildcards)
+            ],
+            software=SOFTWARE,
+        message:
+            "Identifying the traces in rows {wildcards.rows} of {input.table}"
+        # A trace that is not there or cannot be used is a row that says so.
+        shell:
+            "biogrip identify {input.table:q} --rows {wildcards.rows} --model {params.model} "
+            "{params.config} --csv {output.found:q} > {log:q} 2>&1 || test -e {output.found:q}"
+
+    rule traces:
+        input:
+            batches=[
+                f"results/traces/batches/{first}-{first + STUDY.traces.rows_a_batch - 1}.csv"
+                for first in range(0, len(ROWS), STUDY.traces.rows_a_batch)
+            ],
+        output:
+            table="results/tables/traces.csv",
+        log:
+            "results/logs/traces.log",
+        message:
+            "Putting together the tables of all traces"
+        script:
+            "../scripts/traces.py"
