@@ -1,11 +1,7 @@
 """The results beside those that are published: compared, or put in their place."""
 
 # A config of the same name has its published results in a folder of its own.
-OVERLAY = (
-    Path(workflow.overwrite_configfiles[-1]).stem
-    if workflow.overwrite_configfiles
-    else ""
-)
+OVERLAY = Path(workflow.overwrite_configfiles[-1]).stem if workflow.overwrite_configfiles else ""
 PUBLISHED = shipped("results/published") / OVERLAY
 
 

@@ -25,43 +25,25 @@ try:
 except BiogripError as error:
     raise WorkflowError(str(error))
 
-# A job runs again if the config keys that its rule names change, or the software.
-SOFTWARE = {"software": software()}
+SOFTWARE = software()
 # Keys that say what a fit assumes of the instrument and of the sample.
-PROBLEM = (
-    *(
-        "instrument",
-        "gripper",
-        "actuator",
-        "assumed_gripper",
-        "protocol",
-        "measurement",
-    ),
-    *("sample", "fixed", "search_range", "models"),
-)
+PROBLEM = "instrument gripper actuator assumed_gripper protocol measurement".split()
+PROBLEM += "sample fixed search_range models".split()
 # Keys that tables and figures of the whole study use.
-WHOLE = (
-    *(
-        "study_seed",
-        "seeds",
-        "methods",
-        "gripper",
-        "actuator",
-        "protocol",
-        "search_range",
-    ),
-    *("model_selection", "evaluation", "reconstructed"),
-    *keys_of_cases(STUDY),
-)
+WHOLE = "study_seed seeds methods gripper actuator protocol search_range".split()
+WHOLE += ["model_selection", "evaluation", "reconstructed", *keys_of_cases(STUDY)]
 
 
 def settings_of(*keys):
-    """Params by key of the config; a key of the job's case goes before the study's."""
+    """Params that make a job run again if they change: keys of the config, and the software.
+
+    A key of the job's case goes before the study's.
+    """
 
     def of(key):
         return lambda wildcards: settings(STUDY, [key], wildcards.get("case", ""))
 
-    return {key: of(key) for key in keys}
+    return {"software": {"software": SOFTWARE}} | {key: of(key) for key in keys}
 
 
 def method_settings(wildcards):
@@ -95,17 +77,12 @@ def of_case(pattern):
 
 def first_traces(cases):
     """The files of measurements with the traces that are judged."""
-    return [
-        files("results/measurements/{case}/{batch}.parquet", [case])[0]
-        for case in cases
-    ]
+    return [files("results/measurements/{case}/{batch}.parquet", [case])[0] for case in cases]
 
 
 def only_of(cases, pattern):
     """The file of a job's case, if it is one of some cases."""
-    return lambda wildcards: (
-        files(pattern, [wildcards.case]) if wildcards.case in cases else []
-    )
+    return lambda wildcards: (files(pattern, [wildcards.case]) if wildcards.case in cases else [])
 
 
 def names(cases):
@@ -132,9 +109,7 @@ TABLES += ["verdict_counts"] if COUNTED else []
 OTHER_TABLES = ["contact_loss"] if STUDY.gripped else []
 OTHER_TABLES += ["claims"] if STUDY.published else []
 OTHER_TABLES += (
-    ["interpretations", "interpretations_jointly"]
-    if STUDY.config.interpretations
-    else []
+    ["interpretations", "interpretations_jointly"] if STUDY.config.interpretations else []
 )
 FIGURES = ["comb", "linkage", "torque"] if STUDY.has_gripper else []
 FIGURES += ["linearisation"] if STUDY.gripped else []
@@ -202,13 +177,6 @@ def figure(name, whose=""):
     """The files of a figure, of which the first is in Snakemake's report."""
     path = f"results/figures/{stem(name, whose)}"
     return [shown(f"{path}.png", "figures", name, whose), f"{path}.pdf"]
-
-
-def page(path, item, whose="all"):
-    """A page of Snakemake's report."""
-    labels = {"case": whose, "item": item, "format": "page"}
-    caption = f"../report/{item}.rst"
-    return report(path, caption=caption, category="Summaries", labels=labels)
 
 
 wildcard_constraints:

@@ -4,7 +4,7 @@
 def case_figures(simulated, valley):
     """The files of the figures of a case, and its summary."""
     drawn = case_figure_names(simulated, valley)
-    summary = page("results/summaries/{case}.html", "summary", "{case}")
+    summary = shown("results/summaries/{case}.html", "pages", "summary", "{case}")
     return [*(file for name in drawn for file in figure(name, "{case}")), summary]
 
 
@@ -15,9 +15,7 @@ rule case_figures:
         history="results/histories/{case}.parquet",
         measurements=of_case("results/measurements/{case}/{batch}.parquet"),
         verdicts="results/identifiability/{case}.json",
-        expected=only_of(
-            STUDY.simulated, "results/identifiability/expected/{case}.json"
-        ),
+        expected=only_of(STUDY.simulated, "results/identifiability/expected/{case}.json"),
         target=only_of(STUDY.simulated, "results/targets/{case}.csv"),
         calibrated=calibration_of,
     output:
@@ -28,10 +26,9 @@ rule case_figures:
         case=names(case for case in STUDY.simulated if STUDY.case(case).has_valley),
     params:
         **settings_of(
-            "title", "methods", "seeds", "published", "evaluation", "contact", *PROBLEM
+            *"title methods seeds published evaluation contact identifiability".split(),
+            *("genetic_algorithm", *PROBLEM),
         ),
-        **settings_of("identifiability", "genetic_algorithm"),
-        software=SOFTWARE,
     message:
         "Drawing {wildcards.case}"
     script:
@@ -64,9 +61,7 @@ rule figures:
         identifications=files("results/identifications/{case}.csv", STUDY.simulated),
         targets=files("results/targets/{case}.csv", STUDY.simulated),
         expected=files("results/identifiability/expected/{case}.json", STUDY.simulated),
-        measurements=files(
-            "results/measurements/{case}/{batch}.parquet", STUDY.simulated[:1]
-        ),
+        measurements=files("results/measurements/{case}/{batch}.parquet", STUDY.simulated[:1]),
         calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
         differences="results/linearisation.csv" if STUDY.gripped else [],
     output:
@@ -75,7 +70,6 @@ rule figures:
         "results/logs/figures.log",
     params:
         **settings_of(*WHOLE),
-        software=SOFTWARE,
     message:
         "Drawing the figures of the study"
     script:
@@ -97,13 +91,14 @@ rule page:
         measurements=first_traces(STUDY.cases),
         calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
     output:
-        page=page("results/report.html", "report"),
+        page=shown("results/report.html", "pages", "report", ""),
     log:
         "results/logs/page.log",
     params:
-        **settings_of(*(key for key in StudyConfig.model_fields if key != "cases")),
-        **settings_of(*METHOD_BLOCKS, *keys_of_cases(STUDY)),
-        software=SOFTWARE,
+        **settings_of(
+            *(key for key in StudyConfig.model_fields if key != "cases"),
+            *(*METHOD_BLOCKS, *keys_of_cases(STUDY)),
+        ),
     message:
         "Writing the page of the study"
     script:

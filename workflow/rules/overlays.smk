@@ -3,66 +3,37 @@
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.identify.table_of_traces import read_table
 
+# Simulated cases whose model has the paper's parameters, and what is read of each.
 OURS = {parameter.name for parameter in SINGLE_BRANCH}
-# Simulated cases whose model has the paper's parameters.
-INTERPRETED = [
-    n for n in STUDY.simulated if set(STUDY.case(n).sample.model.names) <= OURS
-]
+INTERPRETED_CASE = [*CaseBlock.model_fields, "actuator", "genetic_algorithm"]
+INTERPRETED = [n for n in STUDY.simulated if set(STUDY.case(n).sample.model.names) <= OURS]
 
 
-# The points of a sweep are cases of their own, which the rules of the study identify.
-def points(sweep, case):
-    """The names of the points of a sweep of a case."""
-    return [point.name for point in STUDY.sweeps[sweep].points(sweep, case)]
-
-
-rule sweep_points:
-    input:
-        identifications=lambda wildcards: files(
-            "results/identifications/{case}/{method}/{batch}.csv",
-            points(wildcards.sweep, wildcards.case),
-        ),
-        calibrated=lambda wildcards: files(
-            "results/calibrations/{case}.yaml",
-            [
-                name
-                for name in points(wildcards.sweep, wildcards.case)
-                if name in CALIBRATED
-            ],
-        ),
-    output:
-        points="results/robustness/{sweep}/{case}.csv",
-    log:
-        "results/logs/sweep_points/{sweep}/{case}.log",
-    params:
-        **settings_of(
-            "sweeps", "methods", "evaluation", "actuator", *keys_of_cases(STUDY)
-        ),
-        software=SOFTWARE,
-    message:
-        "Judging the sweep {wildcards.sweep} over {wildcards.case}"
-    script:
-        "../scripts/sweep_points.py"
+def points(sweep):
+    """The names of the points of a sweep, cases of their own that the rules of the study identify."""
+    block = STUDY.sweeps[sweep]
+    return [point.name for case in block.cases for point in block.points(sweep, case)]
 
 
 rule sweep:
     input:
-        points=lambda wildcards: files(
-            f"results/robustness/{wildcards.sweep}/{{case}}.csv",
-            STUDY.sweeps[wildcards.sweep].cases,
+        identifications=lambda wildcards: files(
+            "results/identifications/{case}/{method}/{batch}.csv", points(wildcards.sweep)
+        ),
+        calibrated=lambda wildcards: files(
+            "results/calibrations/{case}.yaml",
+            [name for name in points(wildcards.sweep) if name in CALIBRATED],
         ),
     output:
+        points="results/robustness/{sweep}.csv",
         table=table("robustness", "{sweep}"),
         figure=figure("robustness", "{sweep}"),
     log:
         "results/logs/sweep/{sweep}.log",
     params:
-        **settings_of(
-            "sweeps", "methods", "evaluation", "reconstructed", *keys_of_cases(STUDY)
-        ),
-        software=SOFTWARE,
+        **settings_of("sweeps", *WHOLE),
     message:
-        "Writing and drawing the sweep {wildcards.sweep}"
+        "Judging and drawing the sweep {wildcards.sweep}"
     script:
         "../scripts/sweep.py"
 
@@ -77,15 +48,7 @@ rule interpretations_of_case:
     resources:
         runtime=120,
     params:
-        **settings_of(
-            "study_seed",
-            "seeds",
-            "interpretations",
-            "actuator",
-            *CaseBlock.model_fields,
-        ),
-        **settings_of("genetic_algorithm"),
-        software=SOFTWARE,
+        **settings_of("study_seed", "seeds", "interpretations", *INTERPRETED_CASE),
     message:
         "Identifying {wildcards.case} under every interpretation of the paper"
     script:
@@ -102,7 +65,6 @@ rule interpretations:
         "results/logs/interpretations.log",
     params:
         **settings_of("interpretations", "evaluation", *keys_of_cases(STUDY)),
-        software=SOFTWARE,
     message:
         "Comparing the interpretations of the paper"
     script:
@@ -112,12 +74,15 @@ rule interpretations:
 if STUDY.traces:
     ROWS = read_table(Path(STUDY.traces.table), for_workflow=True)
 
+    def rows_of(wildcards):
+        """The rows of the table that a batch has, as `biogrip identify --rows` chooses them."""
+        first, last = map(int, wildcards.rows.split("-"))
+        return ROWS[first : last + 1]
+
     # Batches have fixed rows, so that more rows redo the last at most.
     rule traces_batch:
         input:
-            lambda wildcards: [
-                str(row.file) for row in rows_of(wildcards) if row.file.is_file()
-            ],
+            lambda wildcards: [str(row.file) for row in rows_of(wildcards) if row.file.is_file()],
             config=STUDY.traces.config or [],
             table=ancient(STUDY.traces.table),
         output:
@@ -127,14 +92,10 @@ if STUDY.traces:
         resources:
             runtime=120,
         params:
-            config=lambda wildcards, input: (
-                f"--config {input.config}" if input.config else ""
-            ),
+            **settings_of(),
+            config=lambda wildcards, input: (f"--config {input.config}" if input.config else ""),
             model=STUDY.traces.model,
-            rows=lambda wildcards: [
-                [str(r.file), r.settings, r.copied] for r in rows_of(wildcards)
-            ],
-            software=SOFTWARE,
+            rows=lambda wildcards: [[str(r.file), r.settings, r.copied] for r in rows_of(wildcards)],
         message:
             "Identifying the traces in rows {wildcards.rows} of {input.table}"
         # A trace that is not there or cannot be used is a row that says so.

@@ -10,23 +10,9 @@ rule target:
         case=names(SIMULATED),
     params:
         **settings_of(
-            *(
-                "instrument",
-                "gripper",
-                "actuator",
-                "protocol",
-                "sample",
-                "fixed",
-                "contact",
-            ),
-            *(
-                "measurement.rate_Hz",
-                "measurement.times_s",
-                "measurement.bursts",
-                "models",
-            ),
+            *"instrument gripper actuator protocol sample fixed contact models".split(),
+            *("measurement.rate_Hz", "measurement.times_s", "measurement.bursts"),
         ),
-        software=SOFTWARE,
     message:
         "Simulating the response of {wildcards.case}"
     script:
@@ -45,7 +31,6 @@ rule measurement:
         case=names(SIMULATED),
     params:
         **settings_of("study_seed", "measurement.noise"),
-        software=SOFTWARE,
     message:
         "Adding noise to {wildcards.case}, {wildcards.batch}"
     script:
@@ -63,7 +48,6 @@ rule recording:
         case=names(STUDY.recorded),
     params:
         **settings_of(*PROBLEM),
-        software=SOFTWARE,
     message:
         "Reading the recorded trace of {wildcards.case}"
     script:
@@ -77,11 +61,7 @@ rule calibration:
     log:
         "results/logs/calibration/{case}.log",
     params:
-        **settings_of(
-            "study_seed", "instrument", "gripper", "actuator", "protocol", "sample"
-        ),
-        **settings_of("calibration"),
-        software=SOFTWARE,
+        **settings_of("study_seed", "calibration", "instrument", "gripper", "protocol", "sample"),
     message:
         "Calibrating the gripper of {wildcards.case} without a sample"
     script:
@@ -103,7 +83,6 @@ rule identification:
     params:
         **settings_of("study_seed", *PROBLEM),
         method=method_settings,
-        software=SOFTWARE,
     message:
         "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
     script:
@@ -126,7 +105,6 @@ rule judgement:
         runtime=60,
     params:
         **settings_of("study_seed", *PROBLEM, "identifiability", "least_squares"),
-        software=SOFTWARE,
     message:
         "Computing confidence limits for the first trace of {wildcards.case}"
     script:
@@ -156,7 +134,6 @@ rule intervals:
         runtime=120,
     params:
         **settings_of("study_seed", *PROBLEM, "identifiability", "least_squares"),
-        software=SOFTWARE,
     message:
         "Estimating intervals of {wildcards.case}, {wildcards.batch}"
     script:
@@ -175,7 +152,6 @@ rule model_fits:
         runtime=60,
     params:
         **settings_of("study_seed", *PROBLEM, "model_selection", "least_squares"),
-        software=SOFTWARE,
     message:
         "Fitting every sample model to {wildcards.case}, {wildcards.batch}"
     script:

@@ -6,9 +6,7 @@ rule case_tables:
         batches=of_case("results/identifications/{case}/{method}/{batch}.csv"),
         histories=of_case("results/histories/{case}/{method}/{batch}.parquet"),
         verdicts="results/identifiability/{case}.json",
-        expected=only_of(
-            STUDY.simulated, "results/identifiability/expected/{case}.json"
-        ),
+        expected=only_of(STUDY.simulated, "results/identifiability/expected/{case}.json"),
     output:
         identifications="results/identifications/{case}.csv",
         history="results/histories/{case}.parquet",
@@ -20,7 +18,6 @@ rule case_tables:
         case=names(STUDY.cases),
     params:
         **settings_of("title", "seeds", "methods", "published", *PROBLEM, "evaluation"),
-        software=SOFTWARE,
     message:
         "Writing the tables of {wildcards.case}"
     script:
@@ -35,7 +32,6 @@ rule model_errors:
         "results/logs/model_errors.log",
     params:
         **settings_of("study_seed", "seeds", "actuator", *keys_of_cases(STUDY)),
-        software=SOFTWARE,
     message:
         "Comparing the linear model with the nonlinear one, and with loss of contact"
     script:
@@ -61,7 +57,6 @@ rule tables:
         "results/logs/tables.log",
     params:
         **settings_of(*WHOLE),
-        software=SOFTWARE,
     message:
         "Writing the tables of the study"
     script:
@@ -89,7 +84,6 @@ rule claims:
         "results/logs/claims.log",
     params:
         **settings_of(*WHOLE),
-        software=SOFTWARE,
     message:
         "Judging the claims of the paper"
     script:

@@ -29,7 +29,7 @@ _RATIO_TICKS = (0.5, 1, 2, 5, 10, 20, 50, 100)
 _WITHOUT_BOUND = "#dddddd"
 
 
-def draw(maps: HeatMaps, points: list[Path]) -> Figure:
+def draw(maps: HeatMaps, points: Path) -> Figure:
     """Draw shares in the true basin, and errors of the best and the worst determined quantity.
 
     Numbers in cells are for the first method; brackets hold the share of the second method, and
@@ -41,7 +41,7 @@ def draw(maps: HeatMaps, points: list[Path]) -> Figure:
     drawn = figure(PAGE_IN, 3 * (height + 0.25) + 0.9)
     grid = drawn.subplots(3, len(cases), squeeze=False, sharex=True, sharey=True)
     for index, (name, title) in enumerate(cases.items()):
-        found = read_points(points, name)
+        found = read_points(points, maps.name, name)
         panel(grid[0, index], "abc"[index], title, most_letters=24)
         _shares(grid[0, index], maps, found, height / rows)
         chosen = headlines_of(found)

@@ -26,7 +26,7 @@ POINTS = RowFile(
         *("near_noise_share", "basin_share"),
         *("median_absolute_error_percent", "basin_error_percent", "bound_percent"),
     ),
-    "results/robustness/{sweep}/{case}.csv",
+    "results/robustness/{sweep}.csv",
     words=("row", "column"),
 )
 
@@ -37,19 +37,18 @@ _FACTOR, _BOUNDS = math.log(2), 4.0
 def judge(
     study: Study,
     sweep: str,
-    case: str,
     identifications: list[Path],
     calibrated: list[Path],
     points: Path,
 ) -> None:
-    """Compute errors and shares of successful seeds at every point of a case's sweep.
+    """Compute errors and shares of successful seeds at every point of a sweep.
 
     Parameters
     ----------
     study
         The study.
-    sweep, case
-        Names of the sweep and of the case that it is laid over.
+    sweep
+        Name of the sweep.
     identifications
         Batches of the points, in folders named like point and method.
     calibrated
@@ -61,7 +60,12 @@ def judge(
     for path in identifications:
         files.setdefault((path.parts[-3], path.parts[-2]), []).append(path)
     calibrations = {path.stem: [path] for path in calibrated}
-    rows = _rows(study, study.sweeps[sweep].points(sweep, case), files, calibrations)
+    block = study.sweeps[sweep]
+    rows = [
+        row
+        for case in block.cases
+        for row in _rows(study, block.points(sweep, case), files, calibrations)
+    ]
     POINTS.write(points, rows)
 
 
@@ -71,7 +75,7 @@ def _rows(
     files: Mapping[tuple[str, str], list[Path]],
     calibrations: Mapping[str, list[Path]],
 ) -> Iterator[tuple[str | int, ...]]:
-    """Yield a row for every point, method and quantity."""
+    """Yield a row for every point of a case, method and quantity."""
     true = study.cases[points[0].case].parameters
     bounds = {}
     for point in points:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from biogrip.errors import BiogripError
 from biogrip.fit.methods import Method
 from biogrip.judging.at_truth import headlines
 from biogrip.stages.sweep_points import POINTS
@@ -28,6 +27,8 @@ class ShownAxis:
 class HeatMaps:
     """Titles, axes and tolerances of a sweep's table and heat maps."""
 
+    name: str
+    """Name of the sweep."""
     title: str
     """Title of the sweep."""
     cases: Mapping[str, str]
@@ -46,6 +47,7 @@ def heat_maps(study: Study, name: str) -> HeatMaps:
     """Return the settings that the table and the heat maps of a sweep depend on."""
     sweep = study.sweeps[name]
     return HeatMaps(
+        name,
         sweep.title or name,
         {case: study.cases[case].title for case in sweep.cases},
         study.identifiers,
@@ -62,12 +64,10 @@ def _shown(study: Study, axis: AxisBlock) -> ShownAxis:
     return ShownAxis(title, {value.text: value.shown for value in axis.levels})
 
 
-def read_points(paths: list[Path], case: str) -> pd.DataFrame:
-    """Read the judged points of a case."""
-    for path in paths:
-        if path.stem == case:
-            return POINTS.read(path)
-    raise BiogripError(f"{case}: no file of its points is given.")
+def read_points(path: Path, sweep: str, case: str) -> pd.DataFrame:
+    """Read the judged points of a case in a sweep."""
+    found = POINTS.read(path)
+    return found[found["point"].str.startswith(f"{case}--{sweep}--")]
 
 
 def headlines_of(points: pd.DataFrame) -> list[str]:

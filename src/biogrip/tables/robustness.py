@@ -19,11 +19,11 @@ _BY_METHOD = {
 }
 
 
-def robustness(maps: HeatMaps, points: list[Path]) -> Table:
+def robustness(maps: HeatMaps, points: Path) -> Table:
     """Join the points of a sweep over all its cases."""
     rows: list[tuple[Cell, ...]] = []
     for name in maps.cases:
-        found = read_points(points, name)
+        found = read_points(points, maps.name, name)
         for quantity in headlines_of(found):
             chosen = found[found["quantity"] == quantity]
             for (row, column), group in chosen.groupby(["row", "column"], sort=False):
