@@ -1,6 +1,5 @@
 """What a script of the workflow does around its work: it reads its params, and says what failed."""
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
@@ -21,7 +20,6 @@ def logged(job: Any) -> Iterator[None]:
             yield
         except BiogripError as error:
             print(f"biogrip: {error}", file=stream)
-            print(f"biogrip: {error}", file=sys.__stderr__)
             raise SystemExit(1) from error
 
 
