@@ -1,5 +1,6 @@
 """The config, checked, and what the rules are told of it."""
 
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from biogrip.study.case_blocks import METHOD_BLOCKS, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.defaults import default_config, shipped
 from biogrip.study.load import load_study, read_configs
+from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.settings import keys_of_cases, settings, software
 from biogrip.study.source import overlaid
 
@@ -26,12 +28,13 @@ except BiogripError as error:
     raise WorkflowError(str(error))
 
 SOFTWARE = software()
+MEASUREMENT = [f"measurement.{field.name}" for field in fields(MeasurementBlock)]
 # Keys that say what a fit assumes of the instrument and of the sample.
-PROBLEM = "instrument gripper actuator assumed_gripper protocol measurement".split()
-PROBLEM += "sample fixed search_range models".split()
+PROBLEM = "instrument gripper actuator assumed_gripper protocol sample fixed search_range models"
+PROBLEM = [*PROBLEM.split(), *(key for key in MEASUREMENT if key != "measurement.noise")]
 # Keys that tables and figures of the whole study use.
 WHOLE = "study_seed seeds methods gripper actuator protocol search_range".split()
-WHOLE += ["model_selection", "evaluation", "reconstructed", *keys_of_cases(STUDY)]
+WHOLE += ["evaluation", "reconstructed", *keys_of_cases(STUDY)]
 
 
 def settings_of(*keys):

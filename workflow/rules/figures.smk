@@ -26,8 +26,8 @@ rule case_figures:
         case=names(case for case in STUDY.simulated if STUDY.case(case).has_valley),
     params:
         **settings_of(
-            *"title methods seeds published evaluation contact identifiability".split(),
-            *("genetic_algorithm", *PROBLEM),
+            *"title methods seeds published evaluation contact genetic_algorithm".split(),
+            *("identifiability.confidence", "measurement.noise", *PROBLEM),
         ),
     message:
         "Drawing {wildcards.case}"

@@ -104,7 +104,10 @@ rule judgement:
     resources:
         runtime=60,
     params:
-        **settings_of("study_seed", *PROBLEM, "identifiability", "least_squares"),
+        **settings_of(
+            *("study_seed", *PROBLEM, "measurement.noise"),
+            *("identifiability.confidence", "least_squares"),
+        ),
     message:
         "Computing confidence limits for the first trace of {wildcards.case}"
     script:
@@ -133,7 +136,10 @@ rule intervals:
     resources:
         runtime=120,
     params:
-        **settings_of("study_seed", *PROBLEM, "identifiability", "least_squares"),
+        **settings_of(
+            *("study_seed", *PROBLEM, "measurement.noise", "least_squares"),
+            *("identifiability.confidence", "identifiability.verdicts_every"),
+        ),
     message:
         "Estimating intervals of {wildcards.case}, {wildcards.batch}"
     script:

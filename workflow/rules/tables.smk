@@ -31,7 +31,10 @@ rule model_errors:
     log:
         "results/logs/model_errors.log",
     params:
-        **settings_of("study_seed", "seeds", "actuator", *keys_of_cases(STUDY)),
+        **settings_of(
+            *("study_seed", "seeds", "actuator"),
+            *keys_of_cases(STUDY, *PROBLEM, "measurement.noise", "contact", "least_squares"),
+        ),
     message:
         "Comparing the linear model with the nonlinear one, and with loss of contact"
     script:
@@ -56,7 +59,7 @@ rule tables:
     log:
         "results/logs/tables.log",
     params:
-        **settings_of(*WHOLE),
+        **settings_of(*WHOLE, "model_selection"),
     message:
         "Writing the tables of the study"
     script:

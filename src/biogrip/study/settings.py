@@ -43,16 +43,17 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
     for key in keys:
         of, name, inner = (*key.split(".", 2), "", "")[:3]
         if of == "cases":
-            found[key] = study.cases[name].plain[inner]
+            found[key] = _value([study.cases[name].plain], inner)
         else:
             blocks = [study.case(case).plain, study.plain] if case else [study.plain]
             found[key] = _value(blocks, key)
     return found
 
 
-def keys_of_cases(study: Study) -> list[str]:
-    """Return the keys of all cases, as ``cases.NAME.KEY``."""
-    return [f"cases.{name}.{key}" for name, case in study.cases.items() for key in case.plain]
+def keys_of_cases(study: Study, *keys: str) -> list[str]:
+    """Return keys of every case, by default all, as ``cases.NAME.KEY``."""
+    of_each = keys or (*CaseBlock.model_fields, *METHOD_BLOCKS)
+    return [f"cases.{name}.{key}" for name in study.cases for key in of_each]
 
 
 def case_of(name: str, given: Mapping[str, Any]) -> Case:
@@ -70,7 +71,9 @@ def study_of(given: Mapping[str, Any]) -> Study:
             cases.setdefault(name, {})[inner] = value
         else:
             rest[key] = value
-    return Study(_partial(StudyConfig, rest | ({"cases": cases} if cases else {})))
+    config = _partial(StudyConfig, rest)
+    vars(config)["cases"] = {name: _partial(CaseBlock, block) for name, block in cases.items()}
+    return Study(config)
 
 
 def _value(blocks: Iterable[Mapping[str, Any]], key: str) -> Any:
