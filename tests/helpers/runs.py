@@ -69,15 +69,16 @@ def snakemake(
     root
         The repository, or a copy of it.
     """
-    given: list[str | Path] = ["-s", root / "Snakefile", "--directory", folder]
+    given: list[str | Path] = []
     if config is not None:
         (folder / "overlay.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
         given += ["--configfile", folder / "overlay.yaml"]
+    given += ["-s", root / "Snakefile", "--directory", folder]
     if not any(str(argument).startswith(("-j", "--cores", "--profile")) for argument in arguments):
         given.append("-j2")
     paths = [Path(sys.executable).parent, os.environ["PATH"]]
     done = subprocess.run(
-        [sys.executable, "-m", "snakemake", *map(str, (*arguments, *given))],
+        [sys.executable, "-m", "snakemake", *map(str, (*given, *arguments))],
         cwd=folder,
         env={**os.environ, "PATH": os.pathsep.join(map(str, paths))},
         stdout=subprocess.PIPE,

@@ -111,9 +111,7 @@ TABLES += ["evidence", "printed_values", "sampling_evidence"] if STUDY.published
 TABLES += ["verdict_counts"] if COUNTED else []
 OTHER_TABLES = ["contact_loss"] if STUDY.gripped else []
 OTHER_TABLES += ["claims"] if STUDY.published else []
-OTHER_TABLES += (
-    ["interpretations", "interpretations_jointly"] if STUDY.config.interpretations else []
-)
+OTHER_TABLES += ["interpretations", "interpretations_jointly"] * bool(STUDY.config.interpretations)
 FIGURES = ["comb", "linkage", "torque"] if STUDY.has_gripper else []
 FIGURES += ["linearisation"] if STUDY.gripped else []
 FIGURES += ["moduli", "overview"] if STUDY.simulated else []
@@ -159,21 +157,15 @@ def made(kind, suffix):
 def shown(path, kind, item, whose):
     """A file of Snakemake's report, with its caption."""
     caption = f"../report/{kind}/{item}.rst"
-    labels = {
-        "case": whose or "all",
-        "item": item.replace("_", " "),
-        "format": kind[:-1],
-    }
+    labels = dict(case=whose or "all", item=item.replace("_", " "), format=kind[:-1])
     return report(path, caption=caption, category=kind.title(), labels=labels)
 
 
 def table(name, whose=""):
     """The files of a table, of which the last is in Snakemake's report."""
     path = f"results/tables/{stem(name, whose)}"
-    return [
-        *multiext(path, ".csv", ".md", ".tex"),
-        shown(f"{path}.html", "tables", name, whose),
-    ]
+    page = shown(f"{path}.html", "tables", name, whose)
+    return [*multiext(path, ".csv", ".md", ".tex"), page]
 
 
 def figure(name, whose=""):

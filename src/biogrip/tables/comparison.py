@@ -17,8 +17,11 @@ def compare(published: Path, made: Sequence[Path]) -> str:
     Raises
     ------
     BiogripError
-        With the lines that differ, if a table is not published, or has other bytes.
+        If there is none to compare; or with the lines that differ, if a table is not published, or
+        has other bytes.
     """
+    if not made:
+        raise BiogripError(f"{published}: holds no tables to compare with.")
     differing: list[str] = []
     for now in made:
         before = published / now.name
