@@ -42,3 +42,20 @@ rule publish:
         "mkdir -p {params.published:q}/tables {params.published:q}/figures 2> {log:q} && "
         "cp {input.tables:q} {params.published:q}/tables 2>> {log:q} && "
         "cp {input.figures:q} {params.published:q}/figures 2>> {log:q}"
+
+
+# The picture of these rules in the documentation; `make docs` draws it.
+rule rulegraph:
+    input:
+        sorted(map(str, shipped("workflow/rules").glob("*.smk"))),
+    output:
+        "docs/rules.png",
+    log:
+        "results/logs/rulegraph.log",
+    localrule: True
+    params:
+        snakefile=workflow.main_snakefile,
+    message:
+        "Drawing the graph of the rules"
+    script:
+        "../scripts/rulegraph.py"
