@@ -13,12 +13,12 @@ from unittest import mock
 
 import numpy as np
 import pandas as pd
+from biogrip.products.catalogue import products
 
 import biogrip.records
 from biogrip.cli import main
 from biogrip.digits import with_unit
 from biogrip.page.answers import compared_rows, say_what_traces_tell
-from biogrip.products.catalogue import products
 from biogrip.records import identifications, traces
 from biogrip.records.rows import RowFile, read_table
 from tests.helpers.key_reference import file_schema, reference

@@ -9,9 +9,9 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from biogrip.running.resolved import write_study
 
 from biogrip.fit.methods import METHODS
-from biogrip.running.resolved import write_study
 from tests.helpers.default import study_of
 from tests.helpers.places import ROOT
 from tests.helpers.runs import built_once

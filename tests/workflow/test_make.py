@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from biogrip.cli import main
 from biogrip.products.catalogue import products
 from biogrip.products.digest import modules_in
 from biogrip.products.source_files import source_files
+
+from biogrip.cli import main
 from tests.helpers.default import study_of
 from tests.helpers.runs import TINY, biogrip, built_once, results_of
 

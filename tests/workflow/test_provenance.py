@@ -6,11 +6,11 @@ import shutil
 from pathlib import Path
 
 import pytest
+from biogrip.running.journal import recorded_in
+from biogrip.running.manifest import Manifest
 
 from biogrip.cli import main
 from biogrip.files import write_text
-from biogrip.running.journal import recorded_in
-from biogrip.running.manifest import Manifest
 from tests.helpers.runs import RECORDED, TINY, results_of, snakemake
 from tests.helpers.runs import run as biogrip_run
 

@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
+from biogrip.products.catalogue import products
 from matplotlib.image import imread
 
 from biogrip.experiment.maxwell_models import generalized_maxwell
 from biogrip.experiment.protocol import hold, torque_history
 from biogrip.figures.style import COLUMN_IN
 from biogrip.instrument.gripper import Gripper
-from biogrip.products.catalogue import products
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.default import plan_of, study_of
 from tests.helpers.in_process import make_in_process

@@ -8,12 +8,12 @@ from tempfile import TemporaryFile
 from typing import Any
 
 import pytest
-from snakemake.api import SnakemakeApi
-from snakemake.settings.types import OutputSettings, Quietness, ResourceSettings
-
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.running.rules import ProductRule, inputs_of, make_rules
+from snakemake.api import SnakemakeApi
+from snakemake.settings.types import OutputSettings, Quietness, ResourceSettings
+
 from tests.helpers import loaded
 from tests.helpers.default import study_of
 from tests.helpers.places import ROOT

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-
 from biogrip.running.resolved import read_study, write_study
 from biogrip.running.wholeness import check_results
+
 from tests.helpers import runs
 from tests.helpers.in_process import inputs_and_outputs
 from tests.helpers.runs import TINY, Run, results_of, snakemake, waited_for

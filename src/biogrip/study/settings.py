@@ -125,7 +125,7 @@ def _part(kind: Any, given: Mapping[str, Any]) -> Any:
     assert is_dataclass(kind)
     absent = {field.name for field in fields(kind)} - given.keys()
 
-    class Part(kind):  # type: ignore[misc, valid-type]
+    class Part(kind):  # type: ignore[misc]
         def __getattribute__(self, name: str) -> Any:
             if name in absent:
                 raise AttributeError(f"{name} is not among the keys that the rule names.")

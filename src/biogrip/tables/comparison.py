@@ -25,8 +25,8 @@ def compare(published: Path, made: Sequence[Path]) -> str:
         if not before.exists():
             differing.append(f"{now.name}: is not published.")
         elif before.read_bytes() != now.read_bytes():
-            texts = (file.read_text(encoding="utf-8").splitlines() for file in (before, now))
-            differing += unified_diff(*texts, str(before), str(now), n=0, lineterm="")
+            was, found = (file.read_text(encoding="utf-8").splitlines() for file in (before, now))
+            differing += unified_diff(was, found, str(before), str(now), n=0, lineterm="")
     if differing:
         shown = "\n".join(islice(differing, _SHOWN))
         raise BiogripError(f"the regenerated tables differ from {published}.\n{shown}")
