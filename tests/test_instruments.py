@@ -226,18 +226,6 @@ def test_readings_that_scatter_more_at_first_are_doubted_and_can_be_left_out(
     assert identified(trace, *options, config=ramp + FEW)["fit"] == "rejected"
 
 
-def test_what_is_assumed_is_a_config_that_gives_the_same(tmp_path: Path) -> None:
-    trace = written(tmp_path / "f.csv", "force_N", noisy(response("force", 2e-6)))
-    options = ["--reading", "force=force_N", "--model", SOLID.name]
-    found = identified(trace, *options, "--hold", "2e-6")
-    again = identified(trace, *options, config=yaml.safe_dump(_config(found["assumed"])))
-    assert again["quantities"] == found["quantities"]
-
-
-def _config(assumed: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in assumed.items() if key != "model"}
-
-
 @pytest.mark.parametrize("reading", ["stress", "modulus"])
 def test_oscillations_about_zero_are_identified(tmp_path: Path, reading: str) -> None:
     """Nothing is held at the ends of the phase: the amplitude is what is."""

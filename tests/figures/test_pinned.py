@@ -11,6 +11,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.spatial import KDTree
 
 from biogrip.figures import robustness as heat_map
 from biogrip.figures.style import COLORS, save_png, styled
@@ -19,8 +20,9 @@ from biogrip.tables.heat_maps import heat_maps
 from tests.helpers.default import study_of
 
 PINNED = Path(__file__).with_name("pinned")
-# Small pictures, in which a line is still a line: their size as a share of what is drawn.
-SIZE = 0.3
+# Small pictures in few colours, in which a line is still a line: their size as a share of what is
+# drawn.
+SIZE, COLOURS = 0.3, 256
 # Root mean square of the difference of all pixels, of 255. Results are the same bytes on every
 # processor; what is left to it are last bits of coordinates, of which antialiasing makes
 # differences of a level or two in a few pixels: some 0.01. A line in another colour makes more,
@@ -84,11 +86,25 @@ def reduced(picture: Image.Image) -> Image.Image:
     return picture.resize((width, height), Image.Resampling.BOX)
 
 
+def in_colours_of(palette: list[int], picture: Image.Image) -> Image.Image:
+    """A picture of the colours of a palette that are nearest."""
+    colours = np.reshape(palette, (-1, 3))
+    nearest = KDTree(colours).query(np.asarray(picture))[1]
+    found = Image.fromarray(nearest.astype(np.uint8), "P")
+    found.putpalette(palette)
+    return found
+
+
 def difference(name: str, found: Image.Image) -> float:
-    """Root mean square by which a picture differs from the pinned one."""
+    """Root mean square by which a picture differs from the pinned one, in the latter's colours."""
     with Image.open(PINNED / f"{name}.png") as pinned:
-        before, now = (np.asarray(each.convert("RGB"), float) for each in (pinned, found))
-    return float(np.sqrt(np.mean((before - now) ** 2))) if before.shape == now.shape else np.inf
+        palette = pinned.getpalette()
+        assert palette is not None
+        if pinned.size != found.size:
+            return np.inf
+        both = pinned, in_colours_of(palette, found)
+        before, now = (np.asarray(each.convert("RGB"), float) for each in both)
+    return float(np.sqrt(np.mean((before - now) ** 2)))
 
 
 @pytest.fixture
@@ -107,7 +123,10 @@ def test_figures_are_what_they_were(
         for path in PINNED.glob("*.png"):
             path.unlink()
         for name, picture in pictures.items():
-            reduced(picture).save(PINNED / f"{name}.png", optimize=True)
+            palette = reduced(picture).quantize(COLOURS).getpalette()
+            assert palette is not None
+            kept = in_colours_of(palette, reduced(picture))
+            kept.save(PINNED / f"{name}.png", optimize=True)
     assert {path.stem for path in PINNED.glob("*.png")} == set(pictures)
     by = {name: difference(name, reduced(picture)) for name, picture in pictures.items()}
     changed = {name: value for name, value in by.items() if value >= TOLERANCE}
