@@ -96,18 +96,10 @@ def test_a_wrong_set_up_determines_nothing(tmp_path: Path, wrong: str, noise_mod
         assert [row["fit"] for row in csv.DictReader(rows)] == [REJECTED]
 
 
-def test_only_strict_makes_a_rejected_fit_a_failure(tmp_path: Path) -> None:
-    (tmp_path / "few.yaml").write_text(FEW)
-    trace = written(tmp_path / "t.csv", WRONG["jump"], 0)
-    status, said = command("identify", trace, "--config", tmp_path / "few.yaml")
-    assert f"{trace}: fit rejected" in said.splitlines()
-    assert status == 0
-
-
 @pytest.mark.parametrize("noise_model", ["white", "coloured"])
 def test_a_right_set_up_is_ok(tmp_path: Path, noise_model: str) -> None:
     (tmp_path / "few.yaml").write_text(FEW)
-    traces = [written(tmp_path / f"{seed}.csv", RIGHT, seed) for seed in range(5)]
+    traces = [written(tmp_path / f"{seed}.csv", RIGHT, seed) for seed in range(3)]
     options = ["--config", tmp_path / "few.yaml", "--noise-model", noise_model, "--strict"]
     assert command("identify", *traces, *options)[0] == 0
     found = [json.loads(trace.with_suffix(".identified.json").read_text()) for trace in traces]
@@ -146,7 +138,9 @@ def test_a_rejected_fit_says_only_why(tmp_path: Path) -> None:
     for noise_model in ("white", "coloured"):
         found = tmp_path / f"{noise_model}.json"
         options = ["--config", tmp_path / "models.yaml", "--output", found]
-        _, said = command("identify", trace, "--noise-model", noise_model, *options)
+        status, said = command("identify", trace, "--noise-model", noise_model, *options)
+        # A failure it is with --strict alone.
+        assert (status, f"{trace}: fit rejected" in said.splitlines()) == (0, True)
         data = json.loads(found.read_text())
         assert data["fit"] == REJECTED
         heavy = [note["text"] for note in data["notes"] if note["weight"] == REJECTION]

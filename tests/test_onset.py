@@ -135,9 +135,9 @@ def test_a_fitted_onset_has_the_lowest_misfit() -> None:
 # The protocol starts at 0 of clocks whose median interval tells nothing of the onset.
 CLOCKS = {
     "eight decades": np.geomspace(1e-4, 1e4, 161),
-    "six decades": np.geomspace(1e-3, 1e3, 1001),
+    "six decades": np.geomspace(1e-3, 1e3, 301),
     "later than the step": np.arange(5, 601) / 10,
-    "log-spaced and later": np.geomspace(0.05, 60.0, 400),
+    "log-spaced and later": np.geomspace(0.05, 60.0, 200),
 }
 
 
@@ -162,8 +162,9 @@ def test_a_trace_over_many_decades_of_time_has_an_answer(tmp_path: Path, last_s:
     times = np.geomspace(1e-4, last_s, 161)
     trace = tmp_path / "liquid.csv"
     trace.write_text("time_s,strain\n" + "".join(f"{t},{1.0 + t}\n" for t in times))
+    (tmp_path / "few.yaml").write_text("model_selection: {models: []}\n")
     given = ("--reading", "strain=strain", "--hold", "1", "--model", "maxwell")
-    assert main(["identify", str(trace), *given]) == 0
+    assert main(["identify", str(trace), *given, "--config", str(tmp_path / "few.yaml")]) == 0
     found = json.loads((tmp_path / "liquid.identified.json").read_text())
     for quantity in found["quantities"]:
         assert quantity["value"] == pytest.approx(1.0, rel=1e-6)

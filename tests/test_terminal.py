@@ -139,7 +139,7 @@ def test_progress_and_warnings_are_shown(
 @pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
 @pytest.mark.parametrize(
     ("arguments", "status"),
-    [("verify .", 1), ("clean .", 0), ("identify a.csv --config few.yaml", 0), ("design", 2)],
+    [("groups a.csv --by x", 1), ("identify a.csv --config few.yaml", 0), ("design", 2)],
 )
 @pytest.mark.nightly
 def test_a_command_may_have_nobody_to_talk_to(

@@ -19,15 +19,13 @@ from biogrip.figures import comb, convergence, linkage, torque
 from biogrip.figures.results import scale_of
 from biogrip.figures.style import ALL_SEEDS, COLORS, FITTED, figure, line_of, save, styled
 from biogrip.fit.methods import METHODS
-from biogrip.products.product import Product
 from tests.helpers.default import STUDY, seen
 
 
 def drawn(module: Any) -> Figure:
     """A figure of the default study's inputs."""
-    (product,) = (value for value in vars(module).values() if isinstance(value, Product))
     with styled():
-        found: Figure = module.draw(product.settings(STUDY, {}))
+        found: Figure = module.draw(STUDY)
     return found
 
 

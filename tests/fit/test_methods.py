@@ -16,7 +16,6 @@ from biogrip.fit.methods import METHODS, block_class
 from biogrip.fit.newton_refinement import refine_optima
 from biogrip.fit.problem import Problem
 from biogrip.response.residuals import Residuals
-from biogrip.running.rules import _CONSTRAINTS
 from tests.helpers.default import STUDY
 from tests.helpers.problems import (
     GRIPPER,
@@ -160,7 +159,7 @@ def test_the_methods_that_the_study_relies_on_promise_what_it_needs() -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_method_is_named_like_its_module_and_its_files(method: str) -> None:
     assert METHODS[method].name == method
-    assert re.fullmatch(_CONSTRAINTS["method"], method)
+    assert re.fullmatch(r"\w+", method)
     assert hasattr(import_module(METHODS[method].module), "identify_many")
     for block in METHODS[method].blocks:
         assert is_dataclass(block_class(block))

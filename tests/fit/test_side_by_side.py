@@ -125,10 +125,6 @@ def test_misfits_that_form_the_responses(
     assert_same_in_groups(case_problem(gripper, steps, 3, **how), few)
 
 
-def test_unequal_arms(unequal_gripper: Gripper, steps: TorqueHistory) -> None:
-    assert_same_in_groups(case_problem(unequal_gripper, steps, 3), SMALL)
-
-
 def test_the_papers_budget(gripper: Gripper, steps: TorqueHistory) -> None:
     """Larger than what is looked at together: seeds stop one after the other."""
     settings = GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 20, 40, 200)
@@ -181,18 +177,6 @@ def test_redrawn_genes_are_those_of_numpy(values: int, times: int) -> None:
     np.testing.assert_array_equal(drawn, np.concatenate(expected, axis=2))
     for generator, reference in zip(ours, numpys, strict=True):
         assert generator.bit_generator.state == reference.bit_generator.state
-
-
-def test_genes_of_different_ranges_are_those_of_numpy() -> None:
-    low = np.zeros(12, dtype=np.int64)
-    genome = Genome(low, np.array([1, 2**30, 2**30 + 2**29, 8, 3, 2**31 - 2] * 2), (3,) * 4)
-    numpys = rng(0)
-    drawn = redraws(genome, [500, 1], 1, [rng(0), rng(1)])[0, :, :500]
-    gene = numpys.integers(12, size=500)
-    np.testing.assert_array_equal(drawn[0], gene)
-    np.testing.assert_array_equal(
-        drawn[1], numpys.integers(low[gene], genome.high[gene], endpoint=True)
-    )
 
 
 @pytest.mark.parametrize(("words", "size"), [(1, 500), (1, 40_000), (2, 300)])

@@ -18,7 +18,6 @@ from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
 from biogrip.judging.quantity_constraint import QuantityConstraint
 from biogrip.response.linear import rotation, step_response
-from tests.helpers.definition import FitConstraint
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE, identified, of_case, posed_for, run
 from tests.helpers.scipy_fits import scipy_fit
 
@@ -116,21 +115,6 @@ def test_a_held_parameter_is_a_known_parameter(case: str) -> None:
         assert increase == pytest.approx(alone, abs=2e-3, rel=1e-5)
 
 
-def test_a_sum_is_held_as_by_leaving_it_out() -> None:
-    """SciPy's fit over what is left free, which is the definition of a held sum."""
-    (likelihood,) = likelihoods("liquid_drop_2", 1)
-    (total,) = labelled("c + c_p")
-    plain = replace(total, penalties=())
-    fits = ConstrainedFits([likelihood], [plain])
-    for shift in (-0.05, 0.02):
-        target = total.log(likelihood.best) + shift
-        one = np.zeros(1, dtype=np.int64)
-        increases, points = fits.at(one, np.array([target]), likelihood.best[None], FINE)
-        held = FitConstraint(likelihood, plain, target)
-        alone = min(held.fitted(start)[0] for start in (likelihood.best, points[0]))
-        assert increases[0] == pytest.approx(alone, rel=1e-3, abs=5e-3)
-
-
 def test_limits_are_where_the_rise_equals_the_threshold() -> None:
     each = likelihoods("liquid_drop_2", 3)
     quantities = labelled("k", "c_p", "c + c_p")
@@ -195,16 +179,6 @@ def test_profiles_are_as_low_as_fits_with_the_parameter_known(case: str) -> None
         for value, increase in zip(found.log_values[::6], found.increases[::6], strict=True):
             alone = rest_fitted(likelihood, [index], [value], likelihood.best)
             assert increase < alone + 1e-3 * (1 + alone)
-
-
-def test_limits_of_a_profile_are_those_near_the_optimum() -> None:
-    """Where there is but one basin."""
-    each = likelihoods("liquid_drop_2", 2)
-    quantities = labelled("k", "c + c_p")
-    limits = find_limits(each, quantities)[0]
-    for near, profiles in zip(limits, compute_profiles(each, quantities), strict=True):
-        ends = np.array([(found.low, found.high) for found in profiles], dtype=float)
-        np.testing.assert_allclose(ends, near, rtol=0, atol=1e-3)
 
 
 def test_the_search_range_determines_no_combination() -> None:

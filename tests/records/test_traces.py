@@ -1,12 +1,9 @@
 from pathlib import Path
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.records import traces
 from biogrip.records.parquet import column_names
 from biogrip.records.traces import (
@@ -19,8 +16,6 @@ from biogrip.records.traces import (
     write_measurements,
     write_target,
 )
-from biogrip.stages import single_trace
-from biogrip.study.study import Case
 
 TIMES = np.arange(5.0)
 # Rounding is all that is in the second.
@@ -89,18 +84,9 @@ def test_standard_deviations_are_kept(tmp_path: Path) -> None:
     assert seeds_in(path) == [0]
 
 
-def test_names_of_columns_have_the_unit_of_what_is_read_or_none(tmp_path: Path) -> None:
-    """Of any instrument: what the case says is read."""
+def test_columns_have_names_for_any_instrument(tmp_path: Path) -> None:
     trace, path = {0: np.arange(4.0)}, tmp_path / "t.parquet"
     noisy = Measurements(np.arange(4.0), np.ones(4), trace, sd_rad=np.full(4, 0.1))
     write_measurements(path, noisy)
     assert column_names(path) == ["time_s", "target", "sd", "seed_0"]
     np.testing.assert_array_equal(read_measurements(path).target_rad, 1.0)
-    for reading, instrument in INSTRUMENTS.items():
-        single = tmp_path / f"{reading}.csv"
-        case = SimpleNamespace(instrument=instrument)
-        single_trace.export(cast("Case", case), 0, path, single)
-        assert single.read_text().splitlines()[:2] == [
-            f"time_s,{instrument.read.column}",
-            "0,0.000000e+00",
-        ]

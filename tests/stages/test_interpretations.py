@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.products.plan import Plan
-from biogrip.records.identifications import BATCHES, read_identifications
+from biogrip.records.identifications import read_identifications
 from biogrip.records.interpretations import INTERPRETATIONS
-from biogrip.stages.identification import IDENTIFICATION
-from biogrip.stages.interpretations import READ
-from biogrip.stages.measurement import MEASUREMENT
-from biogrip.stages.target import TARGET
+from biogrip.stages.identification import identify
+from biogrip.stages.interpretations import read
+from biogrip.stages.measurement import measure
+from biogrip.stages.target import simulate
 from biogrip.study.study import Study
-from biogrip.tables.interpretations import INTERPRETATIONS_TABLE
+from biogrip.tables.interpretations import interpretations
 from tests.helpers.default import study_of
 from tests.helpers.places import ROOT
 
@@ -32,7 +31,7 @@ interpretations:
     changes: {search_range: {k: {digits: 3, digit: [0, 9]}}}
   uniform: {title: uniform noise, changes: {measurement: {noise: {kind: uniform}}}}
 """
-CASE = {"case": "liquid_drop_2"}
+CASE = "liquid_drop_2"
 
 
 @pytest.fixture(scope="module")
@@ -44,22 +43,19 @@ def study() -> Study:
 def folder(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the interpretations have been tried, and the study's own algorithm."""
     made = tmp_path_factory.mktemp("interpretations")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(made)
-        plan = Plan(study, Path("results"))
-        batch = {"batch": "seeds_0-2"}
-        TARGET.run(plan, CASE)
-        MEASUREMENT.run(plan, CASE | batch)
-        IDENTIFICATION.run(plan, CASE | batch | {"method": "genetic"})
-        READ.run(plan, CASE)
-        INTERPRETATIONS_TABLE.run(plan, {})
+    target, measured = made / "t.csv", made / "m.parquet"
+    case = study.case(CASE)
+    simulate(case, target)
+    measure(case, range(3), target, measured)
+    outputs = [made / name for name in ("ours.csv", "h.parquet", "times.csv")]
+    identify(case, "genetic", range(3), measured, [], *outputs)
+    read(case, target, made / f"{CASE}.csv")
     return made
 
 
 def test_a_reading_that_changes_nothing_finds_what_the_study_finds(folder: Path) -> None:
-    path = folder / BATCHES.format(case="liquid_drop_2", method="genetic", batch="seeds_0-2")
-    ours = read_identifications(path)
-    rows = INTERPRETATIONS.read(folder / INTERPRETATIONS.path.format(**CASE))
+    ours = read_identifications(folder / "ours.csv")
+    rows = INTERPRETATIONS.read(folder / f"{CASE}.csv")
     same = rows[rows["interpretation"] == "printed"].reset_index(drop=True)
     for column in ("k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m", "misfit"):
         np.testing.assert_array_equal(same[column], ours[column])
@@ -69,9 +65,9 @@ def test_a_reading_that_changes_nothing_finds_what_the_study_finds(folder: Path)
         assert not np.array_equal(others["misfit"], same["misfit"]), name
 
 
-def test_the_table_has_a_row_for_each_case_and_reading(folder: Path) -> None:
-    lines = (folder / "results/tables/interpretations.csv").read_text(encoding="utf-8").splitlines()
-    assert [line.split(",")[1] for line in lines[1:]] == [
+def test_the_table_has_a_row_for_each_case_and_reading(study: Study, folder: Path) -> None:
+    made = interpretations(study, [folder / f"{CASE}.csv"])
+    assert [row[1] for row in made.rows] == [
         "as printed",
         "patient",
         "three digits",
@@ -80,7 +76,7 @@ def test_the_table_has_a_row_for_each_case_and_reading(folder: Path) -> None:
 
 
 def test_a_reading_changes_only_what_it_says(study: Study) -> None:
-    found = study.case(CASE["case"]).interpretations
+    found = study.case(CASE).interpretations
     assert found["patience"].problem == found["printed"].problem
     assert (found["printed"].genetic.patience, found["patience"].genetic.min_generations) == (
         20,
@@ -102,4 +98,4 @@ def test_a_reading_that_no_case_can_have_is_explained() -> None:
 
 def test_the_overlay_that_is_published_is_a_study() -> None:
     text = (ROOT / "config" / "interpretations.yaml").read_text(encoding="utf-8")
-    assert len(study_of(text).interpretations) == 12
+    assert len(study_of(text).interpretation_titles) == 12

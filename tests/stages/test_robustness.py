@@ -19,10 +19,9 @@ from biogrip.records.identifications import columns
 from biogrip.response.linear import rotation, step_response
 from biogrip.stages import sweep_points as stage
 from biogrip.study.study import Study
-from biogrip.tables.heat_maps import CAPTION, HeatMaps, heat_maps
+from biogrip.tables.heat_maps import HeatMaps, heat_maps
 from biogrip.tables.robustness import robustness
 from tests.helpers.default import study_of
-from tests.helpers.runs import replaced
 
 CASE = "endothelial_cell"
 TRUTH = np.array([35.0, 12.3, 299.9, 1e-3])
@@ -52,11 +51,11 @@ def study() -> Study:
 
 @pytest.fixture
 def maps(study: Study) -> HeatMaps:
-    return heat_maps(study, {"sweep": "both"})
+    return heat_maps(study, "both")
 
 
-def describe_sweep(study: Study) -> stage.SweepContent:
-    return stage.describe_sweep(study, {"sweep": "both", "case": CASE})
+def judge(study: Study, identifications: list[Path], output: Path) -> None:
+    stage.judge(study, "both", CASE, identifications, [], output)
 
 
 @pytest.fixture
@@ -64,12 +63,13 @@ def identifications(study: Study, tmp_path: Path) -> list[Path]:
     """Five seeds: k = 0.7, 0.8, 0.9, 1, 0.3 of 35 and c = 330, c_p = 1; misfits 1 to 1.04 noise."""
     files = []
     for name in study.points:
-        files.append(tmp_path / f"{name}.csv")
         noise = 0.0 if "--0--" in name else 1e-6
-        with files[-1].open("w", newline="") as stream:
-            writer = csv.writer(stream)
-            writer.writerow(columns(MODELS["generalized_maxwell"]))
-            for method in ("genetic", "least_squares"):
+        for method in ("genetic", "least_squares"):
+            files.append(tmp_path / name / method / "seeds_0-4.csv")
+            files[-1].parent.mkdir(parents=True)
+            with files[-1].open("w", newline="") as stream:
+                writer = csv.writer(stream)
+                writer.writerow(columns(MODELS["generalized_maxwell"]))
                 for seed in range(5):
                     misfit = (noise or _resolution()) * (1 + 0.01 * seed)
                     # Least squares is right, and without noise exactly.
@@ -83,7 +83,7 @@ def identifications(study: Study, tmp_path: Path) -> list[Path]:
 @pytest.fixture
 def judged(study: Study, identifications: list[Path], tmp_path: Path) -> Path:
     output = tmp_path / "judged" / f"{CASE}.csv"
-    stage.judge(describe_sweep(study), identifications, [], output)
+    judge(study, identifications, output)
     return output
 
 
@@ -155,17 +155,10 @@ def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
 
 
 def test_a_grid_may_be_a_single_point(identifications: list[Path], tmp_path: Path) -> None:
-    text = replaced(SWEEPS, "values: [0, 0.2]", "values: [0.2]")
+    text = SWEEPS.replace("values: [0, 0.2]", "values: [0.2]")
     text = "\n".join(line for line in text.splitlines() if "proportional" not in line)
-    stage.judge(describe_sweep(study_of(text)), identifications, [], tmp_path / "x.csv")
+    judge(study_of(text), identifications, tmp_path / "x.csv")
     assert set(pd.read_csv(tmp_path / "x.csv")["point"]) == {f"{CASE}--both--0_2--gaussian-peak"}
-
-
-def test_a_missing_point_is_named(
-    study: Study, identifications: list[Path], tmp_path: Path
-) -> None:
-    with pytest.raises(BiogripError, match=r"cell--both--0--gaussian-peak: no file of identific"):
-        stage.judge(describe_sweep(study), identifications[1:], [], tmp_path / "x.csv")
 
 
 def test_the_table_has_the_best_and_the_worst_determined(maps: HeatMaps, judged: Path) -> None:
@@ -202,11 +195,9 @@ def test_the_table_says_what_of_the_gripper_the_config_calls_reconstructed(
     marked: str, said: str | None, judged: Path
 ) -> None:
     study = study_of(f"{SWEEPS}\nreconstructed: {marked}\n")
-    caption = robustness(heat_maps(study, {"sweep": "both"}), [judged]).caption
+    caption = robustness(heat_maps(study, "both"), [judged]).caption
     assert ("econstructed" in caption) == (said is not None)
     assert said is None or caption.endswith(f": {said}.")
-    # Of any config's heat maps the report says the same.
-    assert "econstructed" not in CAPTION
 
 
 def _bounds(**percent: list[float]) -> list[tuple[str, float]]:

@@ -1,17 +1,21 @@
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import Phase, hold
-from biogrip.experiment.sample import Sample
+from biogrip.experiment.sample import MODELS, Sample
 from biogrip.experiment.sampling import Sampling
 from biogrip.instrument.gripper import GRIPPER
+from biogrip.records.identifications import columns
+from biogrip.records.rows import write_rows
 from biogrip.records.traces import read_jaw_force, read_measurements, read_target
-from biogrip.stages import joined, recording, target
+from biogrip.stages import identifications, recording, target
 from biogrip.traces.columns import Columns
 from tests.helpers.default import STUDY, seen
 from tests.helpers.places import EXAMPLE
@@ -92,17 +96,31 @@ def test_rows_of_a_recording_without_a_number_are_counted(
 
 def test_what_is_left_from_a_larger_study_is_not_joined(tmp_path: Path) -> None:
     """Methods may have batches that end at different seeds; their files then have as many rows."""
-    batches = [tmp_path / name for name in ("a.csv", "b.csv", "c.csv")]
-    for batch, method, seeds in zip(batches, "xxy", ((0, 1), (2, 3), (0, 1, 2)), strict=True):
-        lines = [f"drop,{method},{seed},0.5" for seed in seeds]
-        batch.write_text("\n".join(["case,method,seed,cpu_s", *lines, ""]))
-    joined.join(seen(seeds=3), batches, tmp_path / "all.csv")
-    rows = (tmp_path / "all.csv").read_text().splitlines()
-    wanted = [f"drop,{method},{seed},0.5" for method in "xy" for seed in range(3)]
-    assert rows == ["case,method,seed,cpu_s", *wanted]
-    batches[1].write_text("case,method,seed\n")
-    with pytest.raises(BiogripError, match=r"b.csv, line 1: found case,method,seed; wanted"):
-        joined.join(seen(seeds=3), batches, tmp_path / "all.csv")
+    model = MODELS["maxwell"]
+    batches = [tmp_path / name for name in "abc"]
+    case = seen(sample=Sample("maxwell"), seeds=3, study=seen(methods=["x", "y"]))
+
+    def written(seeds: Sequence[Sequence[int]]) -> None:
+        for batch, method, some in zip(batches, "xxy", seeds, strict=True):
+            rows = [("drop", method, seed, *range(len(columns(model)) - 3)) for seed in some]
+            write_rows(batch.with_suffix(".csv"), columns(model), rows)
+            values = {"method": [method] * len(some), "seed": list(some)}
+            pd.DataFrame(values).to_parquet(batch.with_suffix(".parquet"))
+
+    def joined() -> tuple[pd.DataFrame, pd.DataFrame]:
+        files, histories = ([b.with_suffix(s) for b in batches] for s in (".csv", ".parquet"))
+        made, history = tmp_path / "all.csv", tmp_path / "all.parquet"
+        identifications.join(case, files, histories, made, history)
+        return pd.read_csv(made), pd.read_parquet(history)
+
+    written(((0, 1), (2, 3), (0, 1, 2)))
+    for found in joined():
+        assert list(zip(found["method"], found["seed"], strict=True)) == [
+            (method, seed) for method in "xy" for seed in range(3)
+        ]
+    written(((0, 1), (1, 2), (0, 1, 2)))
+    with pytest.raises(BiogripError, match="do not hold each of the seeds 0 to 2 once for each"):
+        joined()
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

@@ -5,14 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from biogrip.products.catalogue import products
+from biogrip.products.plan import Plan
+from biogrip.running.rules import make_rules
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
 from biogrip.errors import BiogripError
 from biogrip.experiment.sample import MODELS
-from biogrip.products.catalogue import products
-from biogrip.products.plan import Plan
-from biogrip.running.rules import make_rules
 from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.config import StudyConfig
 from biogrip.study.load import load_study

@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 import yaml
+from biogrip.products.digest import digest
 
 from biogrip.errors import BiogripError
 from biogrip.experiment.noise import Noise
 from biogrip.instrument.actuator import torque
-from biogrip.products.digest import digest
 from biogrip.study.load import load_study
 from biogrip.study.study import Study
 from biogrip.tables import coverage

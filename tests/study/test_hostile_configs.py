@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-
-from biogrip.errors import BiogripError
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.running.rules import make_rules
+
+from biogrip.errors import BiogripError
 from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config, read_places
 from biogrip.study.study import Study

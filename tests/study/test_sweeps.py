@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 import yaml
+from biogrip.products.digest import digest
 
 from biogrip.errors import BiogripError
 from biogrip.experiment.noise import Noise
-from biogrip.products.digest import digest
 from biogrip.stages.identification import IDENTIFICATION
 from biogrip.stages.measurement import MEASUREMENT
 from biogrip.stages.target import TARGET

@@ -70,7 +70,7 @@ def runs(
         found = history.groupby("seed").last().reset_index()
     cases = {"mine": seen(truth=truth, noise=seen(level=0.1))}
     study = seen(cases=cases, near_noise_tolerance=0.02)
-    return Results(study, {}, {table: Runs("mine", truth, found, history)})
+    return Results(study, {}, {table: Runs("mine", truth, found, history)}, {})
 
 
 def history_of(rows: list[dict[str, float]]) -> pd.DataFrame:
@@ -139,7 +139,7 @@ def test_jaws_that_would_have_to_pull_hold_one_sample_in_three() -> None:
         name: seen(truth=seen(title=name, published=seen(table=table)))
         for name, table in (("a", 5), ("b", 6), ("c", 7))
     }
-    judged = instrument.judge_grip(Results(seen(cases=cases), {"mechanics": forces}, {}))
+    judged = instrument.judge_grip(Results(seen(cases=cases), {"mechanics": forces}, {}, {}))
     assert judged.verdict == IN_PART
     assert "0.2 µN (Table 5), -0.7 µN (Table 6), -0.6 µN (Table 7)" in judged.evidence
 
@@ -163,7 +163,7 @@ def test_models_that_fit_as_well_are_held_against_the_one_that_made_the_traces()
         table = pd.DataFrame(
             [row for name, bic in zip(names, refuted, strict=True) for row in rows(name, bic)]
         )
-        judged = algorithm.judge_cell_model(Results(seen(cases=cases), {"models": table}, {}))
+        judged = algorithm.judge_cell_model(Results(seen(cases=cases), {"models": table}, {}, {}))
         assert judged.verdict == verdict
         assert "7 of 50 traces" in judged.evidence
 

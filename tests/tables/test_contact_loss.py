@@ -1,16 +1,15 @@
-from typing import Any
+from textwrap import dedent
 
 import pytest
 
-from biogrip.tables.contact_loss import CONTACT_LOSS, contact_loss
+from biogrip.tables.contact_loss import contact_loss, linear_cases
 from biogrip.tables.layout import Cell
-from tests.helpers.default import seen, study_of
+from tests.helpers.default import study_of
 
 
 def rows_of(overlay: str) -> dict[tuple[Cell, Cell], dict[str, Cell]]:
-    study: Any = CONTACT_LOSS.settings(study_of(overlay), {})
-    few = {name: seen(**vars(case) | {"seeds": 3}) for name, case in study.cases.items()}
-    found = contact_loss(seen(study_seed=study.study_seed, cases=few))
+    study = study_of(f"seeds: 3\n{dedent(overlay)}")
+    found = contact_loss(study.of(linear_cases(study)))
     names = [column.name for column in found.columns]
     rows = [dict(zip(names, row, strict=True)) for row in found.rows]
     return {(row["case"], row["quantity"]): row for row in rows}

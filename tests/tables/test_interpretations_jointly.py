@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.stats import beta
 
-from biogrip.products.plan import Plan
 from biogrip.records.interpretations import INTERPRETATIONS
 from biogrip.records.rows import read_table
 from biogrip.tables.interpretations_jointly import (
-    INTERPRETATIONS_JOINTLY,
+    interpretations_jointly,
     limits,
     own_shares,
     share_not_larger,
 )
+from biogrip.tables.layout import write
 from tests.helpers.default import study_of
 
 OVERLAY = """
@@ -40,15 +40,17 @@ DROP = (
 
 
 @pytest.fixture
-def rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[dict[str, str]]:
-    monkeypatch.chdir(tmp_path)
+def rows(tmp_path: Path) -> list[dict[str, str]]:
+    files = []
     for case, seeds in (("endothelial_cell", CELL), ("liquid_drop_1", DROP)):
         found = (
             (case, "printed", seed, *values, 1.0, 1.0, 40) for seed, values in enumerate(seeds)
         )
-        INTERPRETATIONS.write(Path(INTERPRETATIONS.path.format(case=case)), found)
-    INTERPRETATIONS_JOINTLY.run(Plan(study_of(OVERLAY), Path("results")), {})
-    return read_table(Path("results/tables/interpretations_jointly.csv"))
+        files.append(tmp_path / f"{case}.csv")
+        INTERPRETATIONS.write(files[-1], found)
+    study = study_of(OVERLAY).of(file.stem for file in files)
+    write(interpretations_jointly(study, files), tmp_path / "t.csv")
+    return read_table(tmp_path / "t.csv")
 
 
 def test_only_seeds_that_are_close_in_all_parameters_count(rows: list[dict[str, str]]) -> None:

@@ -3,8 +3,8 @@ from typing import Any
 import pytest
 
 from biogrip.study.study import Study
-from biogrip.tables.mechanics import MECHANICS, mechanics
-from tests.helpers.default import STUDY, seen, study_of
+from biogrip.tables.mechanics import mechanics
+from tests.helpers.default import STUDY, study_of
 from tests.helpers.places import ROOT
 
 
@@ -67,8 +67,6 @@ def test_soft_samples_are_as_soft_as_cells_and_softer_than_the_gripper() -> None
 
 
 def test_the_nonlinear_model_differs_little() -> None:
-    linear: Any = MECHANICS.settings(STUDY, {})
-    cases = {n: seen(**vars(c) | {"nonlinear_target": True}) for n, c in linear.cases.items()}
-    nonlinear = mechanics(seen(cases=cases))
-    for one, other in zip(mechanics(linear).rows, nonlinear.rows, strict=True):
+    nonlinear = mechanics(study_of("models: {target: nonlinear}"))
+    for one, other in zip(mechanics(STUDY).rows, nonlinear.rows, strict=True):
         assert one[2:6] == pytest.approx(other[2:6], rel=5e-3)

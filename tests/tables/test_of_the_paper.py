@@ -2,7 +2,6 @@
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -48,9 +47,15 @@ def test_the_linearisation_is_held_against_one_percent(tmp_path: Path) -> None:
 
 def test_a_damper_between_both_jaws_damps_a_rotation_twice() -> None:
     """Both arms close by b phi, so the damper by 2 b phi, and each arm's lever is b."""
-    shown: Any = left_out.LEFT_OUT.settings(STUDY, {})
     drop = seen(sample=Sample("kelvin_voigt"), parameters={"k_p": 0.5, "c_p": 11.0})
-    rows = rows_of(left_out.left_out(seen(**vars(shown) | {"cases": {"drop": drop}})))
+    study = seen(
+        gripper=STUDY.gripper,
+        actuator=STUDY.actuator,
+        phases=STUDY.phases,
+        gripped=["drop"],
+        cases={"drop": drop},
+    )
+    rows = rows_of(left_out.left_out(study))
     (found,) = (row for row in rows if str(row["beside"]).startswith("the sample's"))
     b = 1.5e-3 * math.sin(math.radians(75))
     assert found["beside_size"] == pytest.approx(b * 11.0 * 2 * b)

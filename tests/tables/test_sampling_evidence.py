@@ -4,13 +4,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biogrip.tables.sampling_evidence import (
-    SAMPLING_EVIDENCE,
-    sampling_evidence,
-)
+from biogrip.tables.sampling_evidence import sampling_evidence
 from tests.helpers.default import STUDY, seen
 
-CASES: Any = SAMPLING_EVIDENCE.settings(STUDY, {})
+CASES: Any = STUDY.of(STUDY.published)
 
 
 def test_rows_are_what_the_traces_determine() -> None:
@@ -50,13 +47,8 @@ def test_ten_times_the_samples_are_worth_about_the_root_of_ten() -> None:
 def test_what_the_paper_does_not_give_has_no_row() -> None:
     case = CASES.cases["liquid_drop_2"]
     published = replace(case.truth.published, identified={"k": 0.97, "c": 9.7})
-    changed = seen(**vars(case) | {"truth": replace(case.truth, published=published)})
+    truth = replace(case.truth, published=published)
+    changed = seen(truth=truth, problem=case.problem, noise=case.noise)
     rows = sampling_evidence(seen(cases={**CASES.cases, "liquid_drop_2": changed})).rows
     assert [row[1] for row in rows if row[0] == "liquid_drop_2"] == ["k", "c"]
     assert sampling_evidence(seen(cases={})).rows == []
-
-
-def test_no_caption_says_how_much_noise_there_is() -> None:
-    """It is the same for any config."""
-    captions = SAMPLING_EVIDENCE.caption, sampling_evidence(CASES).caption
-    assert all("the study's noise" in caption and "%" not in caption for caption in captions)

@@ -8,10 +8,9 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.experiment.sample import MODELS, Sample
 from biogrip.experiment.truth import Published, Truth
-from biogrip.products.catalogue import chosen
 from biogrip.records.identifications import columns
 from biogrip.records.rows import escape_formula
-from biogrip.tables.errors_of_case import ERRORS_OF_CASE, errors, errors_of_case
+from biogrip.tables.errors_of_case import errors, errors_of_case
 from biogrip.tables.layout import Column, Table, write
 from tests.helpers.default import seen
 from tests.helpers.places import ROOT
@@ -86,16 +85,12 @@ def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
     assert "c &amp; d" in (tmp_path / "t.html").read_text()
 
 
-def test_unknown_tables_and_files_are_explained(tmp_path: Path) -> None:
-    files = {kind: tmp_path / f"t.{kind}" for kind in ERRORS_OF_CASE.writes}
-    with pytest.raises(BiogripError, match="Did you mean 'errors'"):
-        chosen(["erors"])
+def test_files_that_are_no_identifications_are_named(tmp_path: Path) -> None:
     with pytest.raises(BiogripError, match=r"gone.csv: cannot be read as identifications"):
-        ERRORS_OF_CASE.make(CASE, identifications=tmp_path / "gone.csv", **files)
+        errors_of_case(CASE, tmp_path / "gone.csv")
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(BiogripError, match=r"other.csv, line 1: wanted the columns case"):
-        ERRORS_OF_CASE.make(CASE, identifications=tmp_path / "other.csv", **files)
-    assert not any(file.exists() for file in files.values())
+        errors_of_case(CASE, tmp_path / "other.csv")
 
 
 HOSTILE = ("=1+1", "+1+1", "-1+1", "@SUM(A1)", "=cmd|'/C calc'!A0", "\t=1+1")
