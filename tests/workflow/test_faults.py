@@ -49,8 +49,8 @@ def wait_for(found: Callable[[], object], process: "subprocess.Popen[bytes]") ->
 
 def jobs_below(parent: int) -> list[int]:
     """Return the processes of scripts of a run."""
-    listed = subprocess.check_output(["ps", "-eo", "pid,pgid,args"], text=True).splitlines()
-    rows = [line.split(maxsplit=2) for line in listed[1:]]
+    listed = subprocess.check_output(["ps", "-ww", "-eo", "pid=,pgid=,args="], text=True)
+    rows = [line.split(maxsplit=2) for line in listed.splitlines()]
     return [
         int(pid)
         for pid, group, command in rows
@@ -68,7 +68,7 @@ def kill_a_job(process: "subprocess.Popen[bytes]", folder: Path) -> None:
 
 def kill_snakemake(process: "subprocess.Popen[bytes]", folder: Path) -> None:
     """Kill -9 of Snakemake when there is a result; it asks to be unlocked."""
-    wait_for(lambda: [*folder.glob("results/identifications/*/*/*.csv")], process)
+    wait_for(lambda: [*folder.glob("results/identifications/liquid_drop_2/*/*.csv")], process)
     process.kill()
     process.wait()
     again = snakemake(folder, "--", ERRORS, config=TINY)
@@ -144,10 +144,11 @@ def test_a_full_disk_is_said_and_the_run_goes_on(tiny: Path, tmp_path: Path) -> 
 
 def test_a_trace_edited_after_a_run_is_read_again(tiny_copy: Path) -> None:
     trace = tiny_copy / "mine.csv"
-    rows = trace.read_text().splitlines()
-    time_s, rotation = rows[-1].split(",")
-    trace.write_text("\n".join([*rows[:-1], f"{time_s},{1.001 * float(rotation):.6e}", ""]))
-    before = (tiny_copy / "results/tables/errors_mine.csv").read_bytes()
-    run = snakemake(tiny_copy, "--", "results/tables/errors_mine.csv", config=TINY)
+    header, *rows = trace.read_text().splitlines()
+    readings = [(time_s, float(reading)) for time_s, reading in (row.split(",") for row in rows)]
+    lower = [f"{time_s},{0.9 * reading:.6e}" for time_s, reading in readings]
+    trace.write_text("\n".join([header, *lower, ""]))
+    before = (tiny_copy / "results/identifications/mine.csv").read_bytes()
+    run = snakemake(tiny_copy, "--", "results/identifications/mine.csv", config=TINY)
     assert run.status == 0, run.output
-    assert (tiny_copy / "results/tables/errors_mine.csv").read_bytes() != before
+    assert (tiny_copy / "results/identifications/mine.csv").read_bytes() != before

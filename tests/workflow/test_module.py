@@ -55,13 +55,12 @@ def test_without_config_it_is_the_papers_study(tmp_path: Path) -> None:
 
 
 def test_rules_are_used_twice_and_changed_and_the_host_is_as_it_was(tmp_path: Path) -> None:
-    """With a config of the host's, resources and outputs of its own, and a prefix."""
+    """With a config of the host's, and resources and outputs of its own."""
     text = f"""
 config["lab"] = {{"seeds": 1}}
 BEFORE = dict(config)
 {MODULE}
     config: {CONFIG!r}
-    prefix: "sub"
 
 use rule * from biogrip as biogrip_*
 
@@ -69,16 +68,15 @@ use rule identification from biogrip as biogrip_identification with:
     resources: mem_mb=4321
 
 use rule target from biogrip as biogrip_target with:
-    output: target="elsewhere/targets/{{case}}.csv"
+    output: target="elsewhere/{{case}}.csv"
 
 assert config == BEFORE
-{OWN_RULE}
-    shadow: "minimal"
-"""
-    run = host(tmp_path, text.replace('    shadow: "minimal"\n', ""), "-n", "--", f"sub/{ERRORS}")
+{OWN_RULE}"""
+    made = "elsewhere/liquid_drop_2.csv"
+    run = host(tmp_path, text, "--", made)
     assert run.status == 0, run.output
-    assert "mem_mb=4321" in run.output
-    assert "elsewhere/targets/liquid_drop_2.csv" in run.output
+    assert (tmp_path / made).is_file()
+    assert not (tmp_path / "results/targets").exists()
 
 
 def test_a_prefix_is_where_jobs_write(tmp_path: Path) -> None:
@@ -90,9 +88,11 @@ use rule * from biogrip as biogrip_*
 
 use rule identification from biogrip as biogrip_identification with:
     resources: mem_mb=4321
+    message: "Identifying with {{resources.mem_mb}} MB"
 {OWN_RULE}"""
     run = host(tmp_path, text, "--", f"sub/{ERRORS}", "mine.txt")
     assert run.status == 0, run.output
+    assert "Identifying with 4321 MB" in run.output
     assert (tmp_path / "sub" / ERRORS).is_file()
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         *(".snakemake", "Snakefile", "mine.txt", "sub")

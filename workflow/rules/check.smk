@@ -55,6 +55,7 @@ rule rulegraph:
     localrule: True
     params:
         snakefile=workflow.main_snakefile,
+        target="results/report.html",
     message:
         "Drawing the graph of the rules"
     script:
