@@ -120,8 +120,8 @@ def test_it_is_deployed_from_a_clone_and_runs_a_case(tmp_path: Path) -> None:
     branch = subprocess.run(
         ["git", "branch", "--show-current"], cwd=clone, capture_output=True, text=True, check=True
     ).stdout.strip()
-    deploy = [sys.executable, "-m", "snakedeploy", "deploy-workflow", str(clone), str(place)]
-    subprocess.run([*deploy, "--branch", branch], check=True)
+    deploy = [Path(sys.executable).with_name("snakedeploy"), "deploy-workflow", clone, place]
+    subprocess.run([*map(str, deploy), "--branch", branch], check=True)
     (place / "config" / "config.yaml").write_text(yaml.safe_dump(CONFIG))
     text = (place / "workflow" / "Snakefile").read_text()
     for arguments in (("-n",), ("--", ERRORS)):
