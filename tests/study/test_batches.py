@@ -2,7 +2,7 @@ import itertools
 
 import pytest
 
-from biogrip.study.batches import Batch, parse_batch, plan_batches, seeds_a_batch
+from biogrip.stages.batches import Batch, parse_batch, plan_batches, seeds_a_batch
 
 
 def names(*arguments: object) -> list[str]:

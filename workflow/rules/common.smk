@@ -1,5 +1,6 @@
 """The config, checked, and what the rules are told of it."""
 
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 
@@ -7,8 +8,8 @@ from snakemake.exceptions import WorkflowError
 
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
-from biogrip.study.batches import batch_names
-from biogrip.study.case_blocks import METHOD_BLOCKS, CaseBlock
+from biogrip.stages.batches import batch_names
+from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.defaults import default_config, shipped
 from biogrip.study.load import load_study, read_configs
@@ -24,6 +25,17 @@ try:
     )
 except BiogripError as error:
     raise WorkflowError(str(error))
+
+
+
+def literal(path):
+    """A path as text, which Snakemake is not to fill in."""
+    if set(str(path)) & set("{}<>"):
+        raise WorkflowError(f"'{path}': allowed is a file name without {{ }} < >.")
+    return str(path)
+
+
+RECORDINGS = {name: literal(STUDY.case(name).file) for name in STUDY.recorded}
 
 # A job runs again if the config keys that its rule names change, or the software.
 SOFTWARE = {"software": software()}

@@ -101,8 +101,8 @@ rule page:
     log:
         "results/logs/page.log",
     params:
-        **settings_of(*(key for key in StudyConfig.model_fields if key != "cases")),
-        **settings_of(*METHOD_BLOCKS, *keys_of_cases(STUDY)),
+        **settings_of(*(f.name for f in fields(StudyConfig) if f.name != "cases")),
+        **settings_of(*keys_of_cases(STUDY)),
         software=SOFTWARE,
     message:
         "Writing the page of the study"

@@ -82,9 +82,8 @@ rule interpretations_of_case:
             "seeds",
             "interpretations",
             "actuator",
-            *CaseBlock.model_fields,
+            *(field.name for field in fields(CaseBlock)),
         ),
-        **settings_of("genetic_algorithm"),
         software=SOFTWARE,
     message:
         "Identifying {wildcards.case} under every interpretation of the paper"
@@ -110,15 +109,15 @@ rule interpretations:
 
 
 if STUDY.traces:
-    ROWS = read_table(Path(STUDY.traces.table), for_workflow=True)
+    ROWS = read_table(Path(literal(STUDY.traces.table)))
 
     # Batches have fixed rows, so that more rows redo the last at most.
     rule traces_batch:
         input:
             lambda wildcards: [
-                str(row.file) for row in rows_of(wildcards) if row.file.is_file()
+                literal(row.file) for row in rows_of(wildcards) if row.file.is_file()
             ],
-            config=STUDY.traces.config or [],
+            config=literal(STUDY.traces.config) if STUDY.traces.config else [],
             table=ancient(STUDY.traces.table),
         output:
             found="results/traces/batches/{rows}.csv",

@@ -44,13 +44,12 @@ from biogrip.stages.judgement import fits_judged, notes_on_fit
 from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.sample_block import fixed_problems
-from biogrip.study.source import KeyPath, dotted, overlaid
+from biogrip.study.source import KeyPath, dotted, overlaid, shown_path
 from biogrip.study.study import Case, Study
-from biogrip.study.trace_file import trace_file_problem
-from biogrip.study.yaml_text import shown_path
 from biogrip.terminal import visible
 from biogrip.traces.columns import place
 from biogrip.traces.late_onset import note_late_onset
+from biogrip.traces.trace_file import trace_file_problem
 
 _NOT_COMPARED = (
     "With fixed parameters no other sample models are tried: a value that is known in this model "
@@ -364,7 +363,6 @@ def study_of(options: IdentifyOptions) -> Study:
         merged,
         options.configs,
         command_line=["cases"],
-        for_workflow=False,
         over=options.lines(case),
     )
 

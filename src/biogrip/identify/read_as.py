@@ -13,9 +13,9 @@ from biogrip.instrument.gripper import ROTATION, Gripper
 from biogrip.instrument.instrument import Quantity
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
+from biogrip.study.load import measurement_problem
 from biogrip.study.measurement_block import COLOURED, KNOWN_NOISE, READINGS
 from biogrip.study.study import Case
-from biogrip.study.validation import measurement_problem
 from biogrip.traces.columns import Columns
 from biogrip.traces.recognised import Recognised
 

@@ -12,8 +12,8 @@ from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.instrument.gripper import ROTATION
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.keys import Block, OneOf, Problem
-from biogrip.study.trace_file import trace_file_problem
 from biogrip.traces.columns import Columns
+from biogrip.traces.trace_file import trace_file_problem
 from biogrip.traces.units import TIME_UNITS
 
 COLOURED = "coloured"

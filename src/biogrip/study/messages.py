@@ -1,7 +1,6 @@
 """Messages about config values, from pydantic's errors: what was found, and what is allowed."""
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from itertools import islice
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -16,7 +15,6 @@ from biogrip.study.schema import Schema, schema_of
 from biogrip.traces.units import TIME_UNITS, nearest_unit
 
 T = TypeVar("T")
-MOST_EXPLAINED = 1000
 MISSING = "is missing and has no default."
 
 # Keys of earlier versions of the config, by their last two names.
@@ -29,7 +27,7 @@ _RETIRED: dict[tuple[Hashable, ...], str] = {
 
 _UNITS = ([*TIME_UNITS], [*ROTATION.units])
 _BOUNDS = {"exclusiveMinimum": "greater than", "minimum": "at least", "maximum": "at most"}
-_LONGEST = 40
+_MOST, _LONGEST = 1000, 40
 
 
 def checked(kind: Callable[..., T], block: Any) -> tuple[T | None, list[Problem]]:
@@ -42,45 +40,16 @@ def checked(kind: Callable[..., T], block: Any) -> tuple[T | None, list[Problem]
     problems
         Path of a key in the block, and a message: what was found and what is allowed.
     """
-    empty = [(path, _nothing(schema_of(kind), path)) for path in _empty((), block)]
-    found: list[Problem] = [(path, text) for path, text in empty if text]
-    errors: list[ErrorDetails] = []
     try:
-        value = built(kind, block, check=not found)
+        return built(kind, block, check=True), []
     except ValidationError as error:
-        value, errors = None, error.errors(include_url=False)
+        errors = error.errors(include_url=False)
     errors.sort(key=lambda error: [str(part) for part in error["loc"]])
-    explained = (_explained(schema_of(kind), error) for error in islice(errors, MOST_EXPLAINED))
-    return value, [*found, *(problem for problem in explained if problem[1])]
-
-
-def _empty(path: tuple[Hashable, ...], value: Any) -> Iterator[tuple[Hashable, ...]]:
-    """Find keys without a value."""
-    if value is None:
-        yield path
-    for key, inner in inside(value):
-        yield from _empty((*path, key), inner)
-
-
-def _nothing(schema: Schema, path: tuple[Hashable, ...]) -> str | None:
-    for part in path:
-        schema = schema.option("a block of keys").inside(part)
-    return f"found nothing, allowed is {schema.word}." if schema.node else None
-
-
-def unknown(path: Sequence[Hashable], allowed: list[str]) -> str:
-    """Return the message about a key that a block does not have, or no longer has."""
-    name, above = path[-1], tuple(path[-2:])
-    if above in _RETIRED:
-        return f"unknown key, {_RETIRED[above]}"
-    return f"unknown key.{nearest(name, allowed)} Allowed here: {', '.join(allowed)}."
-
-
-def inside(value: Any) -> Iterable[tuple[Any, Any]]:
-    """Return what is in a block or a list, by key or index."""
-    if isinstance(value, Mapping):
-        return value.items()
-    return enumerate(value) if isinstance(value, list) else ()
+    # A list whose items are not valid is not too short besides.
+    explained = [
+        _explained(schema_of(kind), it) for it in errors[:_MOST] if not _is_long_enough(it)
+    ]
+    return None, explained
 
 
 def bound(limit: float) -> str:
@@ -89,6 +58,7 @@ def bound(limit: float) -> str:
 
 
 def _explained(schema: Schema, error: ErrorDetails) -> Problem:
+    """Follow the path of an error, which names alternatives and keys, too, to what is allowed."""
     path: tuple[int | str, ...] = ()
     above = leaf = schema
     for part in error["loc"][1:]:
@@ -99,24 +69,33 @@ def _explained(schema: Schema, error: ErrorDetails) -> Problem:
             leaf = chosen
         else:
             path, above, leaf = (*path, part), leaf, leaf.inside(part)
-    if error["type"] == "literal_error" and error["loc"][-1] == "[key]":
-        # An unknown key of a mapping is reported for the block that contains it.
-        path = path[:-1]
-    return path, _text(path, leaf, above, error)
+    of_name = error["loc"][-1] == "[key]"
+    text = _text(path, leaf, above, error, of_name=of_name)
+    # An unknown key of a mapping is reported for the block that contains it.
+    return path[:-1] if of_name and error["type"] == "literal_error" else path, text
 
 
-def _text(path: tuple[int | str, ...], leaf: Schema, above: Schema, error: ErrorDetails) -> str:
+def _is_long_enough(error: ErrorDetails) -> bool:
+    return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
+
+
+def _text(
+    path: Sequence[Hashable], leaf: Schema, above: Schema, error: ErrorDetails, *, of_name: bool
+) -> str:
     found = error["input"]
     match error["type"]:
         case "extra_forbidden" | "unexpected_keyword_argument":
-            return unknown(path, [*above.keys])
+            if retired := _RETIRED.get(tuple(path[-2:])):
+                return f"unknown key, {retired}"
+            names = [*above.keys]
+            return f"unknown key.{nearest(path[-1], names)} Allowed here: {', '.join(names)}."
         case "missing":
             return MISSING
         case "literal_error":
             choices = leaf.get("enum")
             hint = (nearest_unit if choices in _UNITS else nearest)(found, choices)
             return f"found {_shown(found)}.{hint} Allowed: {', '.join(choices)}."
-        case "string_pattern_mismatch" if error["loc"][-1] == "[key]":
+        case "string_pattern_mismatch" if of_name:
             kind = str(path[-2]).removesuffix("s")
             return f"not a usable {kind} name: {leaf.get('form')} (it names files)."
         case "string_pattern_mismatch":
@@ -126,35 +105,22 @@ def _text(path: tuple[int | str, ...], leaf: Schema, above: Schema, error: Error
         case _ if error["type"] == CONFLICT:
             return error["msg"]
         case "too_short" | "too_long" | "string_too_short" | "string_too_long":
-            return _length(found, error["ctx"], leaf.get("maxItems"))
+            few = "min_length" in error["ctx"]
+            words, limit = ("at least", "min_length") if few else ("at most", "max_length")
+            what = "character" if isinstance(found, str) else "item"
+            given = f"{_shown(found)} of {counted(len(found), what)}"
+            return f"found {given}, allowed are {words} {error['ctx'][limit]}."
+        case "finite_number":
+            return f"found {_shown(found)}, allowed is a finite number."
         case "greater_than" | "greater_than_equal" | "less_than_equal":
-            return f"found {_shown(found)}, allowed is {_range(leaf)}."
+            limits = [
+                f"{words} {bound(leaf.get(name))}"
+                for name, words in _BOUNDS.items()
+                if leaf.get(name) is not None
+            ]
+            text = " and ".join(limits)
+            return f"found {_shown(found)}, allowed is {text} {leaf.get('unit', '')}".rstrip() + "."
     return f"found {_shown(found)}, allowed is {leaf.word}."
-
-
-def _length(found: Any, limits: Mapping[str, Any], most: int | None) -> str:
-    few = "min_length" in limits
-    if few and len(found) >= limits["min_length"]:
-        # Items that are not valid do not count.
-        return "" if most is None or len(found) <= most else _length(found, {"max_length": most}, 0)
-    words, limit = ("at least", limits["min_length"]) if few else ("at most", limits["max_length"])
-    if isinstance(found, str):
-        count = counted(len(found), "character")
-        return f"found {_shown(found)} of {count}, allowed are {words} {limit}."
-    if isinstance(found, Mapping):
-        if not found:
-            return "is empty; at least one is needed."
-        return f"found {counted(len(found), 'key')}, allowed are {words} {limit}."
-    return f"found a list of {len(found)}, allowed are {words} {counted(limit, 'item')}."
-
-
-def _range(leaf: Schema) -> str:
-    limits = [
-        f"{words} {bound(leaf.get(name))}"
-        for name, words in _BOUNDS.items()
-        if leaf.get(name) is not None
-    ]
-    return " and ".join(limits) + (f" {leaf.get('unit')}" if leaf.get("unit") else "")
 
 
 def _shown(value: Any) -> str:

@@ -8,21 +8,19 @@ name one fails, and cannot give a result that Snakemake would not renew.
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_type_hints
+from typing import Any, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter
+from pydantic import TypeAdapter
 
 import biogrip
-from biogrip.study.case_blocks import METHOD_BLOCKS, CaseBlock
+from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.config import StudyConfig
-from biogrip.study.plain import built
+from biogrip.study.plain import adapter
 from biogrip.study.study import Case, Study
-
-_Block = TypeVar("_Block", bound=BaseModel)
 
 
 def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any]:
@@ -83,66 +81,43 @@ def _value(blocks: Iterable[Mapping[str, Any]], key: str) -> Any:
 
 
 @cache
-def _adapter(kind: type[BaseModel], name: str) -> TypeAdapter[Any]:
-    field = kind.model_fields[name]
-    annotation: Any = field.annotation
-    for each in field.metadata:
-        annotation = Annotated[annotation, each]
-    return TypeAdapter(list[annotation], config=ConfigDict(strict=True, extra="forbid"))
+def _adapter(kind: type, name: str) -> TypeAdapter[Any]:
+    return adapter(get_type_hints(kind, include_extras=True)[name])
 
 
-def _field(kind: type[BaseModel], name: str, value: Any) -> Any:
-    """Return a field as its class holds it, given its plain value or None for its default."""
-    if value is None:
-        return kind.model_fields[name].get_default(call_default_factory=True)
-    return _adapter(kind, name).validate_json(json.dumps([value]))[0]
+@cache
+def _with_only(kind: Any, given: frozenset[str]) -> Any:
+    """Return a class like that of a block, in which all other fields are errors."""
+    absent = {field.name for field in fields(kind)} - given
 
-
-def _partial(kind: type[_Block], given: Mapping[str, Any]) -> _Block:
-    """Return a block with only the keys that are given."""
-    block = kind.model_construct()
-    values: dict[str, Any] = {}
-    parts: dict[str, dict[str, Any]] = {}
-    for key, value in given.items():
-        name, _, inner = key.partition(".")
-        if name not in kind.model_fields:
-            continue
-        if inner:
-            parts.setdefault(name, {})[inner] = value
-        else:
-            values[name] = _field(kind, name, value)
-    for name, part in parts.items():
-        values[name] = _part(kind.model_fields[name].annotation, part)
-    vars(block).clear()
-    vars(block).update(values)
-    extra = {name: given[name] or {} for name in METHOD_BLOCKS if name in given}
-    object.__setattr__(block, "__pydantic_extra__", extra)
-    return block
-
-
-def _part(kind: Any, given: Mapping[str, Any]) -> Any:
-    """Return a block of a dataclass with only the keys that are given."""
-    assert is_dataclass(kind)
-    absent = {field.name for field in fields(kind)} - given.keys()
-
-    class Part(kind):  # type: ignore[misc, valid-type]
+    class Part(kind):  # type: ignore[misc]
         def __getattribute__(self, name: str) -> Any:
             if name in absent:
                 raise AttributeError(f"{name} is not among the keys that the rule names.")
             return super().__getattribute__(name)
 
-    part = object.__new__(Part)
-    plain = {name: value for name, value in given.items() if value is not None}
-    hints = get_type_hints(kind, include_extras=True)
-    for field in fields(kind):
-        if field.name in plain:
-            value = built(hints[field.name], plain[field.name])
-        elif field.name in given:
-            value = field.default
+    return Part
+
+
+def _partial(kind: Any, given: Mapping[str, Any]) -> Any:
+    """Return a block with only the keys that are given; None stands for their default."""
+    parts: dict[str, dict[str, Any]] = {}
+    for key, value in given.items():
+        name, _, inner = key.partition(".")
+        parts.setdefault(name, {})[inner] = value
+    own = [field for field in fields(kind) if field.name in parts]
+    block = object.__new__(_with_only(kind, frozenset(field.name for field in own)))
+    for field in own:
+        part = parts[field.name]
+        if "" not in part:
+            value = _partial(get_type_hints(kind)[field.name], part)
+        elif part[""] is not None:
+            value = _adapter(kind, field.name).validate_json(json.dumps([part[""]]))[0]
         else:
-            continue
-        object.__setattr__(part, field.name, value)
-    return part
+            made = field.default_factory
+            value = field.default if made is MISSING else made()
+        object.__setattr__(block, field.name, value)
+    return block
 
 
 def software() -> dict[str, str]:

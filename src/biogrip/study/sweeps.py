@@ -1,20 +1,22 @@
 """Sweeps: grids of cases that differ from a case of the study in two values."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, Tag
 
-from biogrip.keys import BY_KIND, OPEN, Block, Distinct, Printed
-from biogrip.study.case_blocks import CaseBlock
+from biogrip.errors import nearest
+from biogrip.keys import BY_KIND, OPEN, Block, Distinct, Printed, Problem
+from biogrip.study.case_blocks import CaseBlock, Shared
 from biogrip.study.plain import plain
+from biogrip.study.schema import Schema, schema_of
 
 MOST_POINTS = 2000
 _LARGEST = 1e12
-_LONGEST_TEXT = 60
+_LONGEST_TEXT, _LONGEST_NAME = 60, 200
 
 _Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST), Tag("a number")]
 _Text = Annotated[str, Field(max_length=_LONGEST_TEXT), Tag("text")]
@@ -100,6 +102,23 @@ class AxisBlock(Block):
         shown = value if isinstance(value, str) else f"{value / self.unit_in_si:.4g}"
         return Value(_word(value), _text(value), shown, dict.fromkeys(self.keys, value))
 
+    def problems(self) -> Iterator[Problem]:
+        """Refuse values of one name, and keys that no case may change: blocks change blocks."""
+        kinds = {isinstance(value, ValueBlock) for value in self.values}
+        if len(kinds) > 1:
+            yield ("values",), "holds blocks and single values; allowed is one kind of them."
+            return
+        allowed = [key for key, is_block in _dotted(schema_of(Shared)) if is_block in kinds]
+        for key in self.keys:
+            if key not in allowed:
+                expected = "a block" if True in kinds else "a single value"
+                text = f"found '{key}', allowed is the key of {expected} that a case may change."
+                yield ("key",), text + nearest(key, allowed)
+        shown = [value.text for value in self.levels]
+        for index, value in enumerate(shown):
+            if value in shown[:index]:
+                yield ("values", index), f"is called '{value}' like one before it."
+
 
 @dataclass(frozen=True)
 class Point:
@@ -139,6 +158,24 @@ class SweepBlock(Block):
             for row, column in product(self.rows.levels, self.columns.levels)
         ]
 
+    def problems(self) -> Iterator[Problem]:
+        """Refuse keys that both axes set."""
+        ours = {key for value in self.rows.levels for key in value.overrides}
+        for index, changing in enumerate(self.columns.levels):
+            for key in ours & changing.overrides.keys():
+                yield ("columns", "values", index), f"sets {key}, which the rows do too."
+
+    def placed(self, point: Point, problem: Problem) -> Problem:
+        """Return a problem of a point's case as one of the value that causes it."""
+        path, text = problem
+        key = ".".join(map(str, path))
+        for axis, value in (("rows", point.row), ("columns", point.column)):
+            if any(f"{key}.".startswith(f"{changed}.") for changed in value.overrides):
+                index = getattr(self, axis).levels.index(value)
+                return (axis, "values", index), f"gives {key}: {text}"
+        shown = f"{point.row.text} and {point.column.text} for {point.case}"
+        return (), f"{shown}: gives {key}: {text}"
+
 
 def list_points(sweeps: Mapping[str, SweepBlock]) -> Iterator[tuple[str, Point]]:
     """Yield every point of all sweeps with its sweep's name."""
@@ -162,6 +199,30 @@ def point_blocks(
             block = _changed(block, key, int(value) if whole else value)
         found[point.name] = block
     return found
+
+
+def name_problems(sweeps: Mapping[str, SweepBlock], cases: Iterable[str]) -> Iterator[Problem]:
+    """Find points whose names are those of cases or other points, or too long for files."""
+    found = {*cases}
+    for sweep, point in list_points(sweeps):
+        text = f"has the point {point.name[:80]}, a name that there is already; allowed is another."
+        if point.name in found:
+            yield (sweep,), text
+        if len(point.name) > _LONGEST_NAME:
+            text = f"has the point {point.name[:60]}..., a name of {len(point.name)} characters; "
+            yield (sweep,), f"{text}allowed are {_LONGEST_NAME} (it names files)."
+            return
+        found.add(point.name)
+
+
+def _dotted(block: Schema, path: str = "") -> Iterator[tuple[str, bool]]:
+    """Yield dotted keys in a block and below, each with True if it is a block itself."""
+    for name, inner in block.keys.items():
+        if inner.keys:
+            yield f"{path}{name}", True
+            yield from _dotted(inner, f"{path}{name}.")
+        elif inner.get("type") in ("number", "integer", "string", "boolean"):
+            yield f"{path}{name}", False
 
 
 def _text(value: float | str) -> str:
