@@ -13,16 +13,16 @@ from biogrip.errors import BiogripError
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
 from biogrip.experiment.truth import Published
-from biogrip.fit.genome import GeneRange
+from biogrip.fit.genome import GeneRange, SearchRange
 from biogrip.fit.methods import METHODS, block_class
 from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.calibration import CalibrationTest
 from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.gripper_block import GripperBlock
 from biogrip.instrument.instrument import Instrument
 from biogrip.instrument.instruments import INSTRUMENTS, KINDS
 from biogrip.keys import BY_KIND, Block, OneOf, Printed, Problem, below
 from biogrip.response.whitening import MOST_SAMPLES
-from biogrip.study.gripper_block import GripperBlock
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.messages import checked
 from biogrip.study.plain import plain
@@ -40,24 +40,6 @@ _MOST_SAMPLES = 10_000_000
 _AnyGripper = Annotated[
     Annotated[dict[str, Any], Tag("a block of keys")] | Annotated[str, Tag("text")], BY_KIND
 ]
-
-
-@dataclass(frozen=True)
-class SearchRange(Block):
-    """Search range of each parameter as allowed values of its genes (Tables 3 and 4)."""
-
-    k: GeneRange
-    k_p: GeneRange
-    c: GeneRange
-    c_p: GeneRange
-    alpha: GeneRange
-
-    def problems(self) -> Iterator[Problem]:
-        """Refuse a range that has exponents of springpots above 1."""
-        highest = self.alpha.exponent[1]
-        if highest > 0:
-            text = f"found {highest}, which makes exponents of springpots above 1; allowed is at "
-            yield ("alpha", "exponent"), f"{text}most 0."
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ from biogrip.study.sweeps import MOST_POINTS, SweepBlock, list_points, name_prob
 SMALLEST_BATCH, LARGEST_BATCH, USUAL_BATCHES = 500, 1000, 8
 """Least and most seeds of a job, and the number of jobs aimed at in between, by default."""
 
-_MOST_BATCHES = 10_000
 _MOST_CASES = 2000
 # Most names listed in a message.
 _SHOWN = 6
@@ -173,11 +172,6 @@ class StudyConfig(Shared):
 
     def problems(self) -> Iterator[Problem]:
         """Find too many jobs, samples that do not fit, and names of nothing that there is."""
-        tests = (case.identifiability.coverage_seeds for case in self.cases.values())
-        seeds = max(self.seeds, *tests, 0)
-        if self.batch_size is not None and seeds > _MOST_BATCHES * self.batch_size:
-            text = f"found {self.batch_size}, which makes {seeds} seeds more than "
-            yield ("batch_size",), f"{text}{_MOST_BATCHES} batches; allowed are larger ones."
         if not self.cases:
             yield ("cases",), "found none, allowed is one or more."
         longest = max((case.protocol.end_s for case in self.cases.values()), default=0.0)

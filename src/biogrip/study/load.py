@@ -1,7 +1,6 @@
 """Loading of config files into a checked study, or messages that name file, line and key."""
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +13,14 @@ from biogrip.study.messages import MISSING, checked
 from biogrip.study.plain import plain
 from biogrip.study.schema import schema_of
 from biogrip.study.source import (
-    ConfigFiles,
     KeyPath,
-    Lines,
+    Source,
     dotted,
+    keys_in,
     overlaid,
+    place,
     read_config,
-    read_places,
+    read_source,
 )
 from biogrip.study.study import Study
 from biogrip.study.sweeps import list_points, point_blocks
@@ -39,25 +39,26 @@ def read_configs(files: Iterable[Path]) -> dict[str, Any]:
 def load_study(
     config: Mapping[str, Any],
     files: Iterable[str | Path],
-    command_line: Iterable[Hashable] = (),
-    over: Iterable[tuple[str, Lines]] = (),
+    command_line: Mapping[str, Any] | None = None,
+    over: Iterable[Source] = (),
 ) -> Study:
     """Check and type a merged config; the files it came from give the line numbers in messages.
 
-    Some top-level keys may be of the command line, and some keys of a row in a table of traces:
-    `over` has the table, and the row's line by key.
+    Some keys may be of the command line, and some of a row in a table of traces: `over` has the
+    table, and the row's line by key.
 
     Raises
     ------
     BiogripError
         Names file, line and key of the first few problems, with what was found and what is allowed.
     """
-    places = replace(read_places(files, command_line), over=tuple(over))
+    typed = ("command line, --config", dict.fromkeys(keys_in(command_line or {})))
+    sources = [*(read_source(Path(file)) for file in files), typed, *over]
     study, problems = checked(StudyConfig, _fill_in(schema_of(StudyConfig).with_numbers(config)))
-    _refuse(problems, places)
+    _refuse(problems, sources)
     assert study is not None
     study = study.chosen
-    _refuse([*_point_problems(study), *_interpretation_problems(study)], places)
+    _refuse([*_point_problems(study), *_interpretation_problems(study)], sources)
     return Study(study)
 
 
@@ -72,27 +73,27 @@ def some_case_problems(block: Mapping[str, Any]) -> list[Problem]:
     return [(path, text) for path, text in checked(CaseBlock, block)[1] if text != MISSING]
 
 
-def _refuse(problems: Iterable[Problem], files: ConfigFiles) -> None:
+def _refuse(problems: Iterable[Problem], sources: Sequence[Source]) -> None:
     """Raise an error that lists the first few problems, if there are any."""
     found: dict[str, None] = {}
     for path, text in problems:
         # A problem in a block that cases inherit is reported once, not once per case.
-        origin = _origin(path, files)
-        found[f"{files.place(origin)}: {dotted(origin)}: {text}"] = None
+        origin = _origin(path, sources)
+        found[f"{place(origin, sources)}: {dotted(origin)}: {text}"] = None
     if found:
         shown = [*found][:_SHOWN]
         more = [f"... and {len(found) - _SHOWN} more."] if len(found) > _SHOWN else []
         raise BiogripError("\n".join(["The study's configuration cannot be used.", *shown, *more]))
 
 
-def _origin(path: KeyPath, files: ConfigFiles) -> KeyPath:
+def _origin(path: KeyPath, sources: Sequence[Source]) -> KeyPath:
     """Return the path of the study-wide key that a case inherits, or the path itself."""
     if len(path) < 3 or path[0] != "cases" or path[2] not in OVERRIDABLE:
         return path
     for length in range(len(path), 2, -1):
-        if files.has(path[:length]):
+        if any(path[:length] in lines for _, lines in sources):
             return path
-        if files.has(path[2:length]):
+        if any(path[2:length] in lines for _, lines in sources):
             break
     return path[2:]
 

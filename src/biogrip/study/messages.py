@@ -17,29 +17,13 @@ from biogrip.traces.units import TIME_UNITS, nearest_unit
 T = TypeVar("T")
 MISSING = "is missing and has no default."
 
-# Keys of earlier versions of the config, by their last two names.
-_RETIRED: dict[tuple[Hashable, ...], str] = {
-    ("models", "inertia"): "no longer needed: targets have the arms' inertia, fits do not. "
-    "Leave it out.",
-    ("readings",): "now called `interpretations`.",
-    ("noise", "relaxing"): "now called `ar1`.",
-}
-
 _UNITS = ([*TIME_UNITS], [*ROTATION.units])
 _BOUNDS = {"exclusiveMinimum": "greater than", "minimum": "at least", "maximum": "at most"}
 _MOST, _LONGEST = 1000, 40
 
 
 def checked(kind: Callable[..., T], block: Any) -> tuple[T | None, list[Problem]]:
-    """Build a config block from plain keys and values, or find what is not allowed in it.
-
-    Returns
-    -------
-    block
-        The block; None if it cannot be built.
-    problems
-        Path of a key in the block, and a message: what was found and what is allowed.
-    """
+    """Build a config block from plain keys and values, or find what is not allowed in it."""
     try:
         return built(kind, block, check=True), []
     except ValidationError as error:
@@ -85,8 +69,6 @@ def _text(
     found = error["input"]
     match error["type"]:
         case "extra_forbidden" | "unexpected_keyword_argument":
-            if retired := _RETIRED.get(tuple(path[-2:])):
-                return f"unknown key, {retired}"
             names = [*above.keys]
             return f"unknown key.{nearest(path[-1], names)} Allowed here: {', '.join(names)}."
         case "missing":

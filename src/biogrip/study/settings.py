@@ -31,21 +31,19 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
     study
         The study.
     keys
-        Names of blocks, methods' among them, or of single keys in a block, e.g.
-        ``measurement.noise``; or ``cases.NAME.KEY`` for a key of a case with the study's blocks
-        merged in.
+        Names of blocks, or of single keys in a block, e.g. ``measurement.noise``; or
+        ``cases.NAME.KEY`` for a key of a case with the study's blocks merged in.
     case
         Name of the case, or of a point of a sweep; by default the study's own keys.
+
+    Returns
+    -------
+    values
+        By key; None for a default.
     """
-    found = {}
-    for key in keys:
-        of, name, inner = (*key.split(".", 2), "", "")[:3]
-        if of == "cases":
-            found[key] = study.cases[name].plain[inner]
-        else:
-            blocks = [study.case(case).plain, study.plain] if case else [study.plain]
-            found[key] = _value(blocks, key)
-    return found
+    blocks = study.case(case).plain if case else {}
+    blocks = study.plain | blocks | {"cases": {name: it.plain for name, it in study.cases.items()}}
+    return {key: _value(blocks, key) for key in keys}
 
 
 def keys_of_cases(study: Study) -> list[str]:
@@ -59,25 +57,23 @@ def case_of(name: str, given: Mapping[str, Any]) -> Case:
 
 
 def study_of(given: Mapping[str, Any]) -> Study:
-    """Return a study of which some keys are given, by `settings`."""
-    cases: dict[str, dict[str, Any]] = {}
-    rest = {}
+    """Return a study of which some keys are given, by `settings`; of its cases all are."""
+    own: dict[str, Any] = {}
     for key, value in given.items():
-        of, name, inner = (*key.split(".", 2), "", "")[:3]
+        of, _, inner = key.partition(".")
         if of == "cases":
-            cases.setdefault(name, {})[inner] = value
+            name, _, inner = inner.partition(".")
+            own.setdefault("cases", {}).setdefault(name, {})[inner] = value
         else:
-            rest[key] = value
-    return Study(_partial(StudyConfig, rest | ({"cases": cases} if cases else {})))
+            own[key] = value
+    return Study(_partial(StudyConfig, own))
 
 
-def _value(blocks: Iterable[Mapping[str, Any]], key: str) -> Any:
-    """Return the plain value of a key in the first block that has it; None for its default."""
+def _value(block: Mapping[str, Any] | None, key: str) -> Any:
+    """Return the plain value of a dotted key; None for its default."""
     name, _, inner = key.partition(".")
-    for block in blocks:
-        if name in block:
-            return block[name].get(inner) if inner else block[name]
-    return None
+    value = (block or {}).get(name)
+    return _value(value, inner) if inner else value
 
 
 @cache

@@ -1,9 +1,8 @@
 """Reading of YAML config files: their keys, and the lines of these for messages."""
 
 import re
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,9 @@ from biogrip.errors import BiogripError
 from biogrip.terminal import visible
 
 KeyPath = tuple[Hashable, ...]
-Lines = Mapping[KeyPath, int]
+Lines = Mapping[KeyPath, int | None]
+Source = tuple[str, Lines]
+"""Name of a file or of another source of keys, and the line (from 1) of each that it has."""
 
 LARGEST_BYTES = 1_000_000
 # Aliases of aliases make many values of a few lines, and endless ones of an alias of itself.
@@ -25,51 +26,32 @@ _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _OCTAL = re.compile(r"[-+]?0[0-7_]+")
 
 
-@dataclass(frozen=True)
-class ConfigFiles:
-    """Config files of a study with line numbers, the later merged over the earlier."""
-
-    lines: tuple[tuple[str, Lines], ...]
-    """Line (from 1) of every key and list item, by file."""
-    command_line: frozenset[Hashable] = frozenset()
-    """Top-level keys set on the command line, which override all files."""
-    over: tuple[tuple[str, Lines], ...] = ()
-    """Lines of the keys of a row in a table of traces, by the table, which override even these."""
-
-    def place(self, path: KeyPath) -> str:
-        """Return where the value in force was set, e.g. ``"config/my.yaml, line 7"``.
-
-        For a missing key it is the block that lacks it.
-        """
-        if found := _line_of(path, self.over):
-            return found
-        if path and path[0] in self.command_line:
-            return "command line, --config"
-        names = " with ".join(name for name, _ in self.lines)
-        return _line_of(path, self.lines) or names or "the configuration"
-
-    def has(self, path: KeyPath) -> bool:
-        """Return True if a file or a row has a key."""
-        return any(path in lines for _, lines in (*self.lines, *self.over))
+def keys_in(block: Any, above: KeyPath = ()) -> Iterator[KeyPath]:
+    """Yield the paths of all keys of a block and of the blocks below."""
+    for key, inner in block.items() if isinstance(block, Mapping) else ():
+        yield (*above, key)
+        yield from keys_in(inner, (*above, key))
 
 
-def _line_of(path: KeyPath, files: Sequence[tuple[str, Lines]]) -> str | None:
-    """Return the last of some files that has a key, or a block that it is in, and the line."""
-    for length in range(len(path), 0, -1):
-        for name, lines in reversed(files):
-            if path[:length] in lines:
-                return f"{name}, line {lines[path[:length]]}"
-    return None
+def place(path: KeyPath, sources: Sequence[Source]) -> str:
+    """Return which source has a key or a block around it, and where, e.g. ``"my.yaml, line 7"``.
 
-
-def read_places(files: Iterable[str | Path], command_line: Iterable[Hashable] = ()) -> ConfigFiles:
-    """Read the line numbers of all keys in YAML files, the later merged over the earlier.
-
-    Top-level keys set on the command line override all files. A `BiogripError` says why a file is
-    no config at all, see `read_config`.
+    The last of those that have most of the path; for a missing key it is the block that lacks it.
     """
-    lines = tuple((shown_path(Path(file)), _read(Path(file))[0]) for file in files)
-    return ConfigFiles(lines, frozenset(command_line))
+    for length in range(len(path), 0, -1):
+        for name, lines in reversed(sources):
+            if path[:length] in lines:
+                line = lines[path[:length]]
+                return f"{name}, line {line}" if line else name
+    return " with ".join(name for name, _ in sources) or "the configuration"
+
+
+def read_source(file: Path) -> Source:
+    """Return the name of a YAML file, and the lines of all keys and list items in it.
+
+    A `BiogripError` says why it is no config at all, see `read_config`.
+    """
+    return shown_path(file), _read(file)[0]
 
 
 def read_config(file: Path) -> dict[str, Any]:

@@ -49,7 +49,7 @@ class Case:
 
     # What other modules need of the blocks, by the names that it has there.
     recorded = _of_case(lambda case: case.block.recorded)
-    actuator = _of_case(lambda case: case.study.actuator)
+    actuator = _of_case(lambda case: case.study.config.actuator)
     instrument = _of_case(lambda case: case.block.instrument_used)
     size_m = _of_case(lambda case: case.block.sample.size_m)
     published = _of_case(lambda case: case.block.published or UNPUBLISHED)
@@ -77,11 +77,9 @@ class Case:
     """Sample model without fixed parameters."""
     samples = _of_case(lambda case: len(case.sampling.over(torque_history(case.phases).end_s)))
     """Number of samples in a simulated trace."""
-    methods = _of_case(lambda case: {name: case.method(name) for name in case.study.methods})
+    methods = _of_case(lambda case: {it: case.method(it) for it in case.study.config.methods})
     """Settings of the study's identification methods by name."""
-    least_squares = _of_case(
-        lambda case: cast("LeastSquaresSettings", case.method("least_squares"))
-    )
+    least_squares = _of_case(lambda it: cast("LeastSquaresSettings", it.method("least_squares")))
     """Settings of the least-squares fits that judgements are based on."""
     genetic = _of_case(lambda case: cast("GeneticSettings", case.method("genetic")))
     """Settings of the genetic algorithm."""
@@ -229,9 +227,7 @@ class Study:
         lambda study: study._where(lambda case: not case.recorded and case.instrument.has_jaws)
     )
     """Names of simulated cases whose sample the gripper holds."""
-    has_gripper = _of_study(
-        lambda study: any(it.instrument.has_jaws for it in study.cases.values())
-    )
+    has_gripper = _of_study(lambda study: study._where(lambda it: it.instrument.has_jaws) != [])
     """True if the gripper holds the sample of any case."""
     covered = _of_study(lambda study: study._where(lambda case: case.coverage_seeds > 0))
     """Names of cases whose intervals are tested for coverage."""

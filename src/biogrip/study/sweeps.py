@@ -16,7 +16,7 @@ from biogrip.study.schema import Schema, schema_of
 
 MOST_POINTS = 2000
 _LARGEST = 1e12
-_LONGEST_TEXT, _LONGEST_NAME = 60, 200
+_LONGEST_TEXT = 60
 
 _Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST), Tag("a number")]
 _Text = Annotated[str, Field(max_length=_LONGEST_TEXT), Tag("text")]
@@ -162,7 +162,7 @@ class SweepBlock(Block):
         """Refuse keys that both axes set."""
         ours = {key for value in self.rows.levels for key in value.overrides}
         for index, changing in enumerate(self.columns.levels):
-            for key in ours & changing.overrides.keys():
+            for key in sorted(ours & changing.overrides.keys()):
                 yield ("columns", "values", index), f"sets {key}, which the rows do too."
 
     def placed(self, point: Point, problem: Problem) -> Problem:
@@ -202,16 +202,12 @@ def point_blocks(
 
 
 def name_problems(sweeps: Mapping[str, SweepBlock], cases: Iterable[str]) -> Iterator[Problem]:
-    """Find points whose names are those of cases or other points, or too long for files."""
+    """Find points that have the names of cases or of other points."""
     found = {*cases}
     for sweep, point in list_points(sweeps):
-        text = f"has the point {point.name[:80]}, a name that there is already; allowed is another."
         if point.name in found:
+            text = f"has the point {point.name}, a name that there is already; allowed is another."
             yield (sweep,), text
-        if len(point.name) > _LONGEST_NAME:
-            text = f"has the point {point.name[:60]}..., a name of {len(point.name)} characters; "
-            yield (sweep,), f"{text}allowed are {_LONGEST_NAME} (it names files)."
-            return
         found.add(point.name)
 
 
