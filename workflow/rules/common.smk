@@ -13,7 +13,7 @@ from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.defaults import default_config, shipped
 from biogrip.study.load import load_study, read_configs
-from biogrip.study.settings import keys_of_cases, settings, software
+from biogrip.stages.settings import keys_of_cases, settings, software
 from biogrip.study.source import overlaid
 
 try:

@@ -21,7 +21,7 @@ from biogrip.experiment.models import MODELS
 from biogrip.identify.many_traces import COLUMNS
 from biogrip.identify.one_trace import IdentifyOptions, study_of
 from biogrip.study.case_blocks import CaseBlock
-from biogrip.study.load import some_case_problems
+from biogrip.study.messages import checked
 from biogrip.study.schema import Schema, schema_of
 from biogrip.study.source import overlaid, scalar_problem
 from biogrip.study.study import Case
@@ -201,7 +201,7 @@ def _value(name: str, schema: Schema, text: str) -> tuple[Any, str | None]:
             value = text
     for part in reversed(path):
         value = {part: value}
-    problems = [text for at, text in some_case_problems(value) if at[: len(path)] == path]
+    problems = [text for at, text in checked(CaseBlock, value)[1] if at[: len(path)] == path]
     return value, next(iter(problems), None)
 
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, make_dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, Tag
@@ -83,7 +82,9 @@ class _Given(Block):
     """The no-load test of each arm (end of section 2), for cases whose assumed_gripper is
     `calibrated`."""
     identifiability: Identifiability
-    fixed: Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]] | None = None
+    fixed: Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]] = field(
+        default_factory=dict
+    )
     """Known values of parameters, by name; these are not identified. 0 leaves an element out."""
 
     def method(self, name: str) -> object:
@@ -146,19 +147,14 @@ class CaseBlock(Shared):
         return (named or fitting)[0]
 
     @property
-    def known(self) -> Mapping[str, float]:
-        """Parameters with known values, which are not identified."""
-        return self.fixed or {}
-
-    @property
     def searched(self) -> list[Parameter]:
         """Parameters that are identified."""
-        return [p for p in self.sample.sample.model.parameters if p.name not in self.known]
+        return [p for p in self.sample.sample.model.parameters if p.name not in self.fixed]
 
     def problems(self) -> Iterator[Problem]:
         """Find blocks that are in conflict."""
         model = self.sample.sample.model
-        yield from below(("fixed",), fixed_problems(model, self.known))
+        yield from below(("fixed",), fixed_problems(model, self.fixed))
         yield from self._instrument_problems()
         if model.power_law:
             yield from self._band_problems()
@@ -251,37 +247,25 @@ class CaseBlock(Shared):
     def _sampling_problems(self) -> Iterator[Problem]:
         """Find too few or too many samples, or such as do not follow each other in the protocol."""
         measured, end = self.measurement, self.protocol.end_s
+        key = "bursts" if measured.bursts else "times_s" if measured.times_s else "rate_Hz"
+        bursts = sum(burst.samples for burst in measured.bursts)
+        samples = bursts or len(measured.times_s) or end * measured.rate_Hz + 1
         needed = len(self.searched) + measured.fits_offset + measured.fits_drift + 1
-        if measured.bursts:
-            given = sum(burst.samples for burst in measured.bursts)
-            if not needed <= given <= _MOST_SAMPLES:
-                text = f"found {counted(given, 'sample')}, allowed are "
-                yield ("bursts",), f"{text}{needed} to {_MOST_SAMPLES}."
-                return
-        elif measured.times_s:
-            if len(measured.times_s) < needed:
-                text = f"found {len(measured.times_s)} times, allowed are at least {needed}."
-                yield ("times_s",), text
-        else:
-            samples = end * measured.rate_Hz + 1
-            most = MOST_SAMPLES if measured.coloured else _MOST_SAMPLES
-            if not needed <= samples <= most:
-                text = f"found {measured.rate_Hz:g}, which gives "
-                text += counted(f"{samples:.6g}", "sample")
-                how = " with a coloured noise model" if measured.coloured else ""
-                text += f" over the protocol; allowed are {needed} to {most}{how}."
-                yield ("rate_Hz",), text
-        for index, (before, after) in enumerate(pairwise(measured.times_s), start=1):
-            if not before < after <= end:
-                text = f"found {after:g}, allowed is later than {before:g} and at most {end:g} s."
-                yield ("times_s", index), text
-                return
+        coloured = measured.coloured and key == "rate_Hz"
+        most = MOST_SAMPLES if coloured else _MOST_SAMPLES
+        if not needed <= samples <= most:
+            text = f"found {measured.rate_Hz:g}, which gives " if key == "rate_Hz" else "found "
+            text += f"{counted(f'{samples:.6g}', 'sample')} over the protocol; allowed are {needed}"
+            how = " with a coloured noise model" if coloured else ""
+            yield (key,), f"{text} to {most}{how}."
+            return
+        spans = [(it.from_s, it.from_s + (it.samples - 1) / it.rate_Hz) for it in measured.bursts]
         last = -1.0
-        for index, burst in enumerate(measured.bursts):
-            ends = burst.from_s + (burst.samples - 1) / burst.rate_Hz
-            if not last < burst.from_s <= ends <= end:
-                text = f"found one from {burst.from_s} to {ends} s, allowed is after {max(last, 0)}"
-                yield ("bursts", index), f"{text} and at most until {end} s."
+        for index, (first, ends) in enumerate(spans or [(time, time) for time in measured.times_s]):
+            if not last < first <= ends <= end:
+                text = f"found {first:g}" if first == ends else f"found {first:g} to {ends:g}"
+                text += f", allowed is later than {max(last, 0):g} and at most {end:g} s."
+                yield (key, index), text
                 return
             last = ends
 

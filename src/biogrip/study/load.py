@@ -8,8 +8,7 @@ from biogrip.errors import BiogripError
 from biogrip.keys import Problem, below
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig
-from biogrip.study.measurement_block import MeasurementBlock
-from biogrip.study.messages import MISSING, checked
+from biogrip.study.messages import checked
 from biogrip.study.plain import plain
 from biogrip.study.schema import schema_of
 from biogrip.study.source import (
@@ -60,17 +59,6 @@ def load_study(
     study = study.chosen
     _refuse([*_point_problems(study), *_interpretation_problems(study)], sources)
     return Study(study)
-
-
-def measurement_problem(key: str, value: Any) -> str | None:
-    """Return what is wrong with the value of a single key of a measurement, or None."""
-    found = checked(MeasurementBlock, {key: value})[1]
-    return next((text for path, text in found if path == (key,)), None)
-
-
-def some_case_problems(block: Mapping[str, Any]) -> list[Problem]:
-    """Return what is wrong in some blocks of a case, whatever the case lacks."""
-    return [(path, text) for path, text in checked(CaseBlock, block)[1] if text != MISSING]
 
 
 def _refuse(problems: Iterable[Problem], sources: Sequence[Source]) -> None:

@@ -14,6 +14,7 @@ from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genetic_settings import GeneticSettings
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.methods import METHODS, Method
+from biogrip.instrument.contact import Contact
 from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Gripper
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
@@ -69,7 +70,7 @@ class Case:
     """Config block as plain values, without keys that have their default."""
     seeds = _of_case(lambda case: 1 if case.recorded else case.study.config.seeds)
     """Number of traces; 1 for a recorded trace."""
-    fixed = _of_case(lambda case: {name: float(it) for name, it in case.block.known.items()})
+    fixed = _of_case(lambda case: {name: float(it) for name, it in case.block.fixed.items()})
     """Parameters that are not identified, by name."""
     truth = _of_case(lambda case: Truth(case.title, case.sample, case.parameters, case.published))
     """True values of the sample, with the paper's results."""
@@ -114,23 +115,24 @@ class Case:
         return self.block.protocol.make_phases(self.instrument, self.actuator)
 
     @cached_property
+    def _contact(self) -> Contact | None:
+        """State of the gripper when it is closed onto the sample, if its size is known."""
+        size_m = self.block.sample.size_m
+        return None if size_m is None else self.block.gripper.contact(self.actuator, size_m)
+
+    @cached_property
     def gripper(self) -> Gripper:
         """True gripper, at the angle at which the jaws touch the sample; or none."""
         if not self.instrument.has_jaws:
             return NO_ARMS
-        neutral = self.block.gripper.neutral
-        if self.size_m is None:
-            return neutral
-        touching = self.block.gripper.contact(self.actuator, self.size_m)
-        return replace(neutral, reference_angle_deg=touching.reference_angle_deg)
+        neutral, at = self.block.gripper.neutral, self._contact
+        return replace(neutral, reference_angle_deg=at.reference_angle_deg) if at else neutral
 
     @property
     def stroke_rad(self) -> float:
         """Rotation left for gripping: the comb drive's stroke minus closing onto the sample."""
-        stroke = math.radians(self.actuator.stroke_deg)
-        if self.size_m is None:
-            return stroke
-        return stroke - self.block.gripper.contact(self.actuator, self.size_m).closing_rad
+        closing_rad = self._contact.closing_rad if self._contact else 0.0
+        return math.radians(self.actuator.stroke_deg) - closing_rad
 
     @cached_property
     def problem(self) -> CaseProblem:

@@ -134,11 +134,6 @@ class Point:
     column: Value
     """Value on the axis of the columns."""
 
-    @property
-    def overrides(self) -> dict[str, float | str]:
-        """Values that replace those of the case, by dotted key."""
-        return {**self.row.overrides, **self.column.overrides}
-
 
 @dataclass(frozen=True)
 class SweepBlock(Block):
@@ -193,7 +188,7 @@ def point_blocks(
     blocks = {name: plain(case) for name, case in cases.items()} if sweeps else {}
     for _, point in list_points(sweeps):
         block = blocks[point.case]
-        for key, value in point.overrides.items():
+        for key, value in (point.row.overrides | point.column.overrides).items():
             # A key that counts takes no 8.0.
             whole = isinstance(value, float) and value.is_integer()
             block = _changed(block, key, int(value) if whole else value)
