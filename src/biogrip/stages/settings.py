@@ -19,7 +19,7 @@ from pydantic import TypeAdapter
 import biogrip
 from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.config import StudyConfig
-from biogrip.study.plain import adapter
+from biogrip.study.plain import STRICT
 from biogrip.study.study import Case, Study
 
 
@@ -78,7 +78,8 @@ def _value(block: Mapping[str, Any] | None, key: str) -> Any:
 
 @cache
 def _adapter(kind: type, name: str) -> TypeAdapter[Any]:
-    return adapter(get_type_hints(kind, include_extras=True)[name])
+    hint = get_type_hints(kind, include_extras=True)[name]
+    return TypeAdapter(list[hint], config=STRICT)  # type: ignore[valid-type]
 
 
 @cache

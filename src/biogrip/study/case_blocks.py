@@ -69,23 +69,36 @@ class Identifiability(Block):
 class _Given(Block):
     """Blocks that a study sets for all cases, and that a case may change for itself."""
 
-    instrument: Annotated[str, OneOf(KINDS)] = GRIPPER.kind
-    """`gripper`: a torque is held and a rotation read; `creep`: a force is held and a displacement
-    read, or a stress and a strain; `relaxation`: the other way round. The blocks gripper, actuator
-    and calibration are of the first alone."""
+    # With descriptions, for docstrings below fields are not inherited.
+    instrument: Annotated[
+        str,
+        OneOf(KINDS),
+        Field(
+            description="`gripper`: a torque is held and a rotation read; `creep`: a force is held "
+            "and a displacement read, or a stress and a strain; `relaxation`: the other way round. "
+            "The blocks gripper, actuator and calibration are of the first alone."
+        ),
+    ] = GRIPPER.kind
     gripper: GripperBlock
     protocol: ProtocolBlock
     measurement: MeasurementBlock
     search_range: SearchRange
     models: Equations
-    calibration: CalibrationTest
-    """The no-load test of each arm (end of section 2), for cases whose assumed_gripper is
-    `calibrated`."""
+    calibration: Annotated[
+        CalibrationTest,
+        Field(
+            description="The no-load test of each arm (end of section 2), for cases whose "
+            "assumed_gripper is `calibrated`."
+        ),
+    ]
     identifiability: Identifiability
-    fixed: Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]] = field(
-        default_factory=dict
-    )
-    """Known values of parameters, by name; these are not identified. 0 leaves an element out."""
+    fixed: Annotated[
+        Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]],
+        Field(
+            description="Known values of parameters, by name; these are not identified. 0 leaves "
+            "an element out."
+        ),
+    ] = field(default_factory=dict)
 
     def method(self, name: str) -> object:
         """Return the settings object of a method."""
@@ -143,6 +156,8 @@ class CaseBlock(Shared):
         kind = _of_kind(self.instrument)
         bases = self.protocol.phases[0].bases
         fitting = [each for each in kind if each.controlled.column in bases] or kind
+        if len(fitting) == 1:
+            return fitting[0]
         named = [each for each in fitting if each.read.name in self.measurement.readings]
         return (named or fitting)[0]
 

@@ -8,13 +8,14 @@ from typing import Any, TypeVar
 from pydantic import ConfigDict, TypeAdapter
 
 T = TypeVar("T")
+STRICT = ConfigDict(strict=True, extra="forbid")
 
 
 @cache
 def adapter(kind: Any) -> TypeAdapter[Any]:
     """Return what pydantic checks, builds and writes a list of blocks with."""
     # Pydantic takes a configuration for a list of dataclasses, and none for a dataclass alone.
-    return TypeAdapter(list[kind], config=ConfigDict(strict=True, extra="forbid"))
+    return TypeAdapter(list[kind], config=STRICT)
 
 
 def built(kind: Callable[..., T], block: Any, *, check: bool = False) -> T:

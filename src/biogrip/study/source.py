@@ -27,8 +27,9 @@ _OCTAL = re.compile(r"[-+]?0[0-7_]+")
 
 
 def keys_in(block: Any, above: KeyPath = ()) -> Iterator[KeyPath]:
-    """Yield the paths of all keys of a block and of the blocks below."""
-    for key, inner in block.items() if isinstance(block, Mapping) else ():
+    """Yield the paths of all keys and list items of a block and of the blocks below."""
+    items = enumerate(block) if isinstance(block, list) else ()
+    for key, inner in block.items() if isinstance(block, Mapping) else items:
         yield (*above, key)
         yield from keys_in(inner, (*above, key))
 
