@@ -179,8 +179,12 @@ class CaseBlock(Shared):
         for name in METHOD_BLOCKS:
             if hasattr(settings := getattr(self, name), "problems_of"):
                 yield from below((name,), settings.problems_of(genes))
-        if isinstance(self.assumed_gripper, str):
-            yield from self._calibration_problems(self.assumed_gripper)
+        if self.assumed_gripper == CALIBRATED:
+            arms = self.gripper.left, self.gripper.right
+            yield from below(("calibration",), self.calibration.problems_of(arms))
+        elif isinstance(self.assumed_gripper, str):
+            text = f"found '{self.assumed_gripper}', allowed is '{CALIBRATED}' or keys of a "
+            yield ("assumed_gripper",), f"{text}gripper block."
         elif self.assumed_gripper is not None:
             believed = overlaid(plain(self.gripper.neutral), self.assumed_gripper)
             yield from below(("assumed_gripper",), checked(Gripper, believed)[1])
@@ -283,22 +287,6 @@ class CaseBlock(Shared):
                 yield (key, index), text
                 return
             last = ends
-
-    def _calibration_problems(self, assumed: str) -> Iterator[Problem]:
-        """Refuse a calibration test that samples a free arm's ringing too slowly or too briefly."""
-        if assumed != CALIBRATED:
-            text = f"found '{assumed}', allowed is '{CALIBRATED}' or keys of a gripper block."
-            yield ("assumed_gripper",), text
-            return
-        test, arms = self.calibration, (self.gripper.left, self.gripper.right)
-        frequency = max(arm.natural_frequency_Hz for arm in arms)
-        if test.rate_Hz < 10 * frequency:
-            text = f"found {test.rate_Hz}, allowed is at least ten times the arms' natural"
-            yield ("calibration", "rate_Hz"), f"{text} frequency, {10 * frequency:.4g} Hz."
-        most = _MOST_SAMPLES / test.rate_Hz
-        if not 5 / frequency <= test.duration_s <= most:
-            text = f"found {test.duration_s}, allowed is from five periods of the arms' ring, "
-            yield ("calibration", "duration_s"), f"{text}{5 / frequency:.3g} s, to {most:.3g} s."
 
 
 def _of_kind(kind: str) -> list[Instrument]:

@@ -106,19 +106,8 @@ def _interpretation_problems(study: StudyConfig) -> Iterator[Problem]:
 
 def _fill_in(config: Mapping[str, Any]) -> Mapping[str, Any]:
     """Merge the study's blocks into every case; drop cases set to nothing."""
-    cases = config.get("cases")
-    if not isinstance(cases, dict):
+    if not isinstance(cases := config.get("cases"), dict):
         return config
-    filled = {}
-    for name, case in cases.items():
-        if case is None:
-            continue
-        if isinstance(case, dict):
-            case = dict(case)
-            for block in OVERRIDABLE:
-                if isinstance(config.get(block), dict):
-                    case[block] = overlaid(config[block], case.get(block, {}))
-                elif block in config:
-                    case.setdefault(block, config[block])
-        filled[name] = case
+    shared = {name: config[name] for name in OVERRIDABLE if name in config}
+    filled = {name: overlaid(shared, case) for name, case in cases.items() if case is not None}
     return {**config, "cases": filled}

@@ -167,10 +167,9 @@ class MeasurementBlock(Block):
                 yield (key,), "does not go with sd, which says all of the noise."
         if self.scale == 0:
             yield ("scale",), "found 0, allowed is another number."
-        if self.fit_start and self.start_s is not None:
-            yield ("fit_start",), "does not go with start_s; allowed is one of them."
-        if self.bursts and self.times_s:
-            yield ("bursts",), "does not go with times_s; allowed is one of them."
+        for key, other in (("bursts", "times_s"), ("fit_start", "start_s")):
+            if getattr(self, key) and getattr(self, other) not in (None, ()):
+                yield (key,), f"does not go with {other}; allowed is one of them."
         if self.file is None:
             for key in _OF_FILE:
                 given = getattr(self, key)
@@ -191,8 +190,9 @@ class MeasurementBlock(Block):
         name, *others = self.readings
         for other in others:
             yield (other,), f"does not go with {name}; allowed is one of {', '.join(READINGS)}."
-        wrong, right = "reading_unit", "rotation_unit"
-        wrong, right = (wrong, right) if name == ROTATION.name else (right, wrong)
+        right, wrong = "rotation_unit", "reading_unit"
+        if name != ROTATION.name:
+            right, wrong = wrong, right
         if getattr(self, wrong) is not None:
             yield (wrong,), f"does not go with {name}; allowed is {right}."
         allowed = INSTRUMENTS[name].read.units

@@ -1,6 +1,6 @@
 """Messages about config values, from pydantic's errors: what was found, and what is allowed."""
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -9,7 +9,7 @@ from pydantic_core import ErrorDetails
 from biogrip.digits import counted
 from biogrip.errors import nearest
 from biogrip.instrument.gripper import ROTATION
-from biogrip.keys import CONFLICT, TWICE, Problem
+from biogrip.keys import CONFLICT, TWICE, Problem, kind_of
 from biogrip.study.plain import built
 from biogrip.study.schema import Schema, schema_of
 from biogrip.traces.units import TIME_UNITS, nearest_unit
@@ -29,11 +29,7 @@ def checked(kind: Callable[..., T], block: Any) -> tuple[T | None, list[Problem]
     except ValidationError as error:
         errors = error.errors(include_url=False)
     errors.sort(key=lambda error: [str(part) for part in error["loc"]])
-    # A list whose items are not valid is not too short besides.
-    explained = [
-        _explained(schema_of(kind), it) for it in errors[:_MOST] if not _is_long_enough(it)
-    ]
-    return None, explained
+    return None, [_explained(schema_of(kind), it) for it in errors[:_MOST] if not _follows(it)]
 
 
 def bound(limit: float) -> str:
@@ -59,7 +55,8 @@ def _explained(schema: Schema, error: ErrorDetails) -> Problem:
     return path[:-1] if of_name and error["type"] == "literal_error" else path, text
 
 
-def _is_long_enough(error: ErrorDetails) -> bool:
+def _follows(error: ErrorDetails) -> bool:
+    """Return True if a list is called too short because its items are not valid."""
     return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
 
 
@@ -106,11 +103,8 @@ def _text(
 
 
 def _shown(value: Any) -> str:
-    if value is None:
-        return "nothing"
-    if isinstance(value, Mapping):
-        return "a block of keys"
-    if isinstance(value, list):
-        return "a list"
+    kind = "nothing" if value is None else kind_of(value)
+    if kind in ("nothing", "a block of keys", "a list"):
+        return kind
     text = repr(value)
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."

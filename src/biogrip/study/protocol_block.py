@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from biogrip.experiment.protocol import Load, Phase, largest_load, load
+from biogrip.experiment.protocol import Phase, largest_load, load
 from biogrip.instrument.actuator import CombDrive, capacitance_slope
 from biogrip.instrument.instrument import Instrument
 from biogrip.instrument.instruments import CONTROLLED
@@ -87,17 +87,15 @@ class PhaseBlock(Block):
 
     def phase(self, per_square_volt: float) -> Phase:
         """Return the phase in torques; a voltage's torque is `per_square_volt` V^2 (eq. 9)."""
-        if self.voltage_V is not None:
-            left = self._load(self.voltage_V, self.to_voltage_V, self.amplitude_V)
-            loads = left, _at(left, self.voltage_right_V)
-            return Phase(self.duration_s, *(load.squared(per_square_volt) for load in loads))
         (base,) = self.bases
-        keys = (base, *further_keys(base))
-        left = self._load(*(getattr(self, key) for key in keys))
-        return Phase(self.duration_s, left, _at(left, self.torque_right_Nm))
-
-    def _load(self, value: float, to: float | None, amplitude: float | None) -> Load:
-        return load(self.duration_s, value, to, amplitude, self.frequency_Hz)
+        value, to, amplitude = (getattr(self, key) for key in (base, *further_keys(base)))
+        left = right = load(self.duration_s, value, to, amplitude, self.frequency_Hz)
+        of_right = getattr(self, base.replace("_", "_right_")) if base in _PULLS else None
+        if of_right is not None:
+            right = replace(left, value_Nm=of_right)
+        if base == _VOLTAGE:
+            left, right = left.squared(per_square_volt), right.squared(per_square_volt)
+        return Phase(self.duration_s, left, right)
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that are in conflict."""
@@ -178,7 +176,3 @@ class ProtocolBlock(Block):
 def further_keys(base: str) -> tuple[str, str]:
     """Return the keys of a ramp's end and of a sinusoid's amplitude."""
     return f"to_{base}", f"amplitude_{base.rpartition('_')[2]}"
-
-
-def _at(load: Load, value: float | None) -> Load:
-    return load if value is None else replace(load, value_Nm=value)

@@ -47,10 +47,8 @@ class Schema:
     @property
     def values(self) -> "Schema":
         """Values of keys that have no names of their own."""
-        named = self.get("patternProperties")
-        return self.within(
-            next(iter(named.values())) if named else self.get("additionalProperties")
-        )
+        named = self.get("patternProperties") or {"": self.get("additionalProperties")}
+        return self.within(next(iter(named.values())))
 
     @property
     def options(self) -> "list[Schema]":

@@ -20,7 +20,6 @@ Source = tuple[str, Lines]
 LARGEST_BYTES = 1_000_000
 # Aliases of aliases make many values of a few lines, and endless ones of an alias of itself.
 _MOST_KEYS, _DEEPEST = 100_000, 50
-_LONGEST_NAME = 80
 # libyaml is ten times faster, but not part of every PyYAML.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _OCTAL = re.compile(r"[-+]?0[0-7_]+")
@@ -48,10 +47,7 @@ def place(path: KeyPath, sources: Sequence[Source]) -> str:
 
 
 def read_source(file: Path) -> Source:
-    """Return the name of a YAML file, and the lines of all keys and list items in it.
-
-    A `BiogripError` says why it is no config at all, see `read_config`.
-    """
+    """Return the name of a YAML file, and the lines of all in it; see `read_config` for errors."""
     return shown_path(file), _read(file)[0]
 
 
@@ -86,7 +82,6 @@ def dotted(path: KeyPath) -> str:
     text = ""
     for part in path:
         name = visible(part)
-        name = name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}..."
         text += f"[{name}]" if isinstance(part, int) else f".{name}" if text else name
     return text or "the file"
 

@@ -237,6 +237,9 @@ class Study:
     """Names of cases that the paper reports results of."""
     identifiers = _of_study(lambda study: {name: METHODS[name] for name in study.methods})
     """Declarations of the methods, by name."""
+    interpretation_titles = _of_study(
+        lambda study: {name: it.title for name, it in study.config.interpretations.items()}
+    )
     shown = _of_study(lambda study: study.methods[0])
     """Method that tables and figures of a single method show."""
     shown_method = _of_study(lambda study: METHODS[study.shown])
@@ -270,11 +273,6 @@ class Study:
     def fitting_method(self) -> Method:
         """Least squares if the study has it, else the shown method."""
         return METHODS["least_squares" if "least_squares" in self.methods else self.shown]
-
-    @property
-    def interpretation_titles(self) -> dict[str, str]:
-        """Titles of the interpretations by name."""
-        return {name: block.title for name, block in self.config.interpretations.items()}
 
     @property
     def phases(self) -> tuple[Phase, ...]:

@@ -15,11 +15,9 @@ from biogrip.study.plain import plain
 from biogrip.study.schema import Schema, schema_of
 
 MOST_POINTS = 2000
-_LARGEST = 1e12
-_LONGEST_TEXT = 60
 
-_Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST), Tag("a number")]
-_Text = Annotated[str, Field(max_length=_LONGEST_TEXT), Tag("text")]
+_Number = Annotated[float, Field(ge=-1e12, le=1e12), Tag("a number")]
+_Text = Annotated[str, Field(max_length=60), Tag("text")]
 
 
 class ValueBlock(BaseModel):
