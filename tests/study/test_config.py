@@ -127,7 +127,7 @@ BAD = {
     r"liquid_drop needs k, k_p, c",
     f"cases: {{x: {{{DROP[:-1]}, c_p: 1}}}}}}": r"x.sample.c_p: is no parameter of liquid_drop",
     "cases: {x: {sample: {model: liquid_drop, k: -1, k_p: 1, c: 1}}}": r"x.sample.k: found -1, "
-    r"allowed is at least 1e-18 N/m",
+    r"allowed is at least 1e-18 and at most 1e\+12 N/m",
     "cases: {x: 3}": r"cases.x: found 3, allowed is a block of keys",
     "protocol:\n  phases:\n    - {duration_s: -5, torque_Nm: 1e-9}": r"my.yaml, line 3: "
     r"protocol.phases\[0\].duration_s: found -5, allowed is at least 1e-06 and at most 1e\+09 s",
@@ -201,7 +201,7 @@ BAD = {
     "interpretations: {a: {title: x, changes: {genetic_algorithm: {survivors: 500}}}}": r"line 1: "
     r"interpretations.a.changes.genetic_algorithm.survivors: found 500, allowed is less than",
     f"cases: {{x: {{sample: {{{SOLID}, alpha: 1.0}}}}}}": r"x.sample.alpha: found 1, allowed is "
-    r"above 0 and below 1",
+    r"at least 1e-18 and below 1",
     f"cases: {{x: {{sample: {{{SOLID}, alpha: 0.001}}}}}}": r"x.sample.alpha: found 0.001, which "
     r"is not searched for; allowed is 0.01 to 1, or another search_range",
     f"cases: {{x: {{sample: {{{SOLID}, alpha: 0.3}}, {LONG}}}}}": r"x.sample.model: found a "

@@ -86,7 +86,7 @@ def batches(case, stage):
     """The batches of the traces of a case, or of those that its intervals are tested with."""
     chosen = STUDY.case(case)
     seeds = chosen.coverage_seeds if stage == "coverage" else chosen.seeds
-    return batch_names(seeds, STUDY.batch_size, Path("results", stage, case))
+    return batch_names(seeds, STUDY.config.batch_size, Path("results", stage, case))
 
 
 def files(pattern, cases):
@@ -128,7 +128,7 @@ def names(cases):
 # Cases that have what only some have, those of sweeps' points among them.
 SIMULATED = [*STUDY.simulated, *STUDY.points]
 CALIBRATED = [n for n in [*STUDY.cases, *STUDY.points] if STUDY.case(n).is_calibrated]
-SELECTING = list(STUDY.cases) if STUDY.selects_models else []
+SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
 COUNTED = [name for name in STUDY.covered if STUDY.case(name).verdicts_every == 1]
 calibration_of = only_of(CALIBRATED, "results/calibrations/{case}.yaml")
 

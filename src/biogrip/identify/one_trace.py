@@ -110,7 +110,7 @@ class IdentifyOptions:
         if self.table is None:
             return []
         paths = [
-            ("cases", case, *path) if path[0] == "sample" else path
+            ("cases", case, *path) if path[0] in ("sample", "fixed") else path
             for path in keys_in(self.settings)
             if len(path) > 1
         ]

@@ -19,7 +19,7 @@ from biogrip.instrument.calibration import CalibrationTest
 from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.instrument.gripper_block import GripperBlock
 from biogrip.instrument.instrument import Instrument
-from biogrip.instrument.instruments import INSTRUMENTS, KINDS
+from biogrip.instrument.instruments import KINDS, of_kind
 from biogrip.keys import BY_KIND, Block, OneOf, Printed, Problem, below
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.measurement_block import MeasurementBlock
@@ -153,7 +153,7 @@ class CaseBlock(Shared):
     @property
     def instrument_used(self) -> Instrument:
         """The instrument, by its kind, and by what the protocol holds and the trace is of."""
-        kind = _of_kind(self.instrument)
+        kind = of_kind(self.instrument)
         bases = self.protocol.phases[0].bases
         fitting = [each for each in kind if each.controlled.column in bases] or kind
         if len(fitting) == 1:
@@ -203,16 +203,12 @@ class CaseBlock(Shared):
 
     def _instrument_problems(self) -> Iterator[Problem]:
         """Find a protocol, a reading and equations that are not of the kind of instrument."""
-        kind, used = _of_kind(self.instrument), self.instrument_used
+        kind, used = of_kind(self.instrument), self.instrument_used
         yield from below(("protocol",), self.protocol.instrument_problems(kind))
-        allowed = [each.read.name for each in kind]
         for name in self.measurement.readings if self.recorded else ():
-            if name not in allowed:
-                text = f"is not what {self.instrument} reads; allowed is {' or '.join(allowed)}."
-                yield ("measurement", name), text
-            elif name != used.read.name:
-                text = f"is not read where {used.controlled.name} is held; allowed is "
-                yield ("measurement", name), f"{text}{used.read.name}."
+            if name != used.read.name:
+                text = f"is not what {self.instrument} reads where {used.controlled.name} is held; "
+                yield ("measurement", name), f"{text}allowed is {used.read.name}."
         if used.has_jaws:
             return
         for key, value in vars(self.models).items():
@@ -287,7 +283,3 @@ class CaseBlock(Shared):
                 yield (key, index), text
                 return
             last = ends
-
-
-def _of_kind(kind: str) -> list[Instrument]:
-    return [each for each in INSTRUMENTS.values() if each.kind == kind]

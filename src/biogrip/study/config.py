@@ -1,7 +1,7 @@
 """Top-level keys of a study's config."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -15,9 +15,6 @@ from biogrip.keys import Block, Distinct, OneOf, Printed, Problem, below
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
 from biogrip.study.plain import adapter
 from biogrip.study.sweeps import MOST_POINTS, SweepBlock, list_points, name_problems
-
-SMALLEST_BATCH, LARGEST_BATCH, USUAL_BATCHES = 500, 1000, 8
-"""Least and most seeds of a job, and the number of jobs aimed at in between, by default."""
 
 _MOST_CASES = 2000
 # Most names listed in a message.
@@ -119,17 +116,9 @@ class StudyConfig(Shared):
     seeds: Annotated[int, Field(ge=1, le=1_000_000)]
     """Number of noisy traces of each case that are made and identified. Raising it keeps the
     results there are."""
-    batch_size: Annotated[
-        int | None,
-        Field(
-            ge=1,
-            le=100_000,
-            description=f"Number of seeds per job. By default {SMALLEST_BATCH}; for more than "
-            f"{USUAL_BATCHES * SMALLEST_BATCH} seeds, 1/{USUAL_BATCHES} of them, for more than "
-            f"{USUAL_BATCHES * LARGEST_BATCH}, {LARGEST_BATCH}. Changes no result, only how much "
-            "of a job is start-up.",
-        ),
-    ] = None
+    batch_size: Annotated[int | None, Field(ge=1, le=100_000)] = None
+    """Number of seeds per job. By default 500; for more than 4000 seeds, 1/8 of them, for more than
+    8000, 1000. Changes no result, only how much of a job is start-up."""
     actuator: CombDrive
     """The rotary comb drive (Table 2)."""
     methods: Annotated[
@@ -202,12 +191,6 @@ class StudyConfig(Shared):
                 if name not in allowed:
                     text = f"found '{name}', allowed are {', '.join([*allowed][:_SHOWN])}."
                     yield (*path, index), text + nearest(name, allowed)
-
-    @property
-    def chosen(self) -> "StudyConfig":
-        """The study with only the cases that `only` names."""
-        cases = {name: self.cases[name] for name in self.only or self.cases}
-        return replace(self, cases=cases)
 
 
 def _exists(block: Any, key: str) -> bool:

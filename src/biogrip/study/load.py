@@ -1,6 +1,7 @@
 """Loading of config files into a checked study, or messages that name file, line and key."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -41,22 +42,17 @@ def load_study(
     command_line: Mapping[str, Any] | None = None,
     over: Iterable[Source] = (),
 ) -> Study:
-    """Check and type a merged config; the files it came from give the line numbers in messages.
+    """Check and type a merged config, which came from files, the command line, and what is `over`.
 
-    Some keys may be of the command line, and some of a row in a table of traces: `over` has the
-    table, and the row's line by key.
-
-    Raises
-    ------
-    BiogripError
-        Names file, line and key of the first few problems, with what was found and what is allowed.
+    A `BiogripError` names file, line and key of the first few problems, with what was found and
+    what is allowed.
     """
     typed = ("command line, --config", dict.fromkeys(keys_in(command_line or {})))
     sources = [*(read_source(Path(file)) for file in files), typed, *over]
     study, problems = checked(StudyConfig, _fill_in(schema_of(StudyConfig).with_numbers(config)))
     _refuse(problems, sources)
     assert study is not None
-    study = study.chosen
+    study = replace(study, cases={it: study.cases[it] for it in study.only or study.cases})
     _refuse([*_point_problems(study), *_interpretation_problems(study)], sources)
     return Study(study)
 

@@ -125,12 +125,11 @@ class MeasurementBlock(Block):
         """Columns of a recorded trace's file."""
         (name,) = self.readings
         assert self.time is not None
-        of_rotation = name == ROTATION.name
         same = ("time_unit", "start_s", "sd", "block", "average_repeated", "from_s", "until_s")
         return Columns(
             self.time,
             getattr(self, name),
-            reading_unit=self.rotation_unit if of_rotation else self.reading_unit,
+            reading_unit=self.rotation_unit or self.reading_unit,
             skip=self.skip or 0,
             scale=1.0 if self.scale is None else self.scale,
             quantity=INSTRUMENTS[name].read,
@@ -159,11 +158,10 @@ class MeasurementBlock(Block):
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that are in conflict, and what a recorded trace lacks."""
-        for key in KNOWN_NOISE:
-            if self.coloured and getattr(self, key) is not None:
-                text = "is that of white noise; leave it out where noise_model is coloured."
-                yield (key,), text
-            if self.sd is not None and key != "sd" and getattr(self, key) is not None:
+        for key in (key for key in KNOWN_NOISE if getattr(self, key) is not None):
+            if self.coloured:
+                yield (key,), "is that of white noise; leave it out where noise_model is coloured."
+            if self.sd is not None and key != "sd":
                 yield (key,), "does not go with sd, which says all of the noise."
         if self.scale == 0:
             yield ("scale",), "found 0, allowed is another number."

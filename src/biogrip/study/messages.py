@@ -92,13 +92,9 @@ def _text(
         case "finite_number":
             return f"found {_shown(found)}, allowed is a finite number."
         case "greater_than" | "greater_than_equal" | "less_than_equal":
-            limits = [
-                f"{words} {bound(leaf.get(name))}"
-                for name, words in _BOUNDS.items()
-                if leaf.get(name) is not None
-            ]
-            text = " and ".join(limits)
-            return f"found {_shown(found)}, allowed is {text} {leaf.get('unit', '')}".rstrip() + "."
+            limits = [f"{_BOUNDS[it]} {bound(leaf.node[it])}" for it in _BOUNDS if it in leaf.node]
+            text = f"{' and '.join(limits)} {leaf.get('unit', '')}".rstrip()
+            return f"found {_shown(found)}, allowed is {text}."
     return f"found {_shown(found)}, allowed is {leaf.word}."
 
 

@@ -19,13 +19,7 @@ def adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def built(kind: Callable[..., T], block: Any, *, check: bool = False) -> T:
-    """Return the object that a plain block describes; if asked, find conflicts between keys, too.
-
-    Raises
-    ------
-    ValidationError
-        If a value is not allowed; paths begin with the index 0.
-    """
+    """Return the object that a plain block describes; if asked, find conflicts of keys, too."""
     # As JSON, for then pydantic takes blocks for dataclasses and lists for tuples.
     found: T
     (found,) = adapter(kind).validate_json(json.dumps([block], default=str), context=check)

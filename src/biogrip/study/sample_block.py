@@ -11,7 +11,7 @@ from biogrip.instrument.contact import LARGEST_M, SMALLEST_M
 from biogrip.keys import OPEN, Checked, OneOf, Problem
 
 LARGEST_PARAMETER = 1e12
-_LEAST_PARAMETER = 1e-18
+_LEAST = 1e-18
 
 
 class SampleBlock(Checked, BaseModel):
@@ -100,12 +100,10 @@ def _parameter_problems(
             yield (name,), text + nearest(name, model.names)
             continue
         parameter = by_name[name]
-        if value < _LEAST_PARAMETER and not (value == 0 and parameter.may_vanish):
+        vanishes = value == 0 and parameter.may_vanish
+        if not (vanishes or _LEAST <= value <= LARGEST_PARAMETER) or value >= parameter.below:
             zero = "0 or " if parameter.may_vanish else ""
-            text = f"found {value:g}, allowed is {zero}at least {_LEAST_PARAMETER:g}"
-            yield (name,), f"{text} {parameter.unit}".rstrip() + "."
-        elif not (value <= LARGEST_PARAMETER and value < parameter.below):
             bounded = parameter.below < LARGEST_PARAMETER
-            most = f"at most {LARGEST_PARAMETER:g} {parameter.unit}"
-            most = f"below {parameter.below:g}" if bounded else most
-            yield (name,), f"found {value:g}, allowed is above 0 and {most}."
+            most = f"below {parameter.below:g}" if bounded else f"at most {LARGEST_PARAMETER:g}"
+            text = f"found {value:g}, allowed is {zero}at least {_LEAST:g} and {most}"
+            yield (name,), f"{text} {parameter.unit}".rstrip() + "."

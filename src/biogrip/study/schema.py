@@ -1,6 +1,5 @@
 """JSON Schema of config blocks as pydantic derives it, and a way to the part about a key."""
 
-import math
 import re
 from collections.abc import Mapping
 from functools import cache
@@ -123,6 +122,4 @@ def _number(text: str) -> float | str:
     if not _NUMBER.fullmatch(text.strip()):
         return text
     number = float(text)
-    if not math.isfinite(number) or abs(number) >= _MOST_COUNTED:
-        return number
-    return int(number) if number.is_integer() else number
+    return int(number) if number.is_integer() and abs(number) < _MOST_COUNTED else number

@@ -34,10 +34,7 @@ def keys_in(block: Any, above: KeyPath = ()) -> Iterator[KeyPath]:
 
 
 def place(path: KeyPath, sources: Sequence[Source]) -> str:
-    """Return which source has a key or a block around it, and where, e.g. ``"my.yaml, line 7"``.
-
-    The last of those that have most of the path; for a missing key it is the block that lacks it.
-    """
+    """Return which source has a key, or the block that lacks it: ``"my.yaml, line 7"``."""
     for length in range(len(path), 0, -1):
         for name, lines in reversed(sources):
             if path[:length] in lines:
@@ -52,14 +49,7 @@ def read_source(file: Path) -> Source:
 
 
 def read_config(file: Path) -> dict[str, Any]:
-    """Read the keys of one YAML file.
-
-    Raises
-    ------
-    BiogripError
-        With file and line, if the file is missing or is not a YAML mapping, has a duplicate key, or
-        a value that YAML 1.1 misreads, see `scalar_problem`.
-    """
+    """Read the keys of one YAML file; a `BiogripError` names the line of what is not usable."""
     return deepcopy(_read(file)[1])
 
 
@@ -148,7 +138,8 @@ def _walk(file: Path, node: yaml.Node, path: KeyPath, lines: dict[KeyPath, int])
         raise _wrong(file, line, f"{dotted(path)}: {problem}")
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
-            inner, at = (*path, str(key.value)), key.start_mark.line + 1
+            named = isinstance(key, yaml.ScalarNode)
+            inner, at = (*path, key.value if named else "?"), key.start_mark.line + 1
             if not key.tag.endswith((":str", ":merge")):
                 text = "is no text: YAML reads on, off, yes, no and numbers otherwise; put it in"
                 raise _wrong(file, at, f"{dotted(inner)}: {text} quotes.")

@@ -66,6 +66,11 @@ class Case:
     verdicts_every = _of_case(lambda case: case.block.identifiability.verdicts_every)
     ranges = _of_case(lambda case: dict[str, GeneRange](vars(case.block.search_range)))
     title = _of_case(lambda case: case.block.title or case.name)
+    method = _of_case(lambda case: case.block.method)
+    sample = _of_case(lambda c: replace(c.block.sample.sample, per_area=c.instrument.per_area))
+    """Constitutive model."""
+    phases = _of_case(lambda case: case.block.protocol.make_phases(case.instrument, case.actuator))
+    """Phases of the protocol, in torques or what else the instrument holds."""
     plain = _of_case(lambda case: cast("dict[str, Any]", plain(case.block)))
     """Config block as plain values, without keys that have their default."""
     seeds = _of_case(lambda case: 1 if case.recorded else case.study.config.seeds)
@@ -85,15 +90,6 @@ class Case:
     genetic = _of_case(lambda case: cast("GeneticSettings", case.method("genetic")))
     """Settings of the genetic algorithm."""
 
-    def method(self, name: str) -> object:
-        """Return the settings of an identification method."""
-        return self.block.method(name)
-
-    @cached_property
-    def sample(self) -> Sample:
-        """Constitutive model."""
-        return replace(self.block.sample.sample, per_area=self.instrument.per_area)
-
     @property
     def may_start_late(self) -> bool:
         """True if the trace is recorded, and nothing says when its protocol starts."""
@@ -108,11 +104,6 @@ class Case:
         searched = with_fixed(self.sample.model, self.fixed)
         whole = len(known) == len(self.sample.model.names)
         return searched.named_in_order(known) if whole else known
-
-    @cached_property
-    def phases(self) -> tuple[Phase, ...]:
-        """Phases of the protocol, in torques or what else the instrument holds."""
-        return self.block.protocol.make_phases(self.instrument, self.actuator)
 
     @cached_property
     def _contact(self) -> Contact | None:
@@ -141,6 +132,8 @@ class Case:
         gripper = self.gripper
         if isinstance(assumed, Mapping):
             gripper = built(Gripper, overlaid(plain(gripper), assumed))
+        own = self.block.gripper if self.instrument.has_jaws else None
+        uncertainty = own.uncertainties(self.actuator) if own else {}
         return CaseProblem(
             gripper,
             self.phases,
@@ -154,9 +147,7 @@ class Case:
             noise_rad=measurement.noise_rad,
             noise_share=measurement.noise_share,
             coloured=measurement.coloured,
-            uncertainty=(
-                self.block.gripper.uncertainties(self.actuator) if self.instrument.has_jaws else {}
-            ),
+            uncertainty=uncertainty,
             fit_start=measurement.fit_start,
         )
 
@@ -205,8 +196,6 @@ class Study:
 
     sweeps = _of_study(lambda study: study.config.sweeps)
     study_seed = _of_study(lambda study: study.config.study_seed)
-    selects_models = _of_study(lambda study: bool(study.config.model_selection.models))
-    batch_size = _of_study(lambda study: study.config.batch_size)
     near_noise_tolerance = _of_study(lambda study: study.config.evaluation.near_noise_tolerance)
     optimum_tolerance = _of_study(lambda study: study.config.evaluation.optimum_tolerance)
     gripper = _of_study(lambda study: study.config.gripper.neutral)
@@ -225,9 +214,7 @@ class Study:
     """Names of cases that are simulated."""
     recorded = _of_study(lambda study: study._where(lambda case: case.recorded))
     """Names of cases with a recorded trace."""
-    gripped = _of_study(
-        lambda study: study._where(lambda case: not case.recorded and case.instrument.has_jaws)
-    )
+    gripped = _of_study(lambda it: it._where(lambda c: not c.recorded and c.instrument.has_jaws))
     """Names of simulated cases whose sample the gripper holds."""
     has_gripper = _of_study(lambda study: study._where(lambda it: it.instrument.has_jaws) != [])
     """True if the gripper holds the sample of any case."""
@@ -281,7 +268,3 @@ class Study:
         return (
             own.pop() if len(own) == 1 else self.config.protocol.make_phases(GRIPPER, self.actuator)
         )
-
-    def is_reconstructed(self, key: str) -> bool:
-        """Return True if a dotted key is marked as reconstructed, i.e. omitted in the paper."""
-        return any(key == name or key.startswith(f"{name}.") for name in self.reconstructed)

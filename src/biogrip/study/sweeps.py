@@ -10,9 +10,8 @@ from pydantic import BaseModel, Field, Tag
 
 from biogrip.errors import nearest
 from biogrip.keys import BY_KIND, OPEN, Block, Distinct, Printed, Problem
-from biogrip.study.case_blocks import CaseBlock, Shared
+from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.plain import plain
-from biogrip.study.schema import Schema, schema_of
 
 MOST_POINTS = 2000
 
@@ -101,17 +100,11 @@ class AxisBlock(Block):
         return Value(_word(value), _text(value), shown, dict.fromkeys(self.keys, value))
 
     def problems(self) -> Iterator[Problem]:
-        """Refuse values of one name, and keys that no case may change: blocks change blocks."""
-        kinds = {isinstance(value, ValueBlock) for value in self.values}
-        if len(kinds) > 1:
-            yield ("values",), "holds blocks and single values; allowed is one kind of them."
-            return
-        allowed = [key for key, is_block in _dotted(schema_of(Shared)) if is_block in kinds]
+        """Refuse values of one name, and keys that no case may change."""
         for key in self.keys:
-            if key not in allowed:
-                expected = "a block" if True in kinds else "a single value"
-                text = f"found '{key}', allowed is the key of {expected} that a case may change."
-                yield ("key",), text + nearest(key, allowed)
+            if key.partition(".")[0] not in OVERRIDABLE:
+                text = f"found '{key}', allowed is a key in a block that a case may change."
+                yield ("key",), text + nearest(key, OVERRIDABLE)
         shown = [value.text for value in self.levels]
         for index, value in enumerate(shown):
             if value in shown[:index]:
@@ -166,8 +159,7 @@ class SweepBlock(Block):
             if any(f"{key}.".startswith(f"{changed}.") for changed in value.overrides):
                 index = getattr(self, axis).levels.index(value)
                 return (axis, "values", index), f"gives {key}: {text}"
-        shown = f"{point.row.text} and {point.column.text} for {point.case}"
-        return (), f"{shown}: gives {key}: {text}"
+        return (), f"{point.name}: gives {key}: {text}"
 
 
 def list_points(sweeps: Mapping[str, SweepBlock]) -> Iterator[tuple[str, Point]]:
@@ -204,16 +196,6 @@ def name_problems(sweeps: Mapping[str, SweepBlock], cases: Iterable[str]) -> Ite
         found.add(point.name)
 
 
-def _dotted(block: Schema, path: str = "") -> Iterator[tuple[str, bool]]:
-    """Yield dotted keys in a block and below, each with True if it is a block itself."""
-    for name, inner in block.keys.items():
-        if inner.keys:
-            yield f"{path}{name}", True
-            yield from _dotted(inner, f"{path}{name}.")
-        elif inner.get("type") in ("number", "integer", "string", "boolean"):
-            yield f"{path}{name}", False
-
-
 def _text(value: float | str) -> str:
     return value if isinstance(value, str) else f"{value:.15g}"
 
@@ -225,4 +207,5 @@ def _word(value: float | str) -> str:
 
 def _changed(block: dict[str, Any], key: str, value: float | str) -> dict[str, Any]:
     name, _, rest = key.partition(".")
-    return {**block, name: _changed(block.get(name, {}), rest, value) if rest else value}
+    inner = block[name] if isinstance(block.get(name), dict) else {}
+    return {**block, name: _changed(inner, rest, value) if rest else value}
