@@ -32,8 +32,8 @@ from biogrip.response.modes import Modes
 from biogrip.response.protocol_modes import compute_protocol_modes
 from biogrip.response.sensitivity import linear_responses
 from biogrip.response.simulation import simulated_rotation
+from biogrip.study.config import DesignBlock
 from biogrip.study.defaults import default_config
-from biogrip.study.design_block import DesignBlock
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import overlaid, read_config
 from biogrip.study.study import Case
@@ -181,7 +181,7 @@ def design(config: Path, output: Path | None, *, force: bool) -> None:
     refuse_inputs([output], [config])
     check_output(output, force=force)
     files = [default_config(), config]
-    study = load_study(read_configs(files), files, for_workflow=False)
+    study = load_study(read_configs(files), files)
     samples = list(make_plausible(list(study.cases.values()), study.config.design))
     limits = make_limits(samples, study.config.design)
     train, reached = search(samples, limits)

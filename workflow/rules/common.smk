@@ -8,13 +8,13 @@ from snakemake.exceptions import WorkflowError
 
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
-from biogrip.study.batches import batch_names
-from biogrip.study.case_blocks import METHOD_BLOCKS, CaseBlock
+from biogrip.stages.batches import batch_names
+from biogrip.stages.settings import keys_of_cases, settings, software
+from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.defaults import default_config, shipped
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.measurement_block import MeasurementBlock
-from biogrip.study.settings import keys_of_cases, settings, software
 from biogrip.study.source import overlaid
 
 try:
@@ -35,6 +35,13 @@ PROBLEM = [*PROBLEM.split(), *(key for key in MEASUREMENT if key != "measurement
 # Keys that tables and figures of the whole study use.
 WHOLE = "study_seed seeds methods gripper actuator protocol search_range".split()
 WHOLE += ["evaluation", "reconstructed", *keys_of_cases(STUDY)]
+
+
+def literal(path):
+    """A path as text, which Snakemake is not to fill in."""
+    if set(str(path)) & set("{}<>"):
+        raise WorkflowError(f"'{path}': allowed is a file name without {{ }} < >.")
+    return str(path)
 
 
 def settings_of(*keys):
@@ -59,7 +66,7 @@ def batches(case, stage):
     """The batches of the traces of a case, or of those that its intervals are tested with."""
     chosen = STUDY.case(case)
     seeds = chosen.coverage_seeds if stage == "coverage" else chosen.seeds
-    return batch_names(seeds, STUDY.batch_size, Path("results", stage, case))
+    return batch_names(seeds, STUDY.config.batch_size, Path("results", stage, case))
 
 
 def files(pattern, cases):
@@ -96,7 +103,7 @@ def names(cases):
 # Cases that have what only some have, those of sweeps' points among them.
 SIMULATED = [*STUDY.simulated, *STUDY.points]
 CALIBRATED = [n for n in [*STUDY.cases, *STUDY.points] if STUDY.case(n).is_calibrated]
-SELECTING = list(STUDY.cases) if STUDY.selects_models else []
+SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
 COUNTED = [name for name in STUDY.covered if STUDY.case(name).verdicts_every == 1]
 calibration_of = only_of(CALIBRATED, "results/calibrations/{case}.yaml")
 

@@ -96,8 +96,8 @@ rule page:
         "results/logs/page.log",
     params:
         **settings_of(
-            *(key for key in StudyConfig.model_fields if key != "cases"),
-            *(*METHOD_BLOCKS, *keys_of_cases(STUDY)),
+            *(field.name for field in fields(StudyConfig) if field.name != "cases"),
+            *keys_of_cases(STUDY),
         ),
     message:
         "Writing the page of the study"

@@ -5,7 +5,7 @@ from biogrip.identify.table_of_traces import read_table
 
 # Simulated cases whose model has the paper's parameters, and what is read of each.
 OURS = {parameter.name for parameter in SINGLE_BRANCH}
-INTERPRETED_CASE = [*CaseBlock.model_fields, "actuator", "genetic_algorithm"]
+INTERPRETED_CASE = ["actuator", *(field.name for field in fields(CaseBlock))]
 INTERPRETED = [n for n in STUDY.simulated if set(STUDY.case(n).sample.model.names) <= OURS]
 
 
@@ -72,7 +72,7 @@ rule interpretations:
 
 
 if STUDY.traces:
-    ROWS = read_table(Path(STUDY.traces.table), for_workflow=True)
+    ROWS = read_table(Path(literal(STUDY.traces.table)))
 
     def rows_of(wildcards):
         """The rows of the table that a batch has, as `biogrip identify --rows` chooses them."""
@@ -82,8 +82,10 @@ if STUDY.traces:
     # Batches have fixed rows, so that more rows redo the last at most.
     rule traces_batch:
         input:
-            lambda wildcards: [str(row.file) for row in rows_of(wildcards) if row.file.is_file()],
-            config=STUDY.traces.config or [],
+            lambda wildcards: [
+                literal(row.file) for row in rows_of(wildcards) if row.file.is_file()
+            ],
+            config=literal(STUDY.traces.config) if STUDY.traces.config else [],
             table=ancient(STUDY.traces.table),
         output:
             found="results/traces/batches/{rows}.csv",

@@ -17,7 +17,7 @@ from biogrip.records.identifications import read_histories, read_identifications
 from biogrip.records.traces import Measurements, read_measurements
 from biogrip.response.nuisance import within
 from biogrip.response.simulation import simulated_rotation
-from biogrip.study.batches import seeds_of
+from biogrip.stages.batches import seeds_of
 
 SHOWN_SEEDS = 100
 """Most seeds drawn individually; figures show the first ones."""

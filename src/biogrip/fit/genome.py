@@ -65,6 +65,24 @@ class GeneRange(Block):
 
 
 @dataclass(frozen=True)
+class SearchRange(Block):
+    """Search range of each parameter as allowed values of its genes (Tables 3 and 4)."""
+
+    k: GeneRange
+    k_p: GeneRange
+    c: GeneRange
+    c_p: GeneRange
+    alpha: GeneRange
+
+    def problems(self) -> Iterator[Problem]:
+        """Refuse a range that has exponents of springpots above 1."""
+        highest = self.alpha.exponent[1]
+        if highest > 0:
+            text = f"found {highest}, which makes exponents of springpots above 1; allowed is at "
+            yield ("alpha", "exponent"), f"{text}most 0."
+
+
+@dataclass(frozen=True)
 class Genome:
     """Encoding of a sample model's parameters as genes."""
 

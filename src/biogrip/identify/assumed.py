@@ -23,18 +23,13 @@ def assumed(case: Case, tried: Sequence[str]) -> dict[str, Any]:
     blocks += ["gripper"] if case.instrument.has_jaws else []
     return {
         "model": case.sample.candidate,
-        **{name: plain(_block(case, name)) for name in blocks},
+        **{name: plain(getattr(case.block, name)) for name in blocks},
         **({"actuator": plain(case.actuator)} if case.instrument.has_jaws else {}),
         "fixed": case.fixed,
         "identifiability": {"confidence": case.confidence},
         "model_selection": {"models": list(tried)},
         "study_seed": case.study.study_seed,
     }
-
-
-def _block(case: Case, name: str) -> Any:
-    own = case.block
-    return own.method_block(name) if name == "least_squares" else getattr(own, name)
 
 
 def gripper_in_limits(case_problem: CaseProblem) -> str:

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -44,13 +44,12 @@ from biogrip.stages.judgement import fits_judged, notes_on_fit
 from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.sample_block import fixed_problems
-from biogrip.study.source import KeyPath, dotted, overlaid
+from biogrip.study.source import KeyPath, dotted, keys_in, overlaid, shown_path
 from biogrip.study.study import Case, Study
-from biogrip.study.trace_file import trace_file_problem
-from biogrip.study.yaml_text import shown_path
 from biogrip.terminal import visible
 from biogrip.traces.columns import place
 from biogrip.traces.late_onset import note_late_onset
+from biogrip.traces.trace_file import trace_file_problem
 
 _NOT_COMPARED = (
     "With fixed parameters no other sample models are tried: a value that is known in this model "
@@ -111,19 +110,11 @@ class IdentifyOptions:
         if self.table is None:
             return []
         paths = [
-            ("cases", case, *path) if path[0] == "sample" else path
-            for path in _leaves(self.settings)
+            ("cases", case, *path) if path[0] in ("sample", "fixed") else path
+            for path in keys_in(self.settings)
+            if len(path) > 1
         ]
         return [(shown_path(self.table), dict.fromkeys(paths, self.line))]
-
-
-def _leaves(settings: Mapping[str, Any], above: KeyPath = ()) -> Iterator[KeyPath]:
-    """Yield the paths of all keys of some blocks that are no blocks themselves."""
-    for name, value in settings.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, (*above, name))
-        else:
-            yield (*above, name)
 
 
 @dataclass(frozen=True)
@@ -363,8 +354,7 @@ def study_of(options: IdentifyOptions) -> Study:
     return load_study(
         merged,
         options.configs,
-        command_line=["cases"],
-        for_workflow=False,
+        {"cases": merged["cases"]},
         over=options.lines(case),
     )
 

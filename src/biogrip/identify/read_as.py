@@ -13,9 +13,9 @@ from biogrip.instrument.gripper import ROTATION, Gripper
 from biogrip.instrument.instrument import Quantity
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
-from biogrip.study.measurement_block import COLOURED, KNOWN_NOISE, READINGS
+from biogrip.study.measurement_block import COLOURED, KNOWN_NOISE, READINGS, MeasurementBlock
+from biogrip.study.messages import checked
 from biogrip.study.study import Case
-from biogrip.study.validation import measurement_problem
 from biogrip.traces.columns import Columns
 from biogrip.traces.recognised import Recognised
 
@@ -101,9 +101,7 @@ class ReadAs:
 
     def with_config(self, measurement: Mapping[str, Any]) -> "ReadAs":
         """Return the options with those keys of a ``measurement`` block that are valid."""
-        valid = {
-            key: value for key, value in measurement.items() if not measurement_problem(key, value)
-        }
+        valid = {key: value for key, value in measurement.items() if not _problem(key, value)}
         named = [(name, valid[name]) for name in READINGS if name in valid]
         own = {key: valid[key] for key in valid if key in asdict(self)}
         return replace(self, **own, reading=named[0] if named else self.reading)
@@ -177,7 +175,7 @@ class ReadAs:
                 raise BiogripError(
                     f"--{option}: does not go with --sd, which says all of the noise."
                 )
-            if problem := measurement_problem(key, value):
+            if problem := _problem(key, value):
                 raise BiogripError(f"--{option}: {problem}")
         if self.scale == 0:
             raise BiogripError("--scale: found 0, allowed is another number.")
@@ -234,3 +232,9 @@ def read_trace(
     trace = recording.read_checked(file, case.gripper, case.problem, columns, show_unusual)
     case = with_own_ranges(case, trace, given)
     return recording.with_fitted_onset(trace, case.problem), case
+
+
+def _problem(key: str, value: Any) -> str | None:
+    """Return what is wrong with the value of a key of a measurement, whatever others lack."""
+    found = checked(MeasurementBlock, {key: value})[1]
+    return next((text for path, text in found if path == (key,)), None)

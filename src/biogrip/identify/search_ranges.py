@@ -26,7 +26,7 @@ def with_own_ranges(case: Case, recorded: Measurements, given: Mapping[str, Any]
     own = given.get("search_range", {})
     chosen = {name: genes for name, genes in found.items() if name not in own}
     search_range = replace(case.block.search_range, **chosen)
-    return replace(case, block=case.block.model_copy(update={"search_range": search_range}))
+    return replace(case, block=replace(case.block, search_range=search_range))
 
 
 def ranges_of(

@@ -21,11 +21,10 @@ from biogrip.experiment.models import MODELS
 from biogrip.identify.many_traces import COLUMNS
 from biogrip.identify.one_trace import IdentifyOptions, study_of
 from biogrip.study.case_blocks import CaseBlock
+from biogrip.study.messages import checked
 from biogrip.study.schema import Schema, schema_of
-from biogrip.study.source import overlaid
+from biogrip.study.source import overlaid, scalar_problem
 from biogrip.study.study import Case
-from biogrip.study.validation import brackets_problem, some_case_problems
-from biogrip.study.yaml_text import scalar_problem
 from biogrip.terminal import visible
 from biogrip.traces.cells import SEPARATORS, cells_or_none
 from biogrip.traces.columns import listed, place
@@ -71,15 +70,13 @@ def is_table(path: Path) -> bool:
     return any(name.lower() == FILE for each in SEPARATORS for name in cells_or_none(first, each))
 
 
-def read_table(path: Path, *, for_workflow: bool = False) -> list[Row]:
+def read_table(path: Path) -> list[Row]:
     """Read a table, and check all of it but the traces.
 
     Parameters
     ----------
     path
         Text in UTF-8 with a header: `.tsv` is separated by tabs, another by what its header has.
-    for_workflow
-        If true, refuse names of traces that Snakemake would read as wildcards.
 
     Raises
     ------
@@ -109,8 +106,6 @@ def read_table(path: Path, *, for_workflow: bool = False) -> list[Row]:
         elif before != line:
             text = f"found '{visible(by_name[FILE])}' again, as on line {before}; allowed is each"
             problems.append(f"{place(path, line, FILE)}: {text} trace once.")
-        elif for_workflow and (problem := brackets_problem(str(file))):
-            problems.append(f"{place(path, line, FILE)}: {problem}")
         for name, schema in settings.items():
             if by_name[name]:
                 value, problem = _value(name, schema, by_name[name])
@@ -206,7 +201,7 @@ def _value(name: str, schema: Schema, text: str) -> tuple[Any, str | None]:
             value = text
     for part in reversed(path):
         value = {part: value}
-    problems = [text for at, text in some_case_problems(value) if at[: len(path)] == path]
+    problems = [text for at, text in checked(CaseBlock, value)[1] if at[: len(path)] == path]
     return value, next(iter(problems), None)
 
 

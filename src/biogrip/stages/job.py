@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.errors import BiogripError
-from biogrip.study.batches import seeds_of
-from biogrip.study.settings import case_of, study_of
+from biogrip.stages.batches import seeds_of
+from biogrip.stages.settings import case_of, study_of
 from biogrip.study.study import Case, Study
 
 

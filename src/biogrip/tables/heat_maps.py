@@ -59,8 +59,9 @@ def heat_maps(study: Study, name: str) -> HeatMaps:
 
 
 def _shown(study: Study, axis: AxisBlock) -> ShownAxis:
-    keys = {key for value in axis.levels for key in value.overrides}
-    title = axis.title + ", reconstructed" * any(map(study.is_reconstructed, keys))
+    keys = {f"{key}." for value in axis.levels for key in value.overrides}
+    reconstructed = tuple(f"{name}." for name in study.reconstructed)
+    title = axis.title + ", reconstructed" * any(key.startswith(reconstructed) for key in keys)
     return ShownAxis(title, {value.text: value.shown for value in axis.levels})
 
 

@@ -5,8 +5,9 @@ from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
 
-from biogrip.study.config import LARGEST_BATCH, SMALLEST_BATCH, USUAL_BATCHES
-
+# Least and most seeds of a job, and the number of jobs aimed at in between, as the key batch_size
+# says.
+_SMALLEST, _LARGEST, _USUAL = 500, 1000, 8
 _NAME = re.compile(r"seeds_(\d+)-(\d+)")
 
 
@@ -23,7 +24,7 @@ def batch_names(seeds: int, batch_size: int | None = None, folder: Path | None =
     Seeds are cut at multiples of the batch size, by default one that makes start-up a small part of
     a job. Batches that a folder has files of are kept, so that more seeds renew none of them.
     """
-    size = batch_size or min(max(SMALLEST_BATCH, -(-seeds // USUAL_BATCHES)), LARGEST_BATCH)
+    size = batch_size or min(max(_SMALLEST, -(-seeds // _USUAL)), _LARGEST)
     there = folder.glob("seeds_*") if folder else ()
     existing = sorted((r.start, r.stop) for r in map(seeds_of, _stems(there)))
     edges, covered = [], 0
