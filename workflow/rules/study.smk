@@ -39,7 +39,7 @@ rule measurement:
 
 rule recording:
     input:
-        recorded=lambda wildcards: RECORDINGS[wildcards.case],
+        recorded=lambda wildcards: literal(STUDY.case(wildcards.case).file),
     output:
         measurements="results/measurements/{case}/seeds_0-0.parquet",
     log:
