@@ -137,21 +137,6 @@ def test_answers_do_not_depend_on_the_batch() -> None:
         assert all(same(one, together[i]) for one, i in zip(apart, chosen, strict=True))
 
 
-def test_fits_do_not_depend_on_the_batch() -> None:
-    problems = of_case("liquid_drop_2", 3)
-    fits, starts = LocalFits(problems), starts_of(problems[0], 60)
-    trace = np.arange(60) % 3
-    together = fits.fitted(starts, trace)
-    rng = np.random.default_rng(2)
-    for count in (1, 2, 17, 60):
-        chosen = rng.permutation(60)[:count]
-        apart = fits.fitted(starts[chosen], trace[chosen])
-        expected = together[chosen]
-        np.testing.assert_array_equal(apart.x, expected.x)
-        np.testing.assert_array_equal(apart.misfit_rad, expected.misfit_rad)
-        np.testing.assert_array_equal(apart.evaluations, expected.evaluations)
-
-
 def mixed() -> list[Problem]:
     """Traces of which some differ in more than the noise, in no order."""
     times, response = clean("liquid_drop_2")

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import MODELS, Sample, SampleModel, with_fixed
 from biogrip.fit import genetic, genetic_refined
@@ -18,7 +17,6 @@ from biogrip.fit.redraws import redraws
 from biogrip.fit.selection import best
 from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.response.linear import rotation, step_response
-from biogrip.response.misfit import combine_misfits
 from tests.helpers.plain_genetic import identified
 from tests.helpers.problems import condensed_of
 
@@ -191,16 +189,3 @@ def test_the_best_in_order(words: int, size: int) -> None:
         order = np.lexsort((*codes[::-1, population], ranking[population]))[:130]
         np.testing.assert_array_equal(kept[:, population], codes[:, population, order])
         np.testing.assert_array_equal(values[population], ranking[population, order])
-
-
-def test_a_misfit_does_not_depend_on_its_company(gripper: Gripper, steps: TorqueHistory) -> None:
-    problems = case_problem(gripper, steps, 4)
-    misfits = combine_misfits([problem.misfit for problem in problems])
-    genome = problems[0].genome
-    samples: Array = genome.decode(genome.draw(4 * 997, rng(1))).reshape(4, 997, 4)
-    traces = np.array([2, 0, 3, 1])
-    found = misfits(samples, traces)
-    for own, trace, misfit in zip(samples, traces, found, strict=True):
-        np.testing.assert_array_equal(problems[trace].misfit(own), misfit)
-        for few in (slice(0, 1), slice(1, 4), slice(5, 22)):
-            np.testing.assert_array_equal(problems[trace].misfit(own[few]), misfit[few])

@@ -294,24 +294,6 @@ def test_only_equal_times_are_averaged() -> None:
     assert (lines.tolist(), count) == ([0, 1, 4], 3)
 
 
-def test_times_that_go_back_are_refused_even_if_equal_ones_are_averaged(tmp_path: Path) -> None:
-    (tmp_path / "t.csv").write_text(
-        "\n".join(["time_s,modulus_Pa", *(f"{i % 12},1" for i in range(24))])
-    )
-    columns = Columns("time_s", "modulus_Pa", quantity=MODULUS, average_repeated=True)
-    assert "found 0 after 11 (line 13), allowed are times that increase." in refusal(
-        tmp_path / "t.csv", columns
-    )
-
-
-def test_too_few_times_are_left(tmp_path: Path) -> None:
-    (tmp_path / "t.csv").write_text(
-        "\n".join(["time_s,modulus_Pa", *(f"{i // 3},1" for i in range(24))])
-    )
-    columns = Columns("time_s", "modulus_Pa", quantity=MODULUS, average_repeated=True)
-    assert refusal(tmp_path / "t.csv", columns).startswith(": found 8 times with a number in both")
-
-
 def test_what_was_recognised_is_a_small_table(tmp_path: Path) -> None:
     rows = [f"{t}\t{g}" for t, g in numbers(0).T]
     (tmp_path / "t.tsv").write_text("\n".join(["Time\tRelaxation Modulus", *rows, "8\t"]))
