@@ -192,6 +192,7 @@ def test_readings_at_the_instant_of_a_step_are_left_out(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.nightly
 def test_readings_that_scatter_more_at_first_are_doubted_and_can_be_left_out(
     tmp_path: Path,
 ) -> None:

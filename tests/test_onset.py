@@ -141,7 +141,13 @@ CLOCKS = {
 }
 
 
-@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize(
+    "clock",
+    [
+        *("eight decades", "later than the step", "log-spaced and later"),
+        pytest.param("six decades", marks=pytest.mark.nightly),
+    ],
+)
 def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
     """Its misfit is no higher than with the onset of the simulation."""
     times = CLOCKS[clock]
@@ -156,7 +162,7 @@ def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
     assert best.misfit_rad <= true.misfit_rad * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("last_s", [1e3, 1e4])
+@pytest.mark.parametrize("last_s", [1e3, pytest.param(1e4, marks=pytest.mark.nightly)])
 def test_a_trace_over_many_decades_of_time_has_an_answer(tmp_path: Path, last_s: float) -> None:
     """A liquid on which no reading of the first decades moves, and exact times."""
     times = np.geomspace(1e-4, last_s, 161)

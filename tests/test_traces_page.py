@@ -381,7 +381,10 @@ def test_distributions_show_each_cell_by_column(opened: Opened) -> None:
     assert strip.locator("path.cell.dots").count() == 8
 
 
-@pytest.mark.parametrize(("scheme", "rules"), [("light", []), ("dark", ["color-contrast"])])
+@pytest.mark.parametrize(
+    ("scheme", "rules"),
+    [("light", []), pytest.param("dark", ["color-contrast"], marks=pytest.mark.nightly)],
+)
 def test_anybody_can_use_it(browser: Any, page: Path, scheme: Any, rules: list[str]) -> None:
     opened = Opened(browser, page, color_scheme=scheme, viewport={"width": 400, "height": 800})
     for number in (1, 4, 9):

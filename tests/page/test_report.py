@@ -134,7 +134,10 @@ def test_cards_have_the_true_values(opened: Opened) -> None:
     assert "(true: " not in recorded
 
 
-@pytest.mark.parametrize(("scheme", "rules"), [("light", []), ("dark", ["color-contrast"])])
+@pytest.mark.parametrize(
+    ("scheme", "rules"),
+    [("light", []), pytest.param("dark", ["color-contrast"], marks=pytest.mark.nightly)],
+)
 def test_anybody_can_use_the_page(
     browser: Any, report: Path, scheme: Any, rules: list[str]
 ) -> None:
