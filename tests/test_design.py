@@ -48,6 +48,7 @@ def set_up(folder: Path, text: str = GRIPPER):  # type: ignore[no-untyped-def]
     return samples, make_limits(samples, study.config.design)
 
 
+@pytest.mark.nightly
 def test_a_design_is_better_keeps_its_limits_and_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -114,6 +114,7 @@ def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(
     assert found == pytest.approx(2 * (after - before), rel=1e-12)
 
 
+@pytest.mark.nightly
 def test_what_is_declared_is_not_suspected(tmp_path: Path) -> None:
     file = written(tmp_path / "t.csv", trace(0, DRIFT))
     few = tmp_path / "few.yaml"

@@ -117,15 +117,6 @@ def test_what_cannot_be_fixed_is_refused(
     assert text in capsys.readouterr().err
 
 
-def test_a_config_with_a_wrong_name_is_placed(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    config = folder / "wrong.yaml"
-    config.write_text("gripper: {}\nfixed:\n  kp: 1.0\n")
-    assert main(["identify", str(folder / "trace.csv"), "--config", str(config)]) == 1
-    assert "wrong.yaml, line 3: fixed.kp: is no parameter" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("given", ["k", "k=much", "=1"])
 def test_text_that_is_no_value_is_refused(given: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):

@@ -1,6 +1,10 @@
 """Groups of cells: estimates against known ones, promises by simulation, and what is said."""
 
 import csv
+import os
+import signal
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -286,6 +290,16 @@ def test_nothing_of_others_is_replaced(
         assert main(["groups", str(found), "--by", "dish", "--csv", str(table)]) == 1
         assert words in capsys.readouterr().err
     said(capsys, found, "--by", "dish", "--csv", mine, "--force")
+
+
+def test_nobody_reading_on_is_no_error(tmp_path: Path, rows: list[dict[str, str]]) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "biogrip", "groups", written(tmp_path, rows), "--by", "dish"]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert done.returncode == 128 + signal.SIGPIPE
+    assert done.stderr == ""
 
 
 def test_identify_and_groups_say_the_same_of_a_cell(

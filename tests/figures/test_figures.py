@@ -41,19 +41,6 @@ def test_torque_shows_the_protocol_and_its_voltages() -> None:
     assert [t.get_text() for t in legend.get_texts()] == ["30 µm", "120 µm", "from contact"]
 
 
-def test_linkage_is_to_scale() -> None:
-    whole = drawn(linkage).axes[0]
-    arm = whole.lines[0].get_xydata()
-    assert np.hypot(*np.diff(np.asarray(arm), axis=0)[0]) == pytest.approx(1.5)
-    assert whole.get_aspect() == 1.0
-
-
-def test_linkage_names_what_changes() -> None:
-    names = drawn(linkage).axes[2]
-    texts = {text.get_text() for text in names.texts}
-    assert {"$x$", "$u_B$", "$u_C$", r"$\hat\theta_2$", r"$\tilde\theta_4$", r"$\phi_2$"} <= texts
-
-
 def test_comb_has_every_finger_where_it_is() -> None:
     whole, _, curve = drawn(comb).axes
     floating, fixed = whole.collections

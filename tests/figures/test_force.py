@@ -1,6 +1,5 @@
 from pathlib import Path
 
-import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -47,14 +46,3 @@ def test_a_pull_is_marked(tmp_path: Path, name: str, pulls: bool, free: bool) ->
     assert ("the jaws would have to pull" in forces) == pulls
     assert ("jaws that let go" in forces) == free
     assert ("jaws that let go" in rotations) == (free and name != "left")
-
-
-def test_what_is_drawn(tmp_path: Path) -> None:
-    upper, lower = drawn("liquid_drop_1", tmp_path).axes
-    assert upper.get_ylabel() == "jaw force (µN)"
-    held, free = (np.asarray(line.get_ydata(), float) for line in upper.lines[1:3])
-    assert held[201] == pytest.approx(-0.73, abs=0.02)
-    assert np.nanmin(free) == 0
-    target_rad, left = (np.asarray(line.get_ydata(), float) for line in lower.lines)
-    assert np.all(np.isnan(left[:199]))
-    assert np.all(left[200:] < target_rad[200:])

@@ -54,15 +54,6 @@ def test_a_profile_is_a_curve_and_crosses_its_threshold_at_its_limits(tmp_path: 
     assert high > BEST * np.exp(0.49)
 
 
-def test_both_thresholds_are_drawn_and_named(tmp_path: Path) -> None:
-    made = drawn(written(tmp_path / "v.json", item()))
-    flat = {float(line.get_ydata()[0]) for line in made.axes[0].lines if line.get_xdata()[0] == 0}
-    assert {2.71, 10.83} <= flat
-    texts = [text.get_text() for text in made.legends[0].get_texts()]
-    assert "90 %" in texts
-    assert any(text.startswith("99.9 %") for text in texts)
-
-
 def test_a_set_in_two_parts_is_shaded_in_two_parts(tmp_path: Path) -> None:
     made = drawn(written(tmp_path / "v.json", item(excluded=[[1.9, 2.1]])))
     spans = [patch for patch in made.axes[0].patches if isinstance(patch, Rectangle)]

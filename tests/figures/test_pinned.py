@@ -22,7 +22,7 @@ from tests.helpers.default import study_of
 PINNED = Path(__file__).with_name("pinned")
 # Small pictures in few colours, in which a line is still a line: their size as a share of what is
 # drawn.
-SIZE, COLOURS = 0.3, 256
+SIZE, COLOURS = 0.25, 128
 # Root mean square of the difference of all pixels, of 255. Results are the same bytes on every
 # processor; what is left to it are last bits of coordinates, of which antialiasing makes
 # differences of a level or two in a few pixels: some 0.01. A line in another colour makes more,

@@ -4,21 +4,19 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import MODELS, Sample
-from biogrip.fit import genetic_refined, least_squares
+from biogrip.fit import least_squares
 from biogrip.fit.answer import Identification
 from biogrip.fit.levenberg_marquardt import Normal, bounded_step
 from biogrip.fit.local_fits import FINE, ROUGH, LocalFits, alike
-from biogrip.fit.multi_start import fit_from, identify_from, screened
+from biogrip.fit.multi_start import screened
 from biogrip.fit.problem import Problem
 from biogrip.response.linear import rotation, step_response
-from tests.helpers.default import STUDY
 from tests.helpers.places import ROOT
 from tests.helpers.problems import (
     GRIPPER,
@@ -139,51 +137,6 @@ def test_answers_do_not_depend_on_the_batch() -> None:
         assert all(same(one, together[i]) for one, i in zip(apart, chosen, strict=True))
 
 
-def test_fits_do_not_depend_on_the_batch() -> None:
-    problems = of_case("liquid_drop_2", 3)
-    fits, starts = LocalFits(problems), starts_of(problems[0], 60)
-    trace = np.arange(60) % 3
-    together = fits.fitted(starts, trace)
-    rng = np.random.default_rng(2)
-    for count in (1, 2, 17, 60):
-        chosen = rng.permutation(60)[:count]
-        apart = fits.fitted(starts[chosen], trace[chosen])
-        expected = together[chosen]
-        np.testing.assert_array_equal(apart.x, expected.x)
-        np.testing.assert_array_equal(apart.misfit_rad, expected.misfit_rad)
-        np.testing.assert_array_equal(apart.evaluations, expected.evaluations)
-
-
-@pytest.mark.parametrize("case", SAMPLES)
-def test_an_answer_tells_how_it_was_found(case: str) -> None:
-    problems = of_case(case, 3)
-    for problem, answer in zip(problems, identified(problems, [0, 1, 2]), strict=True):
-        history = answer.history
-        assert answer.generations == SETTINGS.starts
-        assert answer.stop_reason == "all starts fitted"
-        assert answer.converged
-        assert len(history.evaluations) == SETTINGS.starts + 1
-        assert history.evaluations[0] == SETTINGS.candidates
-        assert history.evaluations[-1] == answer.evaluations
-        assert np.all(np.diff(history.evaluations) > 0)
-        # What is settled minimizes the prior, too, so that chi^2 alone may rise by next to nothing.
-        chi2 = problem.residuals.samples * (history.best_misfit / answer.misfit_rad) ** 2
-        assert np.all(np.diff(chi2) <= 1e-3)
-        np.testing.assert_array_equal(history.best_parameters[-1], answer.parameters)
-        exact = problem.misfit(answer.parameters[None])[0]
-        assert exact == pytest.approx(answer.misfit_rad, rel=1e-6)
-
-
-def test_the_genetic_algorithm_is_polished_alike() -> None:
-    problems = of_case("liquid_drop_2", 2)
-    settings: Any = STUDY.config.method("genetic_refined")
-    rngs = [np.random.default_rng(seed) for seed in range(2)]
-    for seed, answer in enumerate(genetic_refined.identify_many(problems, settings, rngs)):
-        own = [np.random.default_rng(seed)]
-        (alone,) = genetic_refined.identify_many(problems[seed : seed + 1], settings, own)
-        assert same(answer, alone)
-
-
 def mixed() -> list[Problem]:
     """Traces of which some differ in more than the noise, in no order."""
     times, response = clean("liquid_drop_2")
@@ -217,24 +170,6 @@ def test_what_cannot_be_fitted_together_is_fitted_in_groups() -> None:
     together = least_squares.identify_many(problems, few, rngs())
     for problem, rng, answer in zip(problems, rngs(), together, strict=True):
         assert same(answer, *least_squares.identify_many([problem], few, [rng]))
-
-
-def test_fits_from_a_point_are_those_of_each_alone() -> None:
-    """Byte for byte, in the order of the problems."""
-    problems = mixed()[:-1]
-    start = np.log([SAMPLES["liquid_drop_2"][name] for name in MODEL.names])
-    starts = start + 0.1 * np.random.default_rng(1).normal(size=(len(problems), 4))
-    for given in (start, starts):
-        together = fit_from(problems, given)
-        own_starts = np.broadcast_to(given, (len(problems), 4))
-        for index, problem in enumerate(problems):
-            alone = fit_from([problem], own_starts[index])
-            np.testing.assert_array_equal(alone.x[0], together.x[index])
-            assert alone.misfit_rad[0] == together.misfit_rad[index]
-            assert alone.evaluations[0] == together.evaluations[index]
-            assert alone.converged[0] == together.converged[index]
-    found = identify_from(problems[0], start)
-    np.testing.assert_array_equal(np.exp(fit_from(problems[:1], start).x[0]), found.parameters)
 
 
 DIGITS = """

@@ -92,12 +92,3 @@ def test_elements_vanish_where_the_range_does_not_reach() -> None:
     for answer in without:
         assert not is_within(answer.parameters, problems["liquid_drop"][0])
         np.testing.assert_array_equal(answer.history.best_parameters[-1], answer.parameters)
-
-
-def test_answers_do_not_depend_on_the_batch() -> None:
-    times, response = clean("liquid_drop_1")
-    _, together = fitted(response, times, ("maxwell", "liquid_drop", "burgers"), 3, 0.1)
-    _, alone = fitted(response, times, ("maxwell", "liquid_drop", "burgers"), 1, 0.1)
-    for name, answers in alone.items():
-        assert answers[0].parameters.tobytes() == together[name][0].parameters.tobytes()
-        assert answers[0].misfit_rad == together[name][0].misfit_rad

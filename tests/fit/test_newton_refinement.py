@@ -1,15 +1,12 @@
 """Optima to their last digits: what is told of a fit is so, on all samples."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from biogrip import library
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.sample import MODELS, Sample, SampleModel
-from biogrip.fit import newton_refinement
-from biogrip.fit.levenberg_marquardt import Minima, minimize
+from biogrip.fit.levenberg_marquardt import Minima
 from biogrip.fit.local_fits import FINE, PRIOR_WIDTH, LocalFits
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.newton_refinement import refine_optima
@@ -18,8 +15,6 @@ from biogrip.response.linear import rotation, step_response
 from tests.helpers.problems import (
     GRIPPER,
     TORQUE,
-    identified,
-    of_case,
     posed_for,
     problem,
     run,
@@ -124,38 +119,6 @@ def test_settling_never_makes_a_fit_worse(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MODELS_SETTLED)
-@pytest.mark.nightly
-def test_steps_that_lead_away_are_taken_back(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where they are not those of the way ahead, what was found before counts, to the last bit."""
-    closer: list[Array] = []
-
-    def approached(*given: Any, **how: Any) -> Minima:
-        found: Minima = minimize(*given, **how)
-        closer.append(found.x)
-        return found
-
-    def leap(_: Array, __: Array, ___: Any, x: Array, ____: Array) -> Array:
-        return np.full(x.shape, 0.5)
-
-    model = MODELS_SETTLED[name]
-    for case_problem, _ in noisy(model, 4):
-        fits, found, trace = found_in(case_problem)
-        monkeypatch.setattr(newton_refinement, "minimize", approached)
-        monkeypatch.setattr(newton_refinement, "_newton_step", leap)
-        kept = refine_optima(fits, found, trace)
-        for x, before, after in zip(kept.x, found.x, closer.pop(), strict=True):
-            ordered = [each[model.in_order(np.exp(each)[None])[0]] for each in (before, after)]
-            assert any(np.array_equal(x, each) for each in ordered) or lower(
-                case_problem, x, ordered
-            )
-
-
-def lower(problem: Problem, x: Array, others: list[Array]) -> bool:
-    """Whether a leap was none for the worse, as it may be from where a fit got stuck."""
-    return all(cost(problem, x)[0] <= cost(problem, other)[0] for other in others)
-
-
-@pytest.mark.parametrize("name", MODELS_SETTLED)
 def test_curvatures_are_those_of_what_is_minimized(name: str) -> None:
     """All second derivatives, against differences of gradients on all samples; away from optima."""
     for case_problem, sample in noisy(MODELS_SETTLED[name], 6):
@@ -177,17 +140,6 @@ def test_curvatures_are_those_of_what_is_minimized(name: str) -> None:
             1e-6 * np.abs(second).max() + rounding(case_problem, cost(case_problem, x)[0]) / 2e-4
         )
         np.testing.assert_allclose(found.information[0], second, rtol=0, atol=allowed)
-
-
-def test_an_optimum_is_settled_from_wherever_it_was_found() -> None:
-    """To 1e-8, with what the traces say nothing of as well."""
-    problems = of_case("liquid_drop_1", 6)
-    fits, traces = LocalFits(problems), np.arange(6)
-    best = np.log([answer.parameters for answer in identified(problems, [0] * 6)])
-    beside = fits.fitted(best + 0.02 * np.random.default_rng(3).normal(size=best.shape), traces)
-    again = refine_optima(fits, beside, traces)
-    np.testing.assert_allclose(again.x, best, rtol=0, atol=1e-8)
-    assert np.all(again.converged)
 
 
 def test_the_optimum_is_settled_to_the_last_digits() -> None:

@@ -74,18 +74,6 @@ def test_limits_are_those_of_the_nonlinear_model(gripper: Gripper, torque: str) 
             assert increase == pytest.approx(likelihood.threshold, rel=0.01)
 
 
-def test_fits_do_not_depend_on_the_batch(gripper: Gripper) -> None:
-    problems = case_problem(gripper, TORQUES["ten times"], 3)
-    starts = np.log(TRUTH) + np.random.default_rng(0).uniform(-2, 2, (6, 3))
-    trace = np.arange(6) % 3
-    together = LocalFits(problems).fitted(starts, trace)
-    for fit in range(6):
-        own = LocalFits([problems[trace[fit]]]).fitted(starts[fit : fit + 1], np.zeros(1, int))
-        assert own.x.tobytes() == together.x[fit : fit + 1].tobytes()
-        assert own.misfit_rad[0] == together.misfit_rad[fit]
-        assert own.evaluations[0] == together.evaluations[fit]
-
-
 def test_where_the_model_has_no_answer_no_fit_ends(gripper: Gripper) -> None:
     """A start that the torque closes beyond what the model describes stays, infinitely bad."""
     torque = torque_history((hold(200.0, 1e-6), hold(200.0, 1e-7)))

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import MODELS, Sample, SampleModel, with_fixed
 from biogrip.fit import genetic, genetic_refined
@@ -18,8 +17,7 @@ from biogrip.fit.redraws import redraws
 from biogrip.fit.selection import best
 from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.response.linear import rotation, step_response
-from biogrip.response.misfit import combine_misfits
-from tests.helpers.plain_genetic import chromosomes_of, decoded, identified
+from tests.helpers.plain_genetic import identified
 from tests.helpers.problems import condensed_of
 
 SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)
@@ -191,28 +189,3 @@ def test_the_best_in_order(words: int, size: int) -> None:
         order = np.lexsort((*codes[::-1, population], ranking[population]))[:130]
         np.testing.assert_array_equal(kept[:, population], codes[:, population, order])
         np.testing.assert_array_equal(values[population], ranking[population, order])
-
-
-@pytest.mark.parametrize("branches", [1, 2, 5])
-def test_codes_stand_for_chromosomes(branches: int, gripper: Gripper, steps: TorqueHistory) -> None:
-    (problem,) = case_problem(gripper, steps, 1, Sample("generalized_maxwell", branches).model)
-    genome = problem.genome
-    chromosomes = genome.draw(400, rng(0))
-    codes = genome.code(chromosomes)
-    assert codes.max() < 2**WORD_BITS
-    np.testing.assert_array_equal(chromosomes_of(genome, codes), chromosomes)
-    np.testing.assert_array_equal(genome.parameters(codes), decoded(genome, chromosomes))
-    np.testing.assert_array_equal(np.lexsort(codes[::-1]), np.lexsort(chromosomes.T[::-1]))
-
-
-def test_a_misfit_does_not_depend_on_its_company(gripper: Gripper, steps: TorqueHistory) -> None:
-    problems = case_problem(gripper, steps, 4)
-    misfits = combine_misfits([problem.misfit for problem in problems])
-    genome = problems[0].genome
-    samples: Array = genome.decode(genome.draw(4 * 997, rng(1))).reshape(4, 997, 4)
-    traces = np.array([2, 0, 3, 1])
-    found = misfits(samples, traces)
-    for own, trace, misfit in zip(samples, traces, found, strict=True):
-        np.testing.assert_array_equal(problems[trace].misfit(own), misfit)
-        for few in (slice(0, 1), slice(1, 4), slice(5, 22)):
-            np.testing.assert_array_equal(problems[trace].misfit(own[few]), misfit[few])

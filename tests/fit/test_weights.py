@@ -66,6 +66,7 @@ def test_the_published_fit_comes_out_to_five_digits() -> None:
     assert found == pytest.approx([V, BETA, ETA], rel=5e-6)
 
 
+@pytest.mark.nightly
 def test_weighted_fits_are_scipys() -> None:
     """Standard errors but for the prior of one e-fold, a thousandth of them at most."""
     trace = noisy(0.05)

@@ -100,19 +100,6 @@ def test_points_are_added_until_a_curve_can_be_drawn() -> None:
     assert np.max(np.abs(np.diff(shown))) <= 0.3
 
 
-def test_a_profile_crosses_the_threshold_at_its_limits() -> None:
-    likelihood = likelihood_for("liquid_drop_2", 0)
-    k = QUANTITIES[0]
-    ((found,),) = compute_profiles([likelihood], [k])
-    for limit in (found.low, found.high):
-        assert limit is not None
-        at = np.interp(limit, found.log_values, found.increases)
-        assert at == pytest.approx(likelihood.threshold, rel=0.01)
-    ((coarse,),) = compute_profiles([likelihood], [k], smooth=False)
-    assert len(coarse.log_values) < len(found.log_values)
-    assert (coarse.low, coarse.high) == (found.low, found.high)
-
-
 def test_limits_tell_of_an_optimum_that_was_missed() -> None:
     right = likelihood_for("liquid_drop_2", 0)
     away = right.best + np.array([0.1, 0.0, 0.02, 0.0])

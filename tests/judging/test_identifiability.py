@@ -7,17 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biogrip.arrays import Array
 from biogrip.experiment.sample import MODELS, Sample
 from biogrip.identify.words import limits_in_short
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.fisher import bound, covariance
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.limits import find_limits
-from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import (
-    BranchPenalty,
-    Quantity,
     find_combinations,
     parameters_and_sum,
 )
@@ -126,37 +122,6 @@ def told(case: str) -> tuple[Diagnosis, Likelihood]:
     return diagnosis, diagnosis.likelihood
 
 
-def test_a_profile_is_the_lowest_misfit_with_one_parameter_held() -> None:
-    """Of a damper and a spring in series, against a search over a fine grid of the other."""
-    maxwell = MODELS["maxwell"]
-
-    times, response = clean("liquid_drop_2")
-    trace = response + 0.1 * response.max() * np.random.default_rng(2).standard_normal(len(times))
-    case_problem = posed_for(maxwell, times, trace)
-    found = run("least_squares", case_problem)
-    likelihood = make_likelihood(
-        case_problem, np.log(found.parameters), found.misfit_rad, confidence=0.95
-    )
-    k = parameters_and_sum(maxwell)[0]
-    ((followed,),) = compute_profiles([likelihood], [k])
-    for index in range(0, len(followed.log_values), 7):
-        held = math.exp(followed.log_values[index])
-        c = np.geomspace(5.0, 20.0, 4001)
-        searched = case_problem.misfit(np.stack((np.full_like(c, held), c), axis=1)).min()
-        assert followed.increases[index] == pytest.approx(
-            likelihood.increase(searched), rel=1e-3, abs=0.02
-        )
-    low, high = followed.low, followed.high
-    assert low is not None
-    assert high is not None
-    for limit in (low, high):
-        c = np.geomspace(8.0, 12.0, 8001)
-        misfit = case_problem.misfit(np.stack((np.full_like(c, math.exp(limit)), c), axis=1)).min()
-        assert likelihood.increase(misfit) == pytest.approx(likelihood.threshold, abs=0.01)
-    ((near,),) = find_limits([likelihood], [k])[0]
-    assert near == pytest.approx((low, high), abs=1e-4)
-
-
 @pytest.mark.parametrize(
     ("case", "verdicts"),
     [
@@ -263,18 +228,6 @@ def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:
     assert compute_valley(likelihood, MODELS["maxwell"]) == (None, None)
 
 
-def test_data_of_a_diagnosis_are_plain_and_rounded() -> None:
-    diagnosis, _ = told("endothelial_cell")
-    data = diagnosis_data(diagnosis)
-    k = data["quantities"][0]
-    assert k["quantity"] == "k"
-    assert k["verdict"] == DETERMINED
-    assert k["low"] < k["value"] < k["high"]
-    assert float(f"{k['value']:.5g}") == k["value"]
-    assert len(k["profile"]["values"]) == len(k["profile"]["increases"])
-    assert k["in_words"] == f"determined: {k['value']:.3g} N/m ({k['low']:.3g} to {k['high']:.3g})"
-
-
 def test_what_is_said_is_rounded_once() -> None:
     """To five digits it would be 1.165, of which three are 1.17: files keep more."""
     diagnosis, _ = told("endothelial_cell")
@@ -316,14 +269,6 @@ def test_intervals_hold_the_truth_and_estimates_reach_the_bound() -> None:
     for row, q in enumerate(quantities):
         ratio = np.std(errors[row]) / bound(sensitivity, noise, truth, q)
         assert 0.67 < ratio < 1.33
-
-
-def test_one_quantity_in_text() -> None:
-    q: Quantity = parameters_and_sum(MODEL)[-1]
-    x: Array = np.log([1.0, 1.0, 3.0, 4.0])
-    assert (q.label, q.unit) == ("c + c_p", "N s/m")
-    assert math.exp(q.log(x)) == pytest.approx(7.0)
-    assert q.penalties == (BranchPenalty((0, 2)),)
 
 
 def test_the_larger_exponent_is_that_of_the_first_springpot() -> None:

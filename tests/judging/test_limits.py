@@ -7,7 +7,6 @@ import pytest
 
 from biogrip.experiment.sample import MODELS
 from biogrip.fit.local_fits import FINE
-from biogrip.fit.multi_start import fit_from
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.limits import find_limits
@@ -24,7 +23,7 @@ from tests.helpers.limits import (
     limits_of,
     misses,
 )
-from tests.helpers.problems import MODEL, clean, posed_for, problem, run
+from tests.helpers.problems import MODEL, clean, posed_for, run
 
 QUANTITIES = parameters_and_sum(MODEL)
 
@@ -52,16 +51,6 @@ def test_the_name_of_a_trace_changes_no_limit() -> None:
     pair = [limits_of(likelihoods[i], two) for i in (0, int(np.argmax(away)))]
     assert differences(np.array(pair)).max() < ALIKE
     assert [miss for miss in misses(likelihoods[3], two) if abs(miss[-1]) > ALLOWED] == []
-
-
-@pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1", "liquid_drop_2"])
-def test_an_optimum_is_the_same_from_wherever_it_is_reached(case: str) -> None:
-    case_problem = problem(case, 0, rate_Hz=10.0)
-    best = np.log(run("least_squares", case_problem).parameters)
-    rng = np.random.default_rng(0)
-    starts = best + 0.3 * rng.standard_normal((5, len(best)))
-    found = fit_from([case_problem] * len(starts), starts).x
-    assert np.ptp([best, *found], axis=0).max() < 1e-7
 
 
 def test_an_optimum_that_was_missed_is_judged_again() -> None:

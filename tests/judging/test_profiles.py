@@ -21,8 +21,6 @@ from biogrip.response.linear import rotation, step_response
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE, identified, of_case, posed_for, run
 from tests.helpers.scipy_fits import scipy_fit
 
-LOW = np.full(4, -3.0)
-HIGH = np.full(4, 4.0)
 PARAMETERS = parameters_and_sum(MODEL)
 COMBINATIONS = find_combinations(MODEL, [0, 1, 2])
 

@@ -1,7 +1,5 @@
 """The answers on the page: what its tables say, and no more."""
 
-from pathlib import Path
-
 import pandas as pd
 import pytest
 
@@ -136,8 +134,3 @@ def test_the_published_study_is_counted_as_pandas_counts_it() -> None:
     assert f", {sum(inside & close)} are replicated (" in said
     assert f"; {sum(inside & ~close)} are replicated in part (" in said
     assert f"; {sum(~inside)} are not replicated: " in said
-
-
-def test_a_table_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(Exception, match=r"errors.csv: cannot be read"):
-        read_table(tmp_path / "errors.csv")

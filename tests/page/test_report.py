@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from axe_playwright_python.sync_playwright import Axe
 
 from biogrip.figures.results import Fit
 from biogrip.fit.methods import METHODS
@@ -21,6 +20,7 @@ from biogrip.page.explorer import explorer
 from biogrip.records.identifications import read_identifications
 from biogrip.records.rows import read_table
 from biogrip.records.traces import read_measurements
+from tests.helpers.browser import Opened
 from tests.helpers.places import ROOT
 
 MOST_BYTES = 8_000_000
@@ -32,40 +32,21 @@ def report(tiny: Path) -> Path:
     return tiny / "results" / "report.html"
 
 
-class Opened:
-    """The page, and what went wrong in it."""
-
-    def __init__(
-        self,
-        browser: Any,
-        report: Path,
-        viewport: dict[str, int] | None = None,
-        *,
-        explored: bool = True,
-    ) -> None:
-        self.problems: list[str] = []
-        self.asked: list[str] = []
-        self.page = browser.new_page(**({"viewport": viewport} if viewport else {}))
-        self.page.on("pageerror", lambda error: self.problems.append(str(error)))
-        self.page.on("console", self._said)
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.goto(report.as_uri())
-        if explored:
-            self.page.wait_for_selector("#explorer .main-svg")
-
-    def _said(self, message: Any) -> None:
-        if message.type == "error":
-            self.problems.append(message.text)
-
-
 @pytest.fixture(scope="module")
 def opened(browser: Any, report: Path) -> Opened:
-    return Opened(browser, report)
+    return explored(browser, report)
+
+
+def explored(browser: Any, report: Path, **context: Any) -> Opened:
+    """The page when its explorer is there."""
+    found = Opened(browser, report, **context)
+    found.page.wait_for_selector("#explorer .main-svg")
+    return found
 
 
 def test_the_page_needs_nothing_else(opened: Opened, report: Path) -> None:
     assert report.stat().st_size < MOST_BYTES
-    assert [url for url in opened.asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert opened.asked == []
     missing = "[...document.images].filter(i => !(i.loading === 'lazy' && !i.complete))"
     assert opened.page.evaluate(f"{missing}.filter(i => !i.naturalWidth).length") == 0
     assert opened.page.evaluate("document.images.length") > 10
@@ -94,12 +75,12 @@ def test_the_page_says_how_to_cite_it_as_the_citation_file_does(opened: Opened) 
 
 
 def test_it_is_legible_on_a_phone(browser: Any, report: Path) -> None:
-    opened = Opened(browser, report, PHONE)
+    opened = explored(browser, report, viewport=PHONE)
     assert opened.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
     smallest = """Math.min(...[...document.querySelectorAll('p, li, td, dd, figcaption')]
         .map(e => parseFloat(getComputedStyle(e).fontSize)))"""
     assert opened.page.evaluate(smallest) >= 12
-    opened.page.close()
+    opened.context.close()
 
 
 CLIPPED = """[...document.querySelectorAll('table.compared, .compared :is(th, td, caption)')]
@@ -113,7 +94,7 @@ def test_no_column_of_the_first_table_is_clipped(
     browser: Any, report: Path, medium: Any, width: int
 ) -> None:
     """In print on A4 within margins of a centimetre."""
-    opened = Opened(browser, report, {"width": width, "height": 900})
+    opened = explored(browser, report, viewport={"width": width, "height": 900})
     page = opened.page
     page.emulate_media(media=medium)
     assert page.locator(".compared thead th").count() == 7
@@ -122,7 +103,7 @@ def test_no_column_of_the_first_table_is_clipped(
     assert len(rows) == sum(row["parameter"] != "c_p" for row in errors)
     assert page.evaluate(CLIPPED) == []
     assert page.evaluate("document.documentElement.scrollWidth") <= width
-    page.close()
+    opened.context.close()
 
 
 def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path) -> None:
@@ -153,21 +134,20 @@ def test_cards_have_the_true_values(opened: Opened) -> None:
     assert "(true: " not in recorded
 
 
-@pytest.mark.parametrize(("scheme", "rules"), [("light", []), ("dark", ["color-contrast"])])
+@pytest.mark.parametrize(
+    ("scheme", "rules"),
+    [("light", []), pytest.param("dark", ["color-contrast"], marks=pytest.mark.nightly)],
+)
 def test_anybody_can_use_the_page(
     browser: Any, report: Path, scheme: Any, rules: list[str]
 ) -> None:
     """Axe finds nothing serious, all unfolded; in dark colours none that is too faint."""
-    context = browser.new_context(color_scheme=scheme)
-    opened = Opened(context, report)
+    opened = explored(browser, report, color_scheme=scheme)
     opened.page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
-    found = Axe().run(opened.page, options={"runOnly": rules} if rules else None).response
-    assert len(found["passes"]) > (0 if rules else 20)
-    serious = [v for v in found["violations"] if v["impact"] in ("serious", "critical")]
-    assert [(v["id"], [node["html"] for node in v["nodes"]]) for v in serious] == []
+    assert opened.barriers(*rules) == []
     paper = opened.page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert (paper == "rgb(255, 255, 255)") == (scheme == "light")
-    context.close()
+    opened.context.close()
 
 
 def test_four_figures_are_shown_and_the_others_open_by_sample(opened: Opened) -> None:
@@ -239,10 +219,10 @@ def test_summaries_are_whole_and_legible(browser: Any, tiny: Path) -> None:
     summaries = sorted((tiny / "results" / "summaries").glob("*.html"))
     assert summaries
     for summary in summaries:
-        opened = Opened(browser, summary, PHONE, explored=False)
+        opened = Opened(browser, summary, viewport=PHONE)
         assert opened.page.evaluate("document.images.length") >= 2
         assert opened.page.evaluate("[...document.images].every(i => i.naturalWidth > 0)")
         assert opened.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
         assert opened.problems == []
-        assert all(url.startswith("data:") for url in opened.asked[1:])
-        opened.page.close()
+        assert opened.asked == []
+        opened.context.close()

@@ -19,7 +19,6 @@ from biogrip.response.jaw_force import jaw_force, jaw_force_response
 from biogrip.response.linear import LEFT, RIGHT, StepResponse, rotation, step_response
 from biogrip.response.many_branches import modes_of_many
 from biogrip.response.nonlinear import nonlinear_rotation
-from biogrip.response.sensitivity import rotation_and_sensitivity
 from tests.helpers.power_law import (
     mittag_leffler,
     one_minus_mittag_leffler,
@@ -149,37 +148,6 @@ def test_the_ring_against_inversion(gripper: Gripper) -> None:
     ours = rotation(response, step, times)[0]
     assert np.any(np.abs(response.rates.imag) > 1e3)
     np.testing.assert_allclose(ours, exact, rtol=0, atol=1e-6 * exact.max())
-
-
-@pytest.mark.parametrize("exponent", [0.1, 0.5, 0.9])
-def test_derivatives_against_those_of_mittag_leffler_functions(exponent: float) -> None:
-    """By the logarithms of k_p, k_alpha and alpha, by differences of the closed form."""
-    gripper, sample = arms_of(4.4e-7, 1e-25), np.array([0.2, 0.5, exponent])
-    u = 2 * gripper.lever_m**2
-    times = np.geomspace(0.1, 400, 9)
-    constant = torque_history((hold(400.0, TAU),))
-
-    def closed(logarithms: Array) -> Array:
-        k_p, modulus, alpha = np.exp(logarithms)
-        stiffness = 4.4e-7 + u * k_p
-        values = [
-            one_minus_mittag_leffler(alpha, stiffness / u / modulus * t**alpha) for t in times
-        ]
-        return TAU / stiffness * np.array(values)
-
-    phi, slopes = rotation_and_sensitivity(
-        gripper, MODELS["fractional_kelvin_voigt"], constant, times, sample
-    )
-    np.testing.assert_allclose(phi, closed(np.log(sample)), rtol=1e-6)
-    for index in range(3):
-        unit = np.eye(3)[index]
-        pairs = [
-            (closed(np.log(sample) + h * unit) - closed(np.log(sample) - h * unit)) / (2 * h)
-            for h in (2e-3, 1e-3)
-        ]
-        # Extrapolated: h^4; the ladder's error, 1e-6 at most, turns with alpha by its logarithm.
-        exact = (4 * pairs[1] - pairs[0]) / 3
-        np.testing.assert_allclose(slopes[index], exact, rtol=0, atol=1e-5 * phi.max())
 
 
 # Rates in no order.

@@ -154,13 +154,6 @@ def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
     assert np.isinf(found["c_p"])
 
 
-def test_a_grid_may_be_a_single_point(identifications: list[Path], tmp_path: Path) -> None:
-    text = SWEEPS.replace("values: [0, 0.2]", "values: [0.2]")
-    text = "\n".join(line for line in text.splitlines() if "proportional" not in line)
-    judge(study_of(text), identifications, tmp_path / "x.csv")
-    assert set(pd.read_csv(tmp_path / "x.csv")["point"]) == {f"{CASE}--both--0_2--gaussian-peak"}
-
-
 def test_the_table_has_the_best_and_the_worst_determined(maps: HeatMaps, judged: Path) -> None:
     table = robustness(maps, [judged])
     names = [column.name for column in table.columns]

@@ -93,24 +93,6 @@ def test_files_that_are_no_identifications_are_named(tmp_path: Path) -> None:
         errors_of_case(CASE, tmp_path / "other.csv")
 
 
-HOSTILE = ("=1+1", "+1+1", "-1+1", "@SUM(A1)", "=cmd|'/C calc'!A0", "\t=1+1")
-
-
-@pytest.mark.parametrize("text", HOSTILE)
-def test_no_cell_is_a_formula_to_a_spreadsheet(tmp_path: Path, text: str) -> None:
-    write(Table("A table.", (Column("a", "A"),), [(text,)]), tmp_path / "t.csv")
-    with (tmp_path / "t.csv").open(newline="") as stream:
-        assert list(csv.reader(stream)) == [["a"], [f"'{text}"]]
-
-
-@pytest.mark.parametrize(
-    "text", ["-0.8", "+2.6", ">100", "<1", "-", "-1e-05", "-12", "-inf", "a-b"]
-)
-def test_numbers_with_a_sign_stay_as_they_are(tmp_path: Path, text: str) -> None:
-    write(Table("A table.", (Column("a", "A"),), [(text,)]), tmp_path / "t.csv")
-    assert (tmp_path / "t.csv").read_text() == f"a\n{text}\n"
-
-
 def test_markup_in_a_cell_is_text_in_every_format(tmp_path: Path) -> None:
     cells = ("a|b\nc", "<script>x</script>", "50 % & 3_4 $x$ #1 {y} ~^\\")
     columns = tuple(Column(name, f"{name}|<b>") for name in "abc")
