@@ -34,10 +34,10 @@ done; test -z "$$failed" || { echo "$(1): failed for$$failed" >&2; exit 1; }
 ourselves = $(1)/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
 counted = $$(grep -o '^[a-z][^=]*' $(1) | sort -u | wc -l)
 
-# What runs in minutes: all but the tests that start Snakemake again and again. test_results.py runs
-# a small study from its targets to its report.
+# What runs in minutes: of the tests that start Snakemake those of a small study, from its targets to
+# its report, and of the module.
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
-  $(wildcard tests/*)) tests/workflow/test_results.py
+  $(wildcard tests/*)) $(addprefix tests/workflow/,test_module.py test_rules.py test_study.py)
 
 .PHONY: study test test-nightly test-lowest test-pythons check check-overlays publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
 
