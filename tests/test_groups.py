@@ -295,7 +295,8 @@ def test_nothing_of_others_is_replaced(
 def test_nobody_reading_on_is_no_error(tmp_path: Path, rows: list[dict[str, str]]) -> None:
     reader, writer = os.pipe()
     os.close(reader)
-    command = [sys.executable, "-m", "biogrip", "groups", written(tmp_path, rows), "--by", "dish"]
+    command = [sys.executable, "-m", "biogrip", "groups"]
+    command += [str(written(tmp_path, rows)), "--by", "dish"]
     done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writer)
     assert done.returncode == 128 + signal.SIGPIPE
