@@ -43,7 +43,7 @@ def set_up(folder: Path, text: str = GRIPPER):  # type: ignore[no-untyped-def]
     config = folder / "my.yaml"
     config.write_text(text)
     files = [default_config(), config]
-    study = load_study(read_configs(files), files, for_workflow=False)
+    study = load_study(read_configs(files), files)
     samples = list(make_plausible(list(study.cases.values()), study.config.design))
     return samples, make_limits(samples, study.config.design)
 
@@ -62,7 +62,7 @@ def test_a_design_is_better_keeps_its_limits_and_runs(
     for label in ("noise of the rotation (rad)", "largest torque (N m)", "highest rate (Hz)"):
         assert label in said
     files = [default_config(), output]
-    (case,) = load_study(read_configs(files), files, for_workflow=False).cases.values()
+    (case,) = load_study(read_configs(files), files).cases.values()
     levels = [phase.left.value_Nm for phase in case.phases]
     assert max(levels) <= 1.6e-9 * (1 + 1e-12)
     assert min(levels) > 0

@@ -47,13 +47,12 @@ RECORDED = "_mine"
 
 
 @pytest.fixture(scope="module")
-def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Points of a sweep, of all sizes of numbers and without a bound here and there."""
     folder = tmp_path_factory.mktemp("points")
     sweep = study_of(SWEEP).sweeps["level"]
-    files = []
+    rows = []
     for n, case in enumerate(sweep.cases):
-        rows = []
         grid = list(all_pairs(sweep.rows.levels, sweep.columns.levels))
         for i, (row, column) in enumerate(grid):
             for j, method in enumerate(("genetic", "least_squares")):
@@ -62,14 +61,13 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
                     error = 0.004 * 7.0 ** (i + q)
                     bound = np.nan if row.text == "0" else error * 2.0 ** (i - 3)
                     values = (row.text, column.text, method, quantity, 20, share, error, bound)
-                    rows.append((f"{case}-{i}", *values))
-        files.append(folder / f"{case}.csv")
-        POINTS.write(files[-1], rows)
-    return files
+                    rows.append((f"{case}--level--{i}", *values))
+    POINTS.write(folder / "level.csv", rows)
+    return folder / "level.csv"
 
 
 @pytest.fixture(scope="module")
-def pictures(tiny: Path, judged: list[Path]) -> dict[str, Image.Image]:
+def pictures(tiny: Path, judged: Path) -> dict[str, Image.Image]:
     """Every figure by name."""
     files = sorted((tiny / "results" / "figures").glob("*.png"))
     drawn = BytesIO()

@@ -55,6 +55,7 @@ def changed(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     merged = dict(base)
     for key, value in over.items():
         inner = merged.get(key)
-        both = isinstance(inner, dict) and isinstance(value, dict)
-        merged[key] = changed(inner, value) if both else value
+        if isinstance(inner, dict) and isinstance(value, dict):
+            value = changed(inner, value)
+        merged[key] = value
     return merged

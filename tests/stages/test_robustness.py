@@ -55,7 +55,7 @@ def maps(study: Study) -> HeatMaps:
 
 
 def judge(study: Study, identifications: list[Path], output: Path) -> None:
-    stage.judge(study, "both", CASE, identifications, [], output)
+    stage.judge(study, "both", identifications, [], output)
 
 
 @pytest.fixture
@@ -155,7 +155,7 @@ def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
 
 
 def test_the_table_has_the_best_and_the_worst_determined(maps: HeatMaps, judged: Path) -> None:
-    table = robustness(maps, [judged])
+    table = robustness(maps, judged)
     names = [column.name for column in table.columns]
     rows = [dict(zip(names, row, strict=True)) for row in table.rows]
     assert [(row["quantity"], row["row"], row["column"]) for row in rows] == [
@@ -188,7 +188,7 @@ def test_the_table_says_what_of_the_gripper_the_config_calls_reconstructed(
     marked: str, said: str | None, judged: Path
 ) -> None:
     study = study_of(f"{SWEEPS}\nreconstructed: {marked}\n")
-    caption = robustness(heat_maps(study, "both"), [judged]).caption
+    caption = robustness(heat_maps(study, "both"), judged).caption
     assert ("econstructed" in caption) == (said is not None)
     assert said is None or caption.endswith(f": {said}.")
 
@@ -210,7 +210,7 @@ def test_headlines_follow_from_the_bounds() -> None:
 
 def test_heat_maps_show_the_numbers_they_are_given(maps: HeatMaps, judged: Path) -> None:
     with styled():
-        drawn = figure.draw(maps, [judged])
+        drawn = figure.draw(maps, judged)
     shares, best, worst = drawn.axes[:3]
     texts = [[text.get_text() for text in axes.texts] for axes in (shares, best, worst)]
     assert texts[0] == ["a", *["80\n(80)"] * 4]
@@ -239,6 +239,4 @@ def test_the_basin_of_the_truth_is_as_wide_as_noise_makes_it(
 def test_a_damaged_sweep_is_named(maps: HeatMaps, tmp_path: Path) -> None:
     (tmp_path / f"{CASE}.csv").write_text("a,b\n1,2\n")
     with pytest.raises(BiogripError, match=r"endothelial_cell.csv, line 1: wanted the columns"):
-        robustness(maps, [tmp_path / f"{CASE}.csv"])
-    with pytest.raises(BiogripError, match="endothelial_cell: no file of its points is given"):
-        robustness(maps, [])
+        robustness(maps, tmp_path / f"{CASE}.csv")
