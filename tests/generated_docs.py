@@ -206,10 +206,10 @@ def file_columns() -> str:
     """The columns of every file of rows, as its kind declares them, and of the published tables."""
     leading, trailing = identifications.LEADING, identifications.TRAILING
     files: dict[str, tuple[str, ...]] = {
-        traces.TARGETS: traces.TARGET_COLUMNS,
-        identifications.PATH: (*leading, "parameters ...", *trailing),
+        "results/targets/{case}.csv": traces.TARGET_COLUMNS,
+        "results/identifications/{case}.csv": (*leading, "parameters ...", *trailing),
     }
-    files |= {kind.batch_path or kind.path: kind.columns for kind in _kinds()}
+    files |= {kind.path: kind.columns for kind in _kinds()}
     for table in sorted(PUBLISHED.rglob("tables/*.csv")):
         of = re.match("(errors|verdicts|robustness)_", table.name)
         whose = {"robustness": "{sweep}"}.get(of[1], "{case}") if of else ""

@@ -205,10 +205,6 @@ def test_an_option_that_cannot_be_used_is_named(
     assert not output.exists()
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a pipe that is closed is taken for a fit that fails by a fault of ours",
-)
 @pytest.mark.nightly
 def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: str) -> None:
     reader, writer = os.pipe()

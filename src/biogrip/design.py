@@ -192,7 +192,11 @@ def design(config: Path, output: Path | None, *, force: bool) -> None:
     after = [rated(one, train.phases, sampling) for one in samples]
     write_text(output, as_config(read_config(config), samples, after))
     print(visible_lines("\n".join(_said(samples, before, after, reached))))
-    print(visible_lines(f"Written to {output}; biogrip run {output} simulates and fits it."))
+    print(
+        visible_lines(
+            f"Written to {output}; snakemake -j2 --configfile {output} simulates and fits it."
+        )
+    )
 
 
 def make_plausible(cases: Sequence[Case], block: DesignBlock) -> Iterator[Plausible]:

@@ -32,16 +32,11 @@ MEASUREMENT = [f"measurement.{field.name}" for field in fields(MeasurementBlock)
 # Keys that say what a fit assumes of the instrument and of the sample.
 PROBLEM = "instrument gripper actuator assumed_gripper protocol sample fixed search_range models"
 PROBLEM = [*PROBLEM.split(), *(key for key in MEASUREMENT if key != "measurement.noise")]
+# Keys that verdicts on a trace, and on its expectation, use.
+JUDGED = [*PROBLEM, "measurement.noise", "identifiability.confidence", "least_squares"]
 # Keys that tables and figures of the whole study use.
 WHOLE = "study_seed seeds methods gripper actuator protocol search_range".split()
 WHOLE += ["evaluation", "reconstructed", *keys_of_cases(STUDY)]
-
-
-def literal(path):
-    """A path as text, which Snakemake is not to fill in."""
-    if set(str(path)) & set("{}<>"):
-        raise WorkflowError(f"'{path}': allowed is a file name without {{ }} < >.")
-    return str(path)
 
 
 def settings_of(*keys):

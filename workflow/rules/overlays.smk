@@ -72,7 +72,7 @@ rule interpretations:
 
 
 if STUDY.traces:
-    ROWS = read_table(Path(literal(STUDY.traces.table)))
+    ROWS = read_table(Path(STUDY.traces.table))
 
     def rows_of(wildcards):
         """The rows of the table that a batch has, as `biogrip identify --rows` chooses them."""
@@ -82,10 +82,8 @@ if STUDY.traces:
     # Batches have fixed rows, so that more rows redo the last at most.
     rule traces_batch:
         input:
-            lambda wildcards: [
-                literal(row.file) for row in rows_of(wildcards) if row.file.is_file()
-            ],
-            config=literal(STUDY.traces.config) if STUDY.traces.config else [],
+            lambda wildcards: [str(row.file) for row in rows_of(wildcards) if row.file.is_file()],
+            config=STUDY.traces.config or [],
             table=ancient(STUDY.traces.table),
         output:
             found="results/traces/batches/{rows}.csv",
@@ -95,15 +93,12 @@ if STUDY.traces:
             runtime=120,
         params:
             **settings_of(),
-            config=lambda wildcards, input: (f"--config {input.config}" if input.config else ""),
             model=STUDY.traces.model,
             rows=lambda wildcards: [[str(r.file), r.settings, r.copied] for r in rows_of(wildcards)],
         message:
             "Identifying the traces in rows {wildcards.rows} of {input.table}"
-        # A trace that is not there or cannot be used is a row that says so.
-        shell:
-            "biogrip identify {input.table:q} --rows {wildcards.rows} --model {params.model} "
-            "{params.config} --csv {output.found:q} > {log:q} 2>&1 || test -e {output.found:q}"
+        script:
+            "../scripts/traces_batch.py"
 
     rule traces:
         input:

@@ -39,7 +39,7 @@ rule measurement:
 
 rule recording:
     input:
-        recorded=lambda wildcards: literal(STUDY.case(wildcards.case).file),
+        recorded=lambda wildcards: STUDY.case(wildcards.case).file,
     output:
         measurements="results/measurements/{case}/seeds_0-0.parquet",
     log:
@@ -104,10 +104,7 @@ rule judgement:
     resources:
         runtime=60,
     params:
-        **settings_of(
-            *("study_seed", *PROBLEM, "measurement.noise"),
-            *("identifiability.confidence", "least_squares"),
-        ),
+        **settings_of("study_seed", *JUDGED),
     message:
         "Computing confidence limits for the first trace of {wildcards.case}"
     script:
@@ -136,10 +133,7 @@ rule intervals:
     resources:
         runtime=120,
     params:
-        **settings_of(
-            *("study_seed", *PROBLEM, "measurement.noise", "least_squares"),
-            *("identifiability.confidence", "identifiability.verdicts_every"),
-        ),
+        **settings_of("study_seed", *JUDGED, "identifiability.verdicts_every"),
     message:
         "Estimating intervals of {wildcards.case}, {wildcards.batch}"
     script:

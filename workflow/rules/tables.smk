@@ -75,11 +75,11 @@ rule claims:
         + files("results/tables/verdicts_{case}.csv", STUDY.cases),
         # As published, since these sweeps take longer than the study.
         sweeps=[
-            str(shipped(f"results/published/{name}.csv"))
-            for name in (
-                "robustness/tables/robustness_noise",
-                "robustness/tables/robustness_gripper",
-                "interpretations/tables/interpretations",
+            str(shipped(f"results/published/{overlay}/tables/{name}.csv"))
+            for overlay, name in (
+                ("robustness", "robustness_noise"),
+                ("robustness", "robustness_gripper"),
+                ("interpretations", "interpretations"),
             )
         ],
     output:

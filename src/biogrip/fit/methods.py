@@ -5,9 +5,6 @@ whose fields are the keys of its config block (`biogrip.keys`), and a function
 ``identify_many(problems, settings, rngs, progress)``, which returns an `Identification` of each
 trace, to the bit as if it were alone. Ranges and traces are the problems', the budget of each is
 in the settings, its generator is its only source of randomness, and progress is told of all.
-
-What is made holds the `Method` that it shows in its settings: this module is in no job's digest,
-so that one more method makes nothing again.
 """
 
 from collections.abc import Mapping

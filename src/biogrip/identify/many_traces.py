@@ -175,6 +175,9 @@ def _tried(trace: Path, work: Callable[[], T]) -> T | BiogripError:
         return work()
     except BiogripError as error:
         return error
+    except BrokenPipeError:
+        # Whoever reads the progress has gone.
+        raise
     except Exception as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
         return BiogripError(

@@ -21,15 +21,9 @@ if TYPE_CHECKING:
 # Few enough that results on different processors agree.
 _DIGITS = 8
 
-PATH = "results/identifications/{case}.csv"
-BATCHES = "results/identifications/{case}/{method}/{batch}.csv"
-HISTORIES = "results/histories/{case}.parquet"
-HISTORY_BATCHES = "results/histories/{case}/{method}/{batch}.parquet"
-
 TIMINGS = RowFile(
     "processor times",
     ("case", "method", "seed", "cpu_s"),
-    "results/timings/{case}.csv",
     "results/timings/{case}/{method}/{batch}.csv",
 )
 """Processor time of each seed, in a file of its own since times are not reproducible."""

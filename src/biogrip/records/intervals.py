@@ -13,7 +13,6 @@ INTERVALS = RowFile(
         *("case", "quantity", "seed", "estimate", "low", "high", "estimate_rest_known"),
         *("verdict", "shown_low", "shown_high"),
     ),
-    "results/coverage/{case}.csv",
     "results/coverage/{case}/{batch}.csv",
     words=("verdict",),
 )

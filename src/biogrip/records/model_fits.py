@@ -5,6 +5,5 @@ from biogrip.records.rows import RowFile
 MODEL_FITS = RowFile(
     "fits of models",
     ("case", "model", "seed", "parameters", "samples", "misfit"),
-    "results/selection/{case}.csv",
     "results/selection/{case}/{batch}.csv",
 )

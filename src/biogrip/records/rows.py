@@ -31,9 +31,7 @@ class RowFile:
     columns: tuple[str, ...]
     """Column names."""
     path: str
-    """Path pattern of a case's file, or path of the study's."""
-    batch_path: str = ""
-    """Path pattern of a batch's file, if a case's file is joined from batches."""
+    """Path, with wildcards."""
     words: tuple[str, ...] = ()
     """Columns to read as text even if they look like numbers."""
 

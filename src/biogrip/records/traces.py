@@ -16,10 +16,6 @@ from biogrip.records.parquet import column_names, read_columns, table_of, write_
 from biogrip.records.rows import write_rows
 from biogrip.traces.recognised import Recognised
 
-TARGETS = "results/targets/{case}.csv"
-MEASUREMENTS = "results/measurements/{case}/{batch}.parquet"
-SINGLE_TRACES = "results/traces/{case}/seed_{seed}.csv"
-
 TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
 
 _WITHOUT_JAWS = {

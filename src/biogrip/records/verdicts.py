@@ -21,11 +21,8 @@ if TYPE_CHECKING:
     from biogrip.judging.diagnosis import Diagnosis
     from biogrip.judging.verdicts import Finding
 
-PATH = "results/identifiability/{case}.json"
 FIT_REJECTED = "fit rejected"
 """Verdict on every quantity of a fit that is rejected."""
-
-EXPECTED = "results/identifiability/expected/{case}.json"
 
 
 def diagnosis_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[str, Any]:

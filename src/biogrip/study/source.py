@@ -92,6 +92,9 @@ def scalar_problem(node: yaml.ScalarNode) -> str | None:
 
 def _read(file: Path) -> tuple[Lines, dict[str, Any]]:
     """Return the line number of every key, and the content of the file."""
+    # A pipe that nobody writes to would be waited for.
+    if file.exists() and not (file.is_file() or file.is_dir()):
+        raise BiogripError(f"{shown_path(file)}: is no regular file; allowed is one.")
     try:
         with file.open("rb") as stream:
             content = stream.read(LARGEST_BYTES + 1)

@@ -35,7 +35,6 @@ TYPICAL = (
     "misfit would be that of the quietest trace."
 )
 
-_STEM = "results/tables/errors"
 _WHOLE_NUMBERS = {"typical_seed", "seeds"}
 
 
