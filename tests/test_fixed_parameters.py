@@ -107,7 +107,7 @@ def test_a_config_fixes_and_an_option_adds(folder: Path) -> None:
     [
         ("kp=1", "--fix: kp: is no parameter of the sample, which has k, k_p, c, c_p."),
         ("kp=1", "Did you mean 'k_p'?"),
-        ("k=0", "--fix: k: found 0, allowed is at least 1e-18 N/m."),
+        ("k=0", "--fix: k: found 0, allowed is at least 1e-18 and at most 1e+12 N/m."),
     ],
 )
 def test_what_cannot_be_fixed_is_refused(

@@ -183,7 +183,7 @@ REFUSED = {
     "--noise-share 3": "--noise-share: found 3.0, allowed is greater than 0 and at most 1.",
     "--scale 0": "--scale: found 0, allowed is another number.",
     "--scale -1e-400": "--scale: found 0, allowed is another number.",
-    "--fix k=1e300": "--fix: k: found 1e+300, allowed is above 0 and at most 1e+12 N/m.",
+    "--fix k=1e300": "--fix: k: found 1e+300, allowed is at least 1e-18 and at most 1e+12 N/m.",
     "--fix k=4 --fix k=5": "--fix: found k repeated, allowed is each parameter",
     "--sd sd": "found no such column, allowed are time_s, rotation_rad.",
     "--time=": "--time: found '' of 0 characters, allowed are at least 1.",

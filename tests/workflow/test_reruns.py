@@ -56,7 +56,7 @@ def test_what_uses_a_setting_runs_again_and_nothing_else(tiny: Path, name: str) 
 def test_a_dry_run_says_which_setting_changed_from_what_to_what(tiny: Path) -> None:
     told = dry_run(tiny, config=changed(TINY, {"evaluation": {"near_noise_tolerance": 0.03}}))
     for when, value in (("before", 0.02), ("now", 0.03)):
-        evaluation = f"'evaluation': {{'optimum_tolerance': 0.5, 'near_noise_tolerance': {value}}}"
+        evaluation = f"'evaluation': {{'optimum_tolerance': 1.0, 'near_noise_tolerance': {value}}}"
         assert re.search(rf"{when}: {{[^:]*{evaluation}", told.output)
 
 
@@ -87,6 +87,7 @@ def test_an_edit_of_the_library_runs_everything_again_and_is_named(
     assert re.search(r"before: .*'source': '\w+'.* now: .*'source': '\w+'", told.output)
 
 
+@pytest.mark.nightly
 def test_a_second_run_changes_no_byte(tiny: Path, tiny_copy: Path) -> None:
     """One job at a time, from the targets on."""
     run = snakemake(tiny_copy, "--forceall", "-j1", "--", "results/report.html", config=TINY)

@@ -17,16 +17,22 @@ from biogrip.study.load import load_study, read_configs
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.source import overlaid
 
-try:
-    # What is given is laid over the default study, in a run of its own and in a module alike.
-    STUDY = load_study(
-        overlaid(read_configs([default_config()]), config),
-        [default_config(), *workflow.overwrite_configfiles],
-        command_line=workflow.config_settings.config,
-    )
-except BiogripError as error:
-    raise WorkflowError(str(error))
 
+def usable(read, *given):
+    """What is read of something given, or, if it cannot be used, the message alone."""
+    try:
+        return read(*given)
+    except BiogripError as error:
+        raise WorkflowError(str(error))
+
+
+# What is given is laid over the default study, in a run of its own and in a module alike.
+STUDY = usable(
+    load_study,
+    overlaid(read_configs([default_config()]), config),
+    [default_config(), *workflow.overwrite_configfiles],
+    workflow.config_settings.config,
+)
 SOFTWARE = software()
 MEASUREMENT = [f"measurement.{field.name}" for field in fields(MeasurementBlock)]
 # Keys that say what a fit assumes of the instrument and of the sample.

@@ -72,7 +72,7 @@ rule interpretations:
 
 
 if STUDY.traces:
-    ROWS = read_table(Path(STUDY.traces.table))
+    ROWS = usable(read_table, Path(STUDY.traces.table))
 
     def rows_of(wildcards):
         """The rows of the table that a batch has, as `biogrip identify --rows` chooses them."""
