@@ -182,7 +182,7 @@ def _in_few_colours(path: Path) -> bytes:
             few = image.convert("RGB").quantize(256, dither=PIL.Image.Dither.NONE)
     except OSError as error:
         raise BiogripError(f"{path}: cannot be read: {error.strerror or error}.") from error
-    few.save(packed, "png", optimize=True)
+    few.save(packed, "png")
     return packed.getvalue()
 
 
