@@ -23,18 +23,26 @@ LOCK := $(BIN)/uv pip compile --universal --fork-strategy fewest --python-versio
 locked = $(1)/bin/python -m pip install --quiet --require-hashes -r requirements-install.lock && \
   $(1)/bin/python -m uv pip install --quiet --python $(1)/bin/python --compile-bytecode --require-hashes \
   $(addprefix -r ,$(2))
+# Overlays whose tables are published, each under its name; see `overlaid`.
+OVERLAYS := calibration coverage interpretations measured power_law recorded robustness soft
+# $(call overlaid,TARGET): every overlay in a folder of its own, from where traces are found, too.
+overlaid = failed=; for overlay in $(OVERLAYS); do \
+  mkdir -p overlays/$$overlay && ln -sfn ../../data overlays/$$overlay/data && \
+  $(BIN)/snakemake -j$(JOBS) --configfile config/$$overlay.yaml --directory overlays/$$overlay $(1) || \
+  failed="$$failed $$overlay"; \
+done; test -z "$$failed" || { echo "$(1): failed for$$failed" >&2; exit 1; }
 ourselves = $(1)/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
 counted = $$(grep -o '^[a-z][^=]*' $(1) | sort -u | wc -l)
 
-# What runs in minutes: all but the tests that start Snakemake again and again. test_results.py runs
-# a small study from its targets to its report.
+# What runs in minutes: of the tests that start Snakemake those of a small study, from its targets to
+# its report, and of the module.
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
-  $(wildcard tests/*)) tests/workflow/test_results.py
+  $(wildcard tests/*)) $(addprefix tests/workflow/,test_module.py test_rules.py test_study.py)
 
-.PHONY: study test test-nightly test-lowest test-pythons check check-overlays verify publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
+.PHONY: study test test-nightly test-lowest test-pythons check check-overlays publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
 
 study: $(READY)
-	$(BIN)/biogrip run -j$(JOBS)
+	$(BIN)/snakemake -j$(JOBS)
 
 # One worker more than there are processors: some wait for the programs that they have started.
 test: $(TEST_READY)
@@ -68,24 +76,20 @@ test-pythons:
 	test -n "$$ran" || { echo "test-pythons: nothing ran" >&2; exit 1; }; \
 	echo "test-pythons: ran with Python$$ran"
 
-# Every result read again, and held against the record of what was written.
-verify: $(READY)
-	$(BIN)/biogrip verify
-
+# What is not up to date is made before its tables are compared.
 check: $(READY)
 	$(BIN)/snakemake -j$(JOBS) check
 
 # The same for every overlay that is published, each as long as a study or longer: nightly, not in CI.
 check-overlays: $(READY)
-	overlays=$$($(BIN)/snakemake --list-rules | grep ^check_) && \
-	  $(BIN)/snakemake -j$(JOBS) --keep-going $$overlays
+	@$(call overlaid,check)
 
 publish: $(READY)
 	$(BIN)/snakemake -j$(JOBS) publish
 
 # What the overlays give that the documentation speaks of; takes longer than the study.
 publish-overlays: $(READY)
-	overlays=$$($(BIN)/snakemake --list-rules | grep ^publish_) && $(BIN)/snakemake -j$(JOBS) $$overlays
+	@$(call overlaid,publish)
 
 lint: $(TEST_READY)
 	$(BIN)/ruff check .
@@ -106,11 +110,13 @@ bench-field: $(FIELD_READY)
 	$(FIELD_BIN)/python -m benchmarks.field
 
 report: $(READY)
-	$(BIN)/snakemake -j$(JOBS) --report report.html --report-metadata workflow/report/results.yaml
+	$(BIN)/snakemake -j$(JOBS) --report report.html
 
 # Config keys described from their classes, and a JSON Schema for editors; the tests fail if this is forgotten.
+# And the picture of the rules.
 docs: $(TEST_READY)
 	$(BIN)/python -m tests.generated_docs
+	$(BIN)/snakemake -j1 docs/rules.png
 
 # Written from CITATION.cff, after it is checked by its schema.
 citation: $(SITE_READY)
@@ -127,7 +133,7 @@ site: $(SITE_READY)
 
 # The pictures that figures are compared with; look at what has changed before committing them.
 pinned: $(TEST_READY)
-	$(BIN)/python -m pytest -q tests/products/figures/test_pinned.py --pin
+	$(BIN)/python -m pytest -q tests/figures/test_pinned.py --pin
 
 # The second lock holds only what tests add to the first, and the next two what running on Slurm,
 # and benchmarks, add to both, of which they may need what is there for PyPy only.
@@ -145,9 +151,9 @@ lock: $(READY)
 	$(LOCK) --group docs --output-file docs/requirements.lock
 	$(LOCK) pyproject.toml --extra dev --extra bench --resolution lowest-direct --output-file requirements-lowest.lock
 
-# Of the results only what the study wrote.
+# Of the results only what rules make; overlays/ has folders of results with their own.
 clean:
-	test ! -x $(BIN)/biogrip || $(BIN)/biogrip clean
+	test ! -x $(BIN)/snakemake || $(BIN)/snakemake --delete-all-output
 	rm -rf .venv .venv-bench .venv-field .venv-site .venv-lowest .venv-3.12 .venv-3.13 .snakemake report.html site
 
 $(READY): requirements-install.lock requirements.lock pyproject.toml

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
-from biogrip.identify.local_fits import FINE, PRIOR_WIDTH, ROUGH
-from biogrip.identify.multi_start import FINISHED
-from biogrip.identify.problem import Problem
+from biogrip.fit.local_fits import FINE, PRIOR_WIDTH, ROUGH
+from biogrip.fit.multi_start import FINISHED
+from biogrip.fit.problem import Problem
 
 
 class Objective:

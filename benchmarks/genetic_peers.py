@@ -1,6 +1,6 @@
 """The paper's genetic algorithm in the libraries of others.
 
-Each has the operators of `biogrip.identify.genetic` as nearly as its interface allows, and as fast:
+Each has the operators of `biogrip.fit.genetic` as nearly as its interface allows, and as fast:
 truncation selection, random disjoint pairs, single-point crossover, and from `mutation_start` on
 one gene redrawn in half of the children. All see the same misfit of whole batches.
 """
@@ -21,8 +21,8 @@ from pymoo.operators.selection.rnd import RandomSelection
 from pymoo.optimize import minimize
 
 from biogrip.arrays import Array, IntArray
-from biogrip.identify.genetic_settings import GeneticSettings
-from biogrip.identify.genome import Genome
+from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genome import Genome
 
 creator.create("Misfit", base.Fitness, weights=(-1.0,))
 creator.create("Chromosome", list, fitness=creator.Misfit)

@@ -11,9 +11,9 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import add_noise, rms
 from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
 from biogrip.experiment.sample import SampleModel
-from biogrip.identify.genetic_settings import GeneticSettings
-from biogrip.identify.genome import Genome, make_genome
-from biogrip.identify.problem import Problem, make_problem
+from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genome import Genome, make_genome
+from biogrip.fit.problem import Problem, make_problem
 from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response

@@ -6,9 +6,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Else every job that a test starts would compile all the source code for itself.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-import shutil
 from collections.abc import Iterator
-from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -17,12 +15,8 @@ from playwright.sync_api import Browser
 from biogrip.experiment.protocol import Phase, TorqueHistory, hold, torque_history
 from biogrip.instrument.gripper import Arm, Gripper
 from tests.helpers.browser import chromium, executable
-from tests.helpers.default import study_of
-from tests.helpers.in_process import make_in_process
-from tests.helpers.pictures import in_coarse_dots
-from tests.helpers.places import EXAMPLE
 from tests.helpers.required import cannot_run
-from tests.helpers.runs import RECORDED, SMALL, TINY, built_once, snakemake
+from tests.helpers.runs import built_once, run_tiny
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -36,14 +30,18 @@ def pinning(request: pytest.FixtureRequest) -> bool:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the test that mostly waits, for Slurm, then with those that take longest.
+    """Begin with the test that mostly waits, for Slurm, and with the study that many need.
 
-    What takes long at the end keeps one worker only, and the two studies that most of them need
-    would be waited for by all.
+    One worker runs that study; what needs it comes last, so that no other waits for it.
     """
-    items.sort(
-        key=lambda item: (item.path.name != "test_slurm.py", item.path.parent.name != "workflow")
-    )
+    items.sort(key=lambda item: (item.path.name != "test_slurm.py", _needs_tiny(item)))
+    if first := next((item for item in items if _needs_tiny(item)), None):
+        items.remove(first)
+        items.insert(0, first)
+
+
+def _needs_tiny(item: pytest.Item) -> bool:
+    return "tiny" in getattr(item, "fixturenames", ())
 
 
 def pytest_collection_finish() -> None:
@@ -84,37 +82,6 @@ def steps(phases: tuple[Phase, ...]) -> TorqueHistory:
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
-    """Results of a small study, one for all workers; Snakemake does not know of them.
-
-    Its figures are not those that users see, which `tiny` has.
-    """
-
-    def make(folder: Path) -> None:
-        with in_coarse_dots():
-            make_in_process(folder, study_of(SMALL))
-
-    return built_once("finished", make, tmp_path_factory, worker_id)
-
-
-@pytest.fixture(scope="session")
 def tiny(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
-    """A study of two seeds that Snakemake has run, one for all workers; copy it likewise."""
-
-    def run(folder: Path) -> None:
-        done = snakemake(folder, config=TINY)
-        assert done.status == 0, done.output
-
-    return built_once("tiny", run, tmp_path_factory, worker_id)
-
-
-@pytest.fixture(scope="session")
-def recorded(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
-    """Results of a study of the example alone, named as a user's file; likewise."""
-
-    def make(folder: Path) -> None:
-        shutil.copy(EXAMPLE, folder / "mine.csv")
-        with chdir(folder):
-            make_in_process(folder, study_of(RECORDED))
-
-    return built_once("recorded", make, tmp_path_factory, worker_id)
+    """Folder of a small study that Snakemake has run, one for all workers: leave it as it is."""
+    return built_once("tiny", run_tiny, tmp_path_factory, worker_id)

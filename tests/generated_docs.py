@@ -14,13 +14,12 @@ from unittest import mock
 import numpy as np
 import pandas as pd
 
-import biogrip.products.files
+import biogrip.records
 from biogrip.cli import main
 from biogrip.digits import with_unit
-from biogrip.products.catalogue import products
-from biogrip.products.files import identifications, traces
-from biogrip.products.files.rows import RowFile, read_table
-from biogrip.products.report.answers import compared_rows, say_what_traces_tell
+from biogrip.page.answers import compared_rows, say_what_traces_tell
+from biogrip.records import identifications, traces
+from biogrip.records.rows import RowFile, read_table
 from tests.helpers.key_reference import file_schema, reference
 from tests.helpers.places import EXAMPLE
 from tests.published_numbers import renewed_numbers
@@ -207,16 +206,16 @@ def file_columns() -> str:
     """The columns of every file of rows, as its kind declares them, and of the published tables."""
     leading, trailing = identifications.LEADING, identifications.TRAILING
     files: dict[str, tuple[str, ...]] = {
-        traces.TARGETS: traces.TARGET_COLUMNS,
-        identifications.PATH: (*leading, "parameters ...", *trailing),
+        "results/targets/{case}.csv": traces.TARGET_COLUMNS,
+        "results/identifications/{case}.csv": (*leading, "parameters ...", *trailing),
     }
     files |= {kind.path: kind.columns for kind in _kinds()}
-    for product in products().values():
-        file = product.writes.get("csv", "")
-        published = sorted(PUBLISHED.rglob(re.sub(r"{\w+}", "*", Path(file).name))) if file else []
-        for table in published[:1]:
-            with table.open(encoding="utf-8", newline="") as stream:
-                files[file] = tuple(next(csv.reader(stream)))
+    for table in sorted(PUBLISHED.rglob("tables/*.csv")):
+        of = re.match("(errors|verdicts|robustness)_", table.name)
+        whose = {"robustness": "{sweep}"}.get(of[1], "{case}") if of else ""
+        name = f"{of[1]}_{whose}.csv" if of else table.name
+        with table.open(encoding="utf-8", newline="") as stream:
+            files.setdefault(f"results/tables/{name}", tuple(next(csv.reader(stream))))
     return _table(
         {"file": f"`{path}`", "columns": ", ".join(f"`{name}`" for name in columns)}
         for path, columns in files.items()
@@ -224,32 +223,42 @@ def file_columns() -> str:
 
 
 def _kinds() -> Iterator[RowFile]:
-    package = biogrip.products.files
+    package = biogrip.records
     modules = [module.name for module in iter_modules(package.__path__, f"{package.__name__}.")]
-    modules += [product.module for product in products().values()]
-    for module in dict.fromkeys(modules):
+    for module in (*modules, "biogrip.stages.sweep_points"):
         values = vars(importlib.import_module(module)).values()
         yield from (value for value in values if isinstance(value, RowFile))
 
 
-def product_files() -> str:
-    """Every product, its files, and what it is."""
-    return _table(
-        {
-            "product": f"`{product.name}`",
-            "files": _together(list(product.writes.values())),
-            "what": (product.caption or product.message).split(". ")[0].rstrip("."),
-        }
-        for product in products().values()
-    )
+def rules() -> str:
+    """Every rule that makes files, with what it makes and what it says."""
+    rows = []
+    for path in sorted((ROOT / "workflow" / "rules").glob("*.smk")):
+        text = path.read_text(encoding="utf-8")
+        for name, body in re.findall(
+            r"^ *rule (\w+):\n(.*?)(?=^ *(?:use )?rule |\Z)", text, re.DOTALL | re.MULTILINE
+        ):
+            made = re.search(r"output:\n(.*?)\n *log:", body, re.DOTALL)
+            said = re.search(r'message:\n *"(.*)"', body)
+            if made and said:
+                files = ", ".join(f"`{file}`" for file in _files(made[1]))
+                what = re.sub(r"{\w+\.(\w+)}", r"{\1}", said[1])
+                rows.append({"rule": f"`{name}`", "files": files, "what": what})
+    return _table(iter(rows))
 
 
-def _together(files: list[str]) -> str:
-    stems = {file.rpartition(".")[0] for file in files}
-    if len(stems) < len(files):
-        endings = ", ".join(f"`.{file.rpartition('.')[2]}`" for file in files)
-        return f"`{stems.pop()}` {endings}"
-    return ", ".join(f"`{file}`" for file in files)
+def _files(output: str) -> Iterator[str]:
+    """The files that a rule's output names, those of tables and figures without their endings."""
+    for plain, several, kind, name, whose in re.findall(
+        r'"(results/[^"]+)"|in (table|figure)\(name\)|(table|figure)\("(\w+)"(?:, "({\w+})")?\)',
+        output,
+    ):
+        if plain or several:
+            yield plain or f"results/{several}s/*"
+        else:
+            yield f"results/{kind}s/{name}{whose and f'_{whose}'}"
+    if "case_figures" in output:
+        yield from ("results/figures/*_{case}", "results/summaries/{case}.html")
 
 
 def _table(rows: Iterator[dict[str, str]]) -> str:
@@ -260,7 +269,7 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "config" / "README.md": {"keys": config_keys},
     ROOT / "README.md": {"answer": answer, "example": identified_example},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
-    ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "products": product_files},
+    ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "rules": rules},
     ROOT / "docs" / "identifiability.md": {"methods": methods_compared},
     ROOT / "docs" / "measured.md": {"measured": measured},
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},

@@ -10,7 +10,7 @@ import yaml
 from biogrip.cli import main
 from biogrip.design import NO_BOUND, decode, make_limits, make_plausible, rated, search
 from biogrip.experiment.sampling import Sampling
-from biogrip.identify.multi_start import fit_from
+from biogrip.fit.multi_start import fit_from
 from biogrip.library import simulate
 from biogrip.response.grip import compute_grip
 from biogrip.study.defaults import default_config
@@ -43,11 +43,12 @@ def set_up(folder: Path, text: str = GRIPPER):  # type: ignore[no-untyped-def]
     config = folder / "my.yaml"
     config.write_text(text)
     files = [default_config(), config]
-    study = load_study(read_configs(files), files, for_workflow=False)
+    study = load_study(read_configs(files), files)
     samples = list(make_plausible(list(study.cases.values()), study.config.design))
     return samples, make_limits(samples, study.config.design)
 
 
+@pytest.mark.nightly
 def test_a_design_is_better_keeps_its_limits_and_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -61,7 +62,7 @@ def test_a_design_is_better_keeps_its_limits_and_runs(
     for label in ("noise of the rotation (rad)", "largest torque (N m)", "highest rate (Hz)"):
         assert label in said
     files = [default_config(), output]
-    (case,) = load_study(read_configs(files), files, for_workflow=False).cases.values()
+    (case,) = load_study(read_configs(files), files).cases.values()
     levels = [phase.left.value_Nm for phase in case.phases]
     assert max(levels) <= 1.6e-9 * (1 + 1e-12)
     assert min(levels) > 0

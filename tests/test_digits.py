@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from biogrip.digits import counted, rounded
-from biogrip.identifiability.whiteness import doubts_about_noise
 from biogrip.instrument.gripper import GRIPPER
-from biogrip.products.files.traces import Measurements
-from biogrip.products.stages.recording import notes_on_recording
+from biogrip.judging.whiteness import doubts_about_noise
+from biogrip.records.traces import Measurements
+from biogrip.stages.recording import notes_on_recording
 
 
 @pytest.mark.parametrize(

@@ -8,16 +8,16 @@ import pytest
 from scipy.stats import chi2, norm
 
 from biogrip.arrays import Array
-from biogrip.identifiability.diagnosis import Diagnosis, diagnose
-from biogrip.identifiability.fit_status import Note
-from biogrip.identifiability.likelihood import compute_fall
-from biogrip.identifiability.whiteness import wandering
-from biogrip.identify.answer import silent
-from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace, study_of
-from biogrip.own_traces.read_as import ReadAs
-from biogrip.own_traces.second_opinion import second_opinions
-from biogrip.own_traces.trace_case import TraceCase
-from biogrip.products.files.traces import Measurements
+from biogrip.fit.answer import silent
+from biogrip.identify.one_trace import IdentifyOptions, identify_trace, study_of
+from biogrip.identify.read_as import ReadAs
+from biogrip.identify.second_opinion import second_opinions
+from biogrip.identify.trace_case import TraceCase
+from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.judging.fit_status import Note
+from biogrip.judging.likelihood import compute_fall
+from biogrip.judging.whiteness import wandering
+from biogrip.records.traces import Measurements
 from tests.helpers.problems import clean, run
 
 TIMES, CLEAN = clean("endothelial_cell", 5.0)
@@ -114,6 +114,7 @@ def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(
     assert found == pytest.approx(2 * (after - before), rel=1e-12)
 
 
+@pytest.mark.nightly
 def test_what_is_declared_is_not_suspected(tmp_path: Path) -> None:
     file = written(tmp_path / "t.csv", trace(0, DRIFT))
     few = tmp_path / "few.yaml"

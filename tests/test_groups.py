@@ -1,6 +1,10 @@
 """Groups of cells: estimates against known ones, promises by simulation, and what is said."""
 
 import csv
+import os
+import signal
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +17,7 @@ from scipy.stats import norm, ttest_ind
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.groups import FEWEST_CELLS, Cell, adjusted, compare, estimate
-from biogrip.own_traces.outputs import WRITTEN_BY
+from biogrip.identify.outputs import WRITTEN_BY
 from tests.helpers.places import ROOT
 
 # Log risk ratios of tuberculosis, with and without vaccination, and their variances: Colditz et
@@ -95,16 +99,6 @@ def test_limits_hold_the_truth_and_equal_dishes_seldom_differ(cells: int, error:
     assert 0.93 <= np.mean(ratios) <= 0.97
     assert 0.93 <= np.mean(medians) <= 0.97
     assert false <= 0.06 * 500
-
-
-def test_few_cells_whose_errors_hide_the_spread_have_wide_limits() -> None:
-    """Not too narrow ones: of five cells with errors as large as the spread, 96 % hold it."""
-    rng = np.random.default_rng(3)
-    held = []
-    for _ in range(1000):
-        row = compare(dish(rng, "a", 5, SPREAD, 0.0), ["a"], 0.95)["k", "a"]
-        held.append(row["low"] <= 1.0 <= row["high"])
-    assert 0.94 <= np.mean(held) <= 0.98
 
 
 def test_cells_that_are_only_bounded_are_not_what_limits_are_of() -> None:
@@ -296,6 +290,17 @@ def test_nothing_of_others_is_replaced(
         assert main(["groups", str(found), "--by", "dish", "--csv", str(table)]) == 1
         assert words in capsys.readouterr().err
     said(capsys, found, "--by", "dish", "--csv", mine, "--force")
+
+
+def test_nobody_reading_on_is_no_error(tmp_path: Path, rows: list[dict[str, str]]) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "biogrip", "groups"]
+    command += [str(written(tmp_path, rows)), "--by", "dish"]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert done.returncode == 128 + signal.SIGPIPE
+    assert done.stderr == ""
 
 
 def test_identify_and_groups_say_the_same_of_a_cell(

@@ -7,10 +7,8 @@ import pytest
 from biogrip.cli import _parser, main
 from biogrip.experiment.models import MODELS
 
-COMMANDS = ("run", "identify", "groups", "design", "make", "verify", "clean", "publish")
 
-
-@pytest.mark.parametrize("command", [*COMMANDS, "compare"])
+@pytest.mark.parametrize("command", ["identify", "groups", "design"])
 def test_examples_are_commands_that_can_be_typed(
     command: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -22,8 +20,7 @@ def test_examples_are_commands_that_can_be_typed(
     for line in lines:
         program, *arguments = shlex.split(line)
         assert (program, arguments[0]) == ("biogrip", command)
-        # What follows `run` is for Snakemake.
-        _parser().parse_args(arguments[:1] if command == "run" else arguments)
+        _parser().parse_args(arguments)
 
 
 def test_models_are_listed_as_they_are_typed_and_printed(

@@ -15,8 +15,7 @@ from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import Harmonic, Load, Phase, hold
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.library import Sample, identify_sample, judge, set_up, simulate
-from biogrip.products.catalogue import products
-from tests.helpers.default import plan_of, study_of
+from tests.helpers.default import study_of
 from tests.helpers.places import ROOT
 
 FEW = "least_squares: {candidates: 100, starts: 4}\nmodel_selection: {models: [maxwell]}\n"
@@ -138,18 +137,9 @@ def test_what_is_not_held_is_asked_for_and_kinds_do_not_mix(
             "stress_Pa: is not what relaxation holds; allowed is displacement_m or strain",
         ),
         (
-            "instrument: creep\nmodels: {target: nonlinear}\n"
-            "protocol: {phases: [{duration_s: 5, stress_Pa: 1}]}",
-            "models.target: found nonlinear, allowed with creep is linear",
-        ),
-        (
             "instrument: creep\n"
             "protocol: {phases: [{duration_s: 5, stress_Pa: 1}, {duration_s: 5, force_N: 1}]}",
             "force_N: does not go with stress_Pa in another phase",
-        ),
-        (
-            "instrument: creep\nprotocol: {phases: [{duration_s: 5, stress_Pa: 1, to_strain: 1}]}",
-            "to_strain: does not go with stress_Pa",
         ),
     ],
 )
@@ -202,6 +192,7 @@ def test_readings_at_the_instant_of_a_step_are_left_out(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.nightly
 def test_readings_that_scatter_more_at_first_are_doubted_and_can_be_left_out(
     tmp_path: Path,
 ) -> None:
@@ -225,18 +216,6 @@ def test_readings_that_scatter_more_at_first_are_doubted_and_can_be_left_out(
         "    - {duration_s: 6, strain: 0, to_strain: 1}\n    - {duration_s: 54, strain: 1}\n"
     )
     assert identified(trace, *options, config=ramp + FEW)["fit"] == "rejected"
-
-
-def test_what_is_assumed_is_a_config_that_gives_the_same(tmp_path: Path) -> None:
-    trace = written(tmp_path / "f.csv", "force_N", noisy(response("force", 2e-6)))
-    options = ["--reading", "force=force_N", "--model", SOLID.name]
-    found = identified(trace, *options, "--hold", "2e-6")
-    again = identified(trace, *options, config=yaml.safe_dump(_config(found["assumed"])))
-    assert again["quantities"] == found["quantities"]
-
-
-def _config(assumed: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in assumed.items() if key != "model"}
 
 
 @pytest.mark.parametrize("reading", ["stress", "modulus"])
@@ -302,22 +281,3 @@ def test_mucus_is_fitted_better_than_published(tmp_path: Path) -> None:
     options = ["--reading", "compliance=compliance_per_Pa", "--model", "springpot_beside_damper"]
     found = identified(trace, *options)
     assert found["samples"] * found["misfit_per_Pa"] ** 2 < 0.0039
-
-
-def test_products_of_the_gripper_are_of_its_cases_alone() -> None:
-    plan = plan_of(
-        "only: [pipette]\n"
-        "cases:\n"
-        "  pipette:\n"
-        "    instrument: creep\n"
-        "    sample: {model: maxwell, k: 0.05, c: 0.2}\n"
-        "    protocol: {phases: [{duration_s: 60, force_N: 1.0e-9}]}\n"
-    )
-    made = {name for name, product in products().items() if product.jobs(plan)}
-    of_the_gripper = {
-        *("torque", "comb", "linkage", "force", "linearisation", "gripper", "actuator", "contact"),
-        *("left_out", "mechanics", "contact_loss", "linearisation_figure", "model_difference"),
-    }
-    assert of_the_gripper < set(products())
-    assert not made & of_the_gripper
-    assert {"target", "measurement", "identification", "verdicts", "errors", "report"} <= made

@@ -7,7 +7,7 @@ import pytest
 
 import biogrip
 from biogrip import library
-from biogrip.identifiability.verdicts import DETERMINED
+from biogrip.judging.verdicts import DETERMINED
 from tests.helpers.default import STUDY
 from tests.helpers.places import ROOT
 from tests.response.test_nonlinear import ARM, TIMES, symmetric_radau

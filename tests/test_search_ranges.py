@@ -11,8 +11,8 @@ import yaml
 from biogrip.cli import main
 from biogrip.experiment.models import MODELS
 from biogrip.experiment.protocol import hold, torque_history
+from biogrip.identify.search_ranges import ranges_of
 from biogrip.instrument.gripper import Arm, Gripper
-from biogrip.own_traces.search_ranges import ranges_of
 from biogrip.response.simulation import simulated_rotation
 from tests.helpers.default import STUDY
 

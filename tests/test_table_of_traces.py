@@ -14,10 +14,10 @@ from biogrip.cli import main
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.sample import MODELS
+from biogrip.identify.table_of_traces import is_table, read_table
 from biogrip.library import hold
-from biogrip.own_traces.table_of_traces import is_table, read_table
-from biogrip.products.tables.contact import contacts
 from biogrip.response.linear import rotation, step_response
+from biogrip.tables.contact import contacts
 from tests.helpers.default import STUDY
 from tests.helpers.problems import GRIPPER, TORQUE
 

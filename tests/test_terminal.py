@@ -1,6 +1,5 @@
 """What reaches a terminal: nothing that it obeys but our own, and nothing where it is closed."""
 
-import csv
 import json
 import re
 import shutil
@@ -103,26 +102,6 @@ def test_names_of_traces_are_shown_wherever_they_are_said(
     assert f">{visible(good)}<" in page.read_text()
 
 
-def test_words_of_a_table_and_its_groups_are_shown(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    config, table, found = (tmp_path / name for name in ("few.yaml", f"{FOUND}.csv", "found.csv"))
-    config.write_text(FEW)
-    shutil.copy(EXAMPLE, tmp_path / f"a{FOUND}.csv")
-    rows = [["file", f"dish {FOUND}"], [f"a{FOUND}.csv", f"left {FOUND}"], [f"b{FOUND}.csv", "b"]]
-    with table.open("w", newline="") as stream:
-        csv.writer(stream).writerows(rows)
-    assert main(["identify", str(table), "--config", str(config), "--csv", str(found)]) == 1
-    said = capsys.readouterr().out
-    assert f"  {visible(table)}, line 3: found" in said
-    assert not OBEYED.search(said)
-    assert main(["groups", str(found), "--by", f"dish {FOUND}"]) == 0
-    said = capsys.readouterr().out
-    for text in (f"left {FOUND}", f"not identified: {tmp_path}/b{FOUND}.csv"):
-        assert visible(text) in said
-    assert not OBEYED.search(said)
-
-
 def test_progress_and_warnings_are_shown(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -139,7 +118,7 @@ def test_progress_and_warnings_are_shown(
 @pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
 @pytest.mark.parametrize(
     ("arguments", "status"),
-    [("verify .", 1), ("clean .", 0), ("identify a.csv --config few.yaml", 0), ("design", 2)],
+    [("groups a.csv --by x", 1), ("identify a.csv --config few.yaml", 0), ("design", 2)],
 )
 @pytest.mark.nightly
 def test_a_command_may_have_nobody_to_talk_to(

@@ -22,13 +22,13 @@ import numpy as np
 from benchmarks.report import Row, Section, number
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array, BoolArray
-from biogrip.identifiability.verdicts import DETERMINED
-from biogrip.identify.answer import Identification
-from biogrip.identify.case_problem import CaseProblem
+from biogrip.fit.answer import Identification
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.identify.search_ranges import ranges_of
+from biogrip.judging.verdicts import DETERMINED
 from biogrip.library import Phase, Sample, hold, identify_sample, judge, simulate
-from biogrip.own_traces.search_ranges import ranges_of
-from biogrip.products.files.traces import Measurements
-from biogrip.products.stages.recording import read_checked
+from biogrip.records.traces import Measurements
+from biogrip.stages.recording import read_checked
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case
 

@@ -13,13 +13,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from biogrip import __version__
 from biogrip.errors import BiogripError
-from biogrip.files import watch_writes
 from biogrip.terminal import visible, visible_lines
 
 if TYPE_CHECKING:
-    from biogrip.own_traces.read_as import ReadAs
+    from biogrip.identify.read_as import ReadAs
 
-RESULTS = Path("results")
 FIT = "fit"
 _SHOWN = 200
 
@@ -30,12 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, and return its exit status."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     parser = _parser()
-    if given[:1] == ["run"] and not {"-h", "--help"} & set(given):
-        # All other arguments are for Snakemake.
-        options = parser.parse_args(given[:1])
-        options.rest = given[1:]
-    else:
-        options = parser.parse_args(given)
+    options = parser.parse_args(given)
     # Matrices are small: BLAS threads cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
@@ -54,15 +47,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"biogrip: {place}{error.strerror or error}.", file=sys.stderr)
         return 1
     return options.status
-
-
-def _refuse_others(path: Path, scratch: Path) -> None:
-    """Refuse to replace files without a record; Snakemake has removed those that have one."""
-    if os.path.lexists(path):
-        from biogrip.running.manifest import Manifest
-        from biogrip.running.wholeness import refuse_others
-
-        refuse_others(Manifest(RESULTS), RESULTS, [path])
 
 
 class _Parser(argparse.ArgumentParser):
@@ -101,78 +85,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    text = "run a study"
-    more = (
-        "Config files (*.yaml) are laid over the default study; the rest goes to Snakemake. A "
-        "terminal shows one line per finished job, with --verbose all that Snakemake prints; "
-        ".snakemake/log has it anyway."
-    )
-    run = commands.add_parser(
-        "run",
-        help=text,
-        description=f"{text.capitalize()}. {more}",
-        usage="biogrip run [CONFIG.yaml ...] [options of Snakemake ...]",
-    )
-    run.set_defaults(command=_run)
-    run.examples = _examples(
-        "run",
-        "run my.yaml --directory my_study -j4",
-        cost="The default study takes about a minute on two cores: some 0.01 s of a processor for "
-        "each seed of each case, by the nonlinear model 2 s.",
-    )
-
     _identify_parser(commands)
     _groups_parser(commands)
     _design_parser(commands)
 
-    text = "make products of the study that was last run here, as its jobs do"
-    make = commands.add_parser("make", help=text, description=text)
-    make.set_defaults(command=_make)
-    make.examples = _examples(
-        "make errors_of_case --case liquid_drop_1",
-        "make identification --case liquid_drop_1 --method genetic --batch seeds_0-49",
-    )
-    make.add_argument(
-        "products", nargs="+", metavar="PRODUCT", help="name of a product, e.g. errors"
-    )
-    for name, text in (
-        ("case", "name of the case"),
-        ("method", "name of the method"),
-        ("batch", "batch of seeds, e.g. seeds_0-49"),
-        ("sweep", "name of the sweep"),
-        ("seed", "number of the seed"),
-    ):
-        make.add_argument(f"--{name}", help=text)
-    make.add_argument("--made-for", help=argparse.SUPPRESS)
-
-    for name, command, text in (
-        ("verify", _verify, "compare all results with their record"),
-        ("clean", _clean, "remove the results of a study, and nothing else"),
-    ):
-        parser_of = commands.add_parser(name, help=text, description=text)
-        parser_of.set_defaults(command=command)
-        parser_of.examples = _examples(name, f"{name} my_study/results")
-        parser_of.add_argument(
-            "results", type=Path, nargs="?", default=RESULTS, help="folder [%(default)s]"
-        )
-
-    publish = commands.add_parser("publish", help="renew published tables and figures")
-    publish.set_defaults(command=_publish)
-    publish.examples = _examples(
-        "publish results published", 'publish results published --only "errors*"'
-    )
-    publish.add_argument("results", type=Path, help="results of a finished study")
-    publish.add_argument("published", type=Path, help="folder to publish in")
-    publish.add_argument("--only", default="*", help="pattern of names, e.g. readings*")
-
-    compare = commands.add_parser("compare", help="compare regenerated tables with published ones")
-    compare.set_defaults(command=_compare)
-    compare.examples = _examples(
-        "compare published/tables results/tables", "compare old/tables my_study/results/tables"
-    )
-    compare.add_argument("published", type=Path, help="folder of published tables")
-    compare.add_argument("now", type=Path, help="folder of regenerated tables")
-    compare.add_argument("--only", default="*", help="pattern of names, e.g. readings*")
     return parser
 
 
@@ -377,18 +293,8 @@ def _reading(text: str) -> tuple[str, str]:
     )
 
 
-def _make(options: argparse.Namespace) -> None:
-    from biogrip.running.make import make
-
-    names = ("case", "method", "batch", "sweep", "seed")
-    given = {name: getattr(options, name) for name in names}
-    job = {name: text for name, text in given.items() if text}
-    with watch_writes(_refuse_others):
-        make(options.products, job, RESULTS, options.made_for)
-
-
 def _identify(options: argparse.Namespace) -> None:
-    from biogrip.own_traces.identify import identify
+    from biogrip.identify.identify import identify
 
     options.status = identify(
         options.traces,
@@ -418,7 +324,7 @@ def _design(options: argparse.Namespace) -> None:
 
 
 def _read_as(options: argparse.Namespace) -> "ReadAs":
-    from biogrip.own_traces.read_as import ReadAs
+    from biogrip.identify.read_as import ReadAs
 
     return ReadAs(
         options.time,
@@ -443,33 +349,3 @@ def _read_as(options: argparse.Namespace) -> "ReadAs":
         sd=options.sd,
         noise_share=options.noise_share,
     )
-
-
-def _run(options: argparse.Namespace) -> None:
-    from biogrip.running.run import run
-
-    options.status = run(options.rest)
-
-
-def _verify(options: argparse.Namespace) -> None:
-    from biogrip.running.verify import verify
-
-    print(visible_lines(verify(options.results)))
-
-
-def _clean(options: argparse.Namespace) -> None:
-    from biogrip.running.clean import clean
-
-    print(visible_lines(clean(options.results)))
-
-
-def _publish(options: argparse.Namespace) -> None:
-    from biogrip.running.published import publish
-
-    print(visible_lines(publish(options.results, options.published, options.only)))
-
-
-def _compare(options: argparse.Namespace) -> None:
-    from biogrip.running.comparison import compare
-
-    print(visible_lines(compare(options.published, options.now, options.only)))

@@ -25,15 +25,15 @@ from biogrip.experiment.noise import standard_deviation
 from biogrip.experiment.protocol import Phase, hold, largest_load, torque_history
 from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.files import refuse_inputs, write_text
-from biogrip.own_traces.outputs import WRITTEN_BY, check_output
+from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.response.grip import compute_grip
 from biogrip.response.jaw_force import jaw_force_response
 from biogrip.response.modes import Modes
 from biogrip.response.protocol_modes import compute_protocol_modes
 from biogrip.response.sensitivity import linear_responses
 from biogrip.response.simulation import simulated_rotation
+from biogrip.study.config import DesignBlock
 from biogrip.study.defaults import default_config
-from biogrip.study.design_block import DesignBlock
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import overlaid, read_config
 from biogrip.study.study import Case
@@ -181,7 +181,7 @@ def design(config: Path, output: Path | None, *, force: bool) -> None:
     refuse_inputs([output], [config])
     check_output(output, force=force)
     files = [default_config(), config]
-    study = load_study(read_configs(files), files, for_workflow=False)
+    study = load_study(read_configs(files), files)
     samples = list(make_plausible(list(study.cases.values()), study.config.design))
     limits = make_limits(samples, study.config.design)
     train, reached = search(samples, limits)
@@ -192,7 +192,11 @@ def design(config: Path, output: Path | None, *, force: bool) -> None:
     after = [rated(one, train.phases, sampling) for one in samples]
     write_text(output, as_config(read_config(config), samples, after))
     print(visible_lines("\n".join(_said(samples, before, after, reached))))
-    print(visible_lines(f"Written to {output}; biogrip run {output} simulates and fits it."))
+    print(
+        visible_lines(
+            f"Written to {output}; snakemake -j2 --configfile {output} simulates and fits it."
+        )
+    )
 
 
 def make_plausible(cases: Sequence[Case], block: DesignBlock) -> Iterator[Plausible]:
@@ -439,7 +443,7 @@ def relative_bounds(found: Array) -> Array:
     """Return standard deviations of log-parameters from information, (..., n_parameters).
 
     A parameter that is not told to a factor of e with all others known is taken as known for the
-    others, as in `biogrip.identifiability.fisher`, and has `NO_BOUND`.
+    others, as in `biogrip.judging.fisher`, and has `NO_BOUND`.
     """
     own = np.diagonal(found, axis1=-2, axis2=-1)
     informed = own >= 1

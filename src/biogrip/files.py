@@ -1,32 +1,13 @@
 """Atomic writing of files."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from biogrip.errors import BiogripError
 from biogrip.stopping import unfinished
 from biogrip.terminal import visible
-
-Watch = Callable[[Path, Path], None]
-"""Callback with the final path and the scratch file, just before the file is moved in place."""
-
-Begin = Callable[[Path], None]
-"""Callback with a scratch file, before it is written."""
-
-_watches: list[tuple[Watch, Begin | None]] = []
-
-
-@contextmanager
-def watch_writes(watch: Watch, begin: Begin | None = None) -> Iterator[None]:
-    """Call `watch` for every file written atomically within a context, and `begin` before."""
-    both = watch, begin
-    _watches.append(both)
-    try:
-        yield
-    finally:
-        _watches.remove(both)
 
 
 @contextmanager
@@ -41,13 +22,8 @@ def atomic_write(path: Path) -> Iterator[Path]:
     scratch = scratch_path(path)
     unfinished.add(str(scratch))
     try:
-        for _, begin in _watches:
-            if begin is not None:
-                begin(scratch)
         path.parent.mkdir(parents=True, exist_ok=True)
         yield scratch
-        for watch, _ in _watches:
-            watch(path, scratch)
         os.replace(scratch, path)
     except OSError as error:
         raise BiogripError(

@@ -24,13 +24,13 @@ from biogrip.arrays import Array
 from biogrip.digits import counted, rounded_numbers, with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs
-from biogrip.identifiability.fit_status import DOUBTFUL, REJECTED
-from biogrip.identifiability.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED
-from biogrip.own_traces.many_traces import FAILED
-from biogrip.own_traces.outputs import WRITTEN_BY, check_output
-from biogrip.products.files.rows import read_rows, write_rows
-from biogrip.study.trace_file import trace_file_problem
+from biogrip.identify.many_traces import FAILED
+from biogrip.identify.outputs import WRITTEN_BY, check_output
+from biogrip.judging.fit_status import DOUBTFUL, REJECTED
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED
+from biogrip.records.rows import read_rows, write_rows
 from biogrip.terminal import aligned, visible, visible_lines
+from biogrip.traces.trace_file import trace_file_problem
 
 FEWEST_CELLS = 3
 """Fewest cells of which a median is estimated."""

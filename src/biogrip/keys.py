@@ -42,8 +42,13 @@ Printed = Annotated[
 """Text that is safe in tables, figures and file formats."""
 
 
-OPEN = ConfigDict(strict=True, extra="allow", frozen=True, defer_build=True)
+OPEN = ConfigDict(strict=True, extra="allow", allow_inf_nan=False, frozen=True, defer_build=True)
 """Configuration of models that collect the keys that they do not name."""
+
+
+def below(path: tuple[Hashable, ...], problems: Iterable[Problem]) -> Iterator[Problem]:
+    """Yield problems of a block as those of one that has it, at a path."""
+    return (((*path, *inner), text) for inner, text in problems)
 
 
 def kind_of(value: Any) -> str | None:
@@ -79,7 +84,9 @@ class Checked:
 class Block(Checked):
     """Base class of frozen dataclasses whose fields are the keys of a config block."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True, extra="forbid")
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(
+        strict=True, extra="forbid", allow_inf_nan=False
+    )
 
 
 def _conflict(path: tuple[Hashable, ...], text: str) -> InitErrorDetails:

@@ -13,14 +13,14 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.protocol import Phase, hold
 from biogrip.experiment.sample import Sample
-from biogrip.identifiability.diagnosis import Diagnosis, diagnose
-from biogrip.identify.answer import Identification, silent
-from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.genome import GeneRange
-from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
+from biogrip.fit.answer import Identification, silent
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.genome import GeneRange
+from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Arm, Gripper
 from biogrip.instrument.instrument import Instrument
 from biogrip.instrument.instruments import INSTRUMENTS
+from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.response.simulation import simulated_rotation
 
 if TYPE_CHECKING:
@@ -149,9 +149,9 @@ def plot(
     experiment: CaseProblem, time_s: Array, rotation_rad: Array, found: Identification
 ) -> "Figure":
     """Draw a trace, its fit and the residuals."""
-    from biogrip.products.figures.fit import draw_fit
-    from biogrip.products.figures.results import Fit
-    from biogrip.products.figures.style import styled
+    from biogrip.figures.fit import draw_fit
+    from biogrip.figures.results import Fit
+    from biogrip.figures.style import styled
 
     names = experiment.searched.names
     values = {**experiment.fixed, **dict(zip(names, map(float, found.parameters), strict=True))}

@@ -7,8 +7,7 @@ are written atomically, so only scratch files need to be removed.
 import os
 import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from types import FrameType
 
 from biogrip.terminal import visible
@@ -25,16 +24,6 @@ def end_when_stopped() -> None:
     for number in _SAID:
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, _end)
-
-
-@contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Let signals that stop a command wait for the end of something short."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {*_SAID, signal.SIGHUP})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def end_at_once(number: int, line: str) -> None:

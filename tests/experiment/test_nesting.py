@@ -35,7 +35,7 @@ def test_a_richer_model_becomes_the_simpler_one(
 ) -> None:
     """To rounding: that of polynomials of degree nine, where there are eight branches."""
     rng = np.random.default_rng(0)
-    for _ in range(10):
+    for _ in range(3):
         parameters = drawn(simpler, rng)
         expected = response(gripper, simpler, parameters, inertia)
         found = response(gripper, richer, as_richer(richer, simpler, parameters), inertia)

@@ -1,15 +1,14 @@
 """Limits tie the models to one another and to closed forms."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from biogrip.experiment.maxwell_models import generalized_maxwell, liquid_drop
+from biogrip.experiment.maxwell_models import generalized_maxwell
 from biogrip.experiment.network import complex_modulus
-from biogrip.experiment.protocol import TorqueHistory, hold, torque_history
+from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import MODELS, Network, Sample, with_fixed
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, sample_polynomials, step_response
@@ -35,14 +34,6 @@ def kelvin_voigt(
     return phi
 
 
-def test_liquid_drop_is_generalized_maxwell_without_its_damper(
-    gripper: Gripper, steps: TorqueHistory
-) -> None:
-    drop = response_of(gripper, steps, liquid_drop([9.5, 0.3, 10.0]))
-    general = response_of(gripper, steps, generalized_maxwell([9.5, 0.3, 10.0, 0.0]))
-    np.testing.assert_array_equal(drop, general)
-
-
 def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
     gripper: Gripper, steps: TorqueHistory
 ) -> None:
@@ -52,26 +43,6 @@ def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
         ours = response_of(gripper, steps, generalized_maxwell([1e7, 0.02, c, c_p]))
         # The branch relaxes within c/k = 1e-6 s, and the arms' inertia lags as little.
         np.testing.assert_allclose(ours, expected, atol=1e-6 * expected.max())
-
-
-def test_a_blocked_damper_leaves_the_springs_in_parallel(
-    gripper: Gripper, steps: TorqueHistory
-) -> None:
-    """c to infinity: k and k_p side by side."""
-    ours = response_of(gripper, steps, generalized_maxwell([2.0, 0.5, 1e9, 3.0]))
-    # The damper still creeps by t k/c = 1e-6.
-    np.testing.assert_allclose(ours, kelvin_voigt(gripper, steps, 2.5, 3.0), rtol=2e-6)
-
-
-def test_maxwell_liquid_flows_at_the_rate_of_its_damper(gripper: Gripper) -> None:
-    """k_p, c_p to 0 and soft arms: phi = tau/u (1/k + t/c)."""
-    soft = replace(gripper.left, stiffness_Nm_per_rad=1e-16)
-    free = Gripper(gripper.arm_length_m, gripper.reference_angle_deg, soft, soft)
-    constant = torque_history((hold(400.0, 1.6e-9),))
-    ours = response_of(free, constant, liquid_drop([2.0, 0.0, 50.0]))
-    expected = 1.6e-9 / (2 * free.lever_m**2) * (1 / 2.0 + TIMES / 50.0)
-    # The arm's damper delays the start by c_g / (u k) = 4e-7 s.
-    np.testing.assert_allclose(ours, expected, rtol=1e-6)
 
 
 SPRING_OR_DAMPER: dict[str, Callable[..., complex]] = {
@@ -131,23 +102,6 @@ def test_more_branches_add_up() -> None:
         branches = sum(series(values[j], values[4 + j] * s) for j in range(3))
         expected = 0.5 + 0.02 * s + branches
         assert impedance(model.network(values), s) == pytest.approx(expected, rel=1e-12)
-
-
-def test_both_zener_forms_are_one_solid() -> None:
-    """k_p, k in parallel of the Maxwell form from k_s, k_v in series of the other."""
-    kelvin = MODELS["zener_kelvin"].network([3.0, 2.0, 40.0])
-    maxwell = MODELS["zener_maxwell"].network([9 / 5, 6 / 5, 40 * 9 / 25])
-    for ours, theirs in zip(
-        (kelvin.k, kelvin.k_p, kelvin.c), (maxwell.k, maxwell.k_p, maxwell.c), strict=True
-    ):
-        np.testing.assert_allclose(ours, theirs, rtol=1e-14)
-
-
-def test_burgers_with_a_stiff_kelvin_voigt_element_is_a_maxwell_liquid() -> None:
-    burgers = MODELS["burgers"].network([2.0, 50.0, 1e9, 1.0])
-    maxwell = MODELS["maxwell"].network([2.0, 50.0])
-    for s in 1j * np.geomspace(1e-3, 1e3, 13):
-        assert impedance(burgers, s) == pytest.approx(impedance(maxwell, s), rel=1e-8)
 
 
 def test_fixing_a_parameter_leaves_the_others(gripper: Gripper, steps: TorqueHistory) -> None:

@@ -3,7 +3,10 @@
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, sync_playwright
 
 
@@ -20,3 +23,32 @@ def chromium() -> Iterator[Browser]:
         browser = driver.chromium.launch(executable_path=executable(), args=["--no-sandbox"])
         yield browser
         browser.close()
+
+
+class Opened:
+    """A page, what went wrong in it, and what it asked for beside itself."""
+
+    def __init__(self, browser: Any, page: Path, fragment: str = "", **context: Any) -> None:
+        self.problems: list[str] = []
+        self.asked: list[str] = []
+        self.context = browser.new_context(**context)
+        self.page = self.context.new_page()
+        self.page.on("pageerror", lambda error: self.problems.append(str(error)))
+        self.page.on("console", self._said)
+        self.page.on("request", self._requested)
+        self.page.goto(page.as_uri() + fragment)
+
+    def _said(self, message: Any) -> None:
+        if message.type == "error":
+            self.problems.append(message.text)
+
+    def _requested(self, request: Any) -> None:
+        if not request.url.startswith(("file:", "data:", "blob:")):
+            self.asked.append(request.url)
+
+    def barriers(self, *rules: str) -> list[tuple[str, list[str]]]:
+        """What Axe finds that is serious, by some of its rules or by all."""
+        found = Axe().run(self.page, options={"runOnly": list(rules)} if rules else None).response
+        assert len(found["passes"]) > (0 if rules else 20)
+        serious = [v for v in found["violations"] if v["impact"] in ("serious", "critical")]
+        return [(v["id"], [node["html"] for node in v["nodes"]]) for v in serious]

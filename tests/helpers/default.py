@@ -1,12 +1,10 @@
 """The default study, and such as differ from it."""
 
-from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import yaml
 
-from biogrip.products.plan import Plan
-from biogrip.products.uses import Used
 from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config
 from biogrip.study.study import Study
@@ -19,14 +17,9 @@ def study_of(overlay: str = "") -> Study:
     return load_study(overlaid(read_config(CONFIG), over), [CONFIG])
 
 
-def plan_of(overlay: str = "") -> Plan:
-    """Its jobs where nothing is done yet."""
-    return Plan(study_of(overlay), Path("nowhere"))
-
-
 def seen(**values: object) -> Any:
-    """What a product sees of a study or a case, made up."""
-    return Used(values)
+    """What is read of a study or a case, made up."""
+    return SimpleNamespace(**values)
 
 
 STUDY = study_of()

@@ -13,8 +13,8 @@ from scipy.optimize import least_squares
 from scipy.special import expit, log_expit
 
 from biogrip.arrays import Array
-from biogrip.identifiability.likelihood import Likelihood
-from biogrip.identifiability.quantities import Quantity
+from biogrip.judging.likelihood import Likelihood
+from biogrip.judging.quantities import Quantity
 
 CANDIDATES = 400
 ROUGH, TIGHT = 1e-6, 1e-11

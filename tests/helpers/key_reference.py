@@ -8,9 +8,10 @@ from typing import Any
 
 import pandas as pd
 import yaml
+from pydantic import TypeAdapter
 
 from biogrip.keys import Block
-from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
+from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.config import StudyConfig
 from biogrip.study.messages import bound
 from biogrip.study.schema import Schema, tidy
@@ -27,9 +28,7 @@ _Row = tuple[str, str, str, str, str]
 def documented() -> dict[str, Any]:
     """Return the JSON Schema of a config, with the docstrings of keys, which jobs do not read."""
     Block.__pydantic_config__["use_attribute_docstrings"] = True
-    for model in (CaseBlock, StudyConfig):
-        model.model_rebuild(force=True)
-    return tidy(StudyConfig.model_json_schema())
+    return tidy(TypeAdapter(StudyConfig).json_schema())
 
 
 def reference(config: Path) -> str:

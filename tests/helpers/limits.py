@@ -7,13 +7,13 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.experiment.random_streams import stream
-from biogrip.identifiability.likelihood import Likelihood, make_likelihood
-from biogrip.identifiability.limits import find_limits
-from biogrip.identifiability.profiles import compute_profiles
-from biogrip.identifiability.quantities import Quantity
-from biogrip.identify.answer import silent
-from biogrip.identify.identifier import identifier
-from biogrip.identify.problem import Problem
+from biogrip.fit.answer import silent
+from biogrip.fit.identifier import identifier
+from biogrip.fit.problem import Problem
+from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.limits import find_limits
+from biogrip.judging.profiles import compute_profiles
+from biogrip.judging.quantities import Quantity
 from tests.helpers.default import STUDY
 from tests.helpers.definition import rise_at, rises_along
 from tests.helpers.places import EXAMPLE

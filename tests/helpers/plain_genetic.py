@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.identify.answer import History, Identification
-from biogrip.identify.genetic_settings import GeneticSettings
-from biogrip.identify.genome import Genome
+from biogrip.fit.answer import History, Identification
+from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genome import Genome
 
 
 def chromosomes_of(genome: Genome, codes: IntArray) -> IntArray:

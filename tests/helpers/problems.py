@@ -9,10 +9,10 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
 from biogrip.experiment.sample import MODELS, SampleModel
-from biogrip.identify import least_squares
-from biogrip.identify.answer import Identification, silent
-from biogrip.identify.identifier import identifier
-from biogrip.identify.problem import Problem, make_problem
+from biogrip.fit import least_squares
+from biogrip.fit.answer import Identification, silent
+from biogrip.fit.identifier import identifier
+from biogrip.fit.problem import Problem, make_problem
 from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.response.condensed import Condensed

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
-from biogrip.identify.local_fits import PRIOR_WIDTH
-from biogrip.identify.problem import Problem
+from biogrip.fit.local_fits import PRIOR_WIDTH
+from biogrip.fit.problem import Problem
 
 _MOST_EVALUATIONS = 300
 

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import arb
-from scipy.integrate import quad
 
 from biogrip.arrays import Array
 from biogrip.experiment.models import MODELS
@@ -35,8 +34,6 @@ PHASES = (
     _alike(2.0, load(2.0, 1.0, None, 0.5, 0.3)),
     hold(2.0, 0.0),
 )
-STEP = torque_history((hold(1000.0, 1.0),))
-STRETCH = torque_history((hold(1000.0, 1.0),), deforms=True)
 
 
 def simulated(network: Network, history: TorqueHistory, time_s: Array) -> Array:
@@ -85,29 +82,6 @@ def test_responses_to_ramps_and_sinusoids_are_inverse_laplace_transforms(
     found = simulated(network, history, times)
     expected = [by_laplace(network, history, float(time)) for time in times]
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.max(np.abs(expected)))
-
-
-@EVERY_MODEL
-@pytest.mark.parametrize("end_s", [0.03, 2.0, 300.0])
-@pytest.mark.nightly
-def test_relaxation_and_creep_are_each_other_s_convolution_inverse(
-    model: SampleModel, end_s: float
-) -> None:
-    """The integral of G(t - s) J(s) ds is t, by a quadrature that knows of neither."""
-    network = example(model)
-
-    def product(u: float) -> float:
-        # Both are steep at an end: s = t x^4 up to the middle, and mirrored beyond it.
-        near = end_s * u**4
-        times = np.array([near, end_s - near])
-        creep, modulus = (simulated(network, held, np.sort(times)) for held in (STEP, STRETCH))
-        crossed = creep[0] * modulus[1] + creep[1] * modulus[0]
-        return float(4 * end_s * u**3 * crossed)
-
-    integral, _ = quad(product, 0, 0.5**0.25, epsabs=0, epsrel=1e-11, limit=2000)
-    # A bare damper adds an impulse to the modulus.
-    impulse = network.c_p[0] * simulated(network, STEP, np.array([end_s]))[0]
-    assert integral + impulse == pytest.approx(end_s, rel=1e-9)
 
 
 @pytest.mark.parametrize("model", [m for m in MODELS.values() if not m.power_law])

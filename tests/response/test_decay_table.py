@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.response.decay_table import DEGREE, SHORT_DEGREE, SHORTER, WIDTH, DecayTable
+from biogrip.response.decay_table import DecayTable
 from biogrip.response.misfit_series import _power_sums
 
 RNG = np.random.default_rng(0)
@@ -51,23 +51,3 @@ def test_times_between_samples() -> None:
     rates = -np.geomspace(1e-9, 1e5, 500)
     expected = amplitudes @ np.exp(np.outer(times, rates))
     np.testing.assert_allclose(table(rates)[0], expected, atol=1e-14)
-
-
-def test_several_sums_and_any_shape() -> None:
-    def sums(rates: Array) -> Array:
-        return np.stack((np.exp(rates), 2 + np.exp(3 * rates), np.zeros_like(rates)))
-
-    rates = -RNG.uniform(0, 5, (4, 7))
-    found = DecayTable(sums, 3.0, 1.0)(rates)
-    assert found.shape == (3, 4, 7)
-    np.testing.assert_allclose(found, sums(rates), atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("width", "degree", "bound"),
-    [(WIDTH, DEGREE, 1.7e-16), (WIDTH / SHORTER, SHORT_DEGREE, 4e-17)],
-)
-def test_the_bounds_are_what_is_said(width: float, degree: int, bound: float) -> None:
-    rho = math.pi / width + math.hypot(math.pi / width, 1)
-    assert rho - 1 / rho == pytest.approx(2 * math.pi / width)
-    assert 4 * math.e * rho**-degree / (rho - 1) == pytest.approx(bound, rel=0.05)

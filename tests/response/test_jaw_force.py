@@ -121,21 +121,6 @@ def test_jaws_press_while_the_torque_is_held(gripper: Gripper) -> None:
     assert np.all(np.diff(force, axis=1) < 1e-12 * peak)
 
 
-def test_after_the_torque_drops_the_jaws_would_have_to_pull_a_drop(
-    gripper: Gripper, steps: TorqueHistory
-) -> None:
-    """k_g phi exceeds the second torque, so what is left for the drop is negative."""
-    network, time_s = (
-        generalized_maxwell(np.concatenate((DROPS, CELL))),
-        np.array([199.9, 200.1, 400.0]),
-    )
-    for nonlinear in (False, True):
-        force = jaw_force(gripper, network, steps, time_s, nonlinear=nonlinear)
-        assert np.all(force[:, 0] > 0)
-        assert np.all(force[:2, 1:] < 0)
-        assert np.all(force[2] > 0)
-
-
 def test_no_force_before_anything_moves(gripper: Gripper, steps: TorqueHistory) -> None:
     network = generalized_maxwell(CELL)
     for nonlinear in (False, True):

@@ -135,14 +135,3 @@ def test_a_perfect_fit_is_zero_up_to_cancellation(gripper: Gripper, steps: Torqu
     trace = rotation(response, steps, time_s)[0]
     misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, trace)
     assert misfit(TRUTH[None, :])[0] < 1e-7 * trace.max()
-
-
-def test_an_individual_does_not_depend_on_its_company(
-    gripper: Gripper, steps: TorqueHistory
-) -> None:
-    """To far fewer bits than the ranking keeps."""
-    trace = np.random.default_rng(2).standard_normal(4001) * 1e-5
-    samples = random_samples(300, 4)
-    misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, trace)
-    alone = np.concatenate([misfit(sample[None, :]) for sample in samples])
-    np.testing.assert_allclose(misfit(samples), alone, rtol=1e-11)

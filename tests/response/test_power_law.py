@@ -19,9 +19,7 @@ from biogrip.response.jaw_force import jaw_force, jaw_force_response
 from biogrip.response.linear import LEFT, RIGHT, StepResponse, rotation, step_response
 from biogrip.response.many_branches import modes_of_many
 from biogrip.response.nonlinear import nonlinear_rotation
-from biogrip.response.sensitivity import rotation_and_sensitivity
 from tests.helpers.power_law import (
-    inverted,
     mittag_leffler,
     one_minus_mittag_leffler,
     rotations,
@@ -71,17 +69,6 @@ def test_creep_of_a_kelvin_voigt_solid_is_a_mittag_leffler_function(
         for t in TIMES
     ]
     ours = creep(gripper, "fractional_kelvin_voigt", [k_p, modulus, exponent])
-    np.testing.assert_allclose(ours, expected, rtol=1e-6)
-
-
-@pytest.mark.parametrize("exponent", [0.03, 0.2, 0.5, 0.8, 0.97])
-@pytest.mark.parametrize("c", [1e-2, 1.0, 1e4])
-def test_creep_of_a_maxwell_liquid_is_a_power_and_a_flow(c: float, exponent: float) -> None:
-    """t^a/(V Gamma(1+a)) + t/c between arms of no stiffness."""
-    gripper = arms_of(1e-25, 1e-25)
-    power = TIMES**exponent / (3.0 * float(gamma(1 + exponent)))
-    ours = creep(gripper, "fractional_maxwell", [3.0, exponent, c])
-    expected = TAU / (2 * gripper.lever_m**2) * (power + TIMES / c)
     np.testing.assert_allclose(ours, expected, rtol=1e-6)
 
 
@@ -163,37 +150,6 @@ def test_the_ring_against_inversion(gripper: Gripper) -> None:
     np.testing.assert_allclose(ours, exact, rtol=0, atol=1e-6 * exact.max())
 
 
-@pytest.mark.parametrize("exponent", [0.1, 0.5, 0.9])
-def test_derivatives_against_those_of_mittag_leffler_functions(exponent: float) -> None:
-    """By the logarithms of k_p, k_alpha and alpha, by differences of the closed form."""
-    gripper, sample = arms_of(4.4e-7, 1e-25), np.array([0.2, 0.5, exponent])
-    u = 2 * gripper.lever_m**2
-    times = np.geomspace(0.1, 400, 9)
-    constant = torque_history((hold(400.0, TAU),))
-
-    def closed(logarithms: Array) -> Array:
-        k_p, modulus, alpha = np.exp(logarithms)
-        stiffness = 4.4e-7 + u * k_p
-        values = [
-            one_minus_mittag_leffler(alpha, stiffness / u / modulus * t**alpha) for t in times
-        ]
-        return TAU / stiffness * np.array(values)
-
-    phi, slopes = rotation_and_sensitivity(
-        gripper, MODELS["fractional_kelvin_voigt"], constant, times, sample
-    )
-    np.testing.assert_allclose(phi, closed(np.log(sample)), rtol=1e-6)
-    for index in range(3):
-        unit = np.eye(3)[index]
-        pairs = [
-            (closed(np.log(sample) + h * unit) - closed(np.log(sample) - h * unit)) / (2 * h)
-            for h in (2e-3, 1e-3)
-        ]
-        # Extrapolated: h^4; the ladder's error, 1e-6 at most, turns with alpha by its logarithm.
-        exact = (4 * pairs[1] - pairs[0]) / 3
-        np.testing.assert_allclose(slopes[index], exact, rtol=0, atol=1e-5 * phi.max())
-
-
 # Rates in no order.
 FEW = [2.0, 5.0, 1.0, 0.2, 30.0, 1e3, 0.3, 0.5]
 
@@ -248,26 +204,6 @@ def test_equal_branches_add_up(gripper: Gripper, steps: TorqueHistory) -> None:
             for network in (many, few)
         )
         np.testing.assert_allclose(ours, theirs, rtol=1e-5)
-
-
-def of_relaxation(a: float, x: float) -> Callable[[Any], Any]:
-    """Transform of 1 - E_a(-x t^a)."""
-    return lambda s: x / (s * (s**a + x))
-
-
-def test_inversion_of_a_known_transform() -> None:
-    """The tests' own tools: t^a/Gamma(1+a), and both ways to a Mittag-Leffler function."""
-    for t in (1e-4, 1.0, 300.0):
-        assert inverted(lambda s: s**-1.3, t) == pytest.approx(t**0.3 / float(gamma(1.3)), 1e-12)
-    for a in (0.2, 0.5, 0.9):
-        for x in (0.01, 1.0, 20.0**a):
-            by_series = 1 - mittag_leffler(a, 1.0, x)
-            by_inversion = inverted(of_relaxation(a, x), 1.0)
-            assert by_inversion == pytest.approx(by_series, 1e-9)
-            assert one_minus_mittag_leffler(a, x) == pytest.approx(by_series, 1e-9)
-        far = 1e3**a
-        by_inversion = inverted(of_relaxation(a, far), 1.0)
-        assert one_minus_mittag_leffler(a, far) == pytest.approx(by_inversion, 1e-9)
 
 
 def test_the_nonlinear_model_of_a_power_law_sample_against_radau(gripper: Gripper) -> None:

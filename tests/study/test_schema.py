@@ -8,7 +8,7 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
-from biogrip.identify.methods import METHODS
+from biogrip.fit.methods import METHODS
 from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.source import read_config
 from tests.helpers.key_reference import file_schema

@@ -240,11 +240,6 @@ def test_a_reciprocal_unit_is_spelled_in_many_ways(cell: str) -> None:
     assert unit_of(Path("t"), f"J ({bare})", None, allowed, "reading_unit") == "1/Pa"
 
 
-@pytest.mark.parametrize(("cell", "unit"), [("[min]", "min"), ("sec", "s"), ("(ms)", "ms")])
-def test_units_of_times(cell: str, unit: str) -> None:
-    assert unit_of(Path("t"), "t", None, TIME_UNITS, "time_unit", below=cell) == unit
-
-
 def test_a_lone_m_is_no_minute() -> None:
     with pytest.raises(BiogripError, match="found no unit"):
         unit_of(Path("t"), "t", None, TIME_UNITS, "time_unit", below="[m]")
@@ -299,24 +294,6 @@ def test_only_equal_times_are_averaged() -> None:
     assert (lines.tolist(), count) == ([0, 1, 4], 3)
 
 
-def test_times_that_go_back_are_refused_even_if_equal_ones_are_averaged(tmp_path: Path) -> None:
-    (tmp_path / "t.csv").write_text(
-        "\n".join(["time_s,modulus_Pa", *(f"{i % 12},1" for i in range(24))])
-    )
-    columns = Columns("time_s", "modulus_Pa", quantity=MODULUS, average_repeated=True)
-    assert "found 0 after 11 (line 13), allowed are times that increase." in refusal(
-        tmp_path / "t.csv", columns
-    )
-
-
-def test_too_few_times_are_left(tmp_path: Path) -> None:
-    (tmp_path / "t.csv").write_text(
-        "\n".join(["time_s,modulus_Pa", *(f"{i // 3},1" for i in range(24))])
-    )
-    columns = Columns("time_s", "modulus_Pa", quantity=MODULUS, average_repeated=True)
-    assert refusal(tmp_path / "t.csv", columns).startswith(": found 8 times with a number in both")
-
-
 def test_what_was_recognised_is_a_small_table(tmp_path: Path) -> None:
     rows = [f"{t}\t{g}" for t, g in numbers(0).T]
     (tmp_path / "t.tsv").write_text("\n".join(["Time\tRelaxation Modulus", *rows, "8\t"]))
@@ -337,23 +314,6 @@ def test_what_was_recognised_is_a_small_table(tmp_path: Path) -> None:
     assert outside > 0
     rows_in_words = f"15, 1 gap, {outside} not among the times to use, from 2 to 7 s"
     assert form.in_words(Path("t.tsv")).endswith(rows_in_words)
-
-
-def test_a_usual_table_is_usual(tmp_path: Path) -> None:
-    rows = [f"{t},{g}" for t, g in numbers(0).T]
-    (tmp_path / "t.csv").write_text("\n".join(["# note", "time_s,modulus_Pa", *rows]))
-    columns = Columns("time_s", "modulus_Pa", quantity=MODULUS)
-    form = read_recording(tmp_path / "t.csv", columns).recognised
-    assert form is not None
-    assert form.is_usual(columns)
-    assert not form.is_usual(replace(columns, block=1))
-
-
-def test_names_in_a_comment_are_no_header(tmp_path: Path) -> None:
-    rows = [f"{t},{g}" for t, g in numbers(0).T]
-    (tmp_path / "t.csv").write_text("\n".join(["# time_s,strain (w-r0)/r0; laser 0.2 W", *rows]))
-    said = refusal(tmp_path / "t.csv", Columns("time_s", "strain", quantity=STRAIN))
-    assert said.startswith(", line 2, column 'time_s': found no such column, allowed are 0.5,")
 
 
 def damaged(content: bytes, rng: np.random.Generator) -> bytes:

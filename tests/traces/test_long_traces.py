@@ -10,13 +10,13 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import MODELS
-from biogrip.identifiability.diagnosis import diagnose
+from biogrip.identify.one_trace import IdentifyOptions, identify_trace, study_of
+from biogrip.identify.read_as import ReadAs
 from biogrip.instrument.gripper import Gripper
-from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace, study_of
-from biogrip.own_traces.read_as import ReadAs
-from biogrip.products.files.verdicts import diagnosis_data
-from biogrip.products.stages import judgement
+from biogrip.judging.diagnosis import diagnose
+from biogrip.records.verdicts import diagnosis_data
 from biogrip.response.linear import rotation, step_response
+from biogrip.stages import judgement
 
 SAMPLES, MEANS_OF = 200_000, 50
 MODEL, TRUTH = MODELS["liquid_drop"], np.array([34.0, 12.0, 300.0])

@@ -13,13 +13,12 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from tempfile import TemporaryFile
 
 import pytest
+import yaml
 
-from tests.helpers import loaded
 from tests.helpers.places import ROOT
-from tests.helpers.runs import TINY, Tree, copied_tree
+from tests.helpers.runs import TINY
 
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 # Of each document, what there is when the reader is through.
@@ -49,6 +48,7 @@ LEFT = {
     "howto/figure.md": ["results/figures/heights.png"],
 }
 TAKES_LONG = {"howto/relaxation.md", "howto/creep.md", "design.md"}
+TAKES_LONG |= {f"howto/{name}.md" for name in ("trace", "noise", "figure", "noise_kind")}
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
     "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
@@ -59,18 +59,21 @@ TINY_FIT = """
 least_squares: {candidates: 50, starts: 3}
 model_selection: {models: [damper, maxwell]}
 """
+SMALL = {key: value for key, value in TINY.items() if key != "cases"}
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Tree:
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the repository, in which a reader works."""
-    tree = copied_tree(tmp_path_factory.mktemp("reader"))
-    shutil.copytree(ROOT / "data", tree.root / "data")
+    folder = tmp_path_factory.mktemp("reader")
+    for name in ("src", "workflow", "config", "profiles", "data", "results/published"):
+        shutil.copytree(ROOT / name, folder / name)
+    shutil.copy(ROOT / "Snakefile", folder)
     # A long trace; few of its readings do.
-    fish = tree.root / "data" / "measured" / "fish_muscle.csv"
+    fish = folder / "data" / "measured" / "fish_muscle.csv"
     header, *rows = fish.read_text().splitlines()
     fish.write_text("\n".join([header, *rows[::20]]) + "\n")
-    return tree
+    return folder
 
 
 def test_every_howto_is_followed() -> None:
@@ -85,61 +88,53 @@ def test_every_howto_is_followed() -> None:
         for name in LEFT
     ],
 )
-def test_what_is_said_can_be_done(document: str, place: Tree) -> None:
-    shutil.rmtree(place.root / "results", ignore_errors=True)
+def test_what_is_said_can_be_done(document: str, place: Path) -> None:
+    shutil.rmtree(place / "results" / "tables", ignore_errors=True)
     text = (ROOT / "docs" / document).read_text(encoding="utf-8")
     # Most bring a case of their own.
-    needed = "cases:" not in text or "[liquid_drop_2]" in text
-    (place.root / "tiny.yaml").write_text(TINY if needed else f"{TINY}  liquid_drop_2: null\n")
-    (place.root / "tiny_fit.yaml").write_text(TINY_FIT)
-    blocks = BLOCK.findall(text)
-    # Else the copy's code is the repository's, which is loaded already.
-    own_code = any(title.endswith((".py", ".diff")) for _, title, _ in blocks)
-    environment = place.environment if own_code else {**os.environ, loaded.COARSE: "1"}
-    for language, title, content in blocks:
+    others = ["endothelial_cell", "liquid_drop_1"]
+    others += [] if "cases:" not in text or "[liquid_drop_2]" in text else ["liquid_drop_2"]
+    tiny = SMALL | {"cases": dict.fromkeys(others)}
+    (place / "tiny.yaml").write_text(yaml.safe_dump(tiny))
+    (place / "tiny_fit.yaml").write_text(TINY_FIT)
+    for language, title, content in BLOCK.findall(text):
         if title:
             of_a_fit = re.search(f"identify .*--config {title}", text)
-            (place.root / title).parent.mkdir(parents=True, exist_ok=True)
+            (place / title).parent.mkdir(parents=True, exist_ok=True)
             content = re.sub(r"candidates: \d+", "candidates: 128", content)
             content = re.sub(r"most_steps: \d+", "most_steps: 3", content)
-            (place.root / title).write_text(content + (TINY_FIT if of_a_fit else ""))
+            (place / title).write_text(content + (TINY_FIT if of_a_fit else ""))
         elif language == "sh":
             for line in content.splitlines():
-                program, *arguments = shlex.split(line, comments=True)
-                if program == "biogrip":
-                    arguments = _typed(arguments)
-                _call(program, arguments, place.root, environment)
+                _call(_typed(shlex.split(line, comments=True)), place)
         elif language == "python":
-            _run(content, place)
-    assert [name for name in LEFT[document] if not (place.root / name).is_file()] == []
+            _call([sys.executable, "-c", content], place)
+    assert [name for name in LEFT[document] if not (place / name).is_file()] == []
 
 
-def _typed(arguments: list[str]) -> list[str]:
-    """Arguments of biogrip, such that a run is small."""
-    if arguments[0] == "run":
-        return ["run", "tiny.yaml", *arguments[1:], *LOOKED_AT.get(arguments[-1], [])]
-    if arguments[0] == "identify" and "--config" not in arguments:
+def _typed(command: list[str]) -> list[str]:
+    """Return a command such that a run is small."""
+    program, *arguments = command
+    if program == "snakemake" and "--snakefile" not in arguments:
+        files = (
+            arguments[arguments.index("--configfile") + 1 :] if "--configfile" in arguments else []
+        )
+        rest = arguments[: len(arguments) - len(files) - 1] if files else arguments
+        looked_at = [target for file in files for target in LOOKED_AT.get(file, [])]
+        return [program, "--configfile", "tiny.yaml", *files, *rest, *looked_at]
+    if arguments[:1] == ["identify"] and "--config" not in arguments:
         model = [] if "--model" in arguments else ["--model", "maxwell"]
-        return [*arguments, *model, "--config", "tiny_fit.yaml"]
-    return arguments
+        return [*command, *model, "--config", "tiny_fit.yaml"]
+    return command
 
 
-def _call(program: str, arguments: list[str], folder: Path, environment: dict[str, str]) -> None:
-    with TemporaryFile("w+") as said:
-        if program in ("biogrip", "snakemake"):
-            status = loaded.call(program, arguments, folder, environment, (said, said))
-        else:
-            command = [program, *arguments]
-            status = subprocess.run(command, cwd=folder, stdout=said, stderr=said).returncode
-        said.seek(0)
-        assert status == 0, said.read()
-
-
-def _run(code: str, place: Tree) -> None:
+def _call(command: list[str], folder: Path) -> None:
+    paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
     done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=place.root,
-        env=place.environment,
+        command,
+        cwd=folder,
+        # Python finds the copy.
+        env={**os.environ, "PATH": os.pathsep.join(paths), "PYTHONPATH": str(folder / "src")},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

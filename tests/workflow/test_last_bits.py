@@ -1,6 +1,5 @@
 """Identifications at the paper's budget, under other code paths of numpy and BLAS."""
 
-import json
 import os
 import subprocess
 import sys
@@ -10,17 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.identify.methods import METHODS
-from biogrip.running.resolved import write_study
-from tests.helpers.default import study_of
+from biogrip.fit.methods import METHODS
 from tests.helpers.places import ROOT
-from tests.helpers.runs import built_once
+from tests.helpers.runs import built_once, snakemake
 
 pytestmark = pytest.mark.nightly
 
 # One of each model.
 CASES = ("endothelial_cell", "liquid_drop_2")
-SEEDS = "seeds_0-1"
 
 NO_AVX512 = "X86_V4 AVX512_ICL AVX512_SPR"
 NO_AVX2 = f"{NO_AVX512} X86_V3"
@@ -50,14 +46,11 @@ print(hashlib.sha256((a @ b.T).tobytes()).hexdigest())
 """
 
 
-def in_process(
-    environment: dict[str, str], *arguments: str, given: str = "", folder: Path = ROOT
-) -> str:
+def in_process(environment: dict[str, str], *arguments: str) -> str:
     done = subprocess.run(
         [sys.executable, *arguments],
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1", **environment},
-        cwd=folder,
-        input=given,
+        cwd=ROOT,
         capture_output=True,
         text=True,
         check=True,
@@ -65,26 +58,21 @@ def in_process(
     return done.stdout
 
 
-# A study by the command line's commands.
-DONE = """
-import json, sys
-from biogrip.cli import main
-sys.exit(max(map(main, json.load(sys.stdin))))
-"""
+STUDY = {"seeds": 2, "only": list(CASES), "methods": list(METHODS)}
+WANTED = [
+    f"results/{name}"
+    for case in CASES
+    for name in (f"tables/errors_{case}.csv", f"selection/{case}/seeds_0-1.csv")
+]
 
 
 def make(folder: Path, environment: dict[str, str]) -> None:
-    """Targets to error tables in one process."""
-    results = folder / "results"
-    write_study(study_of("seeds: 2"), results)
-    calls = []
-    for case in CASES:
-        batch = ["--case", case, "--batch", SEEDS]
-        calls += [["make", "target", "--case", case], ["make", "measurement", *batch]]
-        calls += [["make", "identification", *batch, "--method", method] for method in METHODS]
-        calls += [["make", "judgement", "--case", case], ["make", "model_fits", *batch]]
-        calls.append(["make", "identifications", "errors_of_case", "--case", case])
-    in_process(environment, "-c", DONE, given=json.dumps(calls), folder=folder)
+    """Targets to error tables."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in environment.items():
+            patch.setenv(name, value)
+        run = snakemake(folder, "--", *WANTED, config=STUDY)
+    assert run.status == 0, run.output
 
 
 @pytest.fixture(scope="module")

@@ -1,108 +1,62 @@
-"""The published results: compared with the default study run afresh, or renewed from it."""
+"""The results beside those that are published: compared, or put in their place."""
 
-PUBLISHED = Path(workflow.basedir) / "results" / "published"
-
-# What is published beside the default study's results, by the name of its folder: its configs,
-# the rule that makes it, and its names.
-OVERLAYS = {
-    "robustness": (["robustness"], "all_maps", "robustness_*"),
-    "interpretations": (
-        ["interpretations"],
-        "interpretations interpretations_jointly",
-        "interpretations*",
-    ),
-    "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
-    # Errors, verdicts and coverage.
-    "calibration": (["calibration"], "all_tables", "[cev][eor][rv]*"),
-    "measured": (["measured"], "all", "*"),
-    "power_law": (["power_law"], "all_tables", "[cev][eor][rv]*"),
-    "recorded": (["recorded"], "all_tables", "[cev][eor][rv]*"),
-    # Errors, verdicts and robustness.
-    "soft": (["soft"], "all_tables all_maps", "[erv][eor]*_soft*"),
-}
-CONFIGS = Path(workflow.basedir) / "config"
-
-# The default study, whatever this run was configured with; nothing of it is kept.
-RUN_AFRESH = (
-    "scratch=$(mktemp -d); trap 'rm -rf \"$scratch\"' EXIT; "
-    # Recorded traces are found from where Snakemake runs.
-    f'cp -R "{workflow.basedir}/data" "$scratch/data"; '
-    "snakemake -j {threads} --snakefile {params.snakefile:q} "
-    '--directory "$scratch" --quiet rules progress host reason {params.config} -- {params.targets} >> {log:q} 2>&1'
-)
+# A config of the same name has its published results in a folder of its own.
+OVERLAY = Path(workflow.overwrite_configfiles[-1]).stem if workflow.overwrite_configfiles else ""
+PUBLISHED = shipped("results/published") / OVERLAY
 
 
-# None of these has an output, so that none is ever taken for done.
+def published(kind, *suffixes):
+    """Files of a kind that are published; of the default study, or that are to be."""
+    there = {f"results/{kind}/{file.name}" for file in (PUBLISHED / kind).glob("*")}
+    ours = {file for suffix in suffixes for file in made(kind, suffix)}
+    return sorted(there if OVERLAY else there | ours)
+
+
+# Neither has an output, so that neither is ever taken for done.
 rule check:
     input:
-        published=PUBLISHED / "tables",
+        made=published("tables", ".csv", ".md", ".tex"),
     log:
         "results/logs/check.log",
-    threads: lambda _: workflow.cores
+    localrule: True
     params:
-        snakefile=workflow.main_snakefile,
-        config="",
-        targets="all_tables",
+        published=PUBLISHED / "tables",
     message:
-        "Running the default study afresh and comparing its tables with the published ones"
-    shell:
-        f"{RUN_AFRESH}; "
-        'biogrip compare {input.published:q} "$scratch/results/tables" 2>> {log:q} | tee -a {log:q}'
+        "Comparing the tables with the published ones"
+    script:
+        "../scripts/check.py"
 
 
 rule publish:
+    input:
+        tables=published("tables", ".csv", ".md", ".tex"),
+        figures=published("figures", ".png", ".pdf"),
     log:
         "results/logs/publish.log",
-    threads: lambda _: workflow.cores
+    localrule: True
     params:
-        snakefile=workflow.main_snakefile,
-        config="",
-        targets="all",
         published=PUBLISHED,
     message:
-        "Running the default study afresh and publishing its tables and figures"
+        "Publishing the tables and figures"
     shell:
-        f"{RUN_AFRESH}; "
-        'biogrip publish "$scratch/results" {params.published:q} 2>> {log:q} | tee -a {log:q}'
+        "mkdir -p {params.published:q}/tables {params.published:q}/figures 2> {log:q} && "
+        "cp {input.tables:q} {params.published:q}/tables 2>> {log:q} && "
+        "cp {input.figures:q} {params.published:q}/figures 2>> {log:q}"
 
 
-for overlay, (configs, target, only) in OVERLAYS.items():
-
-    rule:
-        name:
-            f"publish_{overlay}"
-        log:
-            f"results/logs/publish_{overlay}.log",
-        threads: lambda _: workflow.cores
-        params:
-            snakefile=workflow.main_snakefile,
-            config=f"--configfile {' '.join(f'{CONFIGS / name}.yaml' for name in configs)}",
-            targets=target,
-            published=PUBLISHED / overlay,
-            only=only,
-        message:
-            f"Running {' and '.join(configs)} afresh and publishing its tables and figures"
-        shell:
-            f"{RUN_AFRESH}; "
-            'biogrip publish "$scratch/results" {params.published:q} --only {params.only:q} '
-            "2>> {log:q} | tee -a {log:q}"
-
-    rule:
-        name:
-            f"check_{overlay}"
-        input:
-            published=PUBLISHED / overlay / "tables",
-        log:
-            f"results/logs/check_{overlay}.log",
-        threads: lambda _: workflow.cores
-        params:
-            snakefile=workflow.main_snakefile,
-            config=f"--configfile {' '.join(f'{CONFIGS / name}.yaml' for name in configs)}",
-            targets=target,
-            only=only,
-        message:
-            f"Running {' and '.join(configs)} afresh and comparing its tables with the published ones"
-        shell:
-            f"{RUN_AFRESH}; "
-            'biogrip compare {input.published:q} "$scratch/results/tables" --only {params.only:q} '
-            "2>> {log:q} | tee -a {log:q}"
+# The picture of these rules in the documentation; `make docs` draws it.
+rule rulegraph:
+    input:
+        sorted(map(str, shipped("workflow/rules").glob("*.smk"))),
+    output:
+        "docs/rules.png",
+    log:
+        "results/logs/rulegraph.log",
+    localrule: True
+    params:
+        snakefile=workflow.main_snakefile,
+        target="results/report.html",
+    message:
+        "Drawing the graph of the rules"
+    script:
+        "../scripts/rulegraph.py"

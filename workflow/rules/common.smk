@@ -1,155 +1,189 @@
-"""The study that all rules work on."""
+"""The config, checked, and what the rules are told of it."""
 
-import shlex
-import sys
+from dataclasses import fields
+from functools import cache
 from pathlib import Path
 
-from snakemake.settings.types import ExecMode
+from snakemake.exceptions import WorkflowError
 
-from biogrip.products.catalogue import products
-from biogrip.products.plan import Plan
-from biogrip.products.stages.recording import check_traces
-from biogrip.running import preparation
-from biogrip.running.locks import sign_locks
-from biogrip.running.provenance import Provenance
-from biogrip.running.resolved import read_study, write_study
-from biogrip.running.rules import (
-    GROUPS,
-    ProductRule,
-    files_of,
-    make_rules,
+from biogrip.errors import BiogripError
+from biogrip.fit.methods import METHODS
+from biogrip.stages.batches import batch_names
+from biogrip.stages.settings import keys_of_cases, settings, software
+from biogrip.study.case_blocks import CaseBlock
+from biogrip.study.config import StudyConfig
+from biogrip.study.defaults import default_config, shipped
+from biogrip.study.load import load_study, read_configs
+from biogrip.study.measurement_block import MeasurementBlock
+from biogrip.study.source import overlaid
+
+
+def usable(read, *given):
+    """What is read of something given, or, if it cannot be used, the message alone."""
+    try:
+        return read(*given)
+    except BiogripError as error:
+        raise WorkflowError(str(error))
+
+
+# What is given is laid over the default study, in a run of its own and in a module alike.
+STUDY = usable(
+    load_study,
+    overlaid(read_configs([default_config()]), config),
+    [default_config(), *workflow.overwrite_configfiles],
+    workflow.config_settings.config,
 )
-from biogrip.running.wholeness import Claim, message_only, say_what_else_is_there
-from biogrip.study.load import load_study
-from biogrip.study.source import read_places
-
-DEFAULT_CONFIG = Path(workflow.basedir) / "config" / "config.yaml"
-
-# Rules find the biogrip command of the Python that runs Snakemake, activated or not.
-COMMANDS = shlex.quote(str(Path(sys.executable).parent))
-# A shell that is stopped ends after its command, not before.
-shell.prefix(f"trap : TERM; set -euo pipefail; PATH={COMMANDS}:$PATH; ")
-
-with message_only():
-    read_places([DEFAULT_CONFIG])
+SOFTWARE = software()
+MEASUREMENT = [f"measurement.{field.name}" for field in fields(MeasurementBlock)]
+# Keys that say what a fit assumes of the instrument and of the sample.
+PROBLEM = "instrument gripper actuator assumed_gripper protocol sample fixed search_range models"
+PROBLEM = [*PROBLEM.split(), *(key for key in MEASUREMENT if key != "measurement.noise")]
+# Keys that verdicts on a trace, and on its expectation, use.
+JUDGED = [*PROBLEM, "measurement.noise", "identifiability.confidence", "least_squares"]
+# Keys that tables and figures of the whole study use.
+WHOLE = "study_seed seeds methods gripper actuator protocol search_range".split()
+WHOLE += ["evaluation", "reconstructed", *keys_of_cases(STUDY)]
 
 
-configfile: DEFAULT_CONFIG
+def settings_of(*keys):
+    """Params that make a job run again if they change: keys of the config, and the software.
+
+    A key of the job's case goes before the study's.
+    """
+
+    def of(key):
+        return lambda wildcards: settings(STUDY, [key], wildcards.get("case", ""))
+
+    return {"software": {"software": SOFTWARE}} | {key: of(key) for key in keys}
 
 
-RESULTS = Path("results")
-
-with message_only():
-    if workflow.exec_mode == ExecMode.DEFAULT:
-        STUDY = load_study(
-            config,
-            files=[DEFAULT_CONFIG, *workflow.overwrite_configfiles],
-            command_line=workflow.config_settings.config,
-        )
-        check_traces(STUDY)
-    else:
-        # On another node: what the run was planned with.
-        STUDY = read_study(RESULTS)
-
-PLAN = Plan(STUDY, RESULTS)
-RULES = make_rules(products().values(), PLAN)
-ALL_FILES = files_of(RULES)
-# The report's captions are looked up by rule: among the parameters, they would make things again.
-config["captions"] = {rule.name: rule.caption for rule in RULES}
-# The rules in stages.smk, which stand there one by one.
-STAGES = (
-    "target",
-    "measurement",
-    "identification",
-    "identifications",
-    "judgement",
-    "errors_of_case",
-    "errors",
-)
+def method_settings(wildcards):
+    """The blocks of the config that the method of a job reads."""
+    return settings(STUDY, METHODS[wildcards.method].blocks, wildcards.case)
 
 
-def cases_of(stage):
-    """The cases that have a stage, as a regular expression; one that nothing matches if none has."""
-    jobs = products()[stage].jobs(PLAN)
-    return "|".join(sorted({job["case"] for job in jobs})) or "(?!)"
+@cache
+def batches(case, stage):
+    """The batches of the traces of a case, or of those that its intervals are tested with."""
+    chosen = STUDY.case(case)
+    seeds = chosen.coverage_seeds if stage == "coverage" else chosen.seeds
+    return batch_names(seeds, STUDY.config.batch_size, Path("results", stage, case))
 
 
-def made_for(stage):
-    """Digest of the settings and the code of a job: if it changes, the job is done again."""
-    return ProductRule(stage, (products()[stage],), PLAN).digest
-
-
-def batches_of(pattern):
-    """The files of all methods and batches of seeds of a case."""
-    return lambda wildcards: PLAN.batch_files(pattern, wildcards.case)
-
-
-def calibration_of(wildcards):
-    """The calibration of the gripper, for a case that uses one."""
-    case = STUDY.case(wildcards.case)
-    return [f"results/calibrations/{case.name}.yaml"] if case.is_calibrated else []
-
-
-def rows_of(wildcards):
-    """The rows of the table that a batch has, as `biogrip identify --rows` chooses them."""
-    first, last = map(int, wildcards.rows.split("-"))
-    return TABLE[first : last + 1]
-
-
-def batches_of_traces(wildcards):
-    """The tables of all batches."""
-    size = TRACES.rows_a_batch
-    firsts = range(0, len(TABLE), size)
+def files(pattern, cases):
+    """The files of some cases, of every method and batch if the pattern has them."""
+    stage = "coverage" if "coverage" in pattern else "measurements"
     return [
-        f"results/traces/batches/{first}-{first + size - 1}.csv" for first in firsts
+        pattern.format(case=case, method=method, batch=batch)
+        for case in cases
+        for method in (STUDY.methods if "{method}" in pattern else [""])
+        for batch in (batches(case, stage) if "{batch}" in pattern else [""])
     ]
 
 
-CLAIM = Claim(RESULTS)
-
-# `biogrip run` has checked already, and put right what can be.
-if workflow.exec_mode == ExecMode.DEFAULT and not preparation.done:
-    with message_only():
-        preparation.look(RULES, RESULTS)
+def of_case(pattern):
+    """The files of the case of a job."""
+    return lambda wildcards: files(pattern, [wildcards.case])
 
 
-# A Snakefile that takes this one in as a module calls `begin` and `end` in hooks of its own.
-def begin():
-    """Refuse what is not the study's before jobs replace it, and say what the study is."""
-    # Tables of the user's traces are not on record.
-    jobs = [
-        job
-        for job in workflow.dag.needrun_jobs()
-        if job.rule.name not in ("traces_batch", "traces")
-    ]
-    with message_only():
-        CLAIM.begin(
-            [Path(file) for job in jobs for file in job.output],
-            [Path(file) for job in jobs for file in job.log],
-            [Path(file) for job in jobs for file in job.input],
-            lambda manifest: Provenance(RESULTS, manifest).made_otherwise(RULES),
-            touching=workflow.touch,
-        )
-        write_study(STUDY, RESULTS)
-    sign_locks(Path(".snakemake"))
+def first_traces(cases):
+    """The files of measurements with the traces that are judged."""
+    return [files("results/measurements/{case}/{batch}.parquet", [case])[0] for case in cases]
 
 
-def end():
-    """Record what the jobs have written, and say what else there is."""
-    CLAIM.end()
-    say_what_else_is_there(RESULTS, files_of(RULES))
+def only_of(cases, pattern):
+    """The file of a job's case, if it is one of some cases."""
+    return lambda wildcards: (files(pattern, [wildcards.case]) if wildcards.case in cases else [])
 
 
-onstart:
-    begin()
+def names(cases):
+    """Cases as a regular expression; one that nothing matches if there are none."""
+    return "|".join(cases) or "(?!)"
 
 
-onsuccess:
-    end()
+# Cases that have what only some have, those of sweeps' points among them.
+SIMULATED = [*STUDY.simulated, *STUDY.points]
+CALIBRATED = [n for n in [*STUDY.cases, *STUDY.points] if STUDY.case(n).is_calibrated]
+SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
+COUNTED = [name for name in STUDY.covered if STUDY.case(name).verdicts_every == 1]
+calibration_of = only_of(CALIBRATED, "results/calibrations/{case}.yaml")
+
+# Tables and figures of the study, of what there is in it, and those of a case.
+TABLES = ["errors", "gene_ranges", "parameter_ranges"]
+TABLES += ["gripper", "actuator", "contact", "left_out"] if STUDY.has_gripper else []
+TABLES += ["linearisation", "mechanics"] if STUDY.gripped else []
+TABLES += ["methods"] if STUDY.simulated else []
+TABLES += ["coverage"] if STUDY.covered else []
+TABLES += ["models"] if SELECTING else []
+TABLES += ["evidence", "printed_values", "sampling_evidence"] if STUDY.published else []
+TABLES += ["verdict_counts"] if COUNTED else []
+OTHER_TABLES = ["contact_loss"] if STUDY.gripped else []
+OTHER_TABLES += ["claims"] if STUDY.published else []
+OTHER_TABLES += ["interpretations", "interpretations_jointly"] * bool(STUDY.config.interpretations)
+FIGURES = ["comb", "linkage", "torque"] if STUDY.has_gripper else []
+FIGURES += ["linearisation"] if STUDY.gripped else []
+FIGURES += ["moduli", "overview"] if STUDY.simulated else []
 
 
-onerror:
-    end()
-    print(
-        "biogrip: not finished. Nothing that is done is lost: the same command goes on."
-    )
+def case_figure_names(simulated, valley):
+    """Names of the figures of a case, by whether it is simulated, and searched for c and c_p."""
+    drawn = ["convergence", "evolution", "fit", "judged_fit", "profiles"]
+    drawn += ["force", "scatter", "waterfall"] if simulated else []
+    return drawn + ["valley"] if valley else drawn
+
+
+def figures_of(case):
+    """Names of the figures of a case."""
+    return case_figure_names(case in STUDY.simulated, STUDY.case(case).has_valley)
+
+
+# All of them with the case or the sweep that they are of.
+SHOWN = {
+    "tables": [
+        *((name, "") for name in [*TABLES, *OTHER_TABLES]),
+        *((name, case) for case in STUDY.cases for name in ("errors", "verdicts")),
+        *(("robustness", sweep) for sweep in STUDY.sweeps),
+    ],
+    "figures": [
+        *((name, "") for name in FIGURES),
+        *((name, case) for case in STUDY.cases for name in figures_of(case)),
+        *(("robustness", sweep) for sweep in STUDY.sweeps),
+    ],
+}
+
+
+def stem(name, whose=""):
+    """The name of a table's or a figure's files, which ends with that of its case or sweep."""
+    return f"{name}_{whose}" if whose else name
+
+
+def made(kind, suffix):
+    """The files of all tables or figures, of one format."""
+    return [f"results/{kind}/{stem(*item)}{suffix}" for item in SHOWN[kind]]
+
+
+def shown(path, kind, item, whose):
+    """A file of Snakemake's report, with its caption."""
+    caption = f"../report/{kind}/{item}.rst"
+    labels = dict(case=whose or "all", item=item.replace("_", " "), format=kind[:-1])
+    return report(path, caption=caption, category=kind.title(), labels=labels)
+
+
+def table(name, whose=""):
+    """The files of a table, of which the last is in Snakemake's report."""
+    path = f"results/tables/{stem(name, whose)}"
+    page = shown(f"{path}.html", "tables", name, whose)
+    return [*multiext(path, ".csv", ".md", ".tex"), page]
+
+
+def figure(name, whose=""):
+    """The files of a figure, of which the first is in Snakemake's report."""
+    path = f"results/figures/{stem(name, whose)}"
+    return [shown(f"{path}.png", "figures", name, whose), f"{path}.pdf"]
+
+
+wildcard_constraints:
+    case="[^/]+",
+    batch=r"seeds_\d+-\d+",
+    method="|".join(METHODS),
+    sweep=names(STUDY.sweeps),

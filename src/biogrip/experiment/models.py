@@ -1,7 +1,6 @@
 """The sample models that there are, by name.
 
-Each is declared, beside its network, in a module here. What is made holds its `Sample`, and a
-job's digest the code of that: this module is in none, so that one more model makes nothing again.
+Each is declared, beside its network, in a module here.
 """
 
 from biogrip.experiment.burgers import BURGERS

@@ -52,6 +52,34 @@ class Load:
             torque = torque + h.amplitude_Nm * np.cos(h.omega_rad_per_s * t + h.phase_rad)
         return torque
 
+    def divided(self, by: float) -> "Load":
+        """Return the load divided by a number."""
+        return Load(
+            self.value_Nm / by,
+            self.slope_Nm_per_s / by,
+            self.curvature_Nm_per_s2 / by,
+            tuple(replace(h, amplitude_Nm=h.amplitude_Nm / by) for h in self.harmonics),
+        )
+
+    def squared(self, kappa: float) -> "Load":
+        """Return kappa times the square of a load V + r t or V + A sin(omega t).
+
+        The squared sinusoid is V^2 + A^2/2 + 2 V A sin(omega t) - A^2/2 cos(2 omega t).
+        """
+        value, mean = self.value_Nm, self.value_Nm**2
+        harmonics: list[Harmonic] = []
+        for h in self.harmonics:
+            a, omega = h.amplitude_Nm, h.omega_rad_per_s
+            mean += a**2 / 2
+            harmonics.append(Harmonic(2 * kappa * value * a, omega, h.phase_rad))
+            harmonics.append(Harmonic(kappa * a**2 / 2, 2 * omega, math.pi))
+        return Load(
+            kappa * mean,
+            2 * kappa * value * self.slope_Nm_per_s,
+            2 * kappa * self.slope_Nm_per_s**2,
+            tuple(harmonics),
+        )
+
 
 @dataclass(frozen=True)
 class Phase:

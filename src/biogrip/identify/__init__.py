@@ -1,1 +1,1 @@
-"""Identification of the sample's parameters from a trace."""
+"""Identification of recorded traces from CSV files to verdicts, without Snakemake."""

@@ -8,8 +8,6 @@ import yaml
 from biogrip.errors import BiogripError
 from biogrip.instrument.gripper import Arm, Gripper
 
-CALIBRATIONS = "results/calibrations/{case}.yaml"
-
 ARM_KEYS = ("inertia_kgm2", "damping_Nms_per_rad", "stiffness_Nm_per_rad")
 
 

@@ -7,6 +7,7 @@ References
    `scipy.optimize.least_squares`.
 """
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -18,9 +19,9 @@ from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.instrument.calibrated_gripper import ARM_KEYS, CalibratedArm
 from biogrip.instrument.gripper import Arm
-from biogrip.keys import Block
+from biogrip.keys import Block, Problem
 
-_FEWEST_SAMPLES = 64
+_FEWEST_SAMPLES, _MOST_SAMPLES = 64, 10_000_000
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,17 @@ class CalibrationTest(Block):
     """Sampling rate of the records."""
     noise_level: Annotated[float, Field(ge=0, le=10)]
     """Standard deviation of the noise as a share of each record's peak."""
+
+    def problems_of(self, arms: Iterable[Arm]) -> Iterator[Problem]:
+        """Find a test that samples the ringing of free arms too slowly or too briefly."""
+        frequency = max(arm.natural_frequency_Hz for arm in arms)
+        if self.rate_Hz < 10 * frequency:
+            text = f"found {self.rate_Hz}, allowed is at least ten times the arms' natural"
+            yield ("rate_Hz",), f"{text} frequency, {10 * frequency:.4g} Hz."
+        most = _MOST_SAMPLES / self.rate_Hz
+        if not 5 / frequency <= self.duration_s <= most:
+            text = f"found {self.duration_s}, allowed is from five periods of the arms' ring, "
+            yield ("duration_s",), f"{text}{5 / frequency:.3g} s, to {most:.3g} s."
 
 
 @dataclass(frozen=True)

@@ -15,3 +15,8 @@ KINDS = tuple(dict.fromkeys(instrument.kind for instrument in INSTRUMENTS.values
 
 CONTROLLED = tuple(dict.fromkeys(instrument.controlled for instrument in INSTRUMENTS.values()))
 """Quantities that protocols hold."""
+
+
+def of_kind(kind: str) -> list[Instrument]:
+    """Return the instruments of a kind."""
+    return [each for each in INSTRUMENTS.values() if each.kind == kind]

@@ -2,34 +2,32 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import Annotated, Any, Literal
+from dataclasses import MISSING, dataclass, field, fields, make_dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, GetJsonSchemaHandler, Tag, TypeAdapter, ValidationError
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic import Field, Tag
 
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
 from biogrip.experiment.truth import Published
-from biogrip.identify.genome import GeneRange
-from biogrip.identify.methods import METHODS, block_class
+from biogrip.fit.genome import GeneRange, SearchRange
+from biogrip.fit.methods import METHODS, block_class
 from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.calibration import CalibrationTest
-from biogrip.instrument.gripper import GRIPPER
+from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.gripper_block import GripperBlock
 from biogrip.instrument.instrument import Instrument
-from biogrip.instrument.instruments import INSTRUMENTS, KINDS
-from biogrip.keys import BY_KIND, OPEN, Block, Checked, OneOf, Printed, Problem
+from biogrip.instrument.instruments import KINDS, of_kind
+from biogrip.keys import BY_KIND, Block, OneOf, Printed, Problem, below
 from biogrip.response.whitening import MOST_SAMPLES
-from biogrip.study.gripper_block import GripperBlock
 from biogrip.study.measurement_block import MeasurementBlock
-from biogrip.study.plain import built
+from biogrip.study.messages import checked
+from biogrip.study.plain import plain
 from biogrip.study.protocol_block import ProtocolBlock
 from biogrip.study.sample_block import LARGEST_PARAMETER, SampleBlock, fixed_problems
+from biogrip.study.source import overlaid
 
 METHOD_BLOCKS = tuple(dict.fromkeys(name for it in METHODS.values() for name in it.blocks))
 """Config blocks of the methods."""
@@ -41,24 +39,6 @@ _MOST_SAMPLES = 10_000_000
 _AnyGripper = Annotated[
     Annotated[dict[str, Any], Tag("a block of keys")] | Annotated[str, Tag("text")], BY_KIND
 ]
-
-
-@dataclass(frozen=True)
-class SearchRange(Block):
-    """Search range of each parameter as allowed values of its genes (Tables 3 and 4)."""
-
-    k: GeneRange
-    k_p: GeneRange
-    c: GeneRange
-    c_p: GeneRange
-    alpha: GeneRange
-
-    def problems(self) -> Iterator[Problem]:
-        """Refuse a range that has exponents of springpots above 1."""
-        highest = self.alpha.exponent[1]
-        if highest > 0:
-            text = f"found {highest}, which makes exponents of springpots above 1; allowed is at "
-            yield ("alpha", "exponent"), f"{text}most 0."
 
 
 @dataclass(frozen=True)
@@ -85,15 +65,11 @@ class Identifiability(Block):
     profiles. By default 25; with 1 a table counts them."""
 
 
-class Shared(Checked, BaseModel):
-    """Blocks that a study sets for all cases, and that a case may change for itself.
+@dataclass(frozen=True, kw_only=True)
+class _Given(Block):
+    """Blocks that a study sets for all cases, and that a case may change for itself."""
 
-    Those of methods are among the extra keys, so that their modules are imported where they are
-    used.
-    """
-
-    model_config = OPEN
-
+    # With descriptions, for docstrings below fields are not inherited.
     instrument: Annotated[
         str,
         OneOf(KINDS),
@@ -117,77 +93,57 @@ class Shared(Checked, BaseModel):
     ]
     identifiability: Identifiability
     fixed: Annotated[
-        Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]] | None,
+        Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]],
         Field(
             description="Known values of parameters, by name; these are not identified. 0 leaves "
             "an element out."
         ),
-    ] = None
-
-    def method_block(self, name: str) -> object:
-        """Return the settings object of a block of a method."""
-        return built(block_class(name), (self.__pydantic_extra__ or {}).get(name, {}))
+    ] = field(default_factory=dict)
 
     def method(self, name: str) -> object:
         """Return the settings object of a method."""
         method = METHODS[name]
-        found = [self.method_block(block) for block in method.blocks]
+        found = [getattr(self, block) for block in method.blocks]
         return method.named(method.settings)(*found) if method.settings else found[0]
 
-    @property
-    def method_blocks(self) -> dict[str, Any]:
-        """Settings objects of all blocks of methods that are valid."""
-        found = {}
-        for name in METHOD_BLOCKS:
-            with suppress(ValidationError):
-                found[name] = self.method_block(name)
-        return found
 
-    @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """Return the JSON Schema, with the blocks of all methods."""
-        ref = handler(schema)
-        found = handler.resolve_ref_schema(ref)
-        found["additionalProperties"] = False
-        for name in METHOD_BLOCKS:
-            found["properties"][name] = handler(TypeAdapter(block_class(name)).core_schema)
-        return ref
+def _of_method(name: str) -> tuple[str, type, Any]:
+    """Return the field of a method's block, which may be left out if all of its keys may be."""
+    kind = block_class(name)
+    needed = any(it.default is it.default_factory is MISSING for it in fields(kind))
+    return name, kind, field() if needed else field(default_factory=kind)
 
 
+if TYPE_CHECKING:
+    Shared = _Given
+else:
+    Shared = make_dataclass(
+        "Shared", map(_of_method, METHOD_BLOCKS), bases=(_Given,), frozen=True, kw_only=True
+    )
+
+OVERRIDABLE = tuple(each.name for each in fields(Shared))
+"""Blocks that a study sets for all cases, those of methods among them, and that a case may change
+for itself."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class CaseBlock(Shared):
     """A sample, with all that its experiment and identification need."""
 
-    title: Annotated[
-        Printed | None,
-        Field(
-            description="Name in print, of letters, digits, spaces and . , : ; ( ) + / % ' - _, "
-            "not beginning with a space, + or -; by default the case's name."
-        ),
-    ] = None
+    title: Printed | None = None
+    """Name in print, of letters, digits, spaces and . , : ; ( ) + / % ' - _, not beginning with a
+    space, + or -; by default the case's name."""
     sample: SampleBlock
-    published: Annotated[
-        Published | None,
-        Field(description="Results that the paper reports for this sample, to compare with."),
-    ] = None
-    contact: Annotated[
-        Literal["bilateral", "unilateral"] | None,
-        Field(
-            description="`bilateral`: the jaws can pull the sample (adhesion), as in the paper's "
-            "equations; `unilateral`: contact is lost where the force reaches zero, the free "
-            "sample recovers, and contact may return. It holds for the target only, whose model "
-            "must be linear; identification always assumes bilateral contact. By default bilateral."
-        ),
-    ] = None
-    assumed_gripper: Annotated[
-        _AnyGripper | None,
-        Field(
-            description="Gripper that the identification assumes, if it differs from the true one: "
-            "keys of a gripper block (with the angle at contact), or `calibrated` for the result "
-            "of a no-load test."
-        ),
-    ] = None
+    published: Published | None = None
+    """Results that the paper reports for this sample, to compare with."""
+    contact: Literal["bilateral", "unilateral"] | None = None
+    """`bilateral`: the jaws can pull the sample (adhesion), as in the paper's equations;
+    `unilateral`: contact is lost where the force reaches zero, the free sample recovers, and
+    contact may return. It holds for the target only, whose model must be linear; identification
+    always assumes bilateral contact. By default bilateral."""
+    assumed_gripper: _AnyGripper | None = None
+    """Gripper that the identification assumes, if it differs from the true one: keys of a gripper
+    block (with the angle at contact), or `calibrated` for the result of a no-load test."""
 
     @property
     def recorded(self) -> bool:
@@ -197,110 +153,87 @@ class CaseBlock(Shared):
     @property
     def instrument_used(self) -> Instrument:
         """The instrument, by its kind, and by what the protocol holds and the trace is of."""
-        kind = _of_kind(self.instrument)
+        kind = of_kind(self.instrument)
         bases = self.protocol.phases[0].bases
         fitting = [each for each in kind if each.controlled.column in bases] or kind
+        if len(fitting) == 1:
+            return fitting[0]
         named = [each for each in fitting if each.read.name in self.measurement.readings]
         return (named or fitting)[0]
 
     @property
-    def known(self) -> Mapping[str, float]:
-        """Parameters with known values, which are not identified."""
-        return self.fixed or {}
-
-    @property
     def searched(self) -> list[Parameter]:
         """Parameters that are identified."""
-        return [p for p in self.sample.sample.model.parameters if p.name not in self.known]
-
-    @property
-    def _genes(self) -> int:
-        return sum(getattr(self.search_range, p.range_name).digits + 1 for p in self.searched)
+        return [p for p in self.sample.sample.model.parameters if p.name not in self.fixed]
 
     def problems(self) -> Iterator[Problem]:
         """Find blocks that are in conflict."""
+        model = self.sample.sample.model
+        yield from below(("fixed",), fixed_problems(model, self.fixed))
+        yield from self._instrument_problems()
+        if model.power_law:
+            yield from self._band_problems()
+        # A chromosome has the digits and the exponent of every parameter.
+        ranges = [getattr(self.search_range, p.range_name) for p in self.searched]
+        genes = sum(each.digits + 1 for each in ranges)
+        for name in METHOD_BLOCKS:
+            if hasattr(settings := getattr(self, name), "problems_of"):
+                yield from below((name,), settings.problems_of(genes))
+        if self.assumed_gripper == CALIBRATED:
+            arms = self.gripper.left, self.gripper.right
+            yield from below(("calibration",), self.calibration.problems_of(arms))
+        elif isinstance(self.assumed_gripper, str):
+            text = f"found '{self.assumed_gripper}', allowed is '{CALIBRATED}' or keys of a "
+            yield ("assumed_gripper",), f"{text}gripper block."
+        elif self.assumed_gripper is not None:
+            believed = overlaid(plain(self.gripper.neutral), self.assumed_gripper)
+            yield from below(("assumed_gripper",), checked(Gripper, believed)[1])
         if self.recorded:
             for name in self.sample.parameters:
-                text = "is what a recorded trace is to tell; leave it out."
-                yield ("sample", name), text
-        else:
-            for path, text in self.sample.missing():
-                yield ("sample", *path), text
-            yield from self._unreachable_problems()
-        yield from (
-            (("fixed", *path), text)
-            for path, text in fixed_problems(self.sample.sample.model, self.known)
-        )
-        yield from self._instrument_problems()
-        yield from self._contact_problems()
-        yield from self._method_problems()
-        if self.sample.sample.model.power_law:
-            yield from self._band_problems()
-        if not self.recorded:
-            yield from self._sampling_problems()
-        if isinstance(self.assumed_gripper, str):
-            if self.assumed_gripper == CALIBRATED:
-                yield from self._calibration_problems()
-            else:
-                text = f"found '{self.assumed_gripper}', allowed is '{CALIBRATED}' or keys of a "
-                yield ("assumed_gripper",), f"{text}gripper block."
+                yield ("sample", name), "is what a recorded trace is to tell; leave it out."
+            if self.contact is not None:
+                yield ("contact",), "is only for a simulated case; leave it out of a recorded one."
+            return
+        yield from below(("sample",), self.sample.missing())
+        yield from self._unreachable_problems()
+        yield from below(("measurement",), self._sampling_problems())
+        if self.contact == "unilateral" and self.models.target != "linear":
+            text = "found unilateral and a nonlinear target, allowed is models.target: linear"
+            yield ("contact",), f"{text} with it."
 
     def _instrument_problems(self) -> Iterator[Problem]:
         """Find a protocol, a reading and equations that are not of the kind of instrument."""
-        kind = _of_kind(self.instrument)
-        for path, text in self.protocol.instrument_problems(kind):
-            yield ("protocol", *path), text
-        allowed = [each.read.name for each in kind]
+        kind, used = of_kind(self.instrument), self.instrument_used
+        yield from below(("protocol",), self.protocol.instrument_problems(kind))
         for name in self.measurement.readings if self.recorded else ():
-            if name not in allowed:
-                text = f"is not what {self.instrument} reads; allowed is {' or '.join(allowed)}."
-                yield ("measurement", name), text
-            elif name != self.instrument_used.read.name:
-                text = (
-                    f"is not read where {self.instrument_used.controlled.name} is held; allowed is "
-                )
-                yield ("measurement", name), f"{text}{self.instrument_used.read.name}."
-        if self.instrument_used.has_jaws:
+            if name != used.read.name:
+                text = f"is not what {self.instrument} reads where {used.controlled.name} is held; "
+                yield ("measurement", name), f"{text}allowed is {used.read.name}."
+        if used.has_jaws:
             return
-        for key, value in (
-            ("target", self.models.target),
-            ("identification", self.models.identification),
-        ):
+        for key, value in vars(self.models).items():
             if value != "linear":
                 yield ("models", key), f"found {value}, allowed with {self.instrument} is linear."
-        for key in ("contact", "assumed_gripper"):
-            if getattr(self, key) is not None:
-                yield (key,), f"is of the gripper; leave it out with {self.instrument}."
-        if self.sample.size_m is not None:
-            yield ("sample", "size_m"), f"is of the gripper; leave it out with {self.instrument}."
+        of_gripper = {
+            ("contact",): self.contact,
+            ("assumed_gripper",): self.assumed_gripper,
+            ("sample", "size_m"): self.sample.size_m,
+        }
+        for path, given in of_gripper.items():
+            if given is not None:
+                yield path, f"is of the gripper; leave it out with {self.instrument}."
 
     def comb_problems(self, comb: CombDrive) -> Iterator[Problem]:
         """Find a sample that does not fit between the jaws, and what is no comb drive's."""
         if not self.instrument_used.has_jaws:
             return
         in_volts = all(phase.voltage_V is not None for phase in self.protocol.phases)
-        for path, text in self.gripper.comb_problems(comb, in_volts=in_volts):
-            yield ("gripper", *path), text
+        yield from below(("gripper",), self.gripper.comb_problems(comb, in_volts=in_volts))
         if self.sample.size_m is not None:
             try:
                 self.gripper.contact(comb, self.sample.size_m)
             except BiogripError as error:
                 yield ("sample", "size_m"), str(error)
-
-    def _contact_problems(self) -> Iterator[Problem]:
-        if self.contact is not None and self.recorded:
-            text = "is only for a simulated case; of a recorded trace leave out what follows."
-            yield ("contact",), text
-        elif self.contact == "unilateral" and self.models.target != "linear":
-            text = "found unilateral and a nonlinear target, allowed is models.target: linear"
-            yield ("contact",), f"{text} with it."
-
-    def _method_problems(self) -> Iterator[Problem]:
-        """Find settings of methods that conflict with the length of a chromosome."""
-        for name, settings in self.method_blocks.items():
-            if hasattr(settings, "problems_of"):
-                for path, text in settings.problems_of(self._genes):
-                    yield (name, *path), text
 
     def _unreachable_problems(self) -> Iterator[Problem]:
         """Find true values outside the decades that are searched."""
@@ -318,74 +251,35 @@ class CaseBlock(Shared):
 
     def _band_problems(self) -> Iterator[Problem]:
         """Find times outside the validity of power laws."""
-        if self.protocol.end_s > LONGEST_S:
-            text = f"found a protocol of {self.protocol.end_s:g} s, allowed are at most"
-            yield ("sample", "model"), f"{text} {LONGEST_S:g} s with {self.sample.model}."
-        if not self.measurement.times_s and self.measurement.rate_Hz * SHORTEST_S > 1:
-            text = f"found {self.measurement.rate_Hz:g}, allowed is at most {1 / SHORTEST_S:g} Hz"
-            yield ("measurement", "rate_Hz"), f"{text} with {self.sample.model}."
+        end_s, rate_Hz, model = self.protocol.end_s, self.measurement.rate_Hz, self.sample.model
+        if end_s > LONGEST_S:
+            text = f"found a protocol of {end_s:g} s, allowed are at most {LONGEST_S:g} s"
+            yield ("sample", "model"), f"{text} with {model}."
+        if not self.measurement.times_s and rate_Hz * SHORTEST_S > 1:
+            text = f"found {rate_Hz:g}, allowed is at most {1 / SHORTEST_S:g} Hz with {model}."
+            yield ("measurement", "rate_Hz"), text
 
     def _sampling_problems(self) -> Iterator[Problem]:
+        """Find too few or too many samples, or such as do not follow each other in the protocol."""
         measured, end = self.measurement, self.protocol.end_s
-        fitted_along = measured.fits_offset + measured.fits_drift
-        needed = len(self.searched) + fitted_along + 1
-        if measured.bursts:
-            yield from self._burst_problems(needed)
+        key = "bursts" if measured.bursts else "times_s" if measured.times_s else "rate_Hz"
+        bursts = sum(burst.samples for burst in measured.bursts)
+        samples = bursts or len(measured.times_s) or end * measured.rate_Hz + 1
+        needed = len(self.searched) + measured.fits_offset + measured.fits_drift + 1
+        coloured = measured.coloured and key == "rate_Hz"
+        most = MOST_SAMPLES if coloured else _MOST_SAMPLES
+        if not needed <= samples <= most:
+            text = f"found {measured.rate_Hz:g}, which gives " if key == "rate_Hz" else "found "
+            text += f"{counted(f'{samples:.6g}', 'sample')} over the protocol; allowed are {needed}"
+            how = " with a coloured noise model" if coloured else ""
+            yield (key,), f"{text} to {most}{how}."
             return
-        times = measured.times_s
-        if not times:
-            samples = end * measured.rate_Hz + 1
-            most = MOST_SAMPLES if measured.coloured else _MOST_SAMPLES
-            if not needed <= samples <= most:
-                given = counted(f"{samples:.6g}", "sample")
-                text = f"found {measured.rate_Hz:g}, which gives {given} over the "
-                how = " with a coloured noise model" if measured.coloured else ""
-                allowed = f"protocol; allowed are {needed} to {most}{how}."
-                yield ("measurement", "rate_Hz"), text + allowed
-            return
-        if len(times) < needed:
-            text = f"found {len(times)} times, allowed are at least {needed}."
-            yield ("measurement", "times_s"), text
-        for index, (before, after) in enumerate(pairwise(times), start=1):
-            if not before < after <= end:
-                text = f"found {after:g}, allowed is later than {before:g} and at most {end:g} s."
-                yield ("measurement", "times_s", index), text
-                break
-
-    def _burst_problems(self, needed: int) -> Iterator[Problem]:
-        bursts = self.measurement.bursts
-        samples = sum(burst.samples for burst in bursts)
-        if not needed <= samples <= _MOST_SAMPLES:
-            text = f"found {counted(samples, 'sample')}, allowed are {needed} to {_MOST_SAMPLES}."
-            yield ("measurement", "bursts"), text
-            return
+        spans = [(it.from_s, it.from_s + (it.samples - 1) / it.rate_Hz) for it in measured.bursts]
         last = -1.0
-        for index, burst in enumerate(bursts):
-            ends = burst.from_s + (burst.samples - 1) / burst.rate_Hz
-            if not last < burst.from_s <= ends <= self.protocol.end_s:
-                text = f"found one from {burst.from_s} to {ends} s, allowed is after {max(last, 0)}"
-                text += f" and at most until {self.protocol.end_s} s."
-                yield ("measurement", "bursts", index), text
+        for index, (first, ends) in enumerate(spans or [(time, time) for time in measured.times_s]):
+            if not last < first <= ends <= end:
+                text = f"found {first:g}" if first == ends else f"found {first:g} to {ends:g}"
+                text += f", allowed is later than {max(last, 0):g} and at most {end:g} s."
+                yield (key, index), text
                 return
             last = ends
-
-    def _calibration_problems(self) -> Iterator[Problem]:
-        """Refuse a calibration test that samples a free arm's ringing too slowly or too briefly."""
-        test = self.calibration
-        arms = self.gripper.left, self.gripper.right
-        frequency = max(arm.natural_frequency_Hz for arm in arms)
-        if test.rate_Hz < 10 * frequency:
-            text = f"found {test.rate_Hz}, allowed is at least ten times the arms' natural"
-            yield ("calibration", "rate_Hz"), f"{text} frequency, {10 * frequency:.4g} Hz."
-        most = _MOST_SAMPLES / test.rate_Hz
-        if not 5 / frequency <= test.duration_s <= most:
-            text = f"found {test.duration_s}, allowed is from five periods of the arms' ring, "
-            yield ("calibration", "duration_s"), f"{text}{5 / frequency:.3g} s, to {most:.3g} s."
-
-
-def _of_kind(kind: str) -> list[Instrument]:
-    return [each for each in INSTRUMENTS.values() if each.kind == kind]
-
-
-OVERRIDABLE = (*Shared.model_fields, *METHOD_BLOCKS)
-"""Blocks that a study sets for all cases, and that a case may change for itself."""

@@ -1,7 +1,7 @@
 """Top-level keys of a study's config."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -9,19 +9,13 @@ from pydantic import Field
 from biogrip.errors import nearest
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.experiment.springpot import LONGEST_S
-from biogrip.identify.methods import METHODS
+from biogrip.fit.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
-from biogrip.keys import Block, Distinct, OneOf, Problem
+from biogrip.keys import Block, Distinct, OneOf, Printed, Problem, below
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
-from biogrip.study.design_block import DesignBlock
-from biogrip.study.interpretations import InterpretationBlock
-from biogrip.study.sweeps import MOST_POINTS, SweepBlock
-from biogrip.study.traces_block import TracesBlock
+from biogrip.study.plain import adapter
+from biogrip.study.sweeps import MOST_POINTS, SweepBlock, list_points, name_problems
 
-SMALLEST_BATCH, LARGEST_BATCH, USUAL_BATCHES = 250, 1000, 8
-"""Least and most seeds of a job, and the number of jobs aimed at in between, by default."""
-
-_MOST_BATCHES = 10_000
 _MOST_CASES = 2000
 # Most names listed in a message.
 _SHOWN = 6
@@ -65,59 +59,77 @@ class Evaluation(Block):
     be an optimum."""
 
 
+@dataclass(frozen=True)
+class InterpretationBlock(Block):
+    """An alternative interpretation of the paper: changes to every simulated case."""
+
+    title: Printed
+    """Name in print."""
+    changes: Mapping[str, Any]
+    """Merged into each case, with keys of a case, e.g. `genetic_algorithm: {patience: 60}`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignBlock(Block):
+    """Limits of the trains of steps that `biogrip design` tries, and the samples they are for."""
+
+    steps: Annotated[int, Field(ge=1, le=50)] = 8
+    """Number of steps at most. By default 8."""
+    largest: Annotated[float | None, Field(gt=0, le=1e12)] = None
+    """Largest torque, or what else the protocol holds, in its SI unit. By default the protocol's
+    largest."""
+    duration_s: Annotated[float | None, Field(ge=1e-6, le=1e9)] = None
+    """Duration. By default the protocol's."""
+    rate_Hz: Annotated[float | None, Field(ge=1e-9, le=1e9)] = None
+    """Most readings a second. There are never more readings in all than under the config's
+    protocol. By default `measurement.rate_Hz`."""
+    parameters: Annotated[tuple[str, ...], Field(max_length=40), Distinct()] = ()
+    """Parameters asked for; the others are unknown all the same. By default all that are not
+    fixed."""
+    factor: Annotated[float | None, Field(gt=1, le=1000)] = None
+    """Factor by which all parameters may be smaller or larger than in a case's sample. By default,
+    the cases' samples alone are plausible."""
+
+
+@dataclass(frozen=True)
+class TracesBlock(Block):
+    """A table of recorded traces, which are identified in batches of rows."""
+
+    table: Annotated[str, Field(min_length=1, max_length=4000)]
+    """The table, a row a trace; relative to where Snakemake runs."""
+    config: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
+    """Config of the traces, as `biogrip identify --config` takes it: gripper, protocol, ... By
+    default the default study's."""
+    model: Annotated[str, OneOf(CANDIDATES)] = "generalized_maxwell"
+    """Sample model of all traces; a column `sample.model` goes before it."""
+    rows_a_batch: Annotated[int, Field(ge=1, le=100_000)] = 100
+    """Number of rows per job. Changes no result."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class StudyConfig(Shared):
     """All keys of a study's config."""
 
-    study_seed: Annotated[
-        int,
-        Field(
-            ge=0,
-            le=2**64 - 1,
-            description="The one seed of the study. Noise and genetic algorithm draw from streams "
-            "derived from it, the case's name and the seed's number.",
-        ),
-    ]
-    seeds: Annotated[
-        int,
-        Field(
-            ge=1,
-            le=1_000_000,
-            description="Number of noisy traces of each case that are made and identified. Raising "
-            "it keeps the results there are.",
-        ),
-    ]
-    batch_size: Annotated[
-        int | None,
-        Field(
-            ge=1,
-            le=100_000,
-            description=f"Number of seeds per job. By default {SMALLEST_BATCH}; for more than "
-            f"{USUAL_BATCHES * SMALLEST_BATCH} seeds, 1/{USUAL_BATCHES} of them, for more than "
-            f"{USUAL_BATCHES * LARGEST_BATCH}, {LARGEST_BATCH}. Changes no result, only how much "
-            "of a job is start-up.",
-        ),
-    ] = None
-    actuator: Annotated[CombDrive, Field(description="The rotary comb drive (Table 2).")]
+    study_seed: Annotated[int, Field(ge=0, le=2**64 - 1)]
+    """The one seed of the study. Noise and genetic algorithm draw from streams derived from it, the
+    case's name and the seed's number."""
+    seeds: Annotated[int, Field(ge=1, le=1_000_000)]
+    """Number of noisy traces of each case that are made and identified. Raising it keeps the
+    results there are."""
+    batch_size: Annotated[int | None, Field(ge=1, le=100_000)] = None
+    """Number of seeds per job. By default 500; for more than 4000 seeds, 1/8 of them, for more than
+    8000, 1000. Changes no result, only how much of a job is start-up."""
+    actuator: CombDrive
+    """The rotary comb drive (Table 2)."""
     methods: Annotated[
-        tuple[Annotated[str, OneOf(METHODS)], ...],
-        Field(
-            min_length=1,
-            max_length=100,
-            description="Identification methods applied to every trace. Tables 5-7 and figures of "
-            "single fits show the first.",
-        ),
-        Distinct(),
+        tuple[Annotated[str, OneOf(METHODS)], ...], Field(min_length=1, max_length=100), Distinct()
     ]
+    """Identification methods applied to every trace. Tables 5-7 and figures of single fits show the
+    first."""
     model_selection: ModelSelection
     evaluation: Evaluation
-    reconstructed: Annotated[
-        tuple[str, ...],
-        Field(
-            max_length=1000,
-            description="Keys, or whole blocks, whose values the paper does not give. Tables mark "
-            "them.",
-        ),
-    ]
+    reconstructed: Annotated[tuple[str, ...], Field(max_length=1000)]
+    """Keys, or whole blocks, whose values the paper does not give. Tables mark them."""
     cases: Annotated[
         Mapping[_CaseName, CaseBlock],
         Field(
@@ -127,23 +139,11 @@ class StudyConfig(Shared):
             "this case alone.",
         ),
     ]
-    traces: Annotated[
-        TracesBlock | None,
-        Field(
-            description="A table of recorded traces, which are identified in batches beside the "
-            "cases, as `biogrip identify` does."
-        ),
-    ] = None
-    only: Annotated[
-        tuple[str, ...],
-        Field(
-            min_length=1,
-            max_length=_MOST_CASES,
-            description="Names of the cases to run; the others are left out. By default all under "
-            "`cases`.",
-        ),
-        Distinct(),
-    ] = ()
+    traces: TracesBlock | None = None
+    """A table of recorded traces, which are identified in batches beside the cases, as `biogrip
+    identify` does."""
+    only: Annotated[tuple[str, ...], Field(min_length=1, max_length=_MOST_CASES), Distinct()] = ()
+    """Names of the cases to run; the others are left out. By default all under `cases`."""
     design: DesignBlock = DesignBlock()
     sweeps: Annotated[
         Mapping[_Name, SweepBlock],
@@ -152,65 +152,45 @@ class StudyConfig(Shared):
             "together. Every point is a case that differs in two values; it is identified like "
             "others, and shown in heat maps and their table only."
         ),
-    ] = {}
-    interpretations: Annotated[
-        Mapping[_Name, InterpretationBlock],
-        Field(
-            max_length=100,
-            description="Interpretations of the paper, by name, each tried with the genetic "
-            "algorithm on the noisy traces of every simulated case, for a table.",
-        ),
-    ] = {}
+    ] = field(default_factory=dict)
+    interpretations: Annotated[Mapping[_Name, InterpretationBlock], Field(max_length=100)] = field(
+        default_factory=dict
+    )
+    """Interpretations of the paper, by name, each tried with the genetic algorithm on the noisy
+    traces of every simulated case, for a table."""
 
     def problems(self) -> Iterator[Problem]:
-        """Find too many jobs, samples that do not fit, and unknown keys marked as reconstructed."""
-        if self.batch_size is not None:
-            tests = (case.identifiability.coverage_seeds for case in self.cases.values())
-            seeds = max(self.seeds, *tests)
-            if seeds > _MOST_BATCHES * self.batch_size:
-                text = f"found {self.batch_size}, which makes {seeds} seeds more than "
-                yield ("batch_size",), f"{text}{_MOST_BATCHES} batches; allowed are larger ones."
+        """Find too many jobs, samples that do not fit, and names of nothing that there is."""
         if not self.cases:
             yield ("cases",), "found none, allowed is one or more."
-        yield from self._band_problems()
+        longest = max((case.protocol.end_s for case in self.cases.values()), default=0.0)
+        for index, name in enumerate(self.model_selection.models):
+            if CANDIDATES[name].model.power_law and longest > LONGEST_S:
+                text = f"found {name} and a protocol of {longest:g} s, allowed are at most"
+                yield ("model_selection", "models", index), f"{text} {LONGEST_S:g} s with it."
         for name, case in self.cases.items():
-            for path, text in case.comb_problems(self.actuator):
-                yield ("cases", name, *path), text
-        methods = {name: asdict(block) for name, block in self.method_blocks.items()}
-        known = self.model_dump() | methods if self.reconstructed else {}
+            yield from below(("cases", name), case.comb_problems(self.actuator))
+        known = adapter(StudyConfig).dump_python([self])[0] if self.reconstructed else {}
         for index, key in enumerate(self.reconstructed):
             if not _exists(known, key):
                 yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
-        yield from self._design_problems()
-        for index, name in enumerate(self.only):
-            if name not in self.cases:
-                text = f"found '{name}', allowed are {', '.join(list(self.cases)[:_SHOWN])}."
-                yield ("only", index), text + nearest(name, self.cases)
-
-    def _design_problems(self) -> Iterator[Problem]:
-        """Find parameters in the block `design` that no case identifies."""
-        found = (p.name for case in self.cases.values() for p in case.searched)
-        searched = list(dict.fromkeys(found))
-        for index, name in enumerate(self.design.parameters):
-            if name not in searched:
-                text = f"found '{name}', allowed are {', '.join(searched)}."
-                yield ("design", "parameters", index), text + nearest(name, searched)
-
-    def _band_problems(self) -> Iterator[Problem]:
-        """Find power-law models in a study whose protocols exceed their range of validity."""
-        longest = max((case.protocol.end_s for case in self.cases.values()), default=0.0)
-        for index, name in enumerate(self.model_selection.models):
-            if not CANDIDATES[name].model.power_law:
-                continue
-            if longest > LONGEST_S:
-                text = f"found {name} and a protocol of {longest:g} s, allowed are at most"
-                yield ("model_selection", "models", index), f"{text} {LONGEST_S:g} s with it."
-
-    @property
-    def chosen(self) -> "StudyConfig":
-        """The study with only the cases that `only` names."""
-        cases = {name: self.cases[name] for name in self.only or self.cases}
-        return self.model_copy(update={"cases": cases})
+        chosen = [name for name in self.cases if name in (self.only or self.cases)]
+        points = sum(1 for _ in list_points(self.sweeps))
+        if points > MOST_POINTS:
+            text = f"found {points} points, allowed are {MOST_POINTS} together."
+            yield ("sweeps",), text
+        yield from below(("sweeps",), name_problems(self.sweeps, chosen))
+        searched = [p.name for case in self.cases.values() for p in case.searched]
+        lists: dict[tuple[str, ...], tuple[Iterable[str], Iterable[str]]] = {
+            ("design", "parameters"): (self.design.parameters, dict.fromkeys(searched)),
+            ("only",): (self.only, self.cases),
+            **{("sweeps", name, "cases"): (s.cases, chosen) for name, s in self.sweeps.items()},
+        }
+        for path, (found, allowed) in lists.items():
+            for index, name in enumerate(found):
+                if name not in allowed:
+                    text = f"found '{name}', allowed are {', '.join([*allowed][:_SHOWN])}."
+                    yield (*path, index), text + nearest(name, allowed)
 
 
 def _exists(block: Any, key: str) -> bool:

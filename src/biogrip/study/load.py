@@ -1,26 +1,35 @@
-"""Loading of config files into a checked study."""
+"""Loading of config files into a checked study, or messages that name file, line and key."""
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from biogrip.study.case_blocks import OVERRIDABLE
+from biogrip.errors import BiogripError
+from biogrip.keys import Problem, below
+from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig
+from biogrip.study.messages import checked
+from biogrip.study.plain import plain
 from biogrip.study.schema import schema_of
-from biogrip.study.source import KeyPath, overlaid, read_config, read_places
+from biogrip.study.source import (
+    KeyPath,
+    Source,
+    dotted,
+    keys_in,
+    overlaid,
+    place,
+    read_config,
+    read_source,
+)
 from biogrip.study.study import Study
-from biogrip.study.validation import checked_study
+from biogrip.study.sweeps import list_points, point_blocks
+
+_SHOWN = 6
 
 
 def read_configs(files: Iterable[Path]) -> dict[str, Any]:
-    """Read config files and merge them, the later over the earlier.
-
-    Raises
-    ------
-    BiogripError
-        With file and line, if a file is no valid config at all, see `read_config`.
-    """
+    """Read config files and merge them, the later over the earlier, see `read_config`."""
     merged: dict[str, Any] = {}
     for file in files:
         merged = overlaid(merged, read_config(file))
@@ -29,43 +38,72 @@ def read_configs(files: Iterable[Path]) -> dict[str, Any]:
 
 def load_study(
     config: Mapping[str, Any],
-    files: Sequence[str | Path],
-    command_line: Iterable[Hashable] = (),
-    *,
-    for_workflow: bool = True,
-    over: Sequence[tuple[str, Mapping[KeyPath, int]]] = (),
+    files: Iterable[str | Path],
+    command_line: Mapping[str, Any] | None = None,
+    over: Iterable[Source] = (),
 ) -> Study:
-    """Check and type a merged config; the files it came from give the line numbers in messages.
+    """Check and type a merged config, which came from files, the command line, and what is `over`.
 
-    Some top-level keys may be of the command line, and some keys of a row in a table of traces:
-    `over` has the table, and the row's line by key. For a workflow, paths of traces are refused
-    that Snakemake would read as wildcards.
-
-    Raises
-    ------
-    BiogripError
-        If anything in the config cannot be used.
+    A `BiogripError` names file, line and key of the first few problems, with what was found and
+    what is allowed.
     """
-    places = replace(read_places(files, command_line), over=tuple(over))
-    numbered = schema_of(StudyConfig).with_numbers(config)
-    return Study(checked_study(_fill_in(numbered), places, for_workflow=for_workflow))
+    typed = ("command line, --config", dict.fromkeys(keys_in(command_line or {})))
+    sources = [*(read_source(Path(file)) for file in files), typed, *over]
+    study, problems = checked(StudyConfig, _fill_in(schema_of(StudyConfig).with_numbers(config)))
+    _refuse(problems, sources)
+    assert study is not None
+    study = replace(study, cases={it: study.cases[it] for it in study.only or study.cases})
+    _refuse([*_point_problems(study), *_interpretation_problems(study)], sources)
+    return Study(study)
+
+
+def _refuse(problems: Iterable[Problem], sources: Sequence[Source]) -> None:
+    """Raise an error that lists the first few problems, if there are any."""
+    found: dict[str, None] = {}
+    for path, text in problems:
+        # A problem in a block that cases inherit is reported once, not once per case.
+        origin = _origin(path, sources)
+        found[f"{place(origin, sources)}: {dotted(origin)}: {text}"] = None
+    if found:
+        shown = [*found][:_SHOWN]
+        more = [f"... and {len(found) - _SHOWN} more."] if len(found) > _SHOWN else []
+        raise BiogripError("\n".join(["The study's configuration cannot be used.", *shown, *more]))
+
+
+def _origin(path: KeyPath, sources: Sequence[Source]) -> KeyPath:
+    """Return the path of the study-wide key that a case inherits, or the path itself."""
+    if len(path) < 3 or path[0] != "cases" or path[2] not in OVERRIDABLE:
+        return path
+    for length in range(len(path), 2, -1):
+        if any(path[:length] in lines for _, lines in sources):
+            return path
+        if any(path[2:length] in lines for _, lines in sources):
+            break
+    return path[2:]
+
+
+def _point_problems(study: StudyConfig) -> Iterator[Problem]:
+    """Check every point of every sweep as if it were a case of the config."""
+    blocks = point_blocks(study.sweeps, study.cases)
+    for name, point in list_points(study.sweeps):
+        case, found = checked(CaseBlock, blocks[point.name])
+        for problem in case.comb_problems(study.actuator) if case else found:
+            yield from below(("sweeps", name), [study.sweeps[name].placed(point, problem)])
+
+
+def _interpretation_problems(study: StudyConfig) -> Iterator[Problem]:
+    """Check every simulated case under every interpretation as if it were a case of the config."""
+    for name, block in study.interpretations.items():
+        for case in study.cases.values():
+            if not case.recorded:
+                problems = checked(CaseBlock, overlaid(plain(case), block.changes))[1]
+                yield from below(("interpretations", name, "changes"), problems)
 
 
 def _fill_in(config: Mapping[str, Any]) -> Mapping[str, Any]:
     """Merge the study's blocks into every case; drop cases set to nothing."""
-    cases = config.get("cases")
-    if not isinstance(cases, dict):
+    if not isinstance(cases := config.get("cases"), dict):
         return config
-    filled = {}
-    for name, case in cases.items():
-        if case is None:
-            continue
-        if isinstance(case, dict):
-            case = dict(case)
-            for block in OVERRIDABLE:
-                if isinstance(config.get(block), dict):
-                    case[block] = overlaid(config[block], case.get(block, {}))
-                elif block in config:
-                    case.setdefault(block, config[block])
-        filled[name] = case
+    shared = {name: config[name] for name in OVERRIDABLE if name in config}
+    filled = {name: overlaid(shared, case) for name, case in cases.items() if case is not None}
     return {**config, "cases": filled}

@@ -12,8 +12,8 @@ from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.instrument.gripper import ROTATION
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.keys import Block, OneOf, Problem
-from biogrip.study.trace_file import trace_file_problem
 from biogrip.traces.columns import Columns
+from biogrip.traces.trace_file import trace_file_problem
 from biogrip.traces.units import TIME_UNITS
 
 COLOURED = "coloured"
@@ -24,11 +24,11 @@ KNOWN_NOISE = ("noise_rad", "sd", "noise_share")
 READINGS = tuple(INSTRUMENTS)
 """Keys that name the column of the readings, one for each quantity that an instrument reads."""
 
-_COLUMNS = ("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "skip", "scale")
-_TABLE = ("block", "average_repeated", "from_s", "until_s")
-OF_FILE = (*_COLUMNS, *_TABLE, *KNOWN_NOISE, "start_s", "fit_start")
-"""Keys of recorded traces only."""
-_Column = Annotated[str | None, Field(min_length=1, max_length=4000)]
+_OF_FILE = (
+    *("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "skip", "scale", "block"),
+    *("average_repeated", "from_s", "until_s", *KNOWN_NOISE, "start_s", "fit_start"),
+)
+_Name = Annotated[str | None, Field(min_length=1, max_length=4000)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,25 +44,25 @@ class MeasurementBlock(Block):
     bursts: Annotated[tuple[Burst, ...], Field(min_length=1, max_length=20_000)] = ()
     """Successive bursts of samples instead of a uniform rate, as of a camera that is fast after
     every step. See docs/design.md."""
-    file: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
+    file: _Name = None
     """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. See
     "Your own measurement"."""
-    time: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
+    time: _Name = None
     """Name of the file's column of times; its clock starts with the protocol, or before."""
-    rotation: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
+    rotation: _Name = None
     """Name of the file's column of the left arm's closing rotation."""
-    displacement: _Column = None
+    displacement: _Name = None
     """Name of the file's column of displacements under a force that is held (`instrument:
     creep`)."""
-    strain: _Column = None
+    strain: _Name = None
     """Name of that of strains under a stress that is held (creep)."""
-    compliance: _Column = None
+    compliance: _Name = None
     """Name of that of creep compliances: strains over the largest stress that is held (creep)."""
-    force: _Column = None
+    force: _Name = None
     """Name of that of forces at a displacement that is held (`instrument: relaxation`)."""
-    stress: _Column = None
+    stress: _Name = None
     """Name of that of stresses at a strain that is held (relaxation)."""
-    modulus: _Column = None
+    modulus: _Name = None
     """Name of that of relaxation moduli: stresses over the largest strain that is held
     (relaxation)."""
     time_unit: Annotated[str | None, OneOf(TIME_UNITS)] = None
@@ -95,7 +95,7 @@ class MeasurementBlock(Block):
     noise_rad: Annotated[float | None, Field(ge=1e-15, le=1e12)] = None
     """Standard deviation of the recorded noise, if it is known; by default it is estimated from the
     residuals."""
-    sd: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
+    sd: _Name = None
     """Name of the file's column of the readings' standard deviations, in the unit of the rotations.
     Every reading then has the weight 1/sd² in all fits, and the noise is known."""
     noise_share: Annotated[float | None, Field(gt=0, le=1)] = None
@@ -125,20 +125,15 @@ class MeasurementBlock(Block):
         """Columns of a recorded trace's file."""
         (name,) = self.readings
         assert self.time is not None
+        same = ("time_unit", "start_s", "sd", "block", "average_repeated", "from_s", "until_s")
         return Columns(
             self.time,
             getattr(self, name),
-            self.time_unit,
-            self.rotation_unit if name == ROTATION.name else self.reading_unit,
-            self.skip or 0,
-            1.0 if self.scale is None else self.scale,
-            self.start_s,
-            sd=self.sd,
+            reading_unit=self.rotation_unit or self.reading_unit,
+            skip=self.skip or 0,
+            scale=1.0 if self.scale is None else self.scale,
             quantity=INSTRUMENTS[name].read,
-            block=self.block,
-            average_repeated=self.average_repeated,
-            from_s=self.from_s,
-            until_s=self.until_s,
+            **{key: getattr(self, key) for key in same},
         )
 
     @property
@@ -163,20 +158,18 @@ class MeasurementBlock(Block):
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that are in conflict, and what a recorded trace lacks."""
-        for key in KNOWN_NOISE:
-            if self.coloured and getattr(self, key) is not None:
-                text = "is that of white noise; leave it out where noise_model is coloured."
-                yield (key,), text
-            if self.sd is not None and key != "sd" and getattr(self, key) is not None:
+        for key in (key for key in KNOWN_NOISE if getattr(self, key) is not None):
+            if self.coloured:
+                yield (key,), "is that of white noise; leave it out where noise_model is coloured."
+            if self.sd is not None and key != "sd":
                 yield (key,), "does not go with sd, which says all of the noise."
         if self.scale == 0:
             yield ("scale",), "found 0, allowed is another number."
-        if self.fit_start and self.start_s is not None:
-            yield ("fit_start",), "does not go with start_s; allowed is one of them."
-        if self.bursts and self.times_s:
-            yield ("bursts",), "does not go with times_s; allowed is one of them."
+        for key, other in (("bursts", "times_s"), ("fit_start", "start_s")):
+            if getattr(self, key) and getattr(self, other) not in (None, ()):
+                yield (key,), f"does not go with {other}; allowed is one of them."
         if self.file is None:
-            for key in OF_FILE:
+            for key in _OF_FILE:
                 given = getattr(self, key)
                 if given is not None and given is not False:
                     yield (key,), "is only for a recorded trace, whose measurement has a file."
@@ -195,10 +188,11 @@ class MeasurementBlock(Block):
         name, *others = self.readings
         for other in others:
             yield (other,), f"does not go with {name}; allowed is one of {', '.join(READINGS)}."
-        if name == ROTATION.name and self.reading_unit is not None:
-            yield ("reading_unit",), f"does not go with {name}; allowed is rotation_unit."
-        if name != ROTATION.name and self.rotation_unit is not None:
-            yield ("rotation_unit",), f"does not go with {name}; allowed is reading_unit."
+        right, wrong = "rotation_unit", "reading_unit"
+        if name != ROTATION.name:
+            right, wrong = wrong, right
+        if getattr(self, wrong) is not None:
+            yield (wrong,), f"does not go with {name}; allowed is {right}."
         allowed = INSTRUMENTS[name].read.units
         if self.reading_unit is not None and self.reading_unit not in allowed:
             text = f"found '{self.reading_unit}', allowed are {', '.join(allowed)}."

@@ -1,20 +1,18 @@
 """Config block of the protocol: what is held over time, as torques or voltages of comb drives."""
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
 from pydantic import Field
 
-from biogrip.experiment.protocol import Harmonic, Load, Phase, largest_load, load
+from biogrip.experiment.protocol import Phase, largest_load, load
 from biogrip.instrument.actuator import CombDrive, capacitance_slope
 from biogrip.instrument.instrument import Instrument
 from biogrip.instrument.instruments import CONTROLLED
 from biogrip.keys import Block, Problem
 
 _LONGEST_S = 1e9
-_MOST_PERIODS = 10_000
 _VOLTAGE = "voltage_V"
 _BASES = (CONTROLLED[0].column, _VOLTAGE, *(each.column for each in CONTROLLED[1:]))
 # What a comb drive pulls with.
@@ -88,40 +86,33 @@ class PhaseBlock(Block):
 
     def phase(self, per_square_volt: float) -> Phase:
         """Return the phase in torques; a voltage's torque is `per_square_volt` V^2 (eq. 9)."""
-        if self.voltage_V is not None:
-            left = self._load(self.voltage_V, self.to_voltage_V, self.amplitude_V)
-            loads = left, _at(left, self.voltage_right_V)
-            return Phase(self.duration_s, *(_squared(load, per_square_volt) for load in loads))
         (base,) = self.bases
-        keys = (base, *further_keys(base))
-        left = self._load(*(getattr(self, key) for key in keys))
-        return Phase(self.duration_s, left, _at(left, self.torque_right_Nm))
-
-    def _load(self, value: float, to: float | None, amplitude: float | None) -> Load:
-        return load(self.duration_s, value, to, amplitude, self.frequency_Hz)
+        value, to, amplitude = (getattr(self, key) for key in (base, *further_keys(base)))
+        left = right = load(self.duration_s, value, to, amplitude, self.frequency_Hz)
+        of_right = getattr(self, base.replace("_", "_right_")) if base in _PULLS else None
+        if of_right is not None:
+            right = replace(left, value_Nm=of_right)
+        if base == _VOLTAGE:
+            left, right = left.squared(per_square_volt), right.squared(per_square_volt)
+        return Phase(self.duration_s, left, right)
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that are in conflict."""
         given = {name: value for name, value in vars(self).items() if value is not None}
         if len(self.bases) != 1:
-            found = " and ".join(self.bases) or "neither"
-            allowed = f"{' and '.join(_PULLS)}, or with another instrument of "
-            others = ", ".join(base for base in _BASES if base not in _PULLS)
-            yield (), f"found {found}, allowed is one of {allowed}{others}."
+            found, others = " and ".join(self.bases) or "neither", ", ".join(_BASES[2:])
+            text = f"found {found}, allowed is one of {' and '.join(_PULLS)}, or with another "
+            yield (), f"{text}instrument of {others}."
             return
         by = self.bases[0]
         ramp, swing = further_keys(by)
         right = by.replace("_", "_right_") if by in _PULLS else ""
-        for key in given:
-            if key not in ("duration_s", by, right, ramp, swing, "frequency_Hz"):
-                yield (key,), f"does not go with {by}."
+        for key in sorted(given.keys() - {"duration_s", by, right, ramp, swing, "frequency_Hz"}):
+            yield (key,), f"does not go with {by}."
         if (swing in given) != ("frequency_Hz" in given):
             yield (), f"has one of {swing} and frequency_Hz; allowed are both or neither."
         if right in given and ramp in given:
             yield (right,), "does not go with a ramp; allowed is a held torque."
-        if given.get("frequency_Hz", 0) * self.duration_s > _MOST_PERIODS:
-            text = f"found {self.frequency_Hz}, allowed are at most {_MOST_PERIODS} periods"
-            yield ("frequency_Hz",), f"{text} in a phase."
         if swing in given and ramp in given:
             yield (), "has a ramp and a sinusoid; allowed is one of them in a phase."
         if by in _PULLS and given.get(swing, 0) > min(given[by], given.get(right, given[by])):
@@ -142,16 +133,14 @@ class ProtocolBlock(Block):
         return sum(phase.duration_s for phase in self.phases)
 
     def make_phases(self, instrument: Instrument, comb: CombDrive) -> tuple[Phase, ...]:
-        """Return all phases in units of what the instrument holds.
-
-        Voltages are converted to torques (eq. 9). What a relative reading is divided by is one.
-        """
+        """Return all phases in units of what the instrument holds, or of the largest load."""
         per_square_volt = 0.5 * capacitance_slope(comb)
         phases = tuple(phase.phase(per_square_volt) for phase in self.phases)
         if not instrument.relative:
             return phases
         largest = largest_load(phases)
-        return tuple(_divided(phase, largest) for phase in phases)
+        divided = [(phase.duration_s, phase.left.divided(largest)) for phase in phases]
+        return tuple(Phase(duration_s, load, load) for duration_s, load in divided)
 
     def problems(self) -> Iterator[Problem]:
         """Refuse a protocol that is too long, or in which all torques are zero."""
@@ -159,9 +148,9 @@ class ProtocolBlock(Block):
             text = f"found {self.end_s:g} s in all phases together, allowed is at most "
             yield ("phases",), f"{text}{_LONGEST_S:g} s."
         if not any(phase.drives for phase in self.phases):
-            (base, *_) = self.phases[0].bases or ["torque_Nm"]
-            text = f"no phase has a {base.partition('_')[0]}, so nothing would move; allowed is at"
-            yield ("phases",), f"{text} least one above 0{_unit(base)}."
+            name = self.phases[0].bases[0].partition("_")[0]
+            text = f"no phase has a {name}, so nothing would move; allowed is at least one above 0."
+            yield ("phases",), text
 
     def instrument_problems(self, instruments: Sequence[Instrument]) -> Iterator[Problem]:
         """Find phases that hold what none of some instruments, of one kind, holds."""
@@ -180,44 +169,3 @@ class ProtocolBlock(Block):
 def further_keys(base: str) -> tuple[str, str]:
     """Return the keys of a ramp's end and of a sinusoid's amplitude."""
     return f"to_{base}", f"amplitude_{base.rpartition('_')[2]}"
-
-
-def _unit(base: str) -> str:
-    return next((f" {each.unit}".rstrip() for each in CONTROLLED if each.column == base), " V")
-
-
-def _divided(phase: Phase, by: float) -> Phase:
-    """Return a phase whose loads, alike on both sides, are divided by a number."""
-    own = phase.left
-    divided = Load(
-        own.value_Nm / by,
-        own.slope_Nm_per_s / by,
-        own.curvature_Nm_per_s2 / by,
-        tuple(replace(h, amplitude_Nm=h.amplitude_Nm / by) for h in own.harmonics),
-    )
-    return Phase(phase.duration_s, divided, divided)
-
-
-def _at(load: Load, value: float | None) -> Load:
-    return load if value is None else replace(load, value_Nm=value)
-
-
-def _squared(volts: Load, per_square_volt: float) -> Load:
-    """Return the torque of a voltage V + r t or V + A sin(omega t): tau = kappa V^2.
-
-    The squared sinusoid is V^2 + A^2/2 + 2 V A sin(omega t) - A^2/2 cos(2 omega t).
-    """
-    kappa, value = per_square_volt, volts.value_Nm
-    mean = value**2
-    harmonics: list[Harmonic] = []
-    for h in volts.harmonics:
-        a, omega = h.amplitude_Nm, h.omega_rad_per_s
-        mean += a**2 / 2
-        harmonics.append(Harmonic(2 * kappa * value * a, omega, h.phase_rad))
-        harmonics.append(Harmonic(kappa * a**2 / 2, 2 * omega, math.pi))
-    return Load(
-        kappa * mean,
-        2 * kappa * value * volts.slope_Nm_per_s,
-        2 * kappa * volts.slope_Nm_per_s**2,
-        tuple(harmonics),
-    )

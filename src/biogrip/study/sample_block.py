@@ -6,12 +6,12 @@ from typing import Annotated
 from pydantic import BaseModel, Field
 
 from biogrip.errors import nearest
-from biogrip.experiment.sample import MODELS, MOST_BRANCHES, Parameter, Sample, SampleModel
+from biogrip.experiment.sample import MODELS, MOST_BRANCHES, Sample, SampleModel
 from biogrip.instrument.contact import LARGEST_M, SMALLEST_M
 from biogrip.keys import OPEN, Checked, OneOf, Problem
 
 LARGEST_PARAMETER = 1e12
-_LEAST_PARAMETER = 1e-18
+_LEAST = 1e-18
 
 
 class SampleBlock(Checked, BaseModel):
@@ -72,11 +72,7 @@ class SampleBlock(Checked, BaseModel):
             yield ("branches",), "only generalized_maxwell has a number of branches."
             return
         model = self.sample.model
-        for name in self.parameters:
-            if name not in model.names:
-                text = f"is no parameter of {model.name}, which has {', '.join(model.names)}."
-                yield (name,), text + nearest(name, model.names)
-        yield from parameter_problems(model, self.parameters)
+        yield from _parameter_problems(model, self.parameters, model.name)
 
     def missing(self) -> Iterator[Problem]:
         """Find parameters of the model without a true value."""
@@ -86,29 +82,28 @@ class SampleBlock(Checked, BaseModel):
                 yield (name,), f"is missing: {model.name} needs {', '.join(model.names)}."
 
 
-def parameter_problems(model: SampleModel, values: Mapping[str, float]) -> Iterator[Problem]:
-    """Find values that are too small or too large; 0 is allowed for parameters that may vanish."""
-    there: list[Parameter] = [p for p in model.parameters if p.name in values]
-    for parameter in there:
-        value = values[parameter.name]
-        if value < _LEAST_PARAMETER and not (value == 0 and parameter.may_vanish):
-            zero = "0 or " if parameter.may_vanish else ""
-            text = f"found {value:g}, allowed is {zero}at least {_LEAST_PARAMETER:g}"
-            yield (parameter.name,), f"{text} {parameter.unit}".rstrip() + "."
-        elif not value < parameter.below or not value <= LARGEST_PARAMETER:
-            most = f"at most {LARGEST_PARAMETER:g} {parameter.unit}"
-            if parameter.below < LARGEST_PARAMETER:
-                most = f"below {parameter.below:g}"
-            text = f"found {value:g}, allowed is above 0 and {most}."
-            yield (parameter.name,), text
-
-
 def fixed_problems(model: SampleModel, values: Mapping[str, float]) -> Iterator[Problem]:
     """Find fixed parameters that the model does not have, or whose values it does not allow."""
-    for name in values:
-        if name not in model.names:
-            text = f"is no parameter of the sample, which has {', '.join(model.names)}."
-            yield (name,), text + nearest(name, model.names)
-    yield from parameter_problems(model, values)
+    yield from _parameter_problems(model, values, "the sample")
     if set(model.names) <= set(values):
         yield (), "leaves nothing to identify; allowed are fewer parameters."
+
+
+def _parameter_problems(
+    model: SampleModel, values: Mapping[str, float], called: str
+) -> Iterator[Problem]:
+    """Find unknown names, and values out of range; 0 is allowed for those that may vanish."""
+    by_name = {parameter.name: parameter for parameter in model.parameters}
+    for name, value in values.items():
+        if name not in by_name:
+            text = f"is no parameter of {called}, which has {', '.join(model.names)}."
+            yield (name,), text + nearest(name, model.names)
+            continue
+        parameter = by_name[name]
+        vanishes = value == 0 and parameter.may_vanish
+        if not (vanishes or _LEAST <= value <= LARGEST_PARAMETER) or value >= parameter.below:
+            zero = "0 or " if parameter.may_vanish else ""
+            bounded = parameter.below < LARGEST_PARAMETER
+            most = f"below {parameter.below:g}" if bounded else f"at most {LARGEST_PARAMETER:g}"
+            text = f"found {value:g}, allowed is {zero}at least {_LEAST:g} and {most}"
+            yield (name,), f"{text} {parameter.unit}".rstrip() + "."

@@ -7,7 +7,6 @@ from typing import Any
 
 from biogrip.keys import kind_of
 from biogrip.study.plain import adapter
-from biogrip.study.yaml_text import LONGEST_NUMBER
 
 _UNITS = {
     **{name: name for name in ("s", "m", "Hz", "rad", "deg", "V")},
@@ -17,7 +16,8 @@ _UNITS = {
 }
 _UNIT = re.compile(rf".*?_({'|'.join(_UNITS)})")
 _WORDS = {"integer": "an integer", "boolean": "true or false", "string": "text", "array": "a list"}
-_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+")
+_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
+# Beyond 2^53 a float does not hold every integer.
 _MOST_COUNTED = 2**53
 
 
@@ -46,10 +46,8 @@ class Schema:
     @property
     def values(self) -> "Schema":
         """Values of keys that have no names of their own."""
-        named = self.get("patternProperties")
-        return self.within(
-            next(iter(named.values())) if named else self.get("additionalProperties")
-        )
+        named = self.get("patternProperties") or {"": self.get("additionalProperties")}
+        return self.within(next(iter(named.values())))
 
     @property
     def options(self) -> "list[Schema]":
@@ -68,11 +66,6 @@ class Schema:
         return self.values if node is None else self.within(node)
 
     @property
-    def is_single(self) -> bool:
-        """True if it is a number, text, or true or false."""
-        return self.get("type") in ("number", "integer", "string", "boolean")
-
-    @property
     def word(self) -> str:
         """Kind of value, in words."""
         if self.options:
@@ -81,9 +74,10 @@ class Schema:
         return "a block of keys" if block else _WORDS.get(self.get("type"), "a number")
 
     def with_numbers(self, value: Any) -> Any:
-        """Return a copy of a plain value with text like ``1e-3`` converted to a number.
+        """Return a copy of a plain value, with text that is a number converted where one is wanted.
 
-        YAML 1.1 takes it for text without a dot. Where text is allowed, it stays text.
+        YAML 1.1 takes ``1e-3`` for text, and Snakemake all that is in a block of its ``--config``,
+        ``true`` and ``false``, too. Where text alone is allowed, it stays text.
         """
         here = self.option(kind_of(value))
         if isinstance(value, Mapping):
@@ -91,6 +85,8 @@ class Schema:
         if isinstance(value, list | tuple):
             return [here.inside(0).with_numbers(item) for item in value]
         kinds = {option.get("type", "number") for option in (here, *self.options)}
+        if isinstance(value, str) and "boolean" in kinds:
+            return {"true": True, "false": False}.get(value.lower(), value)
         return _number(value) if isinstance(value, str) and kinds & {"number", "integer"} else value
 
 
@@ -123,9 +119,7 @@ def _unit(name: str) -> dict[str, str]:
 
 
 def _number(text: str) -> float | str:
-    if len(text) > LONGEST_NUMBER or not _NUMBER.fullmatch(text.strip()):
+    if not _NUMBER.fullmatch(text.strip()):
         return text
     number = float(text)
-    # Beyond 2^53 a float does not hold every integer.
-    whole = number.is_integer() and abs(number) < _MOST_COUNTED
-    return int(number) if whole else number
+    return int(number) if number.is_integer() and abs(number) < _MOST_COUNTED else number

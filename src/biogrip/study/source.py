@@ -1,8 +1,8 @@
-"""Keys of config files with their line numbers, for error messages."""
+"""Reading of YAML config files: their keys, and the lines of these for messages."""
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+import re
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -10,150 +10,153 @@ from typing import Any
 import yaml
 
 from biogrip.errors import BiogripError
-from biogrip.study.yaml_text import compose, no_yaml, read_text, scalar_problem, shown_path
+from biogrip.terminal import visible
 
 KeyPath = tuple[Hashable, ...]
+Lines = Mapping[KeyPath, int | None]
+Source = tuple[str, Lines]
+"""Name of a file or of another source of keys, and the line (from 1) of each that it has."""
 
-_RUNS_CODE: KeyPath = ("__use_yte__",)
-_LONGEST_NAME = 80
-
-
-@dataclass(frozen=True)
-class ConfigFiles:
-    """Config files of a study with line numbers, the later merged over the earlier."""
-
-    lines: tuple[tuple[str, Mapping[KeyPath, int]], ...]
-    """Line (from 1) of every key and list item, by file."""
-    command_line: frozenset[Hashable] = frozenset()
-    """Top-level keys set on the command line, which override all files."""
-    over: tuple[tuple[str, Mapping[KeyPath, int]], ...] = ()
-    """Lines of the keys of a row in a table of traces, by the table, which override even these."""
-
-    def place(self, path: KeyPath) -> str:
-        """Return where the value in force was set, e.g. ``"config/my.yaml, line 7"``.
-
-        For a missing key it is the block that lacks it.
-        """
-        if found := _line_of(path, self.over):
-            return found
-        if path and path[0] in self.command_line:
-            return "command line, --config"
-        if found := _line_of(path, self.lines):
-            return found
-        names = [name for name, _ in self.lines]
-        return " with ".join(names) if names else "the configuration"
+LARGEST_BYTES = 1_000_000
+# Aliases of aliases make many values of a few lines, and endless ones of an alias of itself.
+_MOST_KEYS, _DEEPEST = 100_000, 50
+# libyaml is ten times faster, but not part of every PyYAML.
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_OCTAL = re.compile(r"[-+]?0[0-7_]+")
 
 
-def _line_of(path: KeyPath, files: Sequence[tuple[str, Mapping[KeyPath, int]]]) -> str | None:
-    """Return the last of some files that has a key, or a block that it is in, and the line."""
+def keys_in(block: Any, above: KeyPath = ()) -> Iterator[KeyPath]:
+    """Yield the paths of all keys and list items of a block and of the blocks below."""
+    items = enumerate(block) if isinstance(block, list) else ()
+    for key, inner in block.items() if isinstance(block, Mapping) else items:
+        yield (*above, key)
+        yield from keys_in(inner, (*above, key))
+
+
+def place(path: KeyPath, sources: Sequence[Source]) -> str:
+    """Return which source has a key, or the block that lacks it: ``"my.yaml, line 7"``."""
     for length in range(len(path), 0, -1):
-        for name, lines in reversed(files):
+        for name, lines in reversed(sources):
             if path[:length] in lines:
-                return f"{name}, line {lines[path[:length]]}"
-    return None
+                line = lines[path[:length]]
+                return f"{name}, line {line}" if line else name
+    return " with ".join(name for name, _ in sources) or "the configuration"
 
 
-def read_places(files: Sequence[str | Path], command_line: Iterable[Hashable] = ()) -> ConfigFiles:
-    """Read the line numbers of all keys in YAML files, the later merged over the earlier.
-
-    Top-level keys set on the command line override all files.
-
-    Raises
-    ------
-    BiogripError
-        With file and line, if a file is no valid config at all, see `read_config`.
-    """
-    lines = tuple((shown_path(Path(file)), _read(Path(file))[0]) for file in files)
-    return ConfigFiles(lines, frozenset(command_line))
+def read_source(file: Path) -> Source:
+    """Return the name of a YAML file, and the lines of all in it; see `read_config` for errors."""
+    return shown_path(file), _read(file)[0]
 
 
 def read_config(file: Path) -> dict[str, Any]:
-    """Read the keys of one YAML file.
-
-    Raises
-    ------
-    BiogripError
-        With file and line, if the file is missing or is not a YAML mapping within the bounds of
-        `compose`, has a duplicate key, or a value that YAML 1.1 misreads, see `scalar_problem`.
-    """
-    return _read(file)[1]
+    """Read the keys of one YAML file; a `BiogripError` names the line of what is not usable."""
+    return deepcopy(_read(file)[1])
 
 
 def overlaid(base: Any, over: Any) -> Any:
     """Merge a config block over another: mappings recursively, all else replaced, not copied."""
     if isinstance(base, dict) and isinstance(over, dict):
-        merged = dict(base)
-        for key, value in over.items():
-            merged[key] = overlaid(merged[key], value) if key in merged else value
-        return merged
+        merged = {key: overlaid(base[key], it) if key in base else it for key, it in over.items()}
+        return base | merged
     return over
 
 
-def _read(file: Path) -> tuple[Mapping[KeyPath, int], dict[str, Any]]:
-    """Return the line number of every key, and the content of the file."""
-    lines, content = _parsed(file, read_text(file))
-    return lines, deepcopy(content)
-
-
-# The default study is read again for every trace.
-@lru_cache(maxsize=16)
-def _parsed(file: Path, text: str) -> tuple[dict[KeyPath, int], dict[str, Any]]:
-    root = compose(file, text)
-    lines: dict[KeyPath, int] = {}
-    if root is None:
-        return lines, {}
-    if not isinstance(root, yaml.MappingNode):
-        raise BiogripError(f"{shown_path(file)}, line 1: found no keys, allowed is a config.")
-    _walk(file, root, (), lines)
-    if _RUNS_CODE in lines:
-        raise BiogripError(
-            f"{shown_path(file)}, line {lines[_RUNS_CODE]}: {_RUNS_CODE[0]} makes Snakemake run "
-            "code that stands in the file; allowed is a config without it."
-        )
-    try:
-        return lines, yaml.SafeLoader("").construct_document(root)
-    except yaml.MarkedYAMLError as error:
-        raise no_yaml(file, error) from error
-
-
-def _walk(file: Path, node: yaml.Node, path: KeyPath, lines: dict[KeyPath, int]) -> None:
-    if isinstance(node, yaml.MappingNode):
-        for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                raise _wrong(file, key, path, "has a block or list as a key, allowed is text.")
-            inner = (*path, key.value)
-            if inner in lines:
-                raise _wrong(file, key, inner, f"is given twice, first in line {lines[inner]}.")
-            _refuse_misread(file, key, inner)
-            lines[inner] = key.start_mark.line + 1
-            _walk(file, value, inner, lines)
-    elif isinstance(node, yaml.SequenceNode):
-        for index, value in enumerate(node.value):
-            lines[(*path, index)] = value.start_mark.line + 1
-            _walk(file, value, (*path, index), lines)
-    elif isinstance(node, yaml.ScalarNode):
-        _refuse_misread(file, node, path)
-
-
-def _refuse_misread(file: Path, node: yaml.ScalarNode, path: KeyPath) -> None:
-    if problem := scalar_problem(node):
-        raise _wrong(file, node, path, problem)
-
-
-def _wrong(file: Path, node: yaml.Node, path: KeyPath, text: str) -> BiogripError:
-    line = node.start_mark.line + 1
-    return BiogripError(f"{shown_path(file)}, line {line}: {dotted(path)}: {text}")
+def shown_path(file: Path) -> str:
+    """Return a path relative to the working directory, if it is below."""
+    here = Path.cwd()
+    return visible(file.relative_to(here) if file.is_relative_to(here) else file)
 
 
 def dotted(path: KeyPath) -> str:
     """Return a key as messages name it, e.g. ``protocol.phases[0].duration_s``."""
     text = ""
     for part in path:
-        if isinstance(part, int):
-            text += f"[{part}]"
-        else:
-            name = str(part)
-            name = name if name.isprintable() else repr(name)
-            name = name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}..."
-            text += f".{name}" if text else name
+        name = visible(part)
+        text += f"[{name}]" if isinstance(part, int) else f".{name}" if text else name
     return text or "the file"
+
+
+def scalar_problem(node: yaml.ScalarNode) -> str | None:
+    """Return what is wrong with a value that YAML 1.1 reads unexpectedly (dates, base 60)."""
+    kind, text = node.tag.rpartition(":")[2], node.value
+    if kind in ("int", "float") and ":" in text:
+        reading = "in base 60; allowed is a number without colons"
+    elif kind == "int" and _OCTAL.fullmatch(text):
+        reading = "in base 8; allowed is a number that does not begin with 0"
+    elif kind == "timestamp":
+        reading = "as a date; allowed is a number"
+    else:
+        return None
+    return f"found {text}, which YAML reads {reading}, or text in quotes."
+
+
+def _read(file: Path) -> tuple[Lines, dict[str, Any]]:
+    """Return the line number of every key, and the content of the file."""
+    # A pipe that nobody writes to would be waited for.
+    if file.exists() and not (file.is_file() or file.is_dir()):
+        raise BiogripError(f"{shown_path(file)}: is no regular file; allowed is one.")
+    try:
+        with file.open("rb") as stream:
+            content = stream.read(LARGEST_BYTES + 1)
+    except OSError as error:
+        raise BiogripError(f"{shown_path(file)}: cannot be read: {error.strerror}.") from error
+    if len(content) > LARGEST_BYTES:
+        raise _wrong(file, None, f"found more than {LARGEST_BYTES} bytes; allowed are fewer.")
+    try:
+        return _parsed(file, content.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        found = f"found the byte 0x{content[error.start]:02x}, allowed is text in UTF-8."
+        raise _wrong(file, content.count(b"\n", 0, error.start) + 1, found) from error
+    except (yaml.YAMLError, ValueError) as error:
+        mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+        said = getattr(error, "problem", None) or " ".join(str(error).split())
+        raise _wrong(file, mark and mark.line + 1, f"not valid YAML: {said}.") from error
+
+
+# The default study is read again for every trace.
+@lru_cache(maxsize=16)
+def _parsed(file: Path, text: str) -> tuple[Lines, dict[str, Any]]:
+    root = yaml.compose(text, Loader=_Loader)
+    lines: dict[KeyPath, int] = {}
+    if root is None:
+        return lines, {}
+    if not isinstance(root, yaml.MappingNode):
+        raise _wrong(file, 1, "found no keys, allowed is a config.")
+    _walk(file, root, (), lines)
+    if line := lines.get(("__use_yte__",)):
+        text = "__use_yte__ makes Snakemake run code that stands in the file; allowed is a config "
+        raise _wrong(file, line, f"{text}without it.")
+    return lines, yaml.SafeLoader("").construct_document(root)
+
+
+def _walk(file: Path, node: yaml.Node, path: KeyPath, lines: dict[KeyPath, int]) -> None:
+    """Collect the lines of keys and items, and refuse what stands twice or would be misread."""
+    line = node.start_mark.line + 1
+    if len(path) > _DEEPEST or len(lines) > _MOST_KEYS:
+        text = (
+            f"found more than {_DEEPEST} levels or {_MOST_KEYS} values, those of an alias counted"
+        )
+        raise _wrong(file, line, f"{text} wherever it is used; allowed are fewer.")
+    if isinstance(node, yaml.ScalarNode) and (problem := scalar_problem(node)):
+        raise _wrong(file, line, f"{dotted(path)}: {problem}")
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            named = isinstance(key, yaml.ScalarNode)
+            inner, at = (*path, key.value if named else "?"), key.start_mark.line + 1
+            if not key.tag.endswith((":str", ":merge")):
+                text = "is no text: YAML reads on, off, yes, no and numbers otherwise; put it in"
+                raise _wrong(file, at, f"{dotted(inner)}: {text} quotes.")
+            if inner in lines:
+                text = f"is given twice, first in line {lines[inner]}."
+                raise _wrong(file, at, f"{dotted(inner)}: {text}")
+            lines[inner] = at
+            _walk(file, value, inner, lines)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, value in enumerate(node.value):
+            lines[(*path, index)] = value.start_mark.line + 1
+            _walk(file, value, (*path, index), lines)
+
+
+def _wrong(file: Path, line: int | None, text: str) -> BiogripError:
+    place = f", line {line}" if line else ""
+    return BiogripError(f"{shown_path(file)}{place}: {text}")

@@ -1,28 +1,29 @@
 """Typed access to a checked config: the study and its cases."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from biogrip.experiment.protocol import Phase, torque_history
-from biogrip.experiment.sample import CANDIDATES, Sample, SampleModel, with_fixed
+from biogrip.experiment.sample import CANDIDATES, Sample, with_fixed
 from biogrip.experiment.truth import UNPUBLISHED, Truth
-from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.genetic_settings import GeneticSettings
-from biogrip.identify.genome import GeneRange
-from biogrip.identify.methods import METHODS, Method
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genome import GeneRange
+from biogrip.fit.methods import METHODS, Method
+from biogrip.instrument.contact import Contact
 from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Gripper
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
-from biogrip.study.interpretations import read_blocks
 from biogrip.study.plain import built, plain
 from biogrip.study.source import overlaid
 from biogrip.study.sweeps import point_blocks
 
 if TYPE_CHECKING:
-    from biogrip.identify.least_squares import LeastSquaresSettings
+    from biogrip.fit.least_squares import LeastSquaresSettings
 
 _Part = TypeVar("_Part")
 
@@ -47,56 +48,53 @@ class Case:
     """Config block, with the study's blocks merged in."""
     study: "Study"
 
+    # What other modules need of the blocks, by the names that it has there.
     recorded = _of_case(lambda case: case.block.recorded)
-    """True if the trace was recorded, not simulated."""
     actuator = _of_case(lambda case: case.study.config.actuator)
-    """Comb drive of the study."""
     instrument = _of_case(lambda case: case.block.instrument_used)
-    """What is held and read."""
-    sample = _of_case(
-        lambda case: replace(case.block.sample.sample, per_area=case.instrument.per_area)
-    )
-    """Constitutive model."""
     size_m = _of_case(lambda case: case.block.sample.size_m)
-    """Diameter of the sample, if it is given."""
     published = _of_case(lambda case: case.block.published or UNPUBLISHED)
-    """Results that the paper reports for the sample."""
     noise = _of_case(lambda case: case.block.measurement.noise)
-    """Noise to add to the simulated rotation."""
     sampling = _of_case(lambda case: case.block.measurement.sampling)
-    """Sampling of the rotation."""
     nonlinear_target = _of_case(lambda case: case.block.models.target == "nonlinear")
-    """True if the target is simulated with the nonlinear equations."""
     unilateral = _of_case(lambda case: case.block.contact == "unilateral")
-    """True if the target's jaws cannot pull: contact is lost where the force turns tensile."""
     file = _of_case(lambda case: case.block.measurement.file or "")
-    """Path of the recorded trace; empty for a simulated case."""
     columns = _of_case(lambda case: case.block.measurement.columns)
-    """Columns of a recorded trace's file."""
     is_calibrated = _of_case(lambda case: case.block.assumed_gripper == CALIBRATED)
-    """True if identification takes the gripper's arms from a calibration."""
     calibration = _of_case(lambda case: case.block.calibration)
-    """Settings of the calibration test without sample."""
     confidence = _of_case(lambda case: case.block.identifiability.confidence)
-    """Confidence level of all intervals."""
     verdicts_every = _of_case(lambda case: case.block.identifiability.verdicts_every)
-    """Seeds of the coverage test that are multiples of this get verdicts, too."""
-
-    @property
-    def title(self) -> str:
-        """Title in tables and figures."""
-        return self.name if self.block.title is None else self.block.title
+    ranges = _of_case(lambda case: dict[str, GeneRange](vars(case.block.search_range)))
+    title = _of_case(lambda case: case.block.title or case.name)
+    method = _of_case(lambda case: case.block.method)
+    sample = _of_case(lambda c: replace(c.block.sample.sample, per_area=c.instrument.per_area))
+    """Constitutive model."""
+    phases = _of_case(lambda case: case.block.protocol.make_phases(case.instrument, case.actuator))
+    """Phases of the protocol, in torques or what else the instrument holds."""
+    plain = _of_case(lambda case: cast("dict[str, Any]", plain(case.block)))
+    """Config block as plain values, without keys that have their default."""
+    seeds = _of_case(lambda case: 1 if case.recorded else case.study.config.seeds)
+    """Number of traces; 1 for a recorded trace."""
+    fixed = _of_case(lambda case: {name: float(it) for name, it in case.block.fixed.items()})
+    """Parameters that are not identified, by name."""
+    truth = _of_case(lambda case: Truth(case.title, case.sample, case.parameters, case.published))
+    """True values of the sample, with the paper's results."""
+    searched = _of_case(lambda case: case.problem.searched)
+    """Sample model without fixed parameters."""
+    samples = _of_case(lambda case: len(case.sampling.over(torque_history(case.phases).end_s)))
+    """Number of samples in a simulated trace."""
+    methods = _of_case(lambda case: {it: case.method(it) for it in case.study.config.methods})
+    """Settings of the study's identification methods by name."""
+    least_squares = _of_case(lambda it: cast("LeastSquaresSettings", it.method("least_squares")))
+    """Settings of the least-squares fits that judgements are based on."""
+    genetic = _of_case(lambda case: cast("GeneticSettings", case.method("genetic")))
+    """Settings of the genetic algorithm."""
 
     @property
     def may_start_late(self) -> bool:
         """True if the trace is recorded, and nothing says when its protocol starts."""
         measured = self.block.measurement
         return self.recorded and measured.start_s is None and not measured.fit_start
-
-    @property
-    def seeds(self) -> int:
-        """Number of traces; 1 for a recorded trace."""
-        return 1 if self.recorded else self.study.config.seeds
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -107,54 +105,25 @@ class Case:
         whole = len(known) == len(self.sample.model.names)
         return searched.named_in_order(known) if whole else known
 
-    @property
-    def fixed(self) -> dict[str, float]:
-        """Parameters that are not identified, by name."""
-        return {name: float(value) for name, value in self.block.known.items()}
-
-    @property
-    def truth(self) -> Truth:
-        """True values of the sample, with the paper's results."""
-        return Truth(self.title, self.sample, self.parameters, self.published)
-
     @cached_property
-    def phases(self) -> tuple[Phase, ...]:
-        """Phases of the protocol, in torques or what else the instrument holds."""
-        return self.block.protocol.make_phases(self.instrument, self.actuator)
+    def _contact(self) -> Contact | None:
+        """State of the gripper when it is closed onto the sample, if its size is known."""
+        size_m = self.block.sample.size_m
+        return None if size_m is None else self.block.gripper.contact(self.actuator, size_m)
 
     @cached_property
     def gripper(self) -> Gripper:
         """True gripper, at the angle at which the jaws touch the sample; or none."""
         if not self.instrument.has_jaws:
             return NO_ARMS
-        neutral = self.block.gripper.neutral
-        if self.size_m is None:
-            return neutral
-        touching = self.block.gripper.contact(self.actuator, self.size_m)
-        return replace(neutral, reference_angle_deg=touching.reference_angle_deg)
+        neutral, at = self.block.gripper.neutral, self._contact
+        return replace(neutral, reference_angle_deg=at.reference_angle_deg) if at else neutral
 
     @property
     def stroke_rad(self) -> float:
         """Rotation left for gripping: the comb drive's stroke minus closing onto the sample."""
-        stroke = math.radians(self.actuator.stroke_deg)
-        if self.size_m is None:
-            return stroke
-        return stroke - self.block.gripper.contact(self.actuator, self.size_m).closing_rad
-
-    @property
-    def searched(self) -> SampleModel:
-        """Sample model without fixed parameters."""
-        return self.problem.searched
-
-    @property
-    def samples(self) -> int:
-        """Number of samples in a simulated trace."""
-        return len(self.sampling.over(torque_history(self.phases).end_s))
-
-    @property
-    def ranges(self) -> dict[str, GeneRange]:
-        """Search ranges by name."""
-        return dict(vars(self.block.search_range))
+        closing_rad = self._contact.closing_rad if self._contact else 0.0
+        return math.radians(self.actuator.stroke_deg) - closing_rad
 
     @cached_property
     def problem(self) -> CaseProblem:
@@ -163,6 +132,8 @@ class Case:
         gripper = self.gripper
         if isinstance(assumed, Mapping):
             gripper = built(Gripper, overlaid(plain(gripper), assumed))
+        own = self.block.gripper if self.instrument.has_jaws else None
+        uncertainty = own.uncertainties(self.actuator) if own else {}
         return CaseProblem(
             gripper,
             self.phases,
@@ -176,32 +147,9 @@ class Case:
             noise_rad=measurement.noise_rad,
             noise_share=measurement.noise_share,
             coloured=measurement.coloured,
-            uncertainty=(
-                self.block.gripper.uncertainties(self.actuator) if self.instrument.has_jaws else {}
-            ),
+            uncertainty=uncertainty,
             fit_start=measurement.fit_start,
         )
-
-    def method(self, name: str) -> object:
-        """Return the settings of an identification method."""
-        return self.block.method(name)
-
-    @cached_property
-    def methods(self) -> dict[str, object]:
-        """Settings of the study's identification methods by name."""
-        return {name: self.method(name) for name in self.study.methods}
-
-    @property
-    def least_squares(self) -> "LeastSquaresSettings":
-        """Settings of the least-squares fits that judgements are based on."""
-        return cast("LeastSquaresSettings", self.method("least_squares"))
-
-    @property
-    def genetic(self) -> GeneticSettings:
-        """Settings of the genetic algorithm."""
-        settings = self.block.method_block("genetic_algorithm")
-        assert isinstance(settings, GeneticSettings)
-        return settings
 
     @property
     def mutation_start(self) -> int | None:
@@ -212,7 +160,11 @@ class Case:
     @property
     def interpretations(self) -> dict[str, "Case"]:
         """The case under each interpretation of the paper, by the interpretation's name."""
-        return {name: cases[self.name] for name, cases in self.study.interpretations.items()}
+        blocks = self.study.config.interpretations
+        return {
+            name: replace(self, block=built(CaseBlock, overlaid(self.plain, block.changes)))
+            for name, block in blocks.items()
+        }
 
     @property
     def models(self) -> dict[str, Sample]:
@@ -243,32 +195,42 @@ class Study:
     """The whole config, with the study's blocks merged into every case."""
 
     sweeps = _of_study(lambda study: study.config.sweeps)
-    """Sweeps by name."""
     study_seed = _of_study(lambda study: study.config.study_seed)
-    """Seed from which all random streams are derived."""
-    selects_models = _of_study(lambda study: bool(study.config.model_selection.models))
-    """True if every trace is fitted with several sample models."""
-    batch_size = _of_study(lambda study: study.config.batch_size)
-    """Number of seeds per job, if the config sets it."""
     near_noise_tolerance = _of_study(lambda study: study.config.evaluation.near_noise_tolerance)
-    """Share by which the misfit may exceed the noise, to count as near the noise."""
     optimum_tolerance = _of_study(lambda study: study.config.evaluation.optimum_tolerance)
-    """Increase of chi^2 over the lowest known that still counts as the global optimum."""
     gripper = _of_study(lambda study: study.config.gripper.neutral)
-    """The gripper in its neutral configuration."""
     traces = _of_study(lambda study: study.config.traces)
-    """Table of recorded traces, if there is one."""
     jaw_gap_m = _of_study(lambda study: study.config.gripper.jaw_gap_m)
-    """Distance between the jaws in the neutral configuration."""
     actuator = _of_study(lambda study: study.config.actuator)
-    """The comb drive of both arms."""
     reconstructed = _of_study(lambda study: study.config.reconstructed)
-    """Dotted keys, or whole blocks, whose values the paper omits."""
+    methods = _of_study(lambda study: list(study.config.methods))
+    ranges = _of_study(lambda study: dict[str, GeneRange](vars(study.config.search_range)))
+    plain = _of_study(lambda study: cast("dict[str, Any]", plain(study.config)))
+    """Config as plain values, without keys that have their default."""
 
-    @cached_property
-    def cases(self) -> dict[str, Case]:
-        """Cases by name, in the order of the config."""
-        return self._cases(self.config.cases)
+    cases = _of_study(lambda study: study._cases(study.config.cases))
+    """Cases by name, in the order of the config."""
+    simulated = _of_study(lambda study: study._where(lambda case: not case.recorded))
+    """Names of cases that are simulated."""
+    recorded = _of_study(lambda study: study._where(lambda case: case.recorded))
+    """Names of cases with a recorded trace."""
+    gripped = _of_study(lambda it: it._where(lambda c: not c.recorded and c.instrument.has_jaws))
+    """Names of simulated cases whose sample the gripper holds."""
+    has_gripper = _of_study(lambda study: study._where(lambda it: it.instrument.has_jaws) != [])
+    """True if the gripper holds the sample of any case."""
+    covered = _of_study(lambda study: study._where(lambda case: case.coverage_seeds > 0))
+    """Names of cases whose intervals are tested for coverage."""
+    published = _of_study(lambda study: study._where(lambda case: case.published.table is not None))
+    """Names of cases that the paper reports results of."""
+    identifiers = _of_study(lambda study: {name: METHODS[name] for name in study.methods})
+    """Declarations of the methods, by name."""
+    interpretation_titles = _of_study(
+        lambda study: {name: it.title for name, it in study.config.interpretations.items()}
+    )
+    shown = _of_study(lambda study: study.methods[0])
+    """Method that tables and figures of a single method show."""
+    shown_method = _of_study(lambda study: METHODS[study.shown])
+    """Declaration of the shown method."""
 
     @cached_property
     def points(self) -> dict[str, Case]:
@@ -276,15 +238,13 @@ class Study:
         blocks = point_blocks(self.sweeps, self.config.cases)
         return self._cases({name: built(CaseBlock, block) for name, block in blocks.items()})
 
-    @cached_property
-    def interpretations(self) -> dict[str, dict[str, Case]]:
-        """Simulated cases under each interpretation, by name of interpretation and case."""
-        found: dict[str, dict[str, Case]] = {name: {} for name in self.config.interpretations}
-        for interpretation, name, block in read_blocks(
-            self.config.interpretations, self.config.cases
-        ):
-            found[interpretation] |= self._cases({name: built(CaseBlock, block)})
-        return found
+    def of(self, names: Iterable[str]) -> "Study":
+        """Return the study of some of its cases."""
+        cases = {name: self.config.cases[name] for name in names}
+        # Of the study of a job, which lacks keys, `replace` would ask for all.
+        config = copy(self.config)
+        object.__setattr__(config, "cases", cases)
+        return Study(config)
 
     def _cases(self, blocks: Mapping[str, CaseBlock]) -> dict[str, Case]:
         return {name: Case(name, block, self) for name, block in blocks.items()}
@@ -293,35 +253,13 @@ class Study:
         """Return a case of the study or of a sweep's point."""
         return self.cases[name] if name in self.cases else self.points[name]
 
-    @property
-    def methods(self) -> list[str]:
-        """Identification methods; tables and figures of a single method show the first."""
-        return list(self.config.methods)
-
-    @property
-    def identifiers(self) -> dict[str, Method]:
-        """Declarations of the methods, by name."""
-        return {name: METHODS[name] for name in self.methods}
-
-    @property
-    def shown(self) -> str:
-        """Method that tables and figures of a single method show."""
-        return self.methods[0]
-
-    @property
-    def shown_method(self) -> Method:
-        """Declaration of the shown method."""
-        return METHODS[self.shown]
+    def _where(self, holds: Callable[[Case], bool]) -> list[str]:
+        return [name for name, case in self.cases.items() if holds(case)]
 
     @property
     def fitting_method(self) -> Method:
         """Least squares if the study has it, else the shown method."""
         return METHODS["least_squares" if "least_squares" in self.methods else self.shown]
-
-    @property
-    def interpretation_titles(self) -> dict[str, str]:
-        """Titles of the interpretations by name."""
-        return {name: block.title for name, block in self.config.interpretations.items()}
 
     @property
     def phases(self) -> tuple[Phase, ...]:
@@ -330,42 +268,3 @@ class Study:
         return (
             own.pop() if len(own) == 1 else self.config.protocol.make_phases(GRIPPER, self.actuator)
         )
-
-    @property
-    def ranges(self) -> dict[str, GeneRange]:
-        """Search ranges of the study, for cases that do not change them."""
-        return dict(vars(self.config.search_range))
-
-    def is_reconstructed(self, key: str) -> bool:
-        """Return True if a dotted key is marked as reconstructed, i.e. omitted in the paper."""
-        return any(key == name or key.startswith(f"{name}.") for name in self.reconstructed)
-
-    @property
-    def simulated(self) -> list[str]:
-        """Names of cases that are simulated."""
-        return [name for name, case in self.cases.items() if not case.recorded]
-
-    @property
-    def gripped(self) -> list[str]:
-        """Names of simulated cases whose sample the gripper holds."""
-        return [name for name in self.simulated if self.cases[name].instrument.has_jaws]
-
-    @property
-    def has_gripper(self) -> bool:
-        """True if the gripper holds the sample of any case."""
-        return any(case.instrument.has_jaws for case in self.cases.values())
-
-    @property
-    def recorded(self) -> list[str]:
-        """Names of cases with a recorded trace."""
-        return [name for name, case in self.cases.items() if case.recorded]
-
-    @property
-    def covered(self) -> list[str]:
-        """Names of cases whose intervals are tested for coverage."""
-        return [name for name, case in self.cases.items() if case.coverage_seeds > 0]
-
-    @property
-    def published(self) -> list[str]:
-        """Names of cases that the paper reports results of."""
-        return [name for name, case in self.cases.items() if case.published.table is not None]

@@ -1,23 +1,22 @@
 """Sweeps: grids of cases that differ from a case of the study in two values."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, Tag
 
-from biogrip.keys import BY_KIND, OPEN, Block, Distinct, Printed
-from biogrip.study.case_blocks import CaseBlock
+from biogrip.errors import nearest
+from biogrip.keys import BY_KIND, OPEN, Block, Distinct, Printed, Problem
+from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.plain import plain
 
 MOST_POINTS = 2000
-_LARGEST = 1e12
-_LONGEST_TEXT = 60
 
-_Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST), Tag("a number")]
-_Text = Annotated[str, Field(max_length=_LONGEST_TEXT), Tag("text")]
+_Number = Annotated[float, Field(ge=-1e12, le=1e12), Tag("a number")]
+_Text = Annotated[str, Field(max_length=60), Tag("text")]
 
 
 class ValueBlock(BaseModel):
@@ -100,6 +99,17 @@ class AxisBlock(Block):
         shown = value if isinstance(value, str) else f"{value / self.unit_in_si:.4g}"
         return Value(_word(value), _text(value), shown, dict.fromkeys(self.keys, value))
 
+    def problems(self) -> Iterator[Problem]:
+        """Refuse values of one name, and keys that no case may change."""
+        for key in self.keys:
+            if key.partition(".")[0] not in OVERRIDABLE:
+                text = f"found '{key}', allowed is a key in a block that a case may change."
+                yield ("key",), text + nearest(key, OVERRIDABLE)
+        shown = [value.text for value in self.levels]
+        for index, value in enumerate(shown):
+            if value in shown[:index]:
+                yield ("values", index), f"is called '{value}' like one before it."
+
 
 @dataclass(frozen=True)
 class Point:
@@ -114,11 +124,6 @@ class Point:
     """Value on the axis of the rows."""
     column: Value
     """Value on the axis of the columns."""
-
-    @property
-    def overrides(self) -> dict[str, float | str]:
-        """Values that replace those of the case, by dotted key."""
-        return {**self.row.overrides, **self.column.overrides}
 
 
 @dataclass(frozen=True)
@@ -139,6 +144,23 @@ class SweepBlock(Block):
             for row, column in product(self.rows.levels, self.columns.levels)
         ]
 
+    def problems(self) -> Iterator[Problem]:
+        """Refuse keys that both axes set."""
+        ours = {key for value in self.rows.levels for key in value.overrides}
+        for index, changing in enumerate(self.columns.levels):
+            for key in sorted(ours & changing.overrides.keys()):
+                yield ("columns", "values", index), f"sets {key}, which the rows do too."
+
+    def placed(self, point: Point, problem: Problem) -> Problem:
+        """Return a problem of a point's case as one of the value that causes it."""
+        path, text = problem
+        key = ".".join(map(str, path))
+        for axis, value in (("rows", point.row), ("columns", point.column)):
+            if any(f"{key}.".startswith(f"{changed}.") for changed in value.overrides):
+                index = getattr(self, axis).levels.index(value)
+                return (axis, "values", index), f"gives {key}: {text}"
+        return (), f"{point.name}: gives {key}: {text}"
+
 
 def list_points(sweeps: Mapping[str, SweepBlock]) -> Iterator[tuple[str, Point]]:
     """Yield every point of all sweeps with its sweep's name."""
@@ -156,12 +178,22 @@ def point_blocks(
     blocks = {name: plain(case) for name, case in cases.items()} if sweeps else {}
     for _, point in list_points(sweeps):
         block = blocks[point.case]
-        for key, value in point.overrides.items():
+        for key, value in (point.row.overrides | point.column.overrides).items():
             # A key that counts takes no 8.0.
             whole = isinstance(value, float) and value.is_integer()
             block = _changed(block, key, int(value) if whole else value)
         found[point.name] = block
     return found
+
+
+def name_problems(sweeps: Mapping[str, SweepBlock], cases: Iterable[str]) -> Iterator[Problem]:
+    """Find points that have the names of cases or of other points."""
+    found = {*cases}
+    for sweep, point in list_points(sweeps):
+        if point.name in found:
+            text = f"has the point {point.name}, a name that there is already; allowed is another."
+            yield (sweep,), text
+        found.add(point.name)
 
 
 def _text(value: float | str) -> str:
@@ -175,4 +207,5 @@ def _word(value: float | str) -> str:
 
 def _changed(block: dict[str, Any], key: str, value: float | str) -> dict[str, Any]:
     name, _, rest = key.partition(".")
-    return {**block, name: _changed(block.get(name, {}), rest, value) if rest else value}
+    inner = block[name] if isinstance(block.get(name), dict) else {}
+    return {**block, name: _changed(inner, rest, value) if rest else value}

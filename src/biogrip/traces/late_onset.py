@@ -3,10 +3,10 @@
 from scipy.special import chdtri
 
 from biogrip.arrays import Array
-from biogrip.identifiability.fit_status import REJECTION, Note
-from biogrip.identifiability.likelihood import compute_fall
-from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.fitted_onset import OnsetFits
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.fitted_onset import OnsetFits
+from biogrip.judging.fit_status import REJECTION, Note
+from biogrip.judging.likelihood import compute_fall
 from biogrip.traces.onset import begins_constant, guess_onset
 
 # So that correlated noise does not look like a late onset.

@@ -2,14 +2,14 @@
 
 The trace is fitted by any sample's possible responses to the delayed torque, and the delay with
 the least residual sum of squares is found on ever finer grids. That needs no sample model and some
-hundred small fits; `biogrip.identify.fitted_onset` refines it with the sample model.
+hundred small fits; `biogrip.fit.fitted_onset` refines it with the sample model.
 """
 
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.experiment.protocol import TorqueHistory
-from biogrip.identify.case_problem import CaseProblem
+from biogrip.fit.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.lagged_torques import lagged_torques
 from biogrip.response.noise_estimate import estimate_noise

@@ -1,0 +1,70 @@
+"""Figures 9, 11 and 12: target, noisy measurement, a typical fit and its residuals."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from biogrip.digits import with_unit
+from biogrip.figures.axis_limits import is_over_decades, scale_of_fit
+from biogrip.figures.results import Fit, typical_fit
+from biogrip.figures.style import COLUMN_IN, FITTED, MEASURED, TARGET, figure
+from biogrip.study.study import Case
+
+_READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
+
+
+def draw(
+    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
+) -> Figure:
+    """Draw the fit of a case's typical seed."""
+    problem = case.problem.calibrated(calibrated)
+    fit = typical_fit(problem, case.study.shown_method.name, identifications, measurements)
+    ended = f"{case.study.shown_method.step} {fit.generations}"
+    recorded = fit.target_rad is None
+    label = f"fit ({ended})" if recorded else f"typical fit (seed {fit.seed}, {ended})"
+    return draw_fit(fit, label, case.title, case.published.axis_rad)
+
+
+def draw_traces(axes: Axes, fit: Fit, label: str) -> tuple[float, str]:
+    """Draw a trace, its target and its fit over time; return factor and unit of the readings."""
+    factor, unit = scale_of_fit(fit)
+    axes.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **_READINGS)
+    kind = "recorded trace" if fit.target_rad is None else "noisy measurement"
+    axes.plot([], [], ".", color=MEASURED, markersize=4, label=kind)
+    if fit.target_rad is not None:
+        axes.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
+    axes.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
+    axes.set_ylabel(with_unit(fit.read.title, unit))
+    return factor, unit
+
+
+def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
+    """Draw a trace, its fit and the residuals, on an axis that includes the paper's limits."""
+    drawn = figure(COLUMN_IN, 3.6)
+    traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
+    factor, unit = draw_traces(traces, fit, label)
+    low, high = (end([*axis_rad, end(fit.measured_rad)]) for end in (np.min, np.max))
+    margin = 0.02 * (high - low)
+    traces.set_ylim(factor * (low - margin), factor * (high + margin))
+    drawn.legend(loc="outside upper left", ncols=2)
+    traces.set_title(title)
+    residual = fit.measured_rad - fit.fitted_rad
+    residual = factor * residual if fit.sd_rad is None else residual / fit.sd_rad
+    residuals.plot(fit.time_s, residual, color=MEASURED, **_READINGS)
+    if fit.target_rad is not None:
+        residuals.plot(fit.time_s, factor * (fit.target_rad - fit.fitted_rad), color=TARGET)
+    residuals.axhline(0, color=FITTED, linestyle="--", linewidth=0.8)
+    bound = 1.15 * float(np.max(np.abs(residual)))
+    residuals.set_ylim(-bound, bound)
+    residuals.set_ylabel(with_unit("residual", unit) if fit.sd_rad is None else "residual / sd")
+    residuals.set_xlabel("time (s)")
+    residuals.set_xlim(fit.time_s[0], fit.time_s[-1])
+    if is_over_decades(fit.time_s):
+        residuals.set_xscale("log")
+        if low > 0:
+            traces.set(yscale="log", ylim=(0.8 * factor * low, 1.25 * factor * high))
+    drawn.align_ylabels()
+    return drawn

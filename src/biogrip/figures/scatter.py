@@ -1,0 +1,156 @@
+"""Errors over seeds as distributions, beside the Cramer-Rao bound and the paper's value."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from biogrip.arrays import Array
+from biogrip.experiment.noise import standard_deviation
+from biogrip.figures.results import SHOWN_SEEDS, seeds_in_words
+from biogrip.figures.style import (
+    PAPER,
+    SHADE,
+    TARGET,
+    line_of,
+    panel,
+    row_of_panels,
+)
+from biogrip.judging.fisher import bound
+from biogrip.judging.quantities import Quantity, parameters_and_sum
+from biogrip.judging.verdicts import DETERMINED
+from biogrip.records.identifications import read_identifications
+from biogrip.records.traces import read_target
+from biogrip.records.verdicts import read_verdicts
+from biogrip.study.study import Case
+
+# Bound of a logarithm above which an axis shows decades instead of percent.
+_LOOSE = 0.25
+_WIDTHS = 8.0
+_DECADES = 1e4
+
+
+def draw(
+    case: Case,
+    identifications: Path,
+    target: Path,
+    expected: Path,
+    calibrated: list[Path],
+) -> Figure:
+    """Draw identified over target for every quantity and method."""
+    items = read_verdicts(expected)["quantities"]
+    verdicts = {item["quantity"]: item["verdict"] for item in items}
+    found = read_identifications(identifications)
+    truth, case_problem = case.truth, case.problem.calibrated(calibrated)
+    time_s, _, rotation = read_target(target)
+    log_truth = case_problem.logs(truth.parameters)
+    _, sensitivity = case_problem.of(time_s, rotation).residuals(log_truth)
+    noise_rad = standard_deviation(rotation, case.noise)
+    quantities = parameters_and_sum(case_problem.searched)
+    drawn, grid = row_of_panels(len(quantities), 3.1)
+    for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
+        names = [case_problem.searched.parameters[i] for i in quantity.members]
+        value = sum(truth.parameters[p.name] for p in names)
+        if value == 0:
+            axes.axis("off")
+            continue
+        ratios = found[[p.column for p in names]].sum(axis=1) / value
+        limit = bound(sensitivity, noise_rad, log_truth, quantity)
+        verdict = verdicts[quantity.label]
+        # The bound is a tangent at the truth: no use if the quantity is not determined, or if it
+        # is zero.
+        known = limit if limit and verdict == DETERMINED else np.inf
+        _quantity(axes, case, found["method"], ratios.to_numpy(float), known)
+        _paper(axes, truth.published.identified, [p.name for p in names], value)
+        panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
+        if index == 0:
+            axes.set_ylabel("identified / target")
+    _legend(drawn, case, list(found["method"].unique()), found["seed"].nunique())
+    return drawn
+
+
+def _quantity(
+    axes: Axes, case: Case, methods: "pd.Series[str]", ratios: Array, limit: float
+) -> None:
+    """Draw one column of points per method, with points beyond the axis at its edge."""
+    loose = limit > _LOOSE
+    top = _DECADES if loose else 1 + _WIDTHS * limit
+    bottom = 1 / _DECADES if loose else 1 - _WIDTHS * limit
+    names = list(methods.unique())
+    for place, name in enumerate(names):
+        mine = ratios[(methods == name).to_numpy()]
+        shown = mine[:SHOWN_SEEDS]
+        # A fixed sideways scatter keeps points apart.
+        x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
+        inside = (shown > bottom) & (shown < top)
+        dots: dict[str, Any] = {
+            "color": line_of(case.study.identifiers[name])["color"],
+            "linestyle": "",
+            "markeredgewidth": 0,
+            "alpha": 0.55,
+        }
+        axes.plot(x[inside], shown[inside], marker="o", markersize=2, **dots)
+        for outside, marker, edge in ((shown >= top, "^", top), (shown <= bottom, "v", bottom)):
+            height = np.full(int(outside.sum()), edge)
+            (line,) = axes.plot(
+                x[outside], height, marker=marker, markersize=3, clip_on=False, **dots
+            )
+            line.set_in_layout(False)
+        low, middle, high = np.clip(np.percentile(mine, [25, 50, 75]), bottom, top)
+        axes.plot([place, place], [low, high], color=TARGET, linewidth=1.0)
+        axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
+    if np.isfinite(limit):
+        reach = NormalDist().inv_cdf((1 + case.confidence) / 2) * limit
+        # Of the logarithm, straight where the axis is.
+        low, high = (np.exp(-reach), np.exp(reach)) if loose else (1 - reach, 1 + reach)
+        axes.axhspan(low, high, color=SHADE, zorder=0, linewidth=0)
+    axes.axhline(1, color=TARGET, linewidth=0.6)
+    if loose:
+        axes.set_yscale("log")
+        axes.set_yticks([1e-4, 1e-2, 1, 1e2, 1e4])
+        axes.minorticks_off()
+    else:
+        axes.yaxis.set_major_locator(MaxNLocator(5))
+    axes.set(ylim=(bottom, top), xlim=(-0.6, len(names) - 0.4))
+    axes.set_xticks([])
+
+
+def _paper(axes: Axes, identified: Mapping[str, float], names: list[str], target: float) -> None:
+    if all(name in identified for name in names):
+        low, high = axes.get_ylim()
+        value = float(np.clip(sum(identified[name] for name in names) / target, low, high))
+        axes.axhline(value, color=PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
+
+
+def _title(quantity: Quantity, limit: float, verdict: str) -> str:
+    known = f"{100 * limit:.2g} %" if np.isfinite(limit) else verdict.split(" above")[0]
+    return f"{quantity.symbol}: {known}"
+
+
+def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
+    handles: list[Any] = []
+    axes = drawn.axes[0]
+    for name in methods:
+        method = case.study.identifiers[name]
+        color = line_of(method)["color"]
+        handles += axes.plot(
+            [], [], "o", color=color, markersize=4, label=method.title, markeredgewidth=0
+        )
+    handles += axes.plot(
+        [], [], "^", color=TARGET, markersize=4, label="beyond the axis", markeredgewidth=0
+    )
+    percent = f"{100 * case.confidence:g} %"
+    label = f"{percent} by the Cramér-Rao bound (named above), rest known"
+    handles.append(axes.fill([], [], color=SHADE, label=label)[0])
+    truth = case.truth
+    if truth.published.identified:
+        handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
+    drawn.legend(handles=handles, loc="outside lower left", ncols=3)
+    few = "" if seeds <= SHOWN_SEEDS else f": {seeds_in_words(seeds)}, quartiles of all"
+    drawn.suptitle(truth.title + few, x=0.01, ha="left", fontsize=8)

@@ -1,0 +1,1 @@
+"""Identification of the sample's parameters from a trace."""

@@ -1,0 +1,231 @@
+"""Assumptions of the identification that all traces of a case share."""
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
+from biogrip.experiment.sample import Sample, SampleModel, with_fixed
+from biogrip.fit.genome import GeneRange
+from biogrip.fit.problem import Problem, make_problem, searched
+from biogrip.instrument.calibrated_gripper import read_calibrated_arms
+from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.instrument import Instrument
+from biogrip.response.condensed import Condensed
+from biogrip.response.misfit import Misfit
+from biogrip.response.misfit_series import SeriesMisfit
+from biogrip.response.nuisance import nuisance_basis, with_uncertain
+from biogrip.response.whitening import WEIGHTED, NoiseModel, Whitening
+
+SharedRows = dict[Hashable, Condensed]
+"""Condensed rows by all that they depend on."""
+
+NOT_FITTED = "inertia_kgm2"
+"""Key of an arm that fits leave out, and its uncertainty with it."""
+
+
+@dataclass(frozen=True)
+class CaseProblem:
+    """Assumptions of the identification that all traces of a case share."""
+
+    gripper: Gripper
+    """Gripper of the simulated responses."""
+    phases: tuple[Phase, ...]
+    """The protocol."""
+    ranges: Mapping[str, GeneRange]
+    """Search ranges by `Parameter.range_name`."""
+    sample: Sample
+    """Constitutive model."""
+    fixed: Mapping[str, float]
+    """Parameters that are known, by name."""
+    instrument: Instrument
+    """What is held and read; other than a gripper, it has `NO_ARMS`."""
+    nonlinear: bool = False
+    """True to simulate the nonlinear model."""
+    offset: bool = False
+    """True if the instrument may have added a constant."""
+    drift: bool = False
+    """True if it may have added a drift linear in time."""
+    noise_rad: float | None = None
+    """Standard deviation of the noise, if it is known."""
+    noise_share: float | None = None
+    """Standard deviation of the noise as a share of the rotation; read by `read_checked`."""
+    sd_rad: Array | None = field(default=None, compare=False)
+    """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
+    coloured: bool = False
+    """True if the noise of a trace may be autocorrelated, see `trace_fit`."""
+    uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
+    ``gripper`` itself; and ``share`` of the ``torque``."""
+    fit_start: bool = False
+    """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
+    _condensed: "SharedRows" = field(default_factory=dict, init=False, compare=False)
+
+    @cached_property
+    def torque(self) -> TorqueHistory:
+        """Torque of both arms, or what else is held, against time."""
+        return torque_history(self.phases, deforms=self.instrument.deforms)
+
+    @cached_property
+    def model(self) -> SampleModel:
+        """Sample model."""
+        return self.sample.model
+
+    @cached_property
+    def searched(self) -> SampleModel:
+        """Sample model without the fixed parameters."""
+        return with_fixed(self.model, self.fixed)
+
+    def searched_for(self, *others: SampleModel) -> "CaseProblem":
+        """Return a copy that keeps only the search ranges of its model and of `others`."""
+        chosen = {p.range_name for model in (self.model, *others) for p in model.parameters}
+        return replace(self, ranges={n: r for n, r in self.ranges.items() if n in chosen})
+
+    def to_identify(self, *others: SampleModel) -> "CaseProblem":
+        """Return a copy without noise model, gripper uncertainty and unused search ranges."""
+        return replace(self.searched_for(*others), coloured=False, uncertainty={})
+
+    def weighted(self, sd_rad: Array | None) -> "CaseProblem":
+        """Return a copy for a trace whose readings have known standard deviations, or itself.
+
+        Readings are divided by them, so that the noise becomes white; its standard deviation is
+        then their root mean square.
+        """
+        if sd_rad is None:
+            return self
+        return replace(self, sd_rad=sd_rad, noise_rad=float(np.sqrt(np.mean(sd_rad**2))))
+
+    @property
+    def uncertain_keys(self) -> list[str]:
+        """Parts and keys of the gripper whose uncertainty changes what a fit simulates."""
+        return [
+            f"{part}.{key}"
+            for part, known in self.uncertainty.items()
+            for key in known
+            if known[key] and key != NOT_FITTED
+        ]
+
+    @property
+    def plain(self) -> bool:
+        """True if noise is assumed to be white, and the gripper to be known exactly."""
+        return not self.coloured and not self.uncertain_keys
+
+    def calibrated(self, files: Sequence[Path]) -> "CaseProblem":
+        """Return a copy with the arms of the first calibration file (YAML), if there is one.
+
+        Raises
+        ------
+        BiogripError
+            If the calibration cannot be read.
+        """
+        if not files:
+            return self
+        gripper, uncertainty = read_calibrated_arms(files[0], self.gripper)
+        return replace(self, gripper=gripper, uncertainty={**self.uncertainty, **uncertainty})
+
+    def of(
+        self,
+        time_s: Array,
+        rotation_rad: Array,
+        model: SampleModel | None = None,
+        noise_rad: float | None = None,
+        condensed: Condensed | None = None,
+        shared: SharedRows | None = None,
+    ) -> Problem:
+        """Set up the problem of a trace.
+
+        `model`, `noise_rad`, and `condensed` from `in_noise` replace those of the case; `shared`,
+        rows of several cases, which are added to, those that the traces of this case share.
+        """
+        noise_rad = noise_rad or self.noise_rad
+        if condensed is None:
+            # Shared by all traces of a case: condensing takes as long as some fifty responses.
+            rows = self._condensed if shared is None else shared
+            sampled = (*self._sets_rows, time_s.tobytes())
+            if sampled not in rows:
+                rows[sampled] = self._condense_weighted(time_s)
+            condensed = rows[sampled]
+        return make_problem(
+            self.gripper,
+            model or self.searched,
+            self.torque,
+            time_s,
+            rotation_rad,
+            self.ranges,
+            condensed,
+            noise_rad=noise_rad,
+            instrument=self.instrument,
+        )
+
+    @property
+    def _sets_rows(self) -> tuple[Hashable, ...]:
+        """All that condensed rows depend on but the sampling times."""
+        sd = None if self.sd_rad is None else self.sd_rad.tobytes()
+        return (
+            self.gripper,
+            self.phases,
+            self.instrument,
+            self.nonlinear,
+            self.offset,
+            self.drift,
+            sd,
+        )
+
+    def _condense_weighted(self, time_s: Array) -> Condensed:
+        if self.sd_rad is not None:
+            return self.in_noise(time_s, None, np.zeros((0, len(time_s))))
+        return self._condense(time_s, self.nuisance(time_s))
+
+    def for_model(self, problem: Problem, model: SampleModel) -> Problem:
+        """Return one of its problems posed for another model; both share tables of the trace."""
+        residuals = problem.residuals.of_model(model)
+        misfit: Misfit = residuals.condensed_misfit
+        if isinstance(problem.misfit, SeriesMisfit):
+            misfit = problem.misfit.of_model(model)
+        return searched(misfit, residuals, self.ranges)
+
+    def nuisance(self, time_s: Array) -> Array:
+        """Return the nuisance functions, offset and drift, (n_functions, n_samples)."""
+        return nuisance_basis(time_s, offset=self.offset, drift=self.drift)
+
+    def in_noise(
+        self,
+        time_s: Array,
+        noise_model: NoiseModel | None,
+        uncertain: Array,
+        *,
+        growing: Array | None = None,
+    ) -> Condensed:
+        """Condense the readings for autocorrelated noise or an uncertain gripper.
+
+        Parameters
+        ----------
+        time_s : (n_samples,)
+            Ascending sampling times.
+        noise_model
+            Autocorrelation model of the noise; None if it is white.
+        uncertain : (n_functions, n_samples)
+            Functions added with a random amplitude, see `with_uncertain`.
+        growing : (n_samples,), optional
+            Rotation that noise grows with, see `Whitening`.
+        """
+        nuisance, whitening = self.nuisance(time_s), None
+        if noise_model is None and self.sd_rad is not None:
+            noise_model, growing = WEIGHTED, self.sd_rad
+        if noise_model is not None:
+            whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
+        return self._condense(time_s, with_uncertain(nuisance, uncertain), whitening)
+
+    def _condense(
+        self, time_s: Array, basis: Array, whitening: Whitening | None = None
+    ) -> Condensed:
+        return Condensed(self.torque, time_s, basis, nonlinear=self.nonlinear, whitening=whitening)
+
+    def logs(self, parameters: Mapping[str, float]) -> Array:
+        """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""
+        chosen = [(parameters[p.name], self.ranges[p.range_name]) for p in self.searched.parameters]
+        return np.log([max(value, genes.low) for value, genes in chosen])

@@ -1,0 +1,76 @@
+"""The genetic algorithm, followed by local fits of log-parameters from its survivors.
+
+The last survivors lie in one basin. The survivors of the initial population lie in
+all basins, so local fits start from the best of both.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from biogrip.arrays import Array
+from biogrip.fit.answer import History, Identification, Progress, Row, silent
+from biogrip.fit.genetic import Evolution, evolve
+from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.multi_start import best_of_starts
+from biogrip.fit.problem import Problem
+from biogrip.keys import Block
+
+
+@dataclass(frozen=True)
+class Polishing(Block):
+    """Local fits from survivors of the genetic algorithm."""
+
+    first: Annotated[int, Field(ge=0, le=10_000)]
+    """Number of the best survivors of the initial population that are polished."""
+    last: Annotated[int, Field(ge=1, le=10_000)]
+    """The same for the last population."""
+
+
+@dataclass(frozen=True)
+class RefinedSettings:
+    """Settings of the genetic algorithm and of the local fits that follow."""
+
+    genetic: GeneticSettings
+    polishing: Polishing
+
+
+def identify_many(
+    problems: Sequence[Problem],
+    settings: RefinedSettings,
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
+) -> list[Identification]:
+    """Identify samples of one model by the genetic algorithm and local fits from its survivors.
+
+    `progress` is called after every generation, for all problems together, and finally for each.
+    """
+    evolutions = evolve(problems, settings.genetic, rngs, progress)
+    starts, before = zip(*(_survivors(e, settings.polishing) for e in evolutions), strict=True)
+    fine = best_of_starts(problems, starts, before, progress)
+    coarse = [evolution.identification for evolution in evolutions]
+    return [_polished(*both) for both in zip(coarse, fine, strict=True)]
+
+
+def _survivors(evolution: Evolution, chosen: Polishing) -> tuple[Array, Row]:
+    """Return the starts of the fits, log-parameters, and the first row of their history."""
+    coarse = evolution.identification
+    last, first = evolution.last_survivors, evolution.first_survivors
+    starts = np.concatenate((last[: chosen.last], first[: chosen.first]))
+    median = float(coarse.history.median_misfit[-1])
+    before = coarse.parameters, coarse.misfit_rad, median, coarse.evaluations
+    return np.log(starts), before
+
+
+def _polished(coarse: Identification, fine: Identification) -> Identification:
+    """Append the fits' history, but for its first row, to that of the generations."""
+    columns = zip(vars(coarse.history).values(), vars(fine.history).values(), strict=True)
+    return replace(
+        fine,
+        generations=coarse.generations + fine.generations,
+        stop_reason=f"{coarse.stop_reason}, polished",
+        history=History(*(np.concatenate((first, then[1:])) for first, then in columns)),
+    )

@@ -1,0 +1,227 @@
+"""Fits of nested sample models to the same traces: none fits worse than a model nested in it.
+
+Each model is fitted from starts of its own and from the optima of the models nested in it.
+If one of these still fits better, because its optimum lies outside the richer model's search
+range, its optimum is the richer model's result, with elements that have vanished
+(`biogrip.experiment.nesting`).
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.experiment.nesting import as_richer, contained, contained_in, different_in
+from biogrip.experiment.sample import CANDIDATES
+from biogrip.fit.answer import Identification, silent
+from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
+from biogrip.fit.multi_start import descend_from, fit_from
+from biogrip.fit.problem import Problem
+
+# Factors by which an element that has vanished exceeds a usual one, or falls short of it, at a
+# start; and the usual relaxation time as a share of the length of the experiment.
+_AWAY, _SHARE = (3.0, 100.0), 0.1
+# Relaxation times at which an additional branch starts, over the usual one.
+_FURTHER = 0.03, 1.0, 30.0
+# Factors by which power laws have fewer points and fewer starts. Their responses take forty times
+# as long; of 150 fits to 75 traces none had a chi^2 higher by more than 5e-7 than with all.
+_FEWER = 10, 2
+# A decrease of chi^2 that is worth a fit, far below the 1 that a standard error changes it by.
+_NOTICEABLE = 0.01
+# Models that are equivalent in other parameters may improve one another in turn.
+_MOST_ROUNDS = 3
+
+Answers = list[Identification]
+
+
+def fit_models(
+    problems: Mapping[str, Sequence[Problem]],
+    settings: LeastSquaresSettings,
+    rngs: Mapping[str, Sequence[np.random.Generator]],
+    done: Callable[[], None],
+    near: Mapping[str, Array] | None = None,
+) -> dict[str, Answers]:
+    """Fit nested models to traces by least squares.
+
+    Parameters
+    ----------
+    problems
+        By candidate, the problems of the same traces.
+    settings
+        The budget of each fit.
+    rngs
+        By candidate, a random generator for each trace.
+    done
+        Called after every model.
+    near
+        By candidate, additional starts, log-parameters (n_traces, n_parameters).
+
+    Returns
+    -------
+    dict of list of Identification
+        By candidate, in the given order, the best fit to each trace. Parameters may be zero or
+        infinite. A fit worse than a nested model's within its own range has not converged.
+    """
+    found: dict[str, Answers] = {}
+    for name in sorted(problems, key=lambda each: len(CANDIDATES[each].model.names)):
+        further = []
+        for trace, problem in enumerate(problems[name]):
+            longest_s = problem.residuals.duration_s
+            of_contained = _of_contained(name, found, trace, longest_s)
+            points = [_within(start, problem) for start in of_contained]
+            points += [near[name][trace]] if near and name in near else []
+            further.append(np.reshape(points, (-1, len(problem.low))))
+        own = _fewer(settings) if CANDIDATES[name].model.power_law else settings
+        found[name] = identify_many(problems[name], own, rngs[name], silent, further)
+        _add_branches(name, problems[name], found)
+        done()
+    _fit_again(problems, found)
+    _take_simpler(problems, found)
+    return {name: found[name] for name in problems}
+
+
+def _fewer(settings: LeastSquaresSettings) -> LeastSquaresSettings:
+    """Return the budget of power laws: fewer points and starts, beside those of nested models."""
+    points, starts = _FEWER
+    return LeastSquaresSettings(
+        candidates=-(-settings.candidates // points), starts=-(-settings.starts // starts)
+    )
+
+
+def _of_contained(
+    name: str, found: Mapping[str, Answers], trace: int, longest_s: float
+) -> Iterator[Array]:
+    """Yield the optima of nested models as starts, in the richer model's own parameters.
+
+    Elements that have vanished start at two finite sizes: noticeable, and hardly noticeable.
+    """
+    kinds = np.array([parameter.kind for parameter in CANDIDATES[name].model.parameters])
+    for inner in different_in(name, found):
+        parameters = as_richer(name, inner, found[inner][trace].parameters)
+        gone = (kinds != "exponent") & ((parameters == 0) | ~np.isfinite(parameters))
+        for times in _AWAY if gone.any() else (1.0,):
+            start = parameters.copy()
+            for index in np.flatnonzero(gone):
+                usual = _usual(kinds[index], kinds, parameters, ~gone, longest_s)
+                start[index] = usual * times if parameters[index] else usual / times
+            yield start
+
+
+def _add_branches(name: str, problems: Sequence[Problem], found: dict[str, Answers]) -> None:
+    """Take, in place, better fits that start with one branch more than a fit of fewer branches.
+
+    Beside strong branches a weak one takes long to show: rough fits would not tell.
+    """
+    branches = CANDIDATES[name].model.free_branches
+    fewer = [
+        inner
+        for inner in contained_in(name, found)
+        if 0 < len(CANDIDATES[inner].model.free_branches) == len(branches) - 1
+    ]
+    # A fit of the richest has what those of the models in it have.
+    for inner in [
+        inner for inner in fewer if not any(inner in contained(other) for other in fewer)
+    ]:
+        pairs = [
+            (trace, _within(start, problem))
+            for trace, problem in enumerate(problems)
+            for start in _with_a_branch_more(
+                as_richer(name, inner, found[inner][trace].parameters), np.array(branches)
+            )
+        ]
+        if not pairs:
+            continue
+        traces = [trace for trace, _ in pairs]
+        ends = descend_from([problems[t] for t in traces], np.array([x for _, x in pairs]))
+        for trace, x, misfit_rad in zip(traces, ends.x, ends.misfit_rad.tolist(), strict=True):
+            if _is_noticeably_lower(misfit_rad, found[name][trace].misfit_rad, problems[trace]):
+                found[name][trace] = _better_from(found[name][trace], problems[trace], x)
+
+
+def _with_a_branch_more(parameters: Array, branches: IntArray) -> Iterator[Array]:
+    """Starting points with a branch in the place of one that is gone, weaker than the others."""
+    sizes = parameters[branches]
+    there = np.all((sizes > 0) & np.isfinite(sizes), axis=1)
+    gone = np.flatnonzero(sizes[:, 0] == 0)
+    if not (len(gone) and there.any()):
+        return
+    k, c = np.exp(np.mean(np.log(sizes[there]), axis=0)) / _AWAY[0]
+    for times in _FURTHER:
+        start = parameters.copy()
+        start[branches[gone[-1]]] = k, times * c
+        yield start
+
+
+def _usual(kind: str, kinds: Array, values: Array, there: BoolArray, longest_s: float) -> float:
+    """Return the mean size of a kind's elements, or one that relaxes within the experiment."""
+    if np.any(own := there & (kinds == kind)):
+        return float(np.exp(np.mean(np.log(values[own]))))
+    others = values[there & (kinds != "exponent") & (values > 0)]
+    relaxation_s = _SHARE * longest_s if kind == "damping" else 1 / (_SHARE * longest_s)
+    return float(np.exp(np.mean(np.log(others)))) * relaxation_s
+
+
+def _fit_again(problems: Mapping[str, Sequence[Problem]], found: dict[str, Answers]) -> None:
+    """Fit again, in place, models that fit worse than a nested one within their range."""
+    for _ in range(_MOST_ROUNDS):
+        news = False
+        for name, inner, trace in _worse(found):
+            problem = problems[name][trace]
+            parameters = as_richer(name, inner, found[inner][trace].parameters)
+            if is_within(parameters, problem):
+                before = found[name][trace]
+                found[name][trace] = _better_from(before, problem, _within(parameters, problem))
+                news |= found[name][trace] is not before
+        if not news:
+            break
+
+
+def _take_simpler(problems: Mapping[str, Sequence[Problem]], found: dict[str, Answers]) -> None:
+    """Replace, in place, a richer model's result by a nested model's better optimum."""
+    for name, inner, trace in _worse(found):
+        simpler = found[inner][trace]
+        parameters = as_richer(name, inner, simpler.parameters)
+        reached = simpler.converged and not is_within(parameters, problems[name][trace])
+        found[name][trace] = found[name][trace].replaced(
+            parameters, simpler.misfit_rad, converged=reached
+        )
+
+
+def _worse(found: Mapping[str, Answers]) -> Iterator[tuple[str, str, int]]:
+    """Yield model, nested model and trace where the nested one fits better; simple ones first."""
+    for name in found:
+        for inner in contained_in(name, found):
+            pairs = zip(found[name], found[inner], strict=True)
+            for trace, (answer, simpler) in enumerate(pairs):
+                if _digits(simpler.misfit_rad) < _digits(answer.misfit_rad):
+                    yield name, inner, trace
+
+
+def _is_noticeably_lower(misfit_rad: float, than_rad: float, problem: Problem) -> bool:
+    """Return True if a misfit is lower by what the data could tell: see `_NOTICEABLE`."""
+    gain = problem.residuals.samples * (than_rad**2 - misfit_rad**2)
+    return gain > _NOTICEABLE * misfit_rad**2
+
+
+def _better_from(answer: Identification, problem: Problem, start: Array) -> Identification:
+    """Return the fit from a start if its misfit is lower, or else the answer itself."""
+    again = answer.at(fit_from([problem], start))
+    return again if _digits(again.misfit_rad) < _digits(answer.misfit_rad) else answer
+
+
+def _digits(misfit_rad: float) -> float:
+    """Round a misfit to nine digits, below which processors differ."""
+    return float(f"{misfit_rad:.8e}")
+
+
+def _within(parameters: Array, problem: Problem) -> Array:
+    """Return log-parameters, clipped to the search range."""
+    with np.errstate(divide="ignore"):
+        return np.clip(np.log(parameters), problem.low, problem.high)
+
+
+def is_within(parameters: Array, problem: Problem) -> bool:
+    """Return True if parameters, (n_parameters,), lie in the search range."""
+    with np.errstate(divide="ignore"):
+        x = np.log(parameters)
+    return bool(np.all((x >= problem.low) & (x <= problem.high)))

@@ -1,0 +1,246 @@
+"""Identification of one trace together with its noise model and an uncertain gripper.
+
+If the noise is white and the gripper known, this is one global fit. Otherwise the best fit,
+the autocorrelation of its residuals and the effect of the gripper's uncertainty are
+computed in turn, until none of them changes.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biogrip.arrays import Array, BoolArray
+from biogrip.digits import counted, rounded
+from biogrip.errors import BiogripError
+from biogrip.fit.answer import Identification
+from biogrip.fit.case_problem import CaseProblem, SharedRows
+from biogrip.fit.multi_start import fit_from
+from biogrip.fit.noise_growth import compute_growth
+from biogrip.fit.noise_model_fit import NoiseModelLikelihood
+from biogrip.fit.outliers import outliers_of
+from biogrip.fit.problem import Problem
+from biogrip.fit.uncertain_gripper import gripper_functions
+from biogrip.response.flow import drift_is_flow
+from biogrip.response.whitening import MOST_SAMPLES, NoiseModel
+
+_ROUNDS = 5
+# Changes of noise shares and times below this change no confidence limit in its third digit.
+_CONVERGED = 1e-2
+# The same of a fit that moves by less, in standard deviations.
+_STAYED = 0.03
+_WORTH_SAYING = 0.005
+
+Find = Callable[[Problem], Identification]
+"""Function that finds the global optimum of a problem."""
+
+
+@dataclass(frozen=True)
+class TraceFit:
+    """The identification of one trace, with its noise model and outliers."""
+
+    problem: Problem
+    """The trace without outliers; its residuals are white."""
+    found: Identification
+    """Its global optimum."""
+    noise_model: NoiseModel | None
+    """Autocorrelation model of the noise; None if the noise was assumed to be white."""
+    outliers: BoolArray
+    """True for readings that were left out, (n_samples,)."""
+    fitted_along: str = ""
+    """Terms of the instrument that were fitted along, in words."""
+
+    def noise_data(self) -> dict[str, float | None] | None:
+        """Return the estimated noise model as plain data; None if noise was assumed white."""
+        if self.noise_model is None:
+            return None
+        shares = {"white": self.noise_model.white, **vars(self.noise_model)}
+        return {
+            **{name: rounded(share) for name, share in shares.items()},
+            "degrees_of_freedom": rounded(self.problem.residuals.freedom),
+            "outliers": int(np.count_nonzero(self.outliers)),
+        }
+
+    def notes(self) -> list[str]:
+        """Describe the estimated noise model in sentences."""
+        if self.noise_model is None:
+            return []
+        read = self.problem.residuals.instrument.read.name
+        noise_model, left_out = self.noise_model, int(np.count_nonzero(self.outliers))
+        parts = [f"{_percent(noise_model.white)} white"]
+        if noise_model.ar1 >= _WORTH_SAYING:
+            parts.append(
+                f"{_percent(noise_model.ar1)} correlated over some {noise_model.time_s:.2g} s"
+            )
+        if noise_model.flicker >= _WORTH_SAYING:
+            parts.append(f"{_percent(noise_model.flicker)} 1/f")
+        if noise_model.proportional >= _WORTH_SAYING:
+            parts.append(f"{_percent(noise_model.proportional)} that grows with the {read}")
+        said = [
+            f"Noise model: of the variance {', '.join(parts)};{self.fitted_along} "
+            "the intervals allow for all of it."
+        ]
+        if left_out:
+            samples = counted(left_out, "sample")
+            said.append(f"Left out as outliers: {samples} of {len(self.outliers)}.")
+        return said
+
+
+def fit_traces(
+    case_problems: Sequence[CaseProblem],
+    traces: Sequence[tuple[Array, Array]],
+    find: Callable[[Sequence[Problem], Sequence[int]], list[Identification]],
+) -> list[TraceFit]:
+    """Fit each of several traces as `trace_fit` does, and those with plain noise together.
+
+    Parameters
+    ----------
+    case_problems
+        Assumptions of the identification of each trace.
+    traces
+        Times and rotations of each.
+    find
+        Function that finds the global optima of problems of given traces.
+    """
+    plain = [trace for trace, case_problem in enumerate(case_problems) if case_problem.plain]
+    shared: SharedRows = {}
+    problems = [case_problems[trace].of(*traces[trace], shared=shared) for trace in plain]
+    optima = find(problems, plain) if plain else []
+    found = {
+        trace: TraceFit(problem, optimum, None, np.zeros(len(traces[trace][0]), dtype=bool))
+        for trace, problem, optimum in zip(plain, problems, optima, strict=True)
+    }
+
+    def find_alone(trace: int) -> Find:
+        return lambda problem: find([problem], [trace])[0]
+
+    for trace, case_problem in enumerate(case_problems):
+        if trace not in found:
+            found[trace] = trace_fit(case_problem, *traces[trace], find_alone(trace))
+    return [found[trace] for trace in range(len(traces))]
+
+
+def trace_fit(
+    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
+) -> TraceFit:
+    """Fit a trace and, if wanted, estimate the model of its noise.
+
+    With a coloured noise model, outliers are removed, and the noise is a sum of white,
+    Ornstein-Uhlenbeck and 1/f noise. If it grows with the rotation, so does a part of the white
+    noise: the parts whose readings depend on each other are of the instrument's zero. The
+    effect of the gripper's uncertainty on the rotation is one more component of the noise.
+
+    Parameters
+    ----------
+    case_problem
+        Assumptions of the identification.
+    time_s, rotation_rad : (n_samples,)
+        The trace, times ascending.
+    find
+        Function that finds the global optimum.
+
+    Raises
+    ------
+    BiogripError
+        If the trace has too many readings for a coloured noise model.
+    """
+    kept = np.ones(len(time_s), dtype=bool)
+    if not case_problem.coloured:
+        plain = case_problem.of(time_s, rotation_rad)
+        found = find(plain)
+        if case_problem.plain:
+            return TraceFit(plain, found, None, ~kept)
+    else:
+        if len(time_s) > MOST_SAMPLES:
+            raise BiogripError(
+                f"found {len(time_s)} samples, allowed are at most {MOST_SAMPLES} with a coloured "
+                "noise model: average neighbouring samples."
+            )
+        kept, plain, found = _without_outliers(case_problem, time_s, rotation_rad, find)
+    time_s, rotation_rad = time_s[kept], rotation_rad[kept]
+    problem, found, noise_model = _in_turn(case_problem, time_s, rotation_rad, plain, found)
+    # Slow deviations now weigh less, so that another basin may be the deepest.
+    other = find(problem)
+    if np.float32(other.misfit_rad) < np.float32(found.misfit_rad):
+        found = other
+    return TraceFit(problem, found, noise_model, ~kept, _fitted_along(case_problem, time_s))
+
+
+def _fitted_along(case_problem: CaseProblem, time_s: Array) -> str:
+    terms = ["an offset"] * case_problem.offset + ["a drift"] * case_problem.drift
+    if not terms:
+        return ""
+    controlled = case_problem.instrument.controlled.name
+    or_flow = f" (or the sample flows: under this {controlled} both give the same line)"
+    doubt = or_flow if case_problem.drift and drift_is_flow(case_problem.torque, time_s) else ""
+    verb = "are" if len(terms) > 1 else "is"
+    return f" {' and '.join(terms)} of the instrument{doubt} {verb} fitted along, and"
+
+
+def _without_outliers(
+    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
+) -> tuple[BoolArray, Problem, Identification]:
+    kept = np.ones(len(time_s), dtype=bool)
+    for _ in range(_ROUNDS):
+        plain = case_problem.of(time_s[kept], rotation_rad[kept])
+        found = find(plain)
+        residual = plain.residuals.left(logs := np.log(found.parameters))
+        growth = compute_growth(residual, plain.residuals.rotation(logs))
+        struck = outliers_of(residual / growth, plain.residuals.rounding_rad)
+        if not struck.any():
+            break
+        kept[np.flatnonzero(kept)[struck]] = False
+    return kept, case_problem.of(time_s[kept], rotation_rad[kept]), found
+
+
+def _in_turn(
+    case_problem: CaseProblem,
+    time_s: Array,
+    rotation_rad: Array,
+    plain: Problem,
+    found: Identification,
+) -> tuple[Problem, Identification, NoiseModel | None]:
+    """Estimate the noise from the residuals and fit again with it, until the fit converges."""
+    problem, noise_model = plain, None
+    logs = np.log(found.parameters)
+    growth = compute_growth(plain.residuals.left(logs), plain.residuals.rotation(logs))
+    grows = case_problem.coloured and np.ptp(growth) > 0
+    for _ in range(_ROUNDS):
+        start = np.log(found.parameters)
+        residual, sensitivity = plain.residuals(start)
+        uncertain = gripper_functions(case_problem, time_s, found.parameters)
+        left = problem.residuals.free - len(found.parameters)
+        noise_rad = case_problem.noise_rad or found.misfit_rad * np.sqrt(len(time_s) / left)
+        before: NoiseModel | None = noise_model
+        growing = plain.residuals.rotation(start) if grows else None
+        if case_problem.coloured:
+            nuisance = case_problem.nuisance(time_s)
+            directions = np.vstack((sensitivity, nuisance, uncertain))
+            likelihood = NoiseModelLikelihood(time_s, residual, directions, growing)
+            noise_model = likelihood.best(near=before)
+        condensed = case_problem.in_noise(
+            time_s, noise_model, uncertain / noise_rad, growing=growing
+        )
+        problem = case_problem.of(time_s, rotation_rad, condensed=condensed)
+        found = found.at(fit := fit_from([problem], start))
+        slopes = problem.residuals.condensed_responses(fit.x)[0, 1:]
+        moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_rad
+        if moved < _STAYED and _alike(before, noise_model):
+            break
+    if noise_model is not None:
+        freedom = likelihood.freedom(noise_model, sensitivity / noise_rad, nuisance)
+        problem = replace(problem, residuals=problem.residuals.with_freedom(freedom))
+    return problem, found, noise_model
+
+
+def _alike(one: NoiseModel | None, other: NoiseModel | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    names = ("ar1", "flicker", "proportional")
+    shares = sum(abs(getattr(one, name) - getattr(other, name)) for name in names)
+    times = min(one.ar1, other.ar1) * abs(np.log(one.time_s / other.time_s))
+    return bool(shares + times < _CONVERGED)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"

@@ -1,0 +1,267 @@
+"""Diagnosis of one trace: best fit, a verdict on every quantity, and doubts about the result."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.experiment.sample import SampleModel
+from biogrip.experiment.sample_model import C_P
+from biogrip.fit.answer import Identification
+from biogrip.fit.multi_start import fit_from
+from biogrip.fit.noise_growth import compute_growth
+from biogrip.fit.outliers import outliers_of
+from biogrip.fit.problem import Problem
+from biogrip.judging.fit_status import (
+    DOUBT,
+    HARMLESS,
+    REJECTED,
+    REJECTION,
+    Note,
+    compute_status,
+)
+from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
+from biogrip.judging.quantities import parameters_and_sum
+from biogrip.judging.range_ends import note_range_ends
+from biogrip.judging.slow_misfit import has_fast_noise, has_uneven_noise
+from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.whiteness import FALSE_ALARM, doubts_about_noise
+from biogrip.response.grip import Grip
+from biogrip.response.noise_estimate import estimate_noise
+
+# A misfit larger than the scatter of neighbouring readings by this factor is not noise.
+_TOO_MUCH = 1.2
+# A misfit below these shares of the noise and of the peak is that of a trace without noise.
+_NOISE_FREE, _NOISE_FREE_OF_PEAK = 0.01, 1e-3
+# A misfit below this share of the given noise is reported: noise is rarely known better.
+_TOO_LITTLE = 0.5
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The diagnosis of one trace: best fit, verdicts, contact force and doubts."""
+
+    likelihood: Likelihood
+    """Best fit and noise."""
+    findings: list[Finding]
+    """A verdict on every parameter and on the sum of the exchangeable ones."""
+    trades: list[Trade]
+    """Parameters of which only a combination is determined."""
+    grip: Grip | None
+    """Force of the jaws on the sample of the best fit."""
+    notes: list[Note]
+    """Notes on the result, with weights."""
+
+    @property
+    def status(self) -> str:
+        """Status of the fit by these notes: ok, doubtful or rejected."""
+        return compute_status(self.notes)
+
+
+def diagnose(
+    problem: Problem,
+    model: SampleModel,
+    found: Identification,
+    *,
+    confidence: float,
+    noise_rad: float | None = None,
+) -> Diagnosis:
+    """Judge the identification of one trace by profile likelihoods, as `diagnose_all` does."""
+    (diagnosis,) = diagnose_all(
+        [problem], model, [found], confidence=confidence, noise_rad=[noise_rad]
+    )
+    return diagnosis
+
+
+def diagnose_all(
+    problems: Sequence[Problem],
+    model: SampleModel,
+    found: Sequence[Identification],
+    *,
+    confidence: float,
+    noise_rad: Sequence[float | None],
+) -> list[Diagnosis]:
+    """Judge the identification of each of several traces by profile likelihoods.
+
+    If a profile comes below the optimum, the optimum was not the global one, and the trace
+    is judged again from the lower one. No diagnosis depends on the other traces.
+
+    Parameters
+    ----------
+    problems, model
+        The traces, and the model whose parameters were searched.
+    found
+        Global optimum of each, as far as is known.
+    confidence
+        Of the limits, e.g. 0.95.
+    noise_rad
+        Standard deviation of the noise of each, if it is known; else that of the residual.
+    """
+    best, done = list(found), dict[int, Diagnosis]()
+    while left := [trace for trace in range(len(problems)) if trace not in done]:
+        likelihoods = [
+            make_likelihood(
+                problems[trace],
+                np.log(best[trace].parameters),
+                best[trace].misfit_rad,
+                confidence=confidence,
+                noise_rad=noise_rad[trace],
+            )
+            for trace in left
+        ]
+        findings = compute_findings(likelihoods, parameters_and_sum(model))
+        trades = find_trade_offs(likelihoods, model, findings)
+        for place, trace in enumerate(left):
+            judged = Diagnosis(likelihoods[place], findings[place], trades[place], None, [])
+            lower = _lower_optimum(judged, best[trace])
+            if lower is None:
+                done[trace] = _with_notes(judged, model, converged=best[trace].converged)
+            else:
+                best[trace] = lower
+    return [done[trace] for trace in range(len(problems))]
+
+
+def _lower_optimum(judged: Diagnosis, found: Identification) -> Identification | None:
+    """Return the optimum that is fitted from the lowest point of the profiles, if it is lower."""
+    profiled = [*judged.findings, *(trade.finding for trade in judged.trades)]
+    lowest = min((finding.profile for finding in profiled), key=lambda p: float(p.increases.min()))
+    if lowest.increases.min() > -MISSED:
+        return None
+    missed = found.at(fit_from([judged.likelihood.problem], lowest.lowest))
+    return None if judged.likelihood.increase(missed.misfit_rad) > -MISSED else missed
+
+
+def _with_notes(judged: Diagnosis, model: SampleModel, *, converged: bool) -> Diagnosis:
+    """Return a diagnosis with the force of the jaws and with notes."""
+    likelihood, findings = judged.likelihood, judged.findings
+    residuals = likelihood.problem.residuals
+    grip = residuals.grip(likelihood.best)
+    notes = [
+        Note(
+            HARMLESS,
+            f"The confidence set of {finding.quantity.label} has {1 + len(finding.gaps)} separate "
+            "parts; the limits are the outermost ones.",
+        )
+        for finding in findings
+        if finding.gaps
+    ]
+    notes += [*note_range_ends(likelihood, model), *_noise(likelihood)]
+    notes += _pulling(grip, residuals.duration_s)
+    if not converged:
+        notes.append(
+            Note(
+                DOUBT,
+                "The fit has not converged to its last digits: further Newton steps increase "
+                "chi-squared. Rely on its verdicts, not on its digits.",
+            )
+        )
+    notes += _ringing(judged, rejected=compute_status(notes) == REJECTED)
+    return replace(judged, grip=grip, notes=notes)
+
+
+def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
+    """Yield a note if the trace shows the arms ringing, which fits leave out.
+
+    The parallel damper has the least value that the trace allows. Ringing may be why a fit is
+    rejected, and only what rejects it is said of such a fit; its misfit is no noise.
+    """
+    likelihood = judged.likelihood
+    residuals = likelihood.problem.residuals
+    network = residuals.model.network(np.exp(likelihood.best))
+    damper = [each for each in judged.findings if each.quantity.label == C_P.name]
+    if damper:
+        network = replace(network, c_p=np.array([damper[0].low or 0.0]))
+    noise_rad = residuals.noise_scale_rad if rejected else likelihood.noise_rad
+    if ring := residuals.ring(network, noise_rad):
+        yield Note(
+            REJECTION if rejected else DOUBT,
+            "The arms ring: their inertia, which fits leave out, changes readings of this sample "
+            f"by up to {ring.largest:.2g} times the noise. Leave out the readings of the first "
+            f"{_rounded_up(1e3 * ring.lasts_s)} ms after each change of the torque.",
+        )
+
+
+def _rounded_up(value: float) -> str:
+    """Return a number of two digits that is not below the value."""
+    unit = 10.0 ** (np.floor(np.log10(value)) - 1) if value > 0 else 1.0
+    return f"{unit * np.ceil(value / unit * (1 - 1e-9)):.6g}"
+
+
+def _pulling(grip: Grip | None, last_s: float) -> Iterator[Note]:
+    """Yield a note if, with the best fit, the jaws would have to pull at the sample.
+
+    A loss of contact would show in the misfit: with a good fit the sample stuck.
+    """
+    if grip is not None and grip.pulls_from_s is not None and grip.pulls_from_s <= last_s:
+        yield Note(
+            HARMLESS,
+            f"With the best fit {grip.words()}. Without adhesion the jaws lost contact "
+            "there: fit only the samples before that.",
+        )
+
+
+def _noise(likelihood: Likelihood) -> Iterator[Note]:
+    """Yield doubts about the residuals and about the noise that was given."""
+    residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
+    least_rad = min(_NOISE_FREE * likelihood.noise_rad, _NOISE_FREE_OF_PEAK * residuals.peak_rad)
+    if misfit_rad < least_rad:
+        return
+    residual = residuals.left(likelihood.best)
+    growth = compute_growth(residual, residuals.rotation(likelihood.best))
+    doubts = list(
+        doubts_about_noise(residual, growth, residuals.instrument, residuals.rounding_rad)
+    )
+    yield from (Note(DOUBT, doubt) for doubt in doubts)
+    if doubts and not residuals.coloured:
+        yield Note(
+            HARMLESS,
+            "If the set-up is right, measurement.noise_model: coloured, or --noise-model coloured, "
+            "gives intervals that allow for such noise.",
+        )
+    if _too_little(likelihood):
+        yield Note(
+            DOUBT,
+            f"The noise that was given is {likelihood.noise_rad / misfit_rad:.2g} times what the "
+            "fit leaves: its value, or its unit, is not the right one.",
+        )
+    # Outliers are noise of the recording: they make a fit doubtful, not wrong.
+    scale, even = residuals.noise_scale_rad, residual / growth
+    if np.ptp(growth):
+        scale = max(scale, estimate_noise(even, residuals.rounding_rad))
+    bulk = even[~outliers_of(even, residuals.rounding_rad)]
+    bulk_rad = float(np.sqrt(np.mean(bulk**2)))
+    if bulk_rad > _TOO_MUCH * scale:
+        yield _misfit(likelihood, bulk_rad / scale, residual)
+
+
+def _misfit(likelihood: Likelihood, times: float, residual: Array) -> Note:
+    """Return the note on a misfit that is some times the noise."""
+    if has_uneven_noise(residual, likelihood.problem.residuals.rounding_rad):
+        return Note(
+            DOUBT,
+            "The noise differs from one part of the trace to another, and the intervals do not "
+            "allow for that: leave out the readings that scatter most (--from, --until), or give "
+            "standard deviations (--sd).",
+        )
+    if has_fast_noise(likelihood.problem.residuals, likelihood.best):
+        return Note(
+            DOUBT,
+            f"The misfit is {times:.2g} times the noise of neighbouring readings, as of noise that "
+            "is correlated for a short time: the intervals are too narrow.",
+        )
+    return Note(
+        REJECTION,
+        f"The misfit is {times:.2g} times the noise of the trace: "
+        f"{likelihood.problem.residuals.instrument.suspects(unit=True)} is not the right one.",
+    )
+
+
+def _too_little(likelihood: Likelihood) -> bool:
+    """Return True if the misfit is too small for the given noise, by a chi-squared test."""
+    from scipy.special import chdtr
+
+    residuals = likelihood.problem.residuals
+    share = likelihood.misfit_rad / likelihood.noise_rad
+    left = max(residuals.free - len(likelihood.best), 1)
+    return share < _TOO_LITTLE and float(chdtr(left, residuals.samples * share**2)) < FALSE_ALARM

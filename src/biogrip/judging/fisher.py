@@ -1,0 +1,77 @@
+"""Fisher information and Cramer-Rao bounds of the parameters of a trace.
+
+References
+----------
+.. [1] H. Cramér, Mathematical Methods of Statistics, Princeton University Press, 1946.
+.. [2] C. R. Rao, Information and the accuracy attainable in the estimation of statistical
+   parameters, Bulletin of the Calcutta Mathematical Society 37 (1945).
+.. [3] H. White, A heteroskedasticity-consistent covariance matrix estimator and a direct test
+   for heteroskedasticity, Econometrica 48 (1980), 817-838: noise that changes along the trace.
+"""
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.judging.quantities import Quantity
+
+# Members with a smaller share in a sum are neglected, whatever their uncertainty.
+_NEGLIGIBLE = 1e-2
+
+
+def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
+    """Compute the first-order covariance of log-parameters estimated by least squares.
+
+    With the same Gaussian noise everywhere, it is the inverse of the Fisher
+    information J J^T / sigma^2: the Cramer-Rao bound, which no unbiased
+    estimator undercuts. With noise that changes along the trace, it is the
+    covariance of unweighted least squares, A J diag(sigma^2) J^T A with
+    A = (J J^T)^-1, and no longer a bound.
+
+    A parameter whose standard deviation exceeds one e-fold even with all others known
+    carries no information. It is fixed for the others' covariance: near zero on a
+    logarithmic scale, the linear approximation of its effect fails.
+
+    Parameters
+    ----------
+    sensitivity : (n_parameters, n_samples)
+        J, d rotation / d log parameter in rad.
+    noise_rad : float or (n_samples,)
+        Standard deviation of the noise.
+
+    Returns
+    -------
+    (n_parameters, n_parameters)
+        Infinite on the diagonal for parameters without information; zeros without noise.
+    """
+    sigma = np.broadcast_to(noise_rad, sensitivity.shape[1])
+    scale = float(np.sqrt(np.mean(sigma**2)))
+    if not scale:
+        return np.zeros((len(sensitivity), len(sensitivity)))
+    relative = sensitivity / scale
+    informed = np.flatnonzero(np.sum(relative**2, axis=1) > 1)
+    found = np.diag(np.full(len(sensitivity), np.inf))
+    if len(informed) == 0:
+        return found
+    j = relative[informed]
+    # Rows of length one, for parameters may differ by decades in their information.
+    length = np.sqrt(np.sum(j**2, axis=1))
+    j = j / length[:, None]
+    inverse = np.linalg.pinv(j @ j.T, hermitian=True, rcond=1e-12)
+    scattered = j * (sigma / scale)
+    within = inverse @ (scattered @ scattered.T) @ inverse / np.outer(length, length)
+    found[np.ix_(informed, informed)] = within
+    return found
+
+
+def bound(
+    sensitivity: Array, noise_rad: float | Array, log_parameters: Array, q: Quantity
+) -> float:
+    """Return the first-order standard deviation of a quantity's logarithm, by `covariance`."""
+    slope = q.gradient(log_parameters)
+    members = np.abs(slope) > _NEGLIGIBLE
+    if not np.any(members):
+        return float("inf")
+    found = covariance(sensitivity, noise_rad)[np.ix_(members, members)]
+    if np.any(np.isinf(found)):
+        return float("inf")
+    return float(np.sqrt(slope[members] @ found @ slope[members]))

@@ -1,1 +1,0 @@
-"""Identification of recorded traces from CSV files to verdicts, without Snakemake."""

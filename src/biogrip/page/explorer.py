@@ -1,0 +1,113 @@
+"""The explorer of the page: the judged trace of each case with its fits, drawn by Plotly."""
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from plotly.graph_objects import Figure, Scatter
+
+from biogrip.arrays import Array
+from biogrip.digits import significant, with_unit
+from biogrip.figures.axis_limits import is_over_decades, scale_of_fit
+from biogrip.figures.results import Fit, fit_of
+from biogrip.figures.style import COLORS, MEASURED, TARGET
+from biogrip.fit.methods import Method
+from biogrip.records.identifications import read_identifications
+from biogrip.records.traces import read_measurements
+from biogrip.stages.judgement import TRACE
+from biogrip.study.study import Case
+
+# As many readings as a phone draws.
+_MOST_READINGS = 2000
+# More digits than a screen shows, and fewer than those in which processors differ.
+_DIGITS = 6
+_DASHES = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
+_LAYOUT: dict[str, Any] = {
+    "template": "simple_white",
+    "height": 480,
+    "margin": {"l": 0, "r": 10, "t": 60, "b": 0},
+    "legend": {"orientation": "h", "y": -0.2, "yanchor": "top"},
+    "xaxis": {"title": {"text": "time (s)"}},
+    "yaxis": {"automargin": True, "exponentformat": "power"},
+}
+
+
+def fits_of(
+    case: Case,
+    methods: Sequence[Method],
+    identifications: Path,
+    measurements: Path,
+    calibrated: Sequence[Path],
+) -> list[tuple[Method, Fit]]:
+    """Return the judged trace of a case with the fit of each method, from files of the case."""
+    problem = case.problem.calibrated(calibrated)
+    recorded = read_measurements(measurements, [TRACE])
+    fits = []
+    for method in methods:
+        found = read_identifications(identifications, method.name).set_index("seed").loc[TRACE]
+        values = {p.name: float(found[p.column]) for p in problem.model.parameters}
+        fits.append((method, fit_of(problem, values, recorded, TRACE)))
+    return fits
+
+
+def explorer(cases: Sequence[tuple[str, Sequence[tuple[Method, Fit]]]]) -> str:
+    """Return an interactive figure of traces, targets and fits, with a menu of the cases.
+
+    Parameters
+    ----------
+    cases
+        Title and fits of each case.
+
+    Returns
+    -------
+    str
+        HTML element that holds Plotly's library and needs no network.
+    """
+    lines = [_lines(fits) for _, fits in cases]
+    drawn = Figure([line for own in lines for line in own], _LAYOUT)
+    buttons = []
+    for (title, fits), own in zip(cases, lines, strict=True):
+        visible = [each is own for each in lines for _ in each]
+        change = [{"visible": visible}, _axes(fits[0][1])]
+        buttons.append({"label": escape(title), "method": "update", "args": change})
+    for line in drawn.data[len(lines[0]) :]:
+        line.visible = False
+    for key, value in _axes(cases[0][1][0][1]).items():
+        drawn.layout[key] = value
+    menu = {"buttons": buttons, "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
+    drawn.update_layout(updatemenus=[menu])
+    config = {"displayModeBar": False, "responsive": True}
+    return str(drawn.to_html(config, full_html=False, div_id="explorer"))
+
+
+def _lines(fits: Sequence[tuple[Method, Fit]]) -> list[Scatter]:
+    trace = fits[0][1]
+    factor, _ = scale_of_fit(trace)
+    stride = -(-len(trace.time_s) // _MOST_READINGS)
+
+    def drawn(values: Array, name: str, **style: Any) -> Scatter:
+        x, y = (
+            significant(each[::stride], _DIGITS).astype("f4")
+            for each in (trace.time_s, factor * values)
+        )
+        return Scatter(x=x, y=y, name=name, **style)
+
+    kind = "recorded trace" if trace.target_rad is None else "noisy trace"
+    dots = {"mode": "markers", "marker": {"size": 3, "color": MEASURED}}
+    lines = [drawn(trace.measured_rad, kind, **dots)]
+    if trace.target_rad is not None:
+        lines.append(drawn(trace.target_rad, "target", mode="lines", line_color=TARGET))
+    for method, fit in fits:
+        line = {"color": COLORS[method.color], "dash": _DASHES[method.dashes]}
+        lines.append(drawn(fit.fitted_rad, method.title, mode="lines", line=line))
+    return lines
+
+
+def _axes(trace: Fit) -> dict[str, Any]:
+    return {
+        "xaxis.type": "log" if is_over_decades(trace.time_s) else "linear",
+        "xaxis.autorange": True,
+        "yaxis.title.text": with_unit(trace.read.title, scale_of_fit(trace)[1]),
+        "yaxis.autorange": True,
+    }

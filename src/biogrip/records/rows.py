@@ -1,0 +1,124 @@
+"""CSV files with a header, written atomically and safe for spreadsheets."""
+
+import csv
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+from biogrip.errors import BiogripError
+from biogrip.files import atomic_write
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+# A cell that a spreadsheet takes for a formula, and signed numbers, which it does not.
+_FORMULA = re.compile(r"'*[=+@\t\r-]")
+_SIGNED = re.compile(r"[+-]\d+(\.\d+)?(e[+-]?\d+)?|-(inf)?")
+
+_END = "\r\n"
+
+
+@dataclass(frozen=True)
+class RowFile:
+    """A kind of CSV file."""
+
+    what: str
+    """Content of a row, for messages."""
+    columns: tuple[str, ...]
+    """Column names."""
+    path: str
+    """Path, with wildcards."""
+    words: tuple[str, ...] = ()
+    """Columns to read as text even if they look like numbers."""
+
+    def write(self, path: Path, rows: Iterable[Sequence[Any]]) -> None:
+        """Write a header and rows, consuming an iterator row by row."""
+        write_rows(path, self.columns, rows)
+
+    def read(self, path: Path) -> "pd.DataFrame":
+        """Read all rows."""
+        return read_frame(path, self.what, self.columns, self.words)
+
+
+def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a header and rows, escaping text that a spreadsheet would take for a formula."""
+    with (
+        atomic_write(path) as scratch,
+        # File names may hold bytes that are not valid text.
+        scratch.open("w", encoding="utf-8", errors="backslashreplace", newline="") as stream,
+    ):
+        writer = csv.writer(_Lines(stream), lineterminator=_END)
+        for row in chain((columns,), rows):
+            writer.writerow(
+                [escape_formula(cell) if isinstance(cell, str) else cell for cell in row]
+            )
+
+
+class _Lines:
+    """Stream wrapper that ends lines with LF, while line ends inside quoted cells are kept."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, row: str) -> None:
+        """Write a row."""
+        self._stream.write(row.removesuffix(_END) + "\n")
+
+
+def escape_formula(text: str) -> str:
+    """Return text that a spreadsheet takes for no formula; signed numbers stay as they are."""
+    return f"'{text}" if _FORMULA.match(text) and not _SIGNED.fullmatch(text) else text
+
+
+def as_it_was(cell: Any) -> Any:
+    """Undo `escape_formula`; anything else is returned unchanged."""
+    ours = isinstance(cell, str) and cell[:1] == "'" and _FORMULA.match(cell)
+    return cell[1:] if ours else cell
+
+
+def read_frame(
+    path: Path, what: str, columns: Sequence[str], words: Sequence[str] = ()
+) -> "pd.DataFrame":
+    """Read rows of a CSV file that have at least the given columns.
+
+    Columns of words are read as text even if they look like numbers; `what` says in messages what
+    the file holds.
+    """
+    import pandas as pd
+
+    try:
+        frame = pd.read_csv(path, dtype=dict.fromkeys(words, str))
+    except (OSError, ValueError) as error:
+        raise BiogripError(f"{path}: cannot be read as {what}: {error}.") from error
+    if not set(columns) <= set(frame.columns):
+        raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(columns)}.")
+    for column in frame.columns:
+        if not pd.api.types.is_numeric_dtype(frame[column]):
+            frame[column] = frame[column].map(as_it_was)
+    return frame
+
+
+def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str]]:
+    """Read the header, which may have to be given columns, and all rows as text."""
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            rows = [[as_it_was(cell) for cell in row] for row in csv.reader(stream)]
+    except (OSError, ValueError, csv.Error) as error:
+        raise BiogripError(f"{path}: cannot be read: {error}.") from error
+    if not rows:
+        raise BiogripError(f"{path}: is empty.")
+    if columns is not None and rows[0] != list(columns):
+        raise BiogripError(
+            f"{path}, line 1: found {','.join(rows[0])}; wanted {','.join(columns)}."
+        )
+    return rows
+
+
+def read_table(path: Path) -> list[dict[str, str]]:
+    """Read the rows of a table as text by column."""
+    header, *rows = read_rows(path)
+    return [dict(zip(header, row, strict=False)) for row in rows]

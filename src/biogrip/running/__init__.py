@@ -1,1 +1,0 @@
-"""Running a study with Snakemake: records of files, locks, signals, export."""

@@ -1,0 +1,130 @@
+"""Stage 4: confidence limits of one trace of a case, and expected ones without noise."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from biogrip.arrays import Array
+from biogrip.experiment.noise import rms, standard_deviation
+from biogrip.experiment.random_streams import stream
+from biogrip.files import write_text
+from biogrip.fit.answer import Identification, Progress, silent
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.identifier import identifier
+from biogrip.fit.multi_start import fit_from, identify_from
+from biogrip.fit.problem import Problem
+from biogrip.fit.trace_fit import TraceFit, fit_traces
+from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.judging.fit_status import HARMLESS, Note
+from biogrip.judging.likelihood import MISSED
+from biogrip.judging.onset_profiles import profile_over_onset
+from biogrip.judging.slow_misfit import find_slow_misfit
+from biogrip.judging.valley import compute_valley
+from biogrip.records.traces import read_measurements, read_target
+from biogrip.records.verdicts import diagnosis_data
+from biogrip.study.study import Case
+from biogrip.traces.late_onset import note_late_onset
+
+TRACE = 0
+"""Seed of the trace that is judged."""
+
+"""The measurements with that trace."""
+
+
+def fit_judged(
+    case: Case,
+    case_problem: CaseProblem,
+    time_s: Array,
+    rotation_rad: Array,
+    seed: int,
+    progress: Progress = silent,
+) -> TraceFit:
+    """Return the least-squares fit of a trace that its judgement is based on."""
+    (fit,) = fits_judged([case], [case_problem], [(time_s, rotation_rad)], seed, progress)
+    return fit
+
+
+def fits_judged(
+    cases: Sequence[Case],
+    case_problems: Sequence[CaseProblem],
+    traces: Sequence[tuple[Array, Array]],
+    seed: int,
+    progress: Progress = silent,
+) -> list[TraceFit]:
+    """Return these fits of several traces, times and rotations, of cases with the same budget."""
+    least_squares = identifier("least_squares", cases[0].least_squares)
+
+    def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
+        chosen = [cases[index] for index in which]
+        rngs = [
+            stream(case.study.study_seed, case.name, seed, "identifiability") for case in chosen
+        ]
+        return least_squares(problems, rngs, progress)
+
+    return fit_traces(case_problems, traces, find)
+
+
+def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
+    """Fit the trace of seed 0 by least squares, and write verdicts, profiles and valley."""
+    recorded = read_measurements(measurements, [TRACE])
+    case_problem = case.problem.calibrated(calibrated).weighted(recorded.sd_rad)
+    fit = fit_judged(case, case_problem, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
+    diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
+    if case_problem.fit_start:
+        diagnosis = profile_over_onset(diagnosis, recorded.time_s)
+    notes = notes_on_fit(fit)
+    if case.may_start_late:
+        trace, near = recorded.rotation_rad[TRACE], diagnosis.likelihood.best
+        notes += note_late_onset(case_problem, recorded.time_s, trace, near)
+    said = diagnosis_data(diagnosis, notes)
+    _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": valley})
+
+
+def notes_on_fit(fit: TraceFit) -> list[Note]:
+    """Return notes on the noise model of a fit; one that holds misfit rejects the fit."""
+    notes = [Note(HARMLESS, text) for text in fit.notes()]
+    if fit.noise_model is None:
+        return notes
+    misfit = find_slow_misfit(
+        fit.noise_model, fit.problem.residuals.duration_s, fit.problem.residuals.instrument
+    )
+    return [misfit, *notes] if misfit else notes
+
+
+def _diagnosed(
+    problem: Problem, case_problem: CaseProblem, found: Identification, confidence: float
+) -> tuple[Diagnosis, dict[str, Any] | None]:
+    """Diagnose a trace, and again from a fit along its valley, if that has a lower chi^2."""
+    model, noise_rad = case_problem.searched, case_problem.noise_rad
+    diagnosis = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+    valley, missed = compute_valley(diagnosis.likelihood, model)
+    if missed is not None:
+        again = found.at(fit_from([problem], missed))
+        if diagnosis.likelihood.increase(again.misfit_rad) < -MISSED:
+            found = again
+            diagnosis = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+            valley, _ = compute_valley(diagnosis.likelihood, model)
+    return diagnosis, valley
+
+
+def expect(case: Case, target: Path, calibrated: list[Path], verdicts: Path) -> None:
+    """Write verdicts on the trace without noise, judged with the noise level of the measurement.
+
+    They are what to expect of any trace of the case. Without noise, the rounding of the
+    target's digits takes its place.
+    """
+    case_problem = case.problem.to_identify().calibrated(calibrated)
+    time_s, _, rotation = read_target(target)
+    noise_rad = rms(standard_deviation(rotation, case.noise)) or None
+    problem = case_problem.of(time_s, rotation, noise_rad=noise_rad)
+    found = identify_from(problem, case_problem.logs(case.parameters))
+    diagnosis = diagnose(
+        problem, case_problem.searched, found, confidence=case.confidence, noise_rad=noise_rad
+    )
+    _write(verdicts, case, diagnosis_data(diagnosis))
+
+
+def _write(verdicts: Path, case: Case, said: dict[str, Any]) -> None:
+    head = {"case": case.name, "model": case.problem.model.name, "confidence": case.confidence}
+    write_text(verdicts, json.dumps(head | said, indent=1) + "\n")

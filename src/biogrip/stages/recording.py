@@ -1,0 +1,195 @@
+"""Stage 2 for recorded traces: conversion of the user's file to a measurement."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from biogrip.arrays import BoolArray
+from biogrip.digits import counted
+from biogrip.errors import BiogripError
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.fitted_onset import OnsetFits
+from biogrip.instrument.gripper import Gripper
+from biogrip.progress import warn
+from biogrip.records.traces import Measurements, write_measurements
+from biogrip.response.whitening import MOST_SAMPLES
+from biogrip.study.study import Case, Study
+from biogrip.traces.columns import Columns, place
+from biogrip.traces.noise_share import proportional_deviations
+from biogrip.traces.onset import guess_onset
+from biogrip.traces.plausibility import check_recording
+from biogrip.traces.recognised import Recognised
+from biogrip.traces.recordings import Recording, read_recording
+
+
+def record(case: Case, recorded: Path, measurements: Path) -> None:
+    """Read, check and convert the user's file, and write it as Parquet.
+
+    Raises
+    ------
+    BiogripError
+        With file, line and column, if the trace cannot be used.
+    """
+    trace = read_checked(recorded, case.gripper, case.problem, case.columns)
+    trace = with_fitted_onset(trace, case.problem)
+    for note in notes_on_recording(trace):
+        warn(f"{place(recorded)}: {note}")
+    write_measurements(measurements, trace)
+
+
+def read_checked(
+    recorded: Path,
+    gripper: Gripper,
+    problem: CaseProblem,
+    columns: Columns,
+    show: Callable[[Recognised], None] = lambda _: None,
+) -> Measurements:
+    """Read a recorded trace, and refuse one that is impossible with its gripper and protocol.
+
+    Before it is refused, `show` is called with what was recognised in the file.
+    """
+    trace = read_recording(recorded, columns)
+    if trace.recognised is not None:
+        show(trace.recognised)
+        columns = trace.recognised.stated(columns)
+    weighted = columns.sd is not None or problem.noise_share is not None
+    if (problem.coloured or weighted) and len(trace.time_s) > MOST_SAMPLES:
+        raise BiogripError(
+            f"{place(recorded)}: found {len(trace.time_s)} samples, allowed are at most "
+            f"{MOST_SAMPLES} with {'weights' if weighted else 'a coloured noise model'}: average "
+            "neighbouring ones."
+        )
+    onset_s = columns.start_s
+    if problem.fit_start:
+        onset_s = guess_onset(problem, trace.time_s, trace.rotation_rad)
+    if onset_s is not None:
+        trace = without_padding(replace(trace, time_s=trace.time_s - onset_s))
+    at_steps = 0
+    if not problem.instrument.has_jaws:
+        trace, at_steps = without_steps(trace, problem.torque)
+    nuisance = problem.nuisance(trace.time_s)
+    suspicion = check_recording(
+        trace,
+        gripper,
+        problem.torque,
+        recorded,
+        columns,
+        nuisance,
+        problem.instrument,
+        None if weighted else problem.noise_rad,
+        _typical_noise(trace, problem),
+        onset_s,
+    )
+    sd_rad = trace.sd_rad
+    if problem.noise_share is not None:
+        sd_rad = proportional_deviations(
+            trace.time_s,
+            trace.rotation_rad,
+            gripper,
+            problem.torque,
+            nuisance,
+            problem.noise_share,
+            problem.noise_rad,
+        )
+    rotations = {0: trace.rotation_rad}
+    gaps = trace.without_number
+    return Measurements(
+        *(trace.time_s, None, rotations, gaps, sd_rad, suspicion, onset_s, at_steps),
+        trace.recognised,
+    )
+
+
+def without_steps(trace: Recording, protocol: TorqueHistory) -> tuple[Recording, int]:
+    """Leave out readings at the very instant of a step, and count them.
+
+    Without inertia a sample jumps there, and nothing tells on which side a reading was taken.
+    """
+    steps = [start for start, order, _ in protocol.jumps if order == 0]
+    kept = ~np.isin(trace.time_s, steps)
+    return _part(trace, kept), int(np.count_nonzero(~kept))
+
+
+def _part(trace: Recording, kept: BoolArray) -> Recording:
+    sd_rad = None if trace.sd_rad is None else trace.sd_rad[kept]
+    return replace(
+        trace,
+        time_s=trace.time_s[kept],
+        rotation_rad=trace.rotation_rad[kept],
+        lines=trace.lines[kept],
+        sd_rad=sd_rad,
+    )
+
+
+def without_padding(trace: Recording) -> Recording:
+    """Leave out the same number again and again before the protocol, which is no measurement.
+
+    The last of them stays: it tells that the protocol had not yet started.
+    """
+    differs = np.flatnonzero(trace.rotation_rad != trace.rotation_rad[0])
+    first = max(min([*differs[:1], np.count_nonzero(trace.time_s < 0)]) - 1, 0)
+    kept = np.arange(len(trace.time_s)) >= first
+    return replace(_part(trace, kept), without_number=trace.without_number + first)
+
+
+def with_fitted_onset(trace: Measurements, problem: CaseProblem) -> Measurements:
+    """Return a recording with its estimated onset replaced by that of a fit, if that is wanted."""
+    if not problem.fit_start or trace.onset_s is None:
+        return trace
+    problem = problem.weighted(trace.sd_rad)
+    later_s = OnsetFits(problem, trace.time_s, trace.rotation_rad[0]).best(0.0).onset_s
+    return replace(trace, time_s=trace.time_s - later_s, onset_s=trace.onset_s + later_s)
+
+
+def _typical_noise(trace: Recording, problem: CaseProblem) -> float | None:
+    """Return the standard deviation of the noise, if it is given; typical where it differs."""
+    if trace.sd_rad is not None:
+        return float(np.median(trace.sd_rad))
+    if problem.noise_share is not None:
+        largest_rad = float(np.max(np.abs(trace.rotation_rad)))
+        return math.hypot(problem.noise_share * largest_rad, problem.noise_rad or 0.0)
+    return problem.noise_rad
+
+
+def notes_on_recording(trace: Measurements) -> list[str]:
+    """Return notes on rows of a recording that were left out, and on a hardly plausible one."""
+    notes = [trace.suspicion] if trace.suspicion else []
+    if trace.gaps:
+        rows = f"{counted(trace.gaps, 'row')} of {len(trace.time_s) + trace.gaps}"
+        notes.append(f"Left out for want of a number: {rows}.")
+    if trace.recognised is not None and trace.recognised.averaged:
+        notes.append(
+            f"Averaged at repeated times: {counted(trace.recognised.averaged, 'reading')}."
+        )
+    if trace.recognised is not None and trace.recognised.outside:
+        notes.append(
+            f"Left out by from_s and until_s: {counted(trace.recognised.outside, 'reading')}."
+        )
+    if trace.at_steps:
+        notes.append(
+            f"Left out at the instant of a step: {counted(trace.at_steps, 'reading')}, of which "
+            "nothing tells on which side of it they were taken."
+        )
+    return notes
+
+
+def check_traces(study: Study) -> None:
+    """Check all recorded traces before a run starts.
+
+    Raises
+    ------
+    BiogripError
+        One line for each trace that cannot be used.
+    """
+    problems = []
+    for name in study.recorded:
+        case = study.case(name)
+        try:
+            read_checked(Path(case.file), case.gripper, case.problem, case.columns)
+        except BiogripError as error:
+            problems.append(f"cases.{name}: {error}")
+    if problems:
+        raise BiogripError("\n".join(problems))

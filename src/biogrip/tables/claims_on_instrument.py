@@ -1,0 +1,202 @@
+"""Claims of the paper's sections 2 and 3: actuator, grip, equations of motion."""
+
+import numpy as np
+import pandas as pd
+
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.protocol import sample_times
+from biogrip.experiment.random_streams import stream
+from biogrip.instrument.calibrated_gripper import ARM_KEYS
+from biogrip.instrument.calibration import FreeMotion, calibrate, free_motion
+from biogrip.tables.claim_results import LackingError, Results
+from biogrip.tables.claim_rules import (
+    CLOSE,
+    FEW,
+    IN_PART,
+    NOT,
+    REPLICATED,
+    UNDECIDED,
+    Judged,
+    altogether,
+    by_number,
+    by_share,
+    plain,
+)
+from biogrip.tables.linearisation import LIMIT_PERCENT
+
+_FELT = 1.1
+"""Ratio of bounds from which the gripper's stiffness is said to matter."""
+_SCATTER_OF_CELLS = 30.0
+"""Factor by which measured moduli of cells differ from 1 kPa, by the method of measurement."""
+
+
+def judge_voltage(results: Results) -> Judged:
+    """Judge the voltage of the first torque."""
+    row = results.table("evidence").set_index("quantity").loc["voltage for 1.6e-09 N m"]
+    return Judged(
+        by_number(_printed(row), float(row["this_study"])),
+        f"Eqs. (7) to (9) with Table 2 give {row['this_study']:.3g} V.",
+    )
+
+
+def judge_voltages(results: Results) -> Judged:
+    """Judge both voltages for torques as section 3 prints them."""
+    rows = results.table("evidence").set_index("quantity")
+    misprinted = rows.loc["voltage for 1.6e-06 N m"]
+    meant = [rows.loc[f"voltage for {torque} N m"] for torque in ("1.6e-09", "3.2e-10")]
+    as_printed = by_number(_printed(misprinted), float(misprinted["this_study"]))
+    corrected = altogether(by_number(_printed(row), float(row["this_study"])) for row in meant)
+    ours = " and ".join(f"{row['this_study']:.3g}" for row in meant)
+    return Judged(
+        as_printed if as_printed == corrected else IN_PART,
+        f"1.6 µN m would take {misprinted['this_study']:.3g} V; a thousandth of both torques, "
+        f"as in section 2, takes {ours} V.",
+    )
+
+
+def _printed(row: "pd.Series") -> float:
+    return float(str(row["paper"]).removeprefix("about "))
+
+
+def judge_grip(results: Results) -> Judged:
+    """Judge whether the jaws press throughout."""
+    lowest = results.table("mechanics").groupby("case", sort=False)["lowest_force_uN"].min()
+    tables = {case.truth.title: case.truth.published.table for case in results.study.cases.values()}
+    lowest = lowest[lowest.index.isin(tables)]
+    said = ", ".join(f"{force:.2g} µN (Table {tables[title]})" for title, force in lowest.items())
+    return Judged(
+        altogether(REPLICATED if force > 0 else NOT for force in lowest),
+        f"Lowest jaw force: {said}. Where it is negative the jaws would have to pull.",
+    )
+
+
+def judge_sizes(results: Results) -> Judged:
+    """Judge whether the stroke suffices to close onto samples of all sizes."""
+    found = results.table("contact")
+    stroke = results.study.actuator.stroke_deg
+    needed = np.degrees(1e-3 * found["closing_mrad"].to_numpy(float))
+    within = float(np.mean(needed <= stroke))
+    return Judged(
+        by_share(within),
+        f"Closing onto samples of {found['size_um'].min():g} to {found['size_um'].max():g} µm "
+        f"takes {np.nanmin(needed):.2g} to {np.nanmax(needed):.2g} degrees of the stroke of "
+        f"{stroke:g}, with the reconstructed arm, and {found['voltage_V'].min():.3g} to "
+        f"{found['voltage_V'].max():.3g} V, which the paper does not count.",
+    )
+
+
+def judge_jaw_gap(results: Results) -> Judged:
+    """Judge whether the gap matters: in the linear model only by the angle at contact."""
+    angles = np.radians(results.table("contact")["reference_angle_deg"].to_numpy(float))
+    scale = np.sin(angles) ** 2
+    change = 100 * float(scale.max() / scale.min() - 1)
+    bounds = results.table("coverage").dropna(subset="bound_percent")
+    smallest = float(bounds["bound_percent"].min())
+    return Judged(
+        REPLICATED if change <= smallest else IN_PART,
+        "The gap sets the angle at which the jaws meet a sample. From the smallest sample to the "
+        f"largest the values of a trace change by {change:.2g} % with it, where noise allows "
+        f"{smallest:.2g} % at best: it does not matter if the angle is known.",
+    )
+
+
+def judge_capability(results: Results) -> Judged:
+    """Judge whether the gripper's stiffness and the algorithm decide what is found."""
+    points = results.of_sweep("robustness_gripper")
+    found = points.groupby(["case", "quantity"], sort=False)["bound_percent"]
+    ratio = (found.max() / found.min()).groupby("case", sort=False).max()
+    methods = results.table("methods")
+    by_method = methods.groupby("method", sort=False)["optimum_share"].agg(["min", "max"])
+    shares = "; ".join(
+        f"{name} {_percents(row['min'], row['max'])}" for name, row in by_method.iterrows()
+    )
+    decides = float(by_method["min"].max() - by_method["min"].min()) > FEW
+    return Judged(
+        altogether([*(REPLICATED if r > _FELT else NOT for r in ratio), *([REPLICATED] * decides)]),
+        "From half to twice the stiffness and from 1 to 2 mm, the least errors that noise allows "
+        f"change by factors of {ratio.min():.2g} to {ratio.max():.2g} (sweep robustness_gripper). "
+        f"Traces whose best fit is found: {shares}.",
+    )
+
+
+def _percents(low: float, high: float) -> str:
+    first, last = f"{100 * low:.0f}", f"{100 * high:.0f}"
+    return f"{last} %" if first == last else f"{first} to {last} %"
+
+
+def judge_free_arm(results: Results) -> Judged:
+    """Judge whether a step and an impulse on a free arm give its properties."""
+    case = next(iter(results.study.cases.values()))
+    test = case.calibration
+    time_s = sample_times(test.duration_s, test.rate_Hz)
+    causes = test.step_torque_Nm, test.impulse_Nms
+    arm = case.gripper.left
+    motion = free_motion(arm, time_s, *causes)
+    noise = Noise("gaussian", test.noise_level, "peak")
+    rng = stream(results.study.study_seed, "claims", 0, "calibration")
+    record = FreeMotion(
+        time_s, add_noise(motion.step_rad, noise, rng), add_noise(motion.impulse_rad, noise, rng)
+    )
+    found = calibrate(record, *causes).arm
+    errors = [100 * abs(getattr(found, key) / getattr(arm, key) - 1) for key in ARM_KEYS]
+    inertia, damping, stiffness = errors
+    return Judged(
+        altogether(REPLICATED if error <= 100 * CLOSE else NOT for error in errors),
+        f"Simulated with {100 * test.noise_level:g} % of noise: inertia, damping and stiffness are "
+        f"found with errors of {inertia:.1g}, {damping:.1g} and {stiffness:.1g} %.",
+    )
+
+
+def judge_equations(results: Results) -> Judged:
+    """Judge the printed balance of the massless node, which grows where it should decay."""
+    case = results.study.cases[results.case_of(5)]
+    values = case.truth.parameters
+    length_s = sum(phase.duration_s for phase in case.phases)
+    decades = values["k"] / values["c"] * length_s / np.log(10)
+    return Judged(
+        NOT if decades > 0 else REPLICATED,
+        "Signs and dimensions differ between eqs. (1) to (6). By eq. (6) as printed the node runs "
+        f"away with the time constant c/k: by {decades:.0f} decades in the {length_s:g} s of "
+        "Table 5's sample. Derived anew, the equations hold.",
+    )
+
+
+def judge_linear_model(results: Results) -> Judged:
+    """Judge the linearised equations."""
+    table = results.table("linearisation")
+    angle = results.study.gripper.reference_angle_deg
+    used = table.iloc[(table["reference_angle_deg"] - angle).abs().argsort(kind="stable")]
+    nearest = used[used["reference_angle_deg"] == used["reference_angle_deg"].iloc[0]]
+    worst = float(nearest["difference_percent"].max())
+    return Judged(
+        REPLICATED if worst <= LIMIT_PERCENT else NOT,
+        f"Linear and nonlinear responses differ by at most {worst:.1g} % of the peak (allowed: "
+        f"{LIMIT_PERCENT:g} %).",
+    )
+
+
+def judge_rotation(results: Results) -> Judged:
+    """Tell why the level of the rotation proves nothing."""
+    rows = results.table("evidence").dropna(subset="unit")
+    rows = rows[rows["unit"] == "mrad"]
+    if not len(rows):
+        raise LackingError("the study has no trace of Table 7")
+    low, high = (float(value) for value in rows["this_study"])
+    return Judged(
+        UNDECIDED,
+        f"Ours span {low:.2g} to {high:.2g} mrad; the arms' stiffness, which the copy lacks, was "
+        "reconstructed from this axis.",
+    )
+
+
+def judge_endothelial(results: Results) -> Judged:
+    """Judge whether Table 5's sample is as stiff as a cell."""
+    table = results.table("mechanics")
+    title = results.study.cases[results.case_of(5)].truth.title
+    modulus = table.loc[table["case"] == title, "apparent_modulus_kPa"].to_numpy(float)
+    is_like = modulus.min() >= 1 / _SCATTER_OF_CELLS and modulus.max() <= _SCATTER_OF_CELLS
+    return Judged(
+        REPLICATED if is_like else NOT,
+        f"Its apparent modulus is {plain(modulus.min(), 2)} to {plain(modulus.max(), 2)} kPa by "
+        f"its size; cells have about 1 kPa, give or take a factor of {_SCATTER_OF_CELLS:g}.",
+    )

@@ -1,0 +1,173 @@
+"""Profiles and valleys as they are drawn, read back from their axes."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.patches import Rectangle
+
+from biogrip.figures import overview, profiles, valley
+from biogrip.figures.decades import decade_ticks
+from biogrip.figures.style import figure, lay_out, styled
+from biogrip.fit.methods import METHODS
+from tests.helpers.default import seen
+
+BEST = 2.0
+
+
+def item(**changes: Any) -> dict[str, Any]:
+    """A quantity whose profile is a parabola of its logarithm, with few points."""
+    values = BEST * np.exp(np.linspace(-1, 1, 9))
+    profile = {"values": list(values), "increases": list((4 * np.log(values / BEST)) ** 2)}
+    limits = {"low": BEST * np.exp(-0.49), "high": BEST * np.exp(0.49), "excluded": []}
+    words = {"quantity": "k", "symbol": "$k$", "unit": "N/m", "verdict": "determined"}
+    return {**words, **limits, "profile": profile, **changes}
+
+
+def written(path: Path, *items: dict[str, Any]) -> Path:
+    content = {"quantities": list(items), "trades": [], "notes": []}
+    levels = {"confidence": 0.9, "threshold": 2.71, "certainty": 10.83}
+    path.write_text(json.dumps({**content, **levels}))
+    return path
+
+
+def drawn(path: Path) -> Any:
+    with styled():
+        return profiles.draw(seen(title="A drop", parameters={"k": 2.2}), path, [])
+
+
+def test_a_profile_is_a_curve_and_crosses_its_threshold_at_its_limits(tmp_path: Path) -> None:
+    axes = drawn(written(tmp_path / "v.json", item())).axes[0]
+    (curve,) = (line for line in axes.lines if line.get_label() == "this trace")
+    values, increases = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
+    assert len(values) > 40
+    # Its root is bent at the optimum only, where cubics round it off.
+    away = np.abs(np.log(values / BEST)) > 0.3
+    np.testing.assert_allclose(
+        increases[away], (4 * np.log(values[away] / BEST)) ** 2, rtol=0.05, atol=0.05
+    )
+    low, high = axes.get_xlim()
+    assert low < BEST * np.exp(-0.49)
+    assert high > BEST * np.exp(0.49)
+
+
+def test_a_set_in_two_parts_is_shaded_in_two_parts(tmp_path: Path) -> None:
+    made = drawn(written(tmp_path / "v.json", item(excluded=[[1.9, 2.1]])))
+    spans = [patch for patch in made.axes[0].patches if isinstance(patch, Rectangle)]
+    edges = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in spans]
+    assert [round(end, 3) for pair in edges for end in pair] == [1.225, 1.9, 2.1, 3.265]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "labels"),
+    [
+        (1e-3, 1e7, ["10⁻³", "10²", "10⁷"]),
+        (0.5, 50, ["10⁰", "10¹"]),
+        (1.5e-4, 1.2e-3, ["0.0002", "0.001"]),
+        (2.1, 4.9, []),
+    ],
+)
+def test_ticks_do_not_collide(low: float, high: float, labels: list[str]) -> None:
+    ticks, found = decade_ticks(low, high)
+    assert found == labels
+    assert all(low <= tick <= high for tick in ticks)
+
+
+def drawn_valley(
+    folder: Path, increases: list[list[float]], fits: dict[str, list[float]], **known: Any
+) -> Any:
+    """Axes of a valley along the sum of 10, with sums of 9, 10 and 11."""
+    shares = np.linspace(0.1, 0.9, 5)
+    sums = 10 * np.array([[0.9], [1.0], [1.1]])
+    grid = {"x_values": sums * shares, "y_values": sums * (1 - shares), "increases": increases}
+    axis = {"name": "c", "symbol": "$c$", "unit": "N s/m"}
+    found = {
+        "x": axis,
+        "y": {**axis, "name": "c_p", "symbol": "$c_p$"},
+        "grids": [{key: np.asarray(each).tolist() for key, each in grid.items()}],
+        "best": [9.0, 1.0],
+    }
+    path = folder / "v.json"
+    path.write_text(json.dumps({"quantities": [], "trades": [], "notes": [], "valley": found}))
+    rows = {f"{name}_Ns_per_m": values for name, values in fits.items()}
+    frame = pd.DataFrame(rows).assign(case="x", method="least_squares")
+    frame["seed"] = range(len(frame))
+    for column in ("misfit", "noise_rms", "generations", "evaluations", "stop_reason"):
+        frame[column] = 1
+    frame.to_csv(folder / "found.csv", index=False)
+    paper = seen(identified=known.get("paper", {}))
+    study = seen(fitting_method=METHODS["least_squares"])
+    case = seen(title="A drop", study=study, parameters=known.get("truth", {}), published=paper)
+    with styled():
+        return valley.draw(case, path, folder / "found.csv").axes[0]
+
+
+DEEP = [[50.0] * 5, [0.0] * 5, [60.0] * 5]
+# Deep at its last point alone, where c is 9.
+CLOSED = [[900.0] * 5, [900.0, 900.0, 900.0, 900.0, 0.0], [900.0] * 5]
+
+
+def test_fits_beyond_a_valleys_axes_are_marked(tmp_path: Path) -> None:
+    axes = drawn_valley(tmp_path, DEEP, {"c": [3.0, 4e4, 5.0], "c_p": [7.0, 10.0, 5.0]})
+    (beyond,) = (line for line in axes.lines if line.get_label() == "beyond the axis")
+    np.testing.assert_allclose(np.asarray(beyond.get_xydata()), [[11.5, 10.0]])
+    assert beyond.get_marker() == ">"
+
+
+def test_a_valleys_axes_end_around_what_is_in_it(tmp_path: Path) -> None:
+    """Fits, truth, paper and where it is deep; each of them widens the axes, none is cut off."""
+    near = {"c": [8.9, 9.05], "c_p": [1.1, 0.95]}
+    narrow = drawn_valley(tmp_path, CLOSED, near)
+    # The root of the rise, 30 at the next point, (7, 3), is below that of 10.83 for 0.11 of the way
+    # there, which is as far as (8.78, 1.22); the fits end at (9.05, 0.95).
+    low, high = narrow.get_xlim()
+    assert 8.5 < low < 8.78 < 9.05 < high < 9.3
+    low, high = narrow.get_ylim()
+    assert 0.7 < low < 0.95 < 1.22 < high < 1.5
+    wide = drawn_valley(tmp_path, DEEP, near)
+    assert wide.get_xlim()[0] < 1
+    assert wide.get_xlim()[1] > 9
+    known = {"c": 6.0, "c_p": 4.0}
+    for name in ("truth", "paper"):
+        axes = drawn_valley(tmp_path, CLOSED, near, **{name: known})
+        assert axes.get_xlim()[0] < 6 < 9.05 < axes.get_xlim()[1]
+        assert axes.get_ylim()[0] < 0.95 < 4 < axes.get_ylim()[1]
+    fit = drawn_valley(tmp_path, CLOSED, {"c": [2.0, 9.0], "c_p": [7.0, 1.0]})
+    assert 0 < fit.get_xlim()[0] < 2
+    assert fit.get_ylim()[1] > 7
+
+
+def test_a_paper_far_off_is_marked_and_leaves_the_valley_its_room(tmp_path: Path) -> None:
+    fits, size = {"c": [9.0], "c_p": [1.0]}, []
+    for c in (9.0, 1e5):
+        axes = drawn_valley(tmp_path, DEEP, fits, paper={"c": c, "c_p": 1.0})
+        with styled():
+            lay_out(axes.figure, 100)
+        size.append(axes.get_position().height)
+    (beyond,) = (line for line in axes.lines if line.get_label() == "beyond the axis")
+    assert float(np.asarray(beyond.get_xdata())[0]) == axes.get_xlim()[1]
+    # A third row of the legend is a twentieth of the figure.
+    assert size[1] > 0.85 * size[0]
+
+
+def test_where_truth_and_paper_coincide_both_are_seen(tmp_path: Path) -> None:
+    known = {"c": 9.0, "c_p": 1.0}
+    axes = drawn_valley(tmp_path, CLOSED, {"c": [9.0], "c_p": [1.0]}, truth=known, paper=known)
+    marks = {line.get_label(): line for line in axes.lines}
+    assert marks["truth"].get_zorder() > marks["paper"].get_zorder()
+    assert marks["paper"].get_markerfacecolor() == "none"
+
+
+def test_the_overview_marks_what_is_off_its_axis() -> None:
+    with styled():
+        page = figure(3, 3)
+        axes = page.subplots()
+        places, ratios = np.arange(4.0), np.array([1e-5, 0.5, 2.0, 1e7])
+        overview._points(axes, places, ratios, "red", "a fit")
+    drawn_at = {line.get_marker(): np.asarray(line.get_xydata()) for line in axes.lines}
+    np.testing.assert_allclose(drawn_at["v"], [[0, 1e-3]])
+    np.testing.assert_allclose(drawn_at["^"], [[3, 1e3]])
+    assert len(drawn_at["o"]) == 2

@@ -1,0 +1,138 @@
+"""Branches are exchangeable; everywhere they are counted from the one that relaxes fastest."""
+
+import functools
+
+import numpy as np
+import pytest
+
+from biogrip.experiment.sample import Sample, SampleModel, with_fixed
+from biogrip.fit.answer import Identification, silent
+from biogrip.fit.identifier import identifier
+from biogrip.fit.local_fits import FINE
+from biogrip.fit.methods import METHODS
+from biogrip.fit.problem import Problem
+from biogrip.judging.constrained_fits import ConstrainedFits
+from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.limits import find_limits
+from biogrip.judging.profiles import compute_profiles
+from biogrip.judging.quantities import parameters_and_sum
+from biogrip.response.linear import rotation, step_response
+from tests.helpers.default import STUDY, study_of
+from tests.helpers.problems import GRIPPER, TORQUE, case_problem, clean
+
+TIMES = clean("endothelial_cell")[0]
+TWO = Sample("generalized_maxwell", 2).model
+# A fast and a slow branch, which the traces tell apart.
+SAMPLE = {"k_1": 30.0, "k_2": 10.0, "k_p": 12.3, "c_1": 150.0, "c_2": 600.0, "c_p": 0.01}
+
+
+def problems(
+    model: SampleModel, parameters: dict[str, float], count: int, level: float
+) -> list[Problem]:
+    response = step_response(GRIPPER, model.sample(parameters), inertia=False)
+    return case_problem(TIMES, rotation(response, TORQUE, TIMES)[0], count, model, level)
+
+
+def identified(method: str, case_problem: list[Problem]) -> list[Identification]:
+    rngs = [np.random.default_rng([seed, 3]) for seed in range(len(case_problem))]
+    settings = STUDY.config.method(method)
+    return identifier(method, settings)(case_problem, rngs, silent)
+
+
+def assert_in_order(model: SampleModel, parameters: np.ndarray) -> None:
+    springs, dampers = np.array(model.free_branches).T
+    times = parameters[..., dampers] / parameters[..., springs]
+    assert np.all(np.diff(times, axis=-1) >= 0)
+
+
+@pytest.mark.parametrize("branches", [2, 3, 4])
+@pytest.mark.nightly
+def test_least_squares_counts_branches_as_they_relax(branches: int) -> None:
+    model = Sample("generalized_maxwell", branches).model
+    dampers = np.geomspace(3.0, 3e3, branches)[::-1]
+    truth = dict(zip(model.names, (*np.ones(branches + 1), *dampers, 0.1), strict=True))
+    found = identified("least_squares", problems(model, truth, 8, 1e-3))
+    for answer in found:
+        assert_in_order(model, answer.parameters)
+        assert_in_order(model, answer.history.best_parameters)
+
+
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "least_squares"])
+@pytest.mark.nightly
+def test_every_method_counts_branches_as_they_relax(method: str) -> None:
+    """Of a population some half would come out the other way round."""
+    for answer in identified(method, problems(TWO, SAMPLE, 4, 1e-3)):
+        assert_in_order(TWO, answer.parameters)
+        assert_in_order(TWO, answer.history.best_parameters)
+
+
+def test_names_change_nothing_else() -> None:
+    """The responses of an answer and of its branches in any order are the same."""
+    (problem,) = problems(TWO, SAMPLE, 1, 1e-3)
+    rng = np.random.default_rng(5)
+    drawn = np.exp(rng.uniform(problem.low, problem.high, (200, 6)))
+    ordered = np.take_along_axis(drawn, TWO.in_order(drawn), axis=1)
+    assert_in_order(TWO, ordered)
+    changed = np.any(drawn != ordered, axis=1)
+    assert 50 < np.sum(changed) < 150
+    np.testing.assert_allclose(problem.misfit(ordered), problem.misfit(drawn), rtol=1e-9)
+
+
+def test_a_branch_that_is_partly_known_keeps_its_name() -> None:
+    model = with_fixed(TWO, {"k_1": 10.0})
+    slow_first = np.array([[30.0, 12.3, 600.0, 20.0, 0.01]])
+    assert model.free_branches == ((0, 3),)
+    np.testing.assert_array_equal(model.in_order(slow_first), np.arange(5)[None])
+
+
+@functools.cache
+def likelihoods() -> list[Likelihood]:
+    """Of three traces."""
+    each = problems(TWO, SAMPLE, 3, 3e-3)
+    return [
+        make_likelihood(p, np.log(a.parameters), a.misfit_rad, confidence=0.95)
+        for p, a in zip(each, identified("least_squares", each), strict=True)
+    ]
+
+
+def test_another_name_of_the_optimum_is_none_of_its_neighbours() -> None:
+    """With names free, the fit with a branch at the value of the other is as good as the best."""
+    every = parameters_and_sum(TWO)
+    fits = ConstrainedFits(likelihoods(), every)
+    swapped = fits.best[:: len(every), [1, 0, 2, 4, 3, 5]]
+    for which in (0, 1, 3, 4):
+        targets = swapped[:, which]
+        increases, _ = fits.at(which + len(every) * np.arange(3), targets, swapped, FINE)
+        assert np.all(increases > 10)
+
+
+@pytest.mark.nightly
+def test_intervals_are_those_of_one_branch() -> None:
+    quantities = parameters_and_sum(TWO)
+    for profiles in compute_profiles(likelihoods(), quantities, smooth=False):
+        for quantity, found in zip(quantities, profiles, strict=True):
+            if quantity.label in ("k_1", "k_2", "c_1", "c_2"):
+                assert found.low is not None
+                assert found.high is not None
+                truth = SAMPLE[quantity.label]
+                assert truth / 2 < np.exp(found.low) < truth < np.exp(found.high) < 2 * truth
+
+
+def test_profiles_end_where_limits_are_near_the_optimum() -> None:
+    quantities = parameters_and_sum(TWO)[:2]
+    near = find_limits(likelihoods(), quantities)[0]
+    for limits, profiles in zip(near, compute_profiles(likelihoods(), quantities), strict=True):
+        ends = np.array([(found.low, found.high) for found in profiles], dtype=float)
+        np.testing.assert_allclose(ends, limits, rtol=0, atol=2e-3)
+
+
+def test_the_truth_is_counted_in_the_same_order() -> None:
+    study = study_of("""
+cases:
+  two: {sample: {model: generalized_maxwell, branches: 2,
+                 k_1: 10, k_2: 30, k_p: 12.3, c_1: 600, c_2: 150, c_p: 0.01}}
+  known: {sample: {model: generalized_maxwell, branches: 2,
+                   k_1: 10, k_2: 30, k_p: 12.3, c_1: 600, c_2: 150, c_p: 0.01}, fixed: {k_1: 10}}
+""")
+    assert study.cases["two"].parameters == SAMPLE
+    assert study.cases["known"].parameters["k_1"] == 10

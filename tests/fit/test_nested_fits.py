@@ -1,0 +1,94 @@
+"""A model never fits worse than one that it contains, whatever the search range."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.experiment.nesting import contained
+from biogrip.experiment.sample import CANDIDATES, MODELS
+from biogrip.fit.answer import Identification
+from biogrip.fit.least_squares import LeastSquaresSettings
+from biogrip.fit.nested_fits import fit_models, is_within
+from biogrip.fit.problem import Problem
+from biogrip.response.linear import rotation, step_response
+from tests.helpers.problems import GRIPPER, SAMPLES, TORQUE, case_problem, clean
+
+TRIED = (*MODELS, "generalized_maxwell_2")
+LADDERS = [name for name in TRIED if not CANDIDATES[name].model.power_law]
+FEW = LeastSquaresSettings(candidates=200, starts=4)
+
+
+def fitted(
+    response: Array, times: Array, tried: Sequence[str], traces: int, level: float
+) -> tuple[dict[str, list[Problem]], dict[str, list[Identification]]]:
+    problems = {
+        name: case_problem(times, response, traces, CANDIDATES[name].model, level) for name in tried
+    }
+    rngs = {name: [np.random.default_rng(n) for n in range(traces)] for name in tried}
+    return problems, fit_models(problems, FEW, rngs, lambda: None)
+
+
+def worse(
+    problems: dict[str, list[Problem]], found: dict[str, list[Identification]]
+) -> list[tuple[str, str, float]]:
+    """Pairs the wrong way round, and by how much in chi^2."""
+    increases = [
+        (richer, simpler, problem.residuals.samples * (2 * np.log(a.misfit_rad / b.misfit_rad)))
+        for richer in found
+        for simpler in contained(richer)
+        if simpler in found
+        for problem, a, b in zip(problems[richer], found[richer], found[simpler], strict=True)
+    ]
+    return [each for each in increases if each[-1] > 1e-3]
+
+
+def assert_of_one_point(
+    times: Array,
+    problems: dict[str, list[Problem]],
+    found: dict[str, list[Identification]],
+) -> None:
+    """See that misfits are those of the parameters, by the models' own responses."""
+    for name, answers in found.items():
+        network = CANDIDATES[name].model.network([answer.parameters for answer in answers])
+        rotations = rotation(step_response(GRIPPER, network, inertia=False), TORQUE, times)
+        for problem, answer, own in zip(problems[name], answers, rotations, strict=True):
+            misfit = np.sqrt(np.mean((own - problem.residuals._rotation_rad) ** 2))
+            assert answer.misfit_rad == pytest.approx(misfit, rel=1e-9)
+
+
+@pytest.mark.parametrize("case", SAMPLES)
+@pytest.mark.parametrize("level", [0.1, 0.002])
+@pytest.mark.nightly
+def test_a_model_fits_no_worse_than_one_in_it(case: str, level: float) -> None:
+    """Parameters and misfit are of one point, also of elements that have vanished."""
+    times, response = clean(case)
+    problems, found = fitted(response, times, LADDERS, 3, level)
+    assert worse(problems, found) == []
+    assert_of_one_point(times, problems, found)
+
+
+# Their fits take twenty times as long as all others: every sample, every level, once.
+@pytest.mark.parametrize(("case", "level"), list(zip(SAMPLES, (0.1, 0.02, 0.002), strict=True)))
+@pytest.mark.nightly
+def test_a_model_with_springpots_fits_no_worse_than_one_in_it(case: str, level: float) -> None:
+    times, response = clean(case)
+    problems, found = fitted(response, times, TRIED, 2, level)
+    assert worse(problems, found) == []
+    assert_of_one_point(times, problems, found)
+
+
+def test_elements_vanish_where_the_range_does_not_reach() -> None:
+    """A Maxwell liquid between the jaws: no spring as weak as the range allows is weak enough."""
+    times = clean("liquid_drop_1")[0]
+    response = rotation(
+        step_response(GRIPPER, MODELS["maxwell"].network([[9.5, 10.0]])), TORQUE, times
+    )[0]
+    problems, found = fitted(response, times, ("maxwell", "liquid_drop"), 8, 0.1)
+    assert worse(problems, found) == []
+    without = [answer for answer in found["liquid_drop"] if answer.parameters[1] == 0]
+    assert without
+    for answer in without:
+        assert not is_within(answer.parameters, problems["liquid_drop"][0])
+        np.testing.assert_array_equal(answer.history.best_parameters[-1], answer.parameters)

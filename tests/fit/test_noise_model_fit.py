@@ -1,0 +1,128 @@
+"""The colour of noise: its likelihood against matrices of all samples, and how well it is known."""
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.noise_parts import AR1, Flicker
+from biogrip.fit.noise_model_fit import NoiseModelLikelihood, _logarithms
+from biogrip.response.whitening import NoiseModel, Whitening
+from tests.response.test_whitening import correlation
+
+TIMES = np.cumsum(np.random.default_rng(0).exponential(1.0, 200))
+DIRECTIONS = np.stack((np.ones(200), TIMES, np.exp(-TIMES / 40)))
+
+
+def restricted(
+    time_s: Array,
+    rows: Array,
+    left: Array,
+    noise_model: NoiseModel,
+    growing: Array | None = None,
+) -> float:
+    """Minus twice the restricted likelihood, the scale profiled out, from dense matrices."""
+    matrix = correlation(time_s, noise_model, growing)
+    inverse = np.linalg.inv(matrix)
+    information = rows @ inverse @ rows.T
+    taken = inverse - inverse @ rows.T @ np.linalg.solve(information, rows @ inverse)
+    return float(
+        (len(time_s) - len(rows)) * np.log(left @ taken @ left)
+        + np.linalg.slogdet(matrix)[1]
+        + np.linalg.slogdet(information)[1]
+    )
+
+
+def test_the_likelihood_is_that_of_what_no_direction_reaches() -> None:
+    """Differences between colours, less the prior on the share of 1/f noise; twelve digits are
+    there, and the condition of the matrices takes four."""
+    left = np.random.default_rng(1).standard_normal(200)
+    likelihood = NoiseModelLikelihood(TIMES, left, DIRECTIONS)
+    colours = [NoiseModel(0.3, 5.0, 0.2), NoiseModel(0.9, 1.0, 0.05), NoiseModel(0.01, 100.0, 0.6)]
+    found, expected = [], []
+    for noise_model in colours:
+        x = _logarithms(noise_model)
+        found.append(likelihood._deviance(x) + x[2])
+        expected.append(restricted(TIMES, DIRECTIONS, left, noise_model))
+    np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-8)
+
+
+def test_the_likelihood_of_noise_that_grows_is_that_of_dense_matrices() -> None:
+    left, growing = np.random.default_rng(1).standard_normal(200), np.linspace(0.1, 2.0, 200)
+    likelihood = NoiseModelLikelihood(TIMES, left, DIRECTIONS, growing)
+    colours = [NoiseModel(0.3, 5.0, 0.2, 0.4), NoiseModel(0.01, 100.0, 0.6, 0.3899)]
+    found, expected = [], []
+    for noise_model in colours:
+        x = _logarithms(noise_model)
+        found.append(likelihood._deviance(x) + x[2])
+        expected.append(restricted(TIMES, DIRECTIONS, left, noise_model, growing))
+    np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-8)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.999])
+@pytest.mark.nightly
+def test_the_share_that_grows_is_found(share: float) -> None:
+    growing, rng = np.geomspace(0.01, 1.0, 200), np.random.default_rng(6)
+    grown = share * growing**2 / np.mean(growing**2)
+    found = []
+    for _ in range(20):
+        left = np.sqrt(1 - share + grown) * rng.standard_normal(200)
+        noise_model = NoiseModelLikelihood(TIMES, left, DIRECTIONS, growing).best()
+        found.append(noise_model.proportional)
+    # The mean of twenty, each known to 0.1 where both parts count; the prior leaves some 1/f.
+    assert np.mean(found) == pytest.approx(share, abs=0.08)
+
+
+def test_what_directions_have_in_it_does_not_matter() -> None:
+    left = np.random.default_rng(2).standard_normal(200)
+    plain = NoiseModelLikelihood(TIMES, left, DIRECTIONS)
+    other = NoiseModelLikelihood(TIMES, left + np.array([3.0, -0.1, 7.0]) @ DIRECTIONS, DIRECTIONS)
+    x = _logarithms(NoiseModel(0.3, 5.0, 0.2))
+    assert other._deviance(x) == pytest.approx(plain._deviance(x), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("noise", "expected"),
+    [
+        (Noise("gaussian", 1.0, "peak"), (0.0, 0.0)),
+        (Noise("gaussian", 1.0, "peak", ar1=AR1(0.5, 10.0)), (0.45, 0.0)),
+        (Noise("gaussian", 1.0, "peak", flicker=Flicker(0.5)), (0.0, 0.5)),
+    ],
+)
+@pytest.mark.nightly
+def test_colours_are_found(noise: Noise, expected: tuple[float, float]) -> None:
+    """On the median of nine traces; the scatter of one is some 0.15.
+
+    What relaxes counts by what is left of it after a sample.
+    """
+    times = np.arange(1500.0)
+    found = []
+    for seed in range(9):
+        trace = add_noise(np.ones(1500), noise, np.random.default_rng([seed, 5]), times)
+        noise_model = NoiseModelLikelihood(times, trace, np.ones((1, 1500))).best()
+        # What is forgotten within a sample is white.
+        slow = noise_model.ar1 * np.exp(-1 / noise_model.time_s)
+        found.append((slow, noise_model.flicker))
+    np.testing.assert_allclose(np.median(found, axis=0), expected, atol=0.12)
+
+
+def test_degrees_of_freedom_are_those_of_the_variances_that_come_out() -> None:
+    """The logarithm of a chi-squared variable with f degrees of freedom has a variance of some 2/f.
+
+    Of the variance of a slope in noise that relaxes, over twenty traces; the variance of
+    logarithms is known to 32 %, and Satterthwaite's formula is of first order.
+    """
+    times = np.arange(400.0)
+    noise = Noise("gaussian", 1.0, "peak", ar1=AR1(0.6, 8.0))
+    direction = (times / 400)[None]
+    logs, freedoms = [], []
+    for seed in range(20):
+        trace = add_noise(np.ones(400), noise, np.random.default_rng([seed, 6]), times)
+        likelihood = NoiseModelLikelihood(times, trace, np.vstack((direction, np.ones(400))))
+        noise_model = likelihood.best()
+        x = _logarithms(noise_model)
+        white = Whitening(times, noise_model, np.ones((1, 400)) / 20)(direction)
+        logs.append(2 * likelihood._log_scale(x) - np.log(float(white[0] @ white[0])))
+        scaled = direction / np.exp(likelihood._log_scale(x))
+        freedoms.append(likelihood.freedom(noise_model, scaled, np.ones((1, 400)) / 20))
+    assert 0.4 < np.median(freedoms) / (2 / np.var(logs)) < 2.5

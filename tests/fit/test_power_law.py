@@ -1,0 +1,98 @@
+"""Power-law samples are identified like all others, and told from branches that relax."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.experiment.sample import CANDIDATES, MODELS, SampleModel
+from biogrip.fit.model_choice import ranked
+from biogrip.judging.likelihood import make_likelihood
+from biogrip.judging.limits import find_limits
+from biogrip.judging.quantities import parameters_and_sum
+from biogrip.response.linear import rotation, step_response
+from tests.helpers.problems import (
+    GRIPPER,
+    SETTINGS,
+    TORQUE,
+    case_problem,
+    identified,
+    posed_for,
+    run,
+)
+
+SOLID, LIQUID = MODELS["fractional_kelvin_voigt"], MODELS["fractional_maxwell"]
+TIMES = np.arange(401.0)
+# Enough for three parameters; a fit that ends elsewhere would be seen below.
+FEW = replace(SETTINGS, candidates=100, starts=4)
+
+
+def response(model: SampleModel, sample: list[float]) -> Array:
+    step = step_response(GRIPPER, model.network(sample), inertia=False)
+    found: Array = rotation(step, TORQUE, TIMES)[0]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("model", "truth", "level"),
+    [
+        (SOLID, [0.3, 10.0, 0.4], 0.03),
+        (LIQUID, [10.0, 0.3, 300.0], 0.03),
+        (MODELS["springpot"], [10.0, 0.4], 0.03),
+        (MODELS["springpot_beside_damper"], [10.0, 0.3, 50.0], 0.03),
+        (MODELS["fractional_maxwell_gel"], [5.0, 20.0, 0.5], 0.03),
+        (MODELS["fractional_solid"], [1.0, 10.0, 0.3, 300.0], 0.01),
+        (MODELS["springpots_in_parallel"], [60.0, 0.8, 5.0, 0.2], 0.01),
+    ],
+)
+@pytest.mark.nightly
+def test_intervals_hold_the_exponent(model: SampleModel, truth: list[float], level: float) -> None:
+    """20 seeds, 95 %: fewer than 15 hold it once in 3000 times."""
+    problems = case_problem(TIMES, response(model, truth), 20, model, level=level)
+    found = identified(problems, list(range(20)), FEW)
+    likelihoods = [
+        make_likelihood(problem, np.log(one.parameters), one.misfit_rad, confidence=0.95)
+        for problem, one in zip(problems, found, strict=True)
+    ]
+    limits, _ = find_limits(likelihoods, parameters_and_sum(model))
+    held = (limits[..., 0] <= np.log(truth)) & (np.log(truth) <= limits[..., 1])
+    assert np.all(held.sum(axis=0) >= 15)
+    # And are of use: the exponent's are a fifth of it wide, or less.
+    index = model.names.index("alpha")
+    assert np.median(limits[:, index, 1] - limits[:, index, 0]) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("made_by", "truth"),
+    [
+        ("fractional_kelvin_voigt", [0.3, 10.0, 0.3]),
+        ("fractional_maxwell", [10.0, 0.3, 300.0]),
+        ("liquid_drop", [9.0, 1.0, 300.0]),
+    ],
+)
+@pytest.mark.nightly
+def test_the_model_that_made_a_trace_is_preferred(made_by: str, truth: list[float]) -> None:
+    """By AIC, each of three kinds against the others and against a simpler one."""
+    names = ["kelvin_voigt", "liquid_drop", "fractional_kelvin_voigt", "fractional_maxwell"]
+    clean = response(MODELS[made_by], truth)
+    for seed in range(3):
+        noise = 0.03 * clean.max() * np.random.default_rng(seed).normal(size=len(TIMES))
+        problems = [posed_for(CANDIDATES[name].model, TIMES, clean + noise) for name in names]
+        misfits = [identified([problem], [seed], FEW)[0].misfit_rad for problem in problems]
+        tried = ranked(names, misfits, len(TIMES))
+        best = min(tried, key=lambda each: each.delta_aic)
+        assert best.candidate == made_by
+        # Of as many parameters the others are far behind: no matter of chance.
+        assert sorted(each.delta_aic for each in tried)[1] > 5
+
+
+@pytest.mark.nightly
+def test_the_genetic_algorithm_finds_exponents_too() -> None:
+    """Two digits of each parameter; none encodes an exponent of one or more."""
+    clean = response(SOLID, [0.3, 10.0, 0.4])
+    noise = 0.03 * clean.max() * np.random.default_rng(1).normal(size=len(TIMES))
+    found = run("genetic", posed_for(SOLID, TIMES, clean + noise))
+    assert found.parameters[2] == pytest.approx(0.4, abs=0.1)
+    assert found.misfit_rad < 1.1 * np.sqrt(np.mean(noise**2))
+    assert np.all(found.history.best_parameters[:, 2] < 1)

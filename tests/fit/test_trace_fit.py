@@ -1,0 +1,187 @@
+"""Identification with what an instrument does to a trace, against least squares with all of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.noise_parts import AR1, Drift, Outliers
+from biogrip.fit.answer import Identification
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.multi_start import identify_from
+from biogrip.fit.outliers import FAR, outliers_of
+from biogrip.fit.problem import Problem
+from biogrip.fit.trace_fit import trace_fit
+from biogrip.fit.uncertain_gripper import gripper_functions
+from biogrip.instrument.gripper import Gripper
+from biogrip.response.simulation import simulated_rotation
+from biogrip.response.whitening import MOST_SAMPLES
+from tests.helpers.default import STUDY
+
+CASE = STUDY.cases["liquid_drop_2"]
+POSED = CASE.problem
+TIMES = np.linspace(0, POSED.torque.end_s, 801)
+TRUTH = POSED.logs(CASE.parameters)
+
+
+def simulated(gripper: Gripper, x: Array) -> Array:
+    network = POSED.searched.network(np.exp(x))
+    return simulated_rotation(gripper, network, POSED.torque, TIMES, nonlinear=False)[0]
+
+
+CLEAN = simulated(POSED.gripper, TRUTH)
+
+
+def find(problem: Problem) -> Identification:
+    return identify_from(problem, TRUTH)
+
+
+def noisy(noise: Noise, seed: int = 0) -> Array:
+    return add_noise(CLEAN, noise, np.random.default_rng([seed, 3]), TIMES)
+
+
+def test_white_noise_and_a_known_gripper_leave_the_fit_as_it_is() -> None:
+    trace = noisy(Noise("gaussian", 0.02, "peak"))
+    fit = trace_fit(POSED, TIMES, trace, find)
+    expected = find(POSED.of(TIMES, trace))
+    np.testing.assert_array_equal(fit.found.parameters, expected.parameters)
+    assert fit.noise_model is None
+    assert not fit.outliers.any()
+    assert fit.notes() == []
+
+
+def test_an_uncertain_inertia_changes_nothing_that_is_fitted() -> None:
+    arms = {"left": {"inertia_kgm2": 0.05 * POSED.gripper.left.inertia_kgm2}}
+    case_problem = replace(POSED, uncertainty=arms)
+    assert case_problem.plain
+    assert case_problem.uncertain_keys == []
+    assert gripper_functions(case_problem, TIMES, np.exp(TRUTH)).shape == (0, len(TIMES))
+
+
+def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
+    """SciPy fits both arms' stiffness along, each held by what is known of it.
+
+    Estimates and standard deviations of the logarithms agree to a twentieth of the latter:
+    what is taken for straight is 2 % of a stiffness.
+    """
+    share, level = 0.02, 0.02 * CLEAN.max()
+    arms = POSED.gripper.left, POSED.gripper.right
+    known = [share * arm.stiffness_Nm_per_rad for arm in arms]
+    uncertainty = {
+        name: {"stiffness_Nm_per_rad": value}
+        for name, value in zip(("left", "right"), known, strict=True)
+    }
+    case_problem = replace(POSED, uncertainty=uncertainty, noise_rad=float(level))
+    trace = noisy(Noise("gaussian", 0.02, "peak"))
+    fit = trace_fit(case_problem, TIMES, trace, find)
+    _, slopes = fit.problem.residuals(np.log(fit.found.parameters))
+    told = [0, 2]  # k and c: nothing is told of c_p, and next to nothing of k_p.
+
+    def residuals(z: Array) -> Array:
+        left, right = (
+            replace(arm, stiffness_Nm_per_rad=arm.stiffness_Nm_per_rad * (1 + share * y))
+            for arm, y in zip(arms, z[4:], strict=True)
+        )
+        gripper = replace(POSED.gripper, left=left, right=right)
+        return np.append((simulated(gripper, z[:4]) - trace) / level, z[4:])
+
+    start = np.append(np.log(fit.found.parameters), [0.0, 0.0])
+    low, high = np.append(fit.problem.low, [-5, -5]), np.append(fit.problem.high, [5, 5])
+    start[:4] = np.clip(start[:4], fit.problem.low + 1e-6, fit.problem.high - 1e-6)
+    both = least_squares(residuals, start, bounds=(low, high), x_scale="jac")
+
+    def deviations(information: Array) -> Array:
+        return np.sqrt(np.diagonal(np.linalg.inv(information + 1e-6 * np.eye(len(information)))))
+
+    own = deviations((slopes @ slopes.T / level**2)[np.ix_(told, told)])
+    rows = both.jac[:, [*told, 4, 5]]
+    expected = deviations(rows.T @ rows)[:2]
+    alone = deviations(both.jac[:-2, told].T @ both.jac[:-2, told])
+    np.testing.assert_allclose(own, expected, rtol=0.05)
+    assert np.all(own > 1.2 * alone)
+    moved = (np.log(fit.found.parameters) - both.x[:4])[told]
+    assert np.all(np.abs(moved) < 0.05 * expected + 1e-3)
+
+
+def test_noise_is_found_and_said() -> None:
+    noise = Noise("gaussian", 0.02, "peak", ar1=AR1(0.5, 5.0), drift=Drift(2.0))
+    noise = replace(noise, outliers=Outliers(0.01, 30.0))
+    case_problem = replace(POSED, coloured=True, offset=True, drift=True)
+    fit = trace_fit(case_problem, TIMES, noisy(noise), find)
+    assert fit.noise_model is not None
+    assert fit.noise_model.ar1 + fit.noise_model.flicker == pytest.approx(0.5, abs=0.25)
+    away = np.abs(noisy(noise) - noisy(replace(noise, outliers=None))) / (0.02 * CLEAN.max())
+    # What is only just outside of the noise may be missed, or not.
+    assert set(np.flatnonzero(away > 2 * FAR)) <= set(np.flatnonzero(fit.outliers))
+    assert np.count_nonzero(fit.outliers & (away == 0)) <= 1
+    model, outliers = fit.notes()
+    assert "correlated over some" in model
+    assert f"{np.count_nonzero(fit.outliers)} samples of 801" in outliers
+    assert fit.problem.residuals.freedom < 1000
+    other = case_problem.for_model(fit.problem, POSED.searched)
+    np.testing.assert_array_equal(other.residuals(TRUTH)[0], fit.problem.residuals(TRUTH)[0])
+
+
+def test_a_drift_changes_nothing_of_what_is_found() -> None:
+    """It is fitted along whether it is there or not, so the same noise gives the same limits."""
+    case_problem = replace(POSED, coloured=True, offset=True, drift=True)
+    steady = Noise("gaussian", 0.02, "peak")
+    drift = 3 * 0.02 * CLEAN.max() * TIMES / TIMES[-1]
+    one, other = (
+        trace_fit(case_problem, TIMES, noisy(steady) + added, find) for added in (0 * drift, drift)
+    )
+    np.testing.assert_allclose(one.found.parameters[[0, 2]], other.found.parameters[[0, 2]], 1e-3)
+    first, second = (each.problem.residuals(TRUTH)[1] for each in (one, other))
+    np.testing.assert_allclose(first @ first.T, second @ second.T, rtol=1e-2, atol=1e-18)
+
+
+def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
+    """Three spikes are struck, each of fifteen times the noise of its sample."""
+    case_problem = replace(POSED, coloured=True, offset=True, drift=True)
+    trace = noisy(Noise("gaussian", 0.05, "signal"))
+    spikes = [200, 500, 700]
+    spiked = trace.copy()
+    spiked[spikes] += 15 * 0.05 * CLEAN[spikes]
+    assert not trace_fit(case_problem, TIMES, trace, find).outliers.any()
+    fit = trace_fit(case_problem, TIMES, spiked, find)
+    np.testing.assert_array_equal(np.flatnonzero(fit.outliers), spikes)
+    assert fit.noise_model is not None
+    assert fit.noise_model.proportional > 0.9
+    assert "that grows with the rotation" in fit.notes()[0]
+    assert fit.noise_data()["proportional"] > 0.9  # type: ignore[index, operator]
+
+
+@pytest.mark.parametrize(
+    ("offset", "said"),
+    [
+        (True, "an offset of the instrument is fitted along, and the intervals allow"),
+        (False, "; the intervals allow for all of it"),
+    ],
+)
+def test_a_drift_is_fitted_only_where_it_is_wanted(offset: bool, said: str) -> None:
+    case_problem = replace(POSED, coloured=True, offset=offset)
+    fit = trace_fit(case_problem, TIMES, noisy(Noise("gaussian", 0.02, "peak")), find)
+    assert fit.problem.residuals.free == len(TIMES) - offset
+    assert said in fit.notes()[0]
+
+
+def test_too_many_samples_for_a_colour_are_refused() -> None:
+    case_problem: CaseProblem = replace(POSED, coloured=True, offset=True, drift=True)
+    times = np.linspace(0, 400, MOST_SAMPLES + 1)
+    with pytest.raises(BiogripError, match="allowed are at most 50000 with a coloured"):
+        trace_fit(case_problem, times, times, find)
+
+
+def test_outliers_are_as_rare_as_gaussian_noise_has_them() -> None:
+    """Of a million samples beyond 4.5 standard deviations there are 7."""
+    rng = np.random.default_rng(0)
+    found = sum(int(outliers_of(rng.standard_normal(10_000)).sum()) for _ in range(100))
+    assert found <= 20
+    trace = rng.standard_normal(1000) + 100 * np.sin(np.arange(1000) / 100)
+    trace[[30, 500]] += 9.0
+    np.testing.assert_array_equal(np.flatnonzero(outliers_of(trace)), [30, 500])
+    assert not outliers_of(np.zeros(100)).any()

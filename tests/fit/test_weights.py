@@ -1,0 +1,98 @@
+"""Readings of known standard deviations, against SciPy's weighted least squares."""
+
+from math import gamma
+
+import numpy as np
+import pytest
+from scipy.optimize import curve_fit
+
+from biogrip.arrays import Array
+from biogrip.experiment.protocol import hold
+from biogrip.experiment.sample import Sample
+from biogrip.fit.answer import Identification
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.problem import Problem
+from biogrip.fit.trace_fit import trace_fit
+from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.library import set_up, simulate
+from tests.helpers.problems import run
+
+# The fit of polystyrene at 190 degC that pyRheo publishes, with weights of 5 % of the compliance.
+V, ETA, BETA = 25856.7, 68281.1, 0.4223
+LEVER_M, TORQUE_NM = 1.5e-3, 3e-8
+TIMES = np.geomspace(1.0, 1e4, 120)
+# So soft that the force is held: of the torque they take 3e-8.
+ARM = Arm(inertia_kgm2=1e-20, damping_Nms_per_rad=1e-12, stiffness_Nm_per_rad=1e-12)
+POLYSTYRENE = set_up(
+    Gripper(arm_length_m=LEVER_M, reference_angle_deg=90.0, left=ARM, right=ARM),
+    (hold(1e4, TORQUE_NM),),
+    Sample("fractional_maxwell"),
+)
+
+
+def rotation(time_s: Array, log_v: float, beta: float, log_eta: float) -> Array:
+    """The creep compliance in closed form, as the arm of a given force turns."""
+    compliance = time_s / np.exp(log_eta) + time_s**beta / (np.exp(log_v) * gamma(1 + beta))
+    turned: Array = TORQUE_NM / (2 * LEVER_M**2) * compliance
+    return turned
+
+
+def noisy(share: float, seed: int = 3) -> Array:
+    rng = np.random.default_rng(seed)
+    clean = rotation(TIMES, np.log(V), BETA, np.log(ETA))
+    trace: Array = clean * (1 + share * rng.standard_normal(len(TIMES)))
+    return trace
+
+
+def find(problem: Problem) -> Identification:
+    return run("least_squares", problem)
+
+
+def fitted(problem: CaseProblem, trace: Array) -> Array:
+    return trace_fit(problem, TIMES, trace, find).found.parameters
+
+
+def identified(problem: CaseProblem, trace: Array) -> Diagnosis:
+    fit = trace_fit(problem, TIMES, trace, find)
+    return diagnose(
+        fit.problem, problem.searched, fit.found, confidence=0.95, noise_rad=problem.noise_rad
+    )
+
+
+def test_the_published_fit_comes_out_to_five_digits() -> None:
+    trace = noisy(0.0)
+    found = fitted(POLYSTYRENE.weighted(0.05 * trace), trace)
+    assert found == pytest.approx([V, BETA, ETA], rel=5e-6)
+
+
+@pytest.mark.nightly
+def test_weighted_fits_are_scipys() -> None:
+    """Standard errors but for the prior of one e-fold, a thousandth of them at most."""
+    trace = noisy(0.05)
+    deviations = 0.05 * trace
+    start = [np.log(V), BETA, np.log(ETA)]
+    expected, covariance = curve_fit(
+        rotation, TIMES, trace, start, deviations, absolute_sigma=True, xtol=1e-13, ftol=1e-13
+    )
+    diagnosis = identified(POLYSTYRENE.weighted(deviations), trace)
+    best = diagnosis.likelihood.best
+    assert [best[0], np.exp(best[1]), best[2]] == pytest.approx(expected, rel=2e-6)
+    errors = np.sqrt(np.diagonal(covariance)) / [1.0, expected[1], 1.0]
+    assert [each.deviation for each in diagnosis.findings] == pytest.approx(errors, rel=2e-3)
+    left = (trace - rotation(TIMES, *expected)) / deviations
+    likelihood = diagnosis.likelihood
+    chi_squared = len(TIMES) * (likelihood.misfit_rad / likelihood.noise_rad) ** 2
+    assert chi_squared == pytest.approx(left @ left, rel=1e-6)
+    assert likelihood.threshold == pytest.approx(3.8415, abs=1e-4)
+    assert diagnosis.notes == []
+
+
+def test_without_weights_large_rotations_decide() -> None:
+    best = fitted(POLYSTYRENE, noisy(0.05))
+    assert abs(best[1] - BETA) > 0.1
+
+
+def test_the_model_is_that_of_the_closed_form() -> None:
+    ours = simulate(POLYSTYRENE, {"k_alpha": V, "alpha": BETA, "c": ETA}, TIMES)
+    np.testing.assert_allclose(ours, noisy(0.0), rtol=1e-7)

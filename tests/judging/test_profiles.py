@@ -1,0 +1,269 @@
+"""Quantities held exactly in many fits at once, against SciPy's fits of all samples."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array, IntArray
+from biogrip.experiment.sample import MODELS, Sample, with_fixed
+from biogrip.fit.local_fits import FINE
+from biogrip.fit.multi_start import fit_from
+from biogrip.judging.constrained_fits import ConstrainedFits
+from biogrip.judging.crossings import Brackets, crossings
+from biogrip.judging.diagnosis import diagnose
+from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.limits import find_limits
+from biogrip.judging.profiles import compute_profiles
+from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
+from biogrip.judging.quantity_constraint import QuantityConstraint
+from biogrip.response.linear import rotation, step_response
+from tests.helpers.problems import GRIPPER, MODEL, TORQUE, identified, of_case, posed_for, run
+from tests.helpers.scipy_fits import scipy_fit
+
+PARAMETERS = parameters_and_sum(MODEL)
+COMBINATIONS = find_combinations(MODEL, [0, 1, 2])
+
+
+def likelihoods(case: str, count: int) -> list[Likelihood]:
+    problems = of_case(case, count)
+    return [
+        make_likelihood(problem, np.log(found.parameters), found.misfit_rad, confidence=0.95)
+        for problem, found in zip(problems, identified(problems, [0] * count), strict=True)
+    ]
+
+
+def labelled(*labels: str) -> list[Quantity]:
+    return [quantity for quantity in PARAMETERS if quantity.label in labels]
+
+
+def rest_fitted(likelihood: Likelihood, known: list[int], logs: list[float], start: Array) -> float:
+    """Rise of chi^2 of a model in which parameters are known, fitted by SciPy."""
+    given = {MODEL.names[i]: float(np.exp(log)) for i, log in zip(known, logs, strict=True)}
+    problem = likelihood.problem
+    rest = replace(
+        problem,
+        residuals=problem.residuals.of_model(with_fixed(MODEL, given)),
+        low=np.delete(problem.low, known),
+        high=np.delete(problem.high, known),
+    )
+    return likelihood.increase(scipy_fit(rest, np.delete(start, known)).misfit_rad)
+
+
+def values(quantities: list[Quantity], which: IntArray, x: Array) -> Array:
+    return np.array([quantities[q].log(point) for q, point in zip(which, x, strict=True)])
+
+
+BRANCHED = {branches: Sample("generalized_maxwell", branches).model for branches in (1, 2, 3)}
+BURGERS = MODELS["burgers"]
+FORMS = {
+    "one branch": (BRANCHED[1], find_combinations(BRANCHED[1], [0, 1, 2])),
+    "two branches": (BRANCHED[2], parameters_and_sum(BRANCHED[2])[-1:]),
+    "three branches": (BRANCHED[3], find_combinations(BRANCHED[3], [0, 1, 4])),
+    "springs of burgers": (BURGERS, find_combinations(BURGERS, [0, 2])),
+    "spring and damper of burgers": (BURGERS, find_combinations(BURGERS, [0, 3])),
+}
+
+
+@pytest.mark.parametrize("alike", [True, False])
+@pytest.mark.parametrize("form", FORMS)
+def test_points_are_moved_to_where_quantities_are_held(form: str, alike: bool) -> None:
+    """Within bounds, from anywhere, for targets all over the ranges and at their very ends."""
+    model, combined = FORMS[form]
+    quantities = [*parameters_and_sum(model), *combined]
+    low = np.full(len(model.names), -3.0)
+    high = np.full(len(low), 4.0) if alike else np.linspace(2.0, 5.0, len(low))
+    ends = np.array([quantity.range(low, high) for quantity in quantities])
+    rng = np.random.default_rng(0)
+    which = rng.integers(len(quantities), size=3000)
+    share = rng.choice([0.0, 1.0, *rng.uniform(size=8)], size=3000)
+    targets = ends[which, 0] + share * (ends[which, 1] - ends[which, 0])
+    bounds = np.tile(low, (3000, 1)), np.tile(high, (3000, 1))
+    held = QuantityConstraint(quantities, which, targets, *bounds, 400.0)
+    # Points out of bounds are moved into them first.
+    x = held.started(np.clip(rng.uniform(low - 1, high + 1, (3000, len(low))), low, high))
+    assert np.all((x >= low) & (x <= high))
+    assert np.max(np.abs(values(quantities, which, x) - targets)) < 1e-6
+    with pytest.raises(ValueError, match="outside its range"):
+        QuantityConstraint(quantities, which, targets + 20, *bounds, 400.0).started(x)
+
+
+def test_held_values_are_attained_to_rounding() -> None:
+    (likelihood,) = likelihoods("endothelial_cell", 1)
+    quantities = [*PARAMETERS, *COMBINATIONS]
+    fits = ConstrainedFits([likelihood], quantities)
+    which = np.repeat(np.arange(len(quantities)), 5)
+    targets = fits.at_best[which] + np.tile([-1.0, -0.1, 0.01, 0.1, 1.0], len(quantities))
+    increases, x = fits.at(which, targets, fits.best[which], FINE)
+    assert np.all(increases > -1e-3)
+    assert np.max(np.abs(values(quantities, which, x) - targets)) < 1e-9
+
+
+@pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1"])
+def test_a_held_parameter_is_a_known_parameter(case: str) -> None:
+    """Against SciPy's fit of a model in which the parameter is fixed."""
+    (likelihood,) = likelihoods(case, 1)
+    problem, fits = likelihood.problem, ConstrainedFits([likelihood], PARAMETERS)
+    which = np.repeat(np.arange(4), 3)
+    targets = likelihood.best[which] + np.tile([-1.5, -0.3, 0.7], 4)
+    targets = np.clip(targets, problem.low[which], problem.high[which])
+    increases, x = fits.at(which, targets, fits.best[which], FINE)
+    for index, target, increase, point in zip(which, targets, increases, x, strict=True):
+        alone = rest_fitted(likelihood, [int(index)], [float(target)], point)
+        assert increase == pytest.approx(alone, abs=2e-3, rel=1e-5)
+
+
+def test_limits_are_where_the_rise_equals_the_threshold() -> None:
+    each = likelihoods("liquid_drop_2", 3)
+    quantities = labelled("k", "c_p", "c + c_p")
+    limits = find_limits(each, quantities)[0]
+    fits = ConstrainedFits(each, quantities)
+    ends = limits.reshape(-1, 2)
+    profile, side = np.nonzero(np.isfinite(ends))
+    increases, _ = fits.at(profile, ends[profile, side], fits.best[profile], FINE)
+    threshold = np.repeat([likelihood.threshold for likelihood in each], len(quantities))[profile]
+    np.testing.assert_allclose(np.sqrt(increases), np.sqrt(threshold), rtol=0, atol=3e-3)
+    # Determined are k and the sum; c_p is bounded from above only.
+    assert np.all(np.isfinite(limits[:, [0, 2]]))
+    assert np.all(np.isnan(limits[:, 1, 0]))
+    at_best = fits.at_best.reshape(3, 3)[:, [0, 2]]
+    assert np.all(limits[:, [0, 2], 0] < at_best)
+    assert np.all(limits[:, [0, 2], 1] > at_best)
+
+
+def test_limits_do_not_depend_on_the_batch() -> None:
+    each, quantities = likelihoods("endothelial_cell", 4), labelled("k", "c + c_p")
+    together = find_limits(each, quantities)[0]
+    for chosen in ([2], [3, 0], [1, 3, 2]):
+        apart = find_limits([each[index] for index in chosen], quantities)[0]
+        np.testing.assert_array_equal(apart, together[chosen])
+
+
+@pytest.mark.nightly
+def test_traces_of_any_experiments_are_judged_as_each_alone() -> None:
+    """Byte for byte, in their order; and whose optimum was missed is told by its place."""
+    cell, drop = likelihoods("endothelial_cell", 2), likelihoods("liquid_drop_2", 2)
+    away = drop[1].best + np.array([0.3, 0.0, 0.06, 0.0])
+    misfit_rad = float(drop[1].problem.misfit(np.exp(away)[None])[0])
+    drop[1] = replace(drop[1], best=away, misfit_rad=misfit_rad)
+    mixed, quantities = [drop[0], cell[0], cell[1], drop[1]], labelled("k", "c + c_p")
+    limits, missed = find_limits(mixed, quantities)
+    assert list(missed) == [3]
+    for own, likelihood in zip(limits, mixed, strict=True):
+        (alone,), _ = find_limits([likelihood], quantities)
+        np.testing.assert_array_equal(alone, own)
+    for own, likelihood in zip(
+        compute_profiles(mixed, quantities, smooth=False), mixed, strict=True
+    ):
+        (profiles,) = compute_profiles([likelihood], quantities, smooth=False)
+        for one, other in zip(own, profiles, strict=True):
+            assert (one.low, one.high, one.best) == (other.low, other.high, other.best)
+            np.testing.assert_array_equal(one.increases, other.increases)
+            np.testing.assert_array_equal(one.log_values, other.log_values)
+    assert compute_profiles([], quantities) == []
+
+
+@pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1"])
+def test_profiles_are_as_low_as_fits_with_the_parameter_known(case: str) -> None:
+    """Against SciPy's from the optimum and from the profile's own fits."""
+    (likelihood,) = likelihoods(case, 1)
+    quantities = labelled("k", "c_p")
+    (profiles,) = compute_profiles([likelihood], quantities)
+    for quantity, found in zip(quantities, profiles, strict=True):
+        (index,) = quantity.members
+        ends = likelihood.problem.low[index], likelihood.problem.high[index]
+        np.testing.assert_allclose(found.log_values[[0, -1]], ends)
+        assert np.min(found.increases) > -1e-3
+        for value, increase in zip(found.log_values[::6], found.increases[::6], strict=True):
+            alone = rest_fitted(likelihood, [index], [value], likelihood.best)
+            assert increase < alone + 1e-3 * (1 + alone)
+
+
+def test_the_search_range_determines_no_combination() -> None:
+    """Loud noise leaves only that the sample is not stiffer; two springs in series likewise.
+
+    Softer than the softest spring of the search range they could be only if both were at its end.
+    """
+    sample = np.array([[20.0, 5.0, 80.0, 1e-3]])
+    times = np.linspace(0.0, 400.0, 801)
+    clean_rad = rotation(step_response(GRIPPER, MODEL.network(sample)), TORQUE, times)[0]
+    noise = 4e-6 * np.random.default_rng(1).standard_normal(len(times))
+    case_problem = posed_for(MODEL, times, clean_rad + noise)
+    found, k_and_k_p = run("least_squares", case_problem), find_combinations(MODEL, [0, 1])
+    told = diagnose(case_problem, MODEL, found, confidence=0.95, noise_rad=1e-4)
+    series = next(q for q in k_and_k_p if q.form == "series")
+    # To first order it is known well enough to be looked at.
+    assert told.likelihood.deviation(series) < 0.5
+    ((one,),) = compute_profiles([told.likelihood], [series])
+    assert one.low is None
+    assert one.high is not None
+    assert told.trades == []
+    # With one spring as soft as it may be, and the other any, it is lower than any limit.
+    soft, best = case_problem.low[0], told.likelihood.best
+    assert series.log(np.array([soft, *best[1:]])) < soft + 1e-3
+    assert rest_fitted(told.likelihood, [0], [soft], best) < told.likelihood.threshold
+
+
+def test_points_of_a_valley_take_one_call() -> None:
+    (likelihood,) = likelihoods("liquid_drop_2", 1)
+    fits = ConstrainedFits([likelihood], PARAMETERS)
+    shares = np.array([0.1, 0.4, 0.7, 0.99, 0.9, 0.5])
+    total = np.exp(likelihood.best[2:]).sum() * np.array([1.0, 1.0, 1.0, 1.0, 1.02, 0.97])
+    x = np.tile(likelihood.best, (len(shares), 1))
+    x[:, 2], x[:, 3] = np.log(total * shares), np.log(total * (1 - shares))
+    increases, found = fits.with_fixed(x, np.array([False, False, True, True]), FINE)
+    np.testing.assert_array_equal(found[:, 2:], x[:, 2:])
+    for increase, point in zip(increases, found, strict=True):
+        alone = rest_fitted(likelihood, [2, 3], list(point[2:]), point)
+        assert increase == pytest.approx(alone, rel=1e-5, abs=2e-3)
+
+
+def test_a_model_with_one_parameter_has_a_profile() -> None:
+    damper = MODELS["damper"]
+    (problem,) = of_case("liquid_drop_2", 1)
+    case_problem = replace(
+        problem,
+        residuals=problem.residuals.of_model(damper),
+        low=problem.low[3:],
+        high=problem.high[3:],
+    )
+    best = fit_from([case_problem], np.array([2.0]))
+    misfit_rad = float(best.misfit_rad[0])
+    assert misfit_rad == pytest.approx(
+        scipy_fit(case_problem, np.array([2.0])).misfit_rad, rel=1e-9
+    )
+    likelihood = make_likelihood(case_problem, best.x[0], misfit_rad, confidence=0.95)
+    quantities = parameters_and_sum(damper)
+    (limits,) = find_limits([likelihood], quantities)[0]
+    ((alone,),) = compute_profiles([likelihood], quantities)
+    ends = np.array([alone.low, alone.high], dtype=float)
+    np.testing.assert_allclose(limits[0], ends, rtol=0, atol=1e-4)
+
+
+class TwoBasins(ConstrainedFits):
+    """Rises in two basins, which fits do not leave; a second parameter says in which they are."""
+
+    def __init__(self) -> None:
+        self.threshold = np.array([4.0])
+
+    def at(
+        self, profile: IntArray, targets: Array, near: Array, tolerance: float
+    ) -> tuple[Array, Array]:
+        """Rises of 0.3 t^2 or, from -1, of 5 + (t - 3)^2."""
+        first = near[:, 1] > -1
+        increases = np.where(first, 0.3 * targets**2, 5 + (targets - 3) ** 2)
+        return increases, np.column_stack((targets, np.where(first, 1.0, -1.0)))
+
+
+def test_a_basin_seen_on_the_way_is_followed_to_the_outer_end() -> None:
+    """There it is below the threshold, at 2.7, so that the crossing lies further out."""
+    brackets = Brackets(
+        np.zeros(1, dtype=np.int64),
+        values=np.array([[0.0], [3.0]]),
+        increases=np.array([[0.0], [5.0]]),
+        x=np.array([[[0.0, 1.0]], [[3.0, -1.0]]]),
+    )
+    (crossing,) = crossings(TwoBasins(), brackets, 1e-7, 1e-6)
+    assert np.isnan(crossing)
+    assert brackets.increases[1, 0] == pytest.approx(2.7)
+    assert brackets.x[1].tolist() == [[3.0, 1.0]]

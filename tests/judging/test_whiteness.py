@@ -1,0 +1,68 @@
+"""Tests of white noise: how often they are wrong, and what they see."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.noise_parts import AR1, Outliers
+from biogrip.instrument.gripper import GRIPPER
+from biogrip.judging.whiteness import FALSE_ALARM, doubts_about_noise, uneven
+
+TIMES: Array = np.linspace(0, 400, 4001)
+SAME = np.ones(4001)
+
+
+def test_the_cumulative_periodogram_is_kolmogorovs() -> None:
+    """SciPy's test of the same shares, as if they were a sample of a uniform distribution."""
+    for seed in range(20):
+        residual = np.random.default_rng(seed).standard_normal(4000)
+        power = np.abs(np.fft.rfft(residual)[1:-1]) ** 2
+        shares = np.cumsum(power)[:-1] / power.sum()
+        expected = kstest(shares, "uniform", method="asymp").pvalue
+        # SciPy has steps of 1/1999 where there are steps of 1/2000.
+        assert uneven(residual) == pytest.approx(expected, rel=0.15, abs=0.02)
+    assert uneven(np.ones(3)) == 1.0
+
+
+def test_white_noise_is_seldom_doubted() -> None:
+    """Three tests of 0.003 and one of next to nothing: of 1500 traces 13 or so are wrong."""
+    rng = np.random.default_rng(1)
+    doubted = sum(
+        any(doubts_about_noise(rng.standard_normal(1001), SAME[:1001], instrument=GRIPPER))
+        for _ in range(1500)
+    )
+    assert doubted <= 3 * FALSE_ALARM * 1500 + 4 * np.sqrt(3 * FALSE_ALARM * 1500)
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"ar1": AR1(1.0, 0.1)}, "Neighbouring residuals"),
+        ({"ar1": AR1(0.08, 2.0)}, "more of some frequencies"),
+        ({"ar1": AR1(0.05, 20.0)}, "The residual wanders"),
+        ({"outliers": Outliers(0.005, 20.0)}, "outliers, as of Gaussian noise"),
+    ],
+)
+def test_what_is_not_white_is_said(parts: dict[str, Any], said: str) -> None:
+    noise = Noise("gaussian", 1.0, "peak", **parts)
+    clean = np.ones(len(TIMES))
+    for seed in range(10):
+        residual = add_noise(clean, noise, np.random.default_rng(seed), TIMES) - clean
+        doubts = " ".join(doubts_about_noise(residual, SAME, instrument=GRIPPER))
+        # Where neighbours are correlated enough, too, that is what is said.
+        assert said in doubts or (said.startswith("more") and "Neighbouring residuals" in doubts)
+
+
+def test_noise_that_grows_is_said_and_nothing_else() -> None:
+    """Its tails and its power vary along the trace; without the growth it is white."""
+    growth = np.linspace(0.02, 1.0, len(TIMES))
+    residual = growth * np.random.default_rng(4).standard_normal(len(TIMES))
+    assert any(
+        "outliers" in said for said in doubts_about_noise(residual, SAME, instrument=GRIPPER)
+    )
+    (said,) = doubts_about_noise(residual, growth, instrument=GRIPPER)
+    assert "The noise grows with the rotation: it is 14 times as large" in said

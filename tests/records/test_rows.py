@@ -1,0 +1,58 @@
+"""CSV files as spreadsheets open them, and as we read them back."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from biogrip.identify.many_traces import Outcome, write_table
+from biogrip.records.rows import (
+    as_it_was,
+    escape_formula,
+    read_frame,
+    read_rows,
+    read_table,
+    write_rows,
+)
+
+FORMULAS = ("=1+1", "+1+1", "-1+1", "@SUM(A1)", "\t=1", "\r=1", "-x", "=", "'=1", "''=1", "+")
+PLAIN = ("-1", "+2.5", "-1e-05", "-inf", "-", "a=b", "'a", "", "1.5", "it's", "NaN-1")
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_no_cell_is_a_formula_and_all_are_read_back(tmp_path: Path, text: str) -> None:
+    file, rows = tmp_path / "a.csv", [[text, "1"], ["b", "-2.5"]]
+    write_rows(file, ("name", "value"), rows)
+    with file.open(newline="") as stream:
+        assert list(csv.reader(stream)) == [["name", "value"], [f"'{text}", "1"], ["b", "-2.5"]]
+    assert read_rows(file) == [["name", "value"], *rows]
+    frame = read_frame(file, "rows", ("name", "value"))
+    assert list(frame["name"]) == [text, "b"]
+    assert list(frame["value"]) == [1.0, -2.5]
+
+
+@pytest.mark.parametrize("text", PLAIN)
+def test_numbers_and_other_text_are_written_as_they_are(text: str) -> None:
+    assert escape_formula(text) == as_it_was(text) == text
+
+
+def test_a_table_of_traces_names_those_that_look_like_formulas(tmp_path: Path) -> None:
+    table = tmp_path / "table.csv"
+    reason = "=1+1.csv: found no header, allowed is a line with column names."
+    write_table(Outcome([], {"=1+1.csv": reason}), table)
+    with table.open(newline="") as stream:
+        assert list(csv.reader(stream))[1][:2] == ["'=1+1.csv", "failed"]
+    assert read_rows(table)[1][:2] == ["=1+1.csv", "failed"]
+    assert read_table(table)[0]["trace"] == "=1+1.csv"
+
+
+def test_a_name_that_is_no_text_is_written(tmp_path: Path) -> None:
+    write_rows(tmp_path / "a.csv", ("name",), [["a\udcff.csv"]])
+    assert (tmp_path / "a.csv").read_text() == "name\na\\udcff.csv\n"
+
+
+def test_an_end_of_line_of_any_kind_is_within_quotes(tmp_path: Path) -> None:
+    rows = [["a\rb", "c\nd"], ["e\r\nf", "g"]]
+    write_rows(tmp_path / "a.csv", ("one", "other"), rows)
+    assert read_rows(tmp_path / "a.csv")[1:] == rows
+    assert (tmp_path / "a.csv").read_bytes().endswith(b'\n"e\r\nf",g\n')

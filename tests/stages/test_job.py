@@ -1,0 +1,101 @@
+"""What a job is told of the config: the keys that its rule names, and nothing else."""
+
+import json
+from dataclasses import fields
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from biogrip.errors import BiogripError
+from biogrip.stages.job import job_case, job_seeds, job_study, logged, paths
+from biogrip.stages.settings import case_of, keys_of_cases, settings, study_of
+from biogrip.study.case_blocks import CaseBlock
+from biogrip.study.config import StudyConfig
+from tests.helpers import default
+from tests.helpers.default import STUDY
+
+NAME = "liquid_drop_2"
+SWEPT = """
+seeds: 7
+gripper: {uncertainty: {torque_percent: 1.0}}
+cases:
+  power: {sample: {model: springpot, k_alpha: 3.0, alpha: 0.4}, measurement: {rate_Hz: 2.0}}
+sweeps:
+  level:
+    cases: [liquid_drop_2]
+    rows: {label: level, key: measurement.noise.level, values: [0, 0.2]}
+    columns: {label: rate, key: measurement.rate_Hz, values: [1, 10]}
+"""
+WHOLE = [field.name for field in fields(StudyConfig) if field.name != "cases"]
+
+
+def told(given: dict[str, Any]) -> dict[str, Any]:
+    """As Snakemake keeps it between the workflow and its jobs."""
+    found: dict[str, Any] = json.loads(json.dumps(given))
+    return found
+
+
+@pytest.mark.parametrize("key", ["noise", "problem", "gripper", "seeds", "title"])
+def test_what_the_rule_does_not_name_cannot_be_read(key: str) -> None:
+    case = case_of(NAME, settings(STUDY, ["sample"], NAME))
+    assert case.block.sample == STUDY.cases[NAME].block.sample
+    with pytest.raises(AttributeError):
+        getattr(case, key)
+
+
+def test_of_a_block_only_what_is_named_can_be_read() -> None:
+    case = case_of(NAME, told(settings(STUDY, ["measurement.noise"], NAME)))
+    assert case.noise == STUDY.cases[NAME].noise
+    with pytest.raises(AttributeError, match="not among the keys that the rule names"):
+        _ = case.sampling
+
+
+@pytest.mark.parametrize("overlay", ["", SWEPT])
+def test_all_keys_give_the_study_back(overlay: str) -> None:
+    study = default.study_of(overlay)
+    again = study_of(told(settings(study, [*WHOLE, *keys_of_cases(study)])))
+    assert again.plain == study.plain
+    assert (list(again.cases), list(again.points)) == (list(study.cases), list(study.points))
+
+
+@pytest.mark.parametrize("overlay", ["", SWEPT])
+def test_all_keys_of_a_case_give_the_case_back(overlay: str) -> None:
+    """The points of sweeps are cases, too; what the study gives is the study's."""
+    study = default.study_of(overlay)
+    keys = [field.name for field in fields(CaseBlock)]
+    keys += ["study_seed", "seeds", "methods", "actuator"]
+    for name in (*study.cases, *study.points):
+        was = study.case(name)
+        case = case_of(name, told(settings(study, keys, name)))
+        assert (case.title, case.sample, case.noise, case.sampling) == (
+            *(was.title, was.sample, was.noise, was.sampling),
+        )
+        assert (case.problem, case.parameters) == (was.problem, was.parameters)
+        assert (case.seeds, case.study.study_seed) == (was.seeds, study.study_seed)
+        for method in study.methods:
+            assert case.method(method) == was.method(method)
+
+
+def test_a_script_reads_what_its_rule_gives() -> None:
+    one, other = settings(STUDY, ["sample"], NAME), settings(STUDY, ["study_seed"])
+    job = SimpleNamespace(
+        params=[one, other, {"software": {}}],
+        wildcards=SimpleNamespace(case=NAME, batch="seeds_3-5"),
+    )
+    assert (job_case(job).name, job_case(job).study.study_seed) == (NAME, STUDY.study_seed)
+    assert job_seeds(job) == [3, 4, 5]
+    assert job_study(SimpleNamespace(params=[other, {"software": {}}])).study_seed == 1
+    assert paths("a.csv") == [Path("a.csv")]
+    assert paths(["a", "b"]) == [Path("a"), Path("b")]
+
+
+def test_an_error_of_ours_ends_a_job_with_its_message_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "job.log"
+    with pytest.raises(SystemExit) as ended, logged(SimpleNamespace(log=[str(log)])):
+        raise BiogripError("a.csv: cannot be read.")
+    assert ended.value.code == 1
+    assert log.read_text() == "biogrip: a.csv: cannot be read.\n"

@@ -1,0 +1,242 @@
+"""The robustness stage, its table and its heat maps: numbers recomputed by hand."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from biogrip.errors import BiogripError
+from biogrip.experiment.maxwell_models import generalized_maxwell
+from biogrip.experiment.protocol import hold, torque_history
+from biogrip.experiment.sample import MODELS
+from biogrip.figures import robustness as figure
+from biogrip.figures.style import styled
+from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.judging.at_truth import headlines
+from biogrip.records.identifications import columns
+from biogrip.response.linear import rotation, step_response
+from biogrip.stages import sweep_points as stage
+from biogrip.study.study import Study
+from biogrip.tables.heat_maps import HeatMaps, heat_maps
+from biogrip.tables.robustness import robustness
+from tests.helpers.default import study_of
+
+CASE = "endothelial_cell"
+TRUTH = np.array([35.0, 12.3, 299.9, 1e-3])
+SWEEPS = """
+methods: [genetic, least_squares]
+sweeps:
+  both:
+    title: Level and kind
+    cases: [endothelial_cell]
+    rows:
+      {label: level, unit: "%", unit_in_si: 0.01, key: measurement.noise.level, values: [0, 0.2]}
+    columns:
+      label: kind
+      key: measurement.noise
+      values:
+        - {label: "additive, any", kind: gaussian, reference: peak}
+        - {label: proportional, kind: uniform, reference: signal}
+"""
+TIME_S = np.arange(4001) / 10.0
+K = 35 * np.array([0.7, 0.8, 0.9, 1.0, 0.3])
+
+
+@pytest.fixture
+def study() -> Study:
+    return study_of(SWEEPS)
+
+
+@pytest.fixture
+def maps(study: Study) -> HeatMaps:
+    return heat_maps(study, "both")
+
+
+def judge(study: Study, identifications: list[Path], output: Path) -> None:
+    stage.judge(study, "both", identifications, [], output)
+
+
+@pytest.fixture
+def identifications(study: Study, tmp_path: Path) -> list[Path]:
+    """Five seeds: k = 0.7, 0.8, 0.9, 1, 0.3 of 35 and c = 330, c_p = 1; misfits 1 to 1.04 noise."""
+    files = []
+    for name in study.points:
+        noise = 0.0 if "--0--" in name else 1e-6
+        for method in ("genetic", "least_squares"):
+            files.append(tmp_path / name / method / "seeds_0-4.csv")
+            files[-1].parent.mkdir(parents=True)
+            with files[-1].open("w", newline="") as stream:
+                writer = csv.writer(stream)
+                writer.writerow(columns(MODELS["generalized_maxwell"]))
+                for seed in range(5):
+                    misfit = (noise or _resolution()) * (1 + 0.01 * seed)
+                    # Least squares is right, and without noise exactly.
+                    if method == "least_squares":
+                        misfit = noise
+                    row = [name, method, seed, K[seed], 12.3, 330, 1]
+                    writer.writerow([*row, misfit, noise, 60, 15500, "stalled"])
+    return files
+
+
+@pytest.fixture
+def judged(study: Study, identifications: list[Path], tmp_path: Path) -> Path:
+    output = tmp_path / "judged" / f"{CASE}.csv"
+    judge(study, identifications, output)
+    return output
+
+
+def _response(parameters: np.ndarray) -> np.ndarray:
+    arm = Arm(1.0e-14, 3.3e-12, 4.4e-7)
+    steps = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
+    step = step_response(Gripper(1.5e-3, 75.0, arm, arm), generalized_maxwell(parameters))
+    return rotation(step, steps, TIME_S)[0]
+
+
+def _resolution() -> float:
+    """Misfit of the truth with two digits of 1 to 9: 35, 12, 290 (300 has none) and 0.99e-3."""
+    rounded = _response(np.array([35.0, 12.0, 290.0, 0.99e-3]))
+    return float(np.sqrt(np.mean((rounded - _response(TRUTH)) ** 2)))
+
+
+def _by_hand(relative_sigma: np.ndarray) -> np.ndarray:
+    """Sandwich covariance of log k, log k_p, log c from central differences."""
+    step = 1e-5
+    slopes = []
+    for index in range(3):
+        up, down = TRUTH.copy(), TRUTH.copy()
+        up[index] *= np.exp(step)
+        down[index] *= np.exp(-step)
+        slopes.append((_response(up) - _response(down)) / (2 * step))
+    jacobian = np.array(slopes)
+    inverse = np.linalg.inv(jacobian @ jacobian.T)
+    spread: np.ndarray = (jacobian * relative_sigma) @ (jacobian * relative_sigma).T
+    return inverse @ spread @ inverse
+
+
+def test_judged_points_are_the_arithmetic_they_say(judged: Path) -> None:
+    rows = pd.read_csv(judged, dtype={"row": str, "column": str})
+    assert tuple(rows.columns) == stage.POINTS.columns
+    assert len(rows) == 4 * 2 * 5
+    index = rows.set_index(["row", "column", "method", "quantity"]).sort_index()
+    noisy = index.loc[("0.2", "additive, any", "genetic")]
+    # |35 - k| / 35: 0, 10, 20, 30 and 70 %, the last outside a factor of two.
+    assert noisy.loc["k", "median_absolute_error_percent"] == pytest.approx(20.0)
+    assert noisy.loc["k", "basin_error_percent"] == pytest.approx(15.0)
+    assert (noisy["basin_share"] == 0.8).all()
+    total = 100 * (331 - 299.901) / 299.901
+    assert noisy.loc["c + c_p", "median_absolute_error_percent"] == pytest.approx(total, rel=1e-5)
+    # 1, 1.01 and 1.02 times the noise are within 2 % of it.
+    assert noisy.loc["k", "near_noise_share"] == 0.6
+    assert (noisy["seeds"] == 5).all()
+
+
+@pytest.mark.parametrize("method", ["genetic", "least_squares"])
+def test_without_noise_the_floor_is_what_two_digits_can_do(judged: Path, method: str) -> None:
+    rows = pd.read_csv(judged, dtype={"row": str})
+    clean = rows[(rows["row"] == "0") & (rows["method"] == method)]
+    assert clean["bound_percent"].isna().all()
+    wanted = 0.6 if method == "genetic" else 1.0
+    assert clean["near_noise_share"].tolist() == [wanted] * 10
+
+
+@pytest.mark.parametrize("column", ["additive, any", "proportional"])
+def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
+    rows = pd.read_csv(judged, dtype={"row": str})
+    chosen = rows[(rows["row"] == "0.2") & (rows["column"] == column)]
+    found = chosen[chosen["method"] == "genetic"].set_index("quantity")["bound_percent"]
+    phi = _response(TRUTH)
+    sigma = 0.2 * (np.full_like(phi, phi.max()) if column == "additive, any" else np.abs(phi))
+    wanted = 100 * np.sqrt(np.diag(_by_hand(sigma)))
+    np.testing.assert_allclose(found[["k", "k_p", "c"]], wanted, rtol=1e-3)
+    # Of c_p = 1e-3 beside c = 299.9 the trace carries no information.
+    assert np.isinf(found["c_p"])
+
+
+def test_the_table_has_the_best_and_the_worst_determined(maps: HeatMaps, judged: Path) -> None:
+    table = robustness(maps, judged)
+    names = [column.name for column in table.columns]
+    rows = [dict(zip(names, row, strict=True)) for row in table.rows]
+    assert [(row["quantity"], row["row"], row["column"]) for row in rows] == [
+        (quantity, level, kind)
+        for quantity in ("k_p", "k")
+        for level in ("0", "20")
+        for kind in ("additive, any", "proportional")
+    ]
+    assert rows[-1]["near_noise_genetic"] == 0.6
+    assert rows[-1]["near_noise_least_squares"] == 1.0
+    assert rows[-1]["basin_genetic"] == 0.8
+    assert (rows[-1]["basin_error_genetic"], rows[-1]["error_genetic"]) == (15.0, 20.0)
+    assert "Share within 2 % of the noise, genetic algorithm" in [c.heading for c in table.columns]
+    assert "reconstructed" in table.columns[2].heading
+    assert "reconstructed" not in table.columns[1].heading
+
+
+@pytest.mark.parametrize(
+    ("marked", "said"),
+    [
+        ("[]", None),
+        ("[measurement.rate_Hz]", None),
+        (
+            "[gripper.left, search_range, gripper.arm_length_m]",
+            "gripper.left, gripper.arm_length_m",
+        ),
+    ],
+)
+def test_the_table_says_what_of_the_gripper_the_config_calls_reconstructed(
+    marked: str, said: str | None, judged: Path
+) -> None:
+    study = study_of(f"{SWEEPS}\nreconstructed: {marked}\n")
+    caption = robustness(heat_maps(study, "both"), judged).caption
+    assert ("econstructed" in caption) == (said is not None)
+    assert said is None or caption.endswith(f": {said}.")
+
+
+def _bounds(**percent: list[float]) -> list[tuple[str, float]]:
+    return [(q.replace("_and_", " + "), p) for q, values in percent.items() for p in values]
+
+
+def test_headlines_follow_from_the_bounds() -> None:
+    assert headlines(_bounds(k=[50, 60], k_p=[5, 6], c=[1, 2])) == ["c", "k"]
+    # A sum stands for its parts, whatever their bounds.
+    assert headlines(_bounds(c=[1, 1], c_p=[2, 2], c_and_c_p=[3, 3], k=[99, 98])) == [
+        "c + c_p",
+        "k",
+    ]
+    assert headlines(_bounds(k=[99, 400, 400], c=[1, 1, np.nan])) == ["c"]
+    assert headlines(_bounds(k=[400.0])) == []
+
+
+def test_heat_maps_show_the_numbers_they_are_given(maps: HeatMaps, judged: Path) -> None:
+    with styled():
+        drawn = figure.draw(maps, judged)
+    shares, best, worst = drawn.axes[:3]
+    texts = [[text.get_text() for text in axes.texts] for axes in (shares, best, worst)]
+    assert texts[0] == ["a", *["80\n(80)"] * 4]
+    rows = pd.read_csv(judged, dtype={"row": str})
+    bound = rows[(rows["row"] == "0.2") & (rows["quantity"] == "k")]["bound_percent"].unique()
+    assert texts[2] == ["15", "15", *(f"15\n({value:.2g})" for value in bound)]
+    assert [label.get_text() for label in worst.get_yticklabels()] == ["0", "20"]
+    assert [label.get_text() for label in worst.get_xticklabels()] == [
+        "additive,\nany",
+        "proportional",
+    ]
+    assert best.get_title(loc="left").startswith("$k_{p}$: error")
+
+
+@pytest.mark.parametrize(
+    ("bound", "inside"),
+    [(0.05, [False, True, True, False]), (0.5, [True] * 4), (np.nan, [False, True, True, False])],
+)
+def test_the_basin_of_the_truth_is_as_wide_as_noise_makes_it(
+    bound: float, inside: list[bool]
+) -> None:
+    values = 10.0 * np.array([0.4, 0.6, 1.9, 2.1])
+    assert stage.in_basin(values, 10.0, bound).tolist() == inside
+
+
+def test_a_damaged_sweep_is_named(maps: HeatMaps, tmp_path: Path) -> None:
+    (tmp_path / f"{CASE}.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(BiogripError, match=r"endothelial_cell.csv, line 1: wanted the columns"):
+        robustness(maps, tmp_path / f"{CASE}.csv")

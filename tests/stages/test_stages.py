@@ -1,0 +1,138 @@
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.experiment.protocol import Phase, hold
+from biogrip.experiment.sample import MODELS, Sample
+from biogrip.experiment.sampling import Sampling
+from biogrip.instrument.gripper import GRIPPER
+from biogrip.records.identifications import columns
+from biogrip.records.rows import write_rows
+from biogrip.records.traces import read_jaw_force, read_measurements, read_target
+from biogrip.stages import identifications, recording, target
+from biogrip.traces.columns import Columns
+from tests.helpers.default import STUDY, seen
+from tests.helpers.places import EXAMPLE
+
+
+def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
+    return seen(
+        name="Drop",
+        instrument=GRIPPER,
+        gripper=STUDY.gripper,
+        phases=(hold(100.0, torque_Nm), *more),
+        averaged=(hold(100.0, torque_Nm), *more),
+        sampling=Sampling(rate_Hz=1.0),
+        sample=Sample("maxwell"),
+        parameters={"k": 1.0, "c": 1.0},
+        nonlinear_target=False,
+        unilateral=unilateral,
+        stroke_rad=0.0785,
+    )
+
+
+def test_arms_cannot_turn_further_than_their_combs(tmp_path: Path) -> None:
+    with pytest.raises(
+        BiogripError, match=r"turns the arms by 90.\d+ mrad, allowed is .* 78.5 mrad"
+    ):
+        target.simulate(drop(4e-8), tmp_path / "t.csv")
+    assert not list(tmp_path.iterdir())
+    target.simulate(drop(3e-8), tmp_path / "t.csv")
+    assert len((tmp_path / "t.csv").read_text().splitlines()) == 102
+
+
+def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "t.csv"
+    target.simulate(drop(1e-9), file)
+    assert capsys.readouterr().out == ""
+    target.simulate(drop(1e-9, hold(100.0, 1e-10)), file)
+    said = capsys.readouterr()
+    assert "biogrip: warning: Drop: under this protocol the jaws would have to pull" in said.out
+    assert "from 100 s on" in said.err
+    time_s, _, force = read_jaw_force(file)
+    assert np.all(force[time_s < 100] >= 0)
+    assert force[time_s > 100].max() < 0
+    bilateral = read_target(file)[2]
+    target.simulate(drop(1e-9, hold(100.0, 1e-10), unilateral=True), file)
+    assert "contact is lost there, which its identification ignores" in capsys.readouterr().out
+    time_s, _, force = read_jaw_force(file)
+    assert np.all(force[time_s > 100] == 0)
+    rotation = read_target(file)[2]
+    # Left to their hinges, the arms open at once.
+    np.testing.assert_allclose(rotation[time_s > 100], 1e-10 / 4.4e-7, rtol=1e-8)
+    # Below 100 s only inertia differs, by less than 4e-6 of the peak.
+    until = (time_s > 0) & (time_s < 100)
+    np.testing.assert_allclose(
+        rotation[until], bilateral[until], rtol=0, atol=1e-5 * rotation.max()
+    )
+
+
+def test_rows_of_a_recording_without_a_number_are_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = STUDY.cases["liquid_drop_2"]
+    columns = Columns("time_s", "rotation_rad")
+    read = seen(gripper=case.gripper, problem=case.problem, columns=columns)
+    # The example is a trace of this gripper under this protocol.
+    text, rows = EXAMPLE.read_text(), 1 + np.arange(3) / 10
+    for gaps in ("", "".join(f"{400 + row:g},nan\n" for row in rows)):
+        trace, made = tmp_path / "trace.csv", tmp_path / "made.parquet"
+        trace.write_text(text + gaps)
+        recording.record(read, trace, made)
+        samples = len(read_measurements(made).time_s)
+        said = capsys.readouterr().out
+        warned = f"{trace}: Left out for want of a number: 3 rows of {samples + 3}."
+        assert (warned in said) == bool(gaps)
+        assert np.isfinite(read_measurements(made).rotation_rad[0]).all()
+
+
+def test_what_is_left_from_a_larger_study_is_not_joined(tmp_path: Path) -> None:
+    """Methods may have batches that end at different seeds; their files then have as many rows."""
+    model = MODELS["maxwell"]
+    batches = [tmp_path / name for name in "abc"]
+    case = seen(sample=Sample("maxwell"), seeds=3, study=seen(methods=["x", "y"]))
+
+    def written(seeds: Sequence[Sequence[int]]) -> None:
+        for batch, method, some in zip(batches, "xxy", seeds, strict=True):
+            rows = [("drop", method, seed, *range(len(columns(model)) - 3)) for seed in some]
+            write_rows(batch.with_suffix(".csv"), columns(model), rows)
+            values = {"method": [method] * len(some), "seed": list(some)}
+            pd.DataFrame(values).to_parquet(batch.with_suffix(".parquet"))
+
+    def joined() -> tuple[pd.DataFrame, pd.DataFrame]:
+        files, histories = ([b.with_suffix(s) for b in batches] for s in (".csv", ".parquet"))
+        made, history = tmp_path / "all.csv", tmp_path / "all.parquet"
+        identifications.join(case, files, histories, made, history)
+        return pd.read_csv(made), pd.read_parquet(history)
+
+    written(((0, 1), (2, 3), (0, 1, 2)))
+    for found in joined():
+        assert list(zip(found["method"], found["seed"], strict=True)) == [
+            (method, seed) for method in "xy" for seed in range(3)
+        ]
+    written(((0, 1), (1, 2), (0, 1, 2)))
+    with pytest.raises(BiogripError, match="do not hold each of the seeds 0 to 2 once for each"):
+        joined()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_target_that_is_not_finite_is_refused_where_it_arises(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, value: float
+) -> None:
+    def odd(*_: object, **__: object) -> Array:
+        return np.where(np.arange(101) < 7, 1e-5, value)[None]
+
+    monkeypatch.setattr(target, "simulated_rotation", odd)
+    with pytest.raises(BiogripError) as error:
+        target.simulate(drop(1e-9), tmp_path / "t.csv")
+    said = str(error.value)
+    assert f"the simulated rotation of Maxwell liquid with k = 1, c = 1 is {value} at 7 s" in said
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,59 @@
+from textwrap import dedent
+
+import pytest
+
+from biogrip.tables.contact_loss import contact_loss, linear_cases
+from biogrip.tables.layout import Cell
+from tests.helpers.default import study_of
+
+
+def rows_of(overlay: str) -> dict[tuple[Cell, Cell], dict[str, Cell]]:
+    study = study_of(f"seeds: 3\n{dedent(overlay)}")
+    found = contact_loss(study.of(linear_cases(study)))
+    names = [column.name for column in found.columns]
+    rows = [dict(zip(names, row, strict=True)) for row in found.rows]
+    return {(row["case"], row["quantity"]): row for row in rows}
+
+
+def number(value: Cell) -> float:
+    assert isinstance(value, float)
+    return value
+
+
+def test_what_nobody_notices_is_taken_for_the_sample() -> None:
+    found = rows_of(
+        """
+        least_squares: {candidates: 200, starts: 4}
+        cases: {bent: {sample: {model: damper, c_p: 9.0}, models: {target: nonlinear}}}
+        """
+    )
+    # The cell is pressed throughout, and what is not linear is left out.
+    assert {case for case, _ in found} == {"liquid_drop_1", "liquid_drop_2"}
+    for case in ("liquid_drop_1", "liquid_drop_2"):
+        total, misfit = found[case, "c + c_p"], found[case, "misfit"]
+        assert total["lost_at_s"] == pytest.approx(200)
+        # Of 2001 samples with 10 % noise the sum is known to 1 %; four times that is allowed.
+        assert number(total["held"]) == pytest.approx(10, rel=0.03)
+        assert number(total["until_lost"]) == pytest.approx(10, rel=0.04)
+        assert number(total["error_percent"]) > 30
+        assert number(misfit["let_go"]) > 1.4
+        assert number(misfit["until_lost"]) == pytest.approx(1, abs=0.02)
+
+
+def test_a_sample_that_is_lost_at_once_tells_nothing() -> None:
+    found = rows_of(
+        """
+        measurement: {rate_Hz: 0.1}
+        cases:
+          endothelial_cell: null
+          liquid_drop_1: null
+          liquid_drop_2: null
+          brief:
+            sample: {model: damper, c_p: 9.0}
+            protocol:
+              phases:
+                - {duration_s: 5, torque_Nm: 1.6e-9}
+                - {duration_s: 300, torque_Nm: 0}
+        """
+    )
+    assert found["brief", "c_p"]["until_lost"] is None

@@ -1,0 +1,136 @@
+"""Coverage of intervals and of verdicts, counted by hand."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import f
+
+from biogrip.records.intervals import INTERVALS
+from biogrip.records.traces import write_target
+from biogrip.response.simulation import simulated_rotation
+from biogrip.stages import intervals as stage
+from biogrip.tables.coverage import coverage
+from biogrip.tables.verdict_counts import verdict_counts
+from tests.helpers.default import study_of
+
+CASE = "liquid_drop_2"
+OVERLAY = """
+measurement: {rate_Hz: 1.0}
+identifiability: {confidence: 0.9}
+cases: {endothelial_cell: null, liquid_drop_1: null}
+"""
+
+
+@pytest.fixture
+def target(tmp_path: Path) -> Path:
+    case = study_of(OVERLAY).cases[CASE]
+    problem = case.problem
+    time_s = case.sampling.over(problem.torque.end_s)
+    network = problem.model.network(np.array([list(case.parameters.values())]))
+    rotation = simulated_rotation(
+        problem.gripper, network, problem.torque, time_s, nonlinear=False
+    )[0]
+    path = tmp_path / "target.csv"
+    nothing = np.zeros_like(time_s)
+    write_target(path, time_s, nothing, rotation, nothing)
+    return path
+
+
+def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> None:
+    rows = [
+        # Of k = 1 three intervals, two of which hold it; two seeds judged in full.
+        (CASE, "k", 0, 1.01, 0.9, 1.1, 1.0, "determined", 1.005, 1.2),
+        (CASE, "k", 1, 1.02, 0.9, 1.2, 1.01, "", "", ""),
+        (CASE, "k", 10, 1.3, 1.1, 1.5, 1.0, "bounded below", 0.95, ""),
+        # c_p = 1e-3 is only judged in full.
+        (CASE, "c_p", 0, 0.1, "", "", "", "bounded above", "", 0.5),
+        (CASE, "c_p", 10, 0.1, "", "", "", "bounded above", "", 0.5e-3),
+        # k_p = 1e-4 is below the range that is searched, and the limit between the two.
+        (CASE, "k_p", 0, 0.1, "", "", "", "bounded above", "", 1.05e-4),
+        # Of c nothing is said.
+        (CASE, "c", 0, 0.1, "", "", "", "not determined", "", ""),
+    ]
+    INTERVALS.write(tmp_path / "i.csv", rows)
+    made = coverage(study_of(OVERLAY), [target], [tmp_path / "i.csv"], [])
+    names = [column.name for column in made.columns]
+    found = {row[1]: dict(zip(names, row, strict=True)) for row in made.rows}
+    assert list(found) == ["k", "k_p", "c_p"]
+    assert (found["k_p"]["target"], found["k_p"]["shown_one_sided_true"]) == (1e-4, 1)
+    k, c_p = found["k"], found["c_p"]
+    assert (k["seeds"], k["confidence_percent"]) == (3, 90.0)
+    assert k["coverage_percent"] == pytest.approx(100 * 2 / 3)
+    assert k["bias_percent"] == pytest.approx(100 * np.mean(np.log([1.01, 1.02, 1.3])))
+    shown = ["shown_seeds", "shown_determined", "shown_determined_true"]
+    shown += ["shown_one_sided", "shown_one_sided_true"]
+    assert [k[name] for name in shown] == [2, 1, 0, 1, 1]
+    assert [c_p[name] for name in shown] == [2, 0, 0, 2, 1]
+    assert c_p["bound_percent"] is None
+    assert "95" not in made.caption
+
+
+def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
+    """Intervals of shares by the F distribution, as Clopper and Pearson's are in textbooks."""
+    empty = ("", "", "", "")
+    rows = [
+        # Of k = 1 two intervals within a factor of 3, one of which holds it, and one that is wider.
+        (CASE, "k", 0, *empty, "determined", 0.9, 1.1),
+        (CASE, "k", 1, *empty, "determined", 1.1, 1.2),
+        (CASE, "k", 2, *empty, "determined", 0.2, 2.0),
+        (CASE, "k", 3, *empty, "bounded above", "", 0.99),
+        (CASE, "k", 4, *empty, "not determined", "", ""),
+        # Not judged in full.
+        (CASE, "k", 5, 1.0, 0.9, 1.1, 1.0, "", "", ""),
+    ]
+    INTERVALS.write(tmp_path / "i.csv", rows)
+    made = verdict_counts(study_of(OVERLAY), [tmp_path / "i.csv"])
+    names = [column.name for column in made.columns]
+    found = {row[4]: dict(zip(names, row, strict=True)) for row in made.rows}
+    assert list(found) == ["bounded above", "determined", "not determined"]
+    assert [row["reached"] for row in found.values()] == [1, 3, 1]
+    assert {row["seeds"] for row in found.values()} == {5}
+    assert [row["true"] for row in found.values()] == [0, 2, None]
+    assert [row["narrow"] for row in found.values()] == [None, 2, None]
+    determined = found["determined"]
+    for count, tried, name in ((3, 5, "reached"), (2, 3, "true")):
+        more = tried - count + 1
+        low = 1 / (1 + more / (count * f.isf(0.975, 2 * count, 2 * more)))
+        odds = (count + 1) / (tried - count) * f.isf(0.025, 2 * (count + 1), 2 * (tried - count))
+        assert determined[f"{name}_from_percent"] == pytest.approx(100 * low)
+        assert determined[f"{name}_to_percent"] == pytest.approx(100 * odds / (1 + odds))
+    assert "at 90 %" in made.caption
+
+
+@pytest.mark.parametrize(("every", "judged"), [(1, [9, 10, 11]), (10, [10])])
+def test_some_seeds_are_judged_in_full(
+    tmp_path: Path, target: Path, every: int, judged: list[int]
+) -> None:
+    overlay = OVERLAY.replace("0.9}", f"0.9, verdicts_every: {every}}}")
+    expected = tmp_path / "expected.json"
+    expected.write_text('{"quantities": [], "trades": [], "notes": [], "fit": "ok"}')
+    case = study_of(overlay).case(CASE)
+    stage.estimate(case, range(9, 12), target, expected, [], tmp_path / "i.csv")
+    found = INTERVALS.read(tmp_path / "i.csv")
+    assert found["seed"].drop_duplicates().tolist() == judged
+    assert found["verdict"].notna().all()
+
+
+def test_one_in_25_seeds_is_judged_in_full(tmp_path: Path, target: Path) -> None:
+    """Whatever the batch, and with the limits that whole profiles have."""
+    study = study_of(OVERLAY)
+    expected = tmp_path / "expected.json"
+    expected.write_text(
+        '{"quantities": [{"quantity": "k", "verdict": "determined"}], "trades": [], "notes": [], '
+        '"fit": "ok"}'
+    )
+    stage.estimate(study.case(CASE), range(24, 27), target, expected, [], tmp_path / "i.csv")
+    found = INTERVALS.read(tmp_path / "i.csv")
+    judged = found[found["verdict"].notna()]
+    assert judged["seed"].tolist() == [25] * 5
+    assert judged["quantity"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"]
+    assert found["seed"].tolist() == [24, *[25] * 5, 26]
+    assert judged["low"].notna().tolist() == [True, False, False, False, False]
+    k = judged.iloc[0]
+    # There is but one basin.
+    assert k["shown_low"] == pytest.approx(k["low"], rel=1e-3)
+    assert k["shown_high"] == pytest.approx(k["high"], rel=1e-3)

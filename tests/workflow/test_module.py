@@ -1,0 +1,130 @@
+"""The study as a module of somebody else's workflow, and deployed from a clone."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.helpers.places import ROOT
+from tests.helpers.runs import TINY, Run
+
+ONE_CASE = {
+    "methods": ["genetic"],
+    "identifiability": {"coverage_seeds": 0},
+    "only": ["liquid_drop_2"],
+}
+CONFIG = {key: value for key, value in TINY.items() if key != "cases"} | ONE_CASE
+ERRORS = "results/tables/errors_liquid_drop_2.csv"
+MODULE = f"""
+module biogrip:
+    snakefile: {str(ROOT / "workflow" / "Snakefile")!r}
+"""
+OWN_RULE = """
+rule mine:
+    output: "mine.txt"
+    shell: "command -v python > {output}"
+"""
+
+
+def host(folder: Path, text: str, *arguments: str) -> Run:
+    """Run a Snakefile of the host's in a folder."""
+    (folder / "Snakefile").write_text(text)
+    command = [sys.executable, "-m", "snakemake", "-j2", "--workflow-profile", "none"]
+    done = subprocess.run(
+        [*command, *arguments],
+        cwd=folder,
+        env={**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=600,
+    )
+    return Run(done.returncode, done.stdout)
+
+
+def test_without_config_it_is_the_papers_study(tmp_path: Path) -> None:
+    text = MODULE + "use rule * from biogrip as biogrip_*\n"
+    run = host(tmp_path, text, "-n", "--quiet", "rules", "--", "biogrip_all")
+    assert run.status == 0, run.output
+    for rule in ("biogrip_claims", "biogrip_identification"):
+        assert rule in run.output
+
+
+def test_rules_are_used_twice_and_changed_and_the_host_is_as_it_was(tmp_path: Path) -> None:
+    """With a config of the host's, and resources and outputs of its own."""
+    text = f"""
+config["lab"] = {{"seeds": 1}}
+BEFORE = dict(config)
+{MODULE}
+    config: {CONFIG!r}
+
+use rule * from biogrip as biogrip_*
+
+use rule identification from biogrip as biogrip_identification with:
+    resources: mem_mb=4321
+
+use rule target from biogrip as biogrip_target with:
+    output: target="elsewhere/{{case}}.csv"
+
+assert config == BEFORE
+{OWN_RULE}"""
+    made = "elsewhere/liquid_drop_2.csv"
+    run = host(tmp_path, text, "--", made)
+    assert run.status == 0, run.output
+    assert (tmp_path / made).is_file()
+    assert not (tmp_path / "results/targets").exists()
+
+
+def test_a_prefix_is_where_jobs_write(tmp_path: Path) -> None:
+    text = f"""{MODULE}
+    config: {CONFIG!r}
+    prefix: "sub"
+
+use rule * from biogrip as biogrip_*
+
+use rule identification from biogrip as biogrip_identification with:
+    resources: mem_mb=4321
+    message: "Identifying with {{resources.mem_mb}} MB"
+{OWN_RULE}"""
+    run = host(tmp_path, text, "--", f"sub/{ERRORS}", "mine.txt")
+    assert run.status == 0, run.output
+    assert "Identifying with 4321 MB" in run.output
+    assert (tmp_path / "sub" / ERRORS).is_file()
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        *(".snakemake", "Snakefile", "mine.txt", "sub")
+    ]
+    # The host's rules find what they found before.
+    assert (tmp_path / "mine.txt").read_text().strip() == shutil.which(
+        "python", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    )
+
+
+def test_a_wrong_value_in_a_module_is_one_message(tmp_path: Path) -> None:
+    text = f"{MODULE}    config: {{'seedz': 2}}\n\nuse rule * from biogrip as biogrip_*\n"
+    run = host(tmp_path, text, "-n")
+    assert run.status == 1
+    assert "seedz: unknown key. Did you mean 'seeds'?" in run.output
+    assert "Traceback" not in run.output
+
+
+@pytest.mark.nightly
+def test_it_is_deployed_from_a_clone_and_runs_a_case(tmp_path: Path) -> None:
+    """By snakedeploy, as the catalogue of workflows tells its readers to."""
+    pytest.importorskip("snakedeploy")
+    clone, place = tmp_path / "clone", tmp_path / "place"
+    subprocess.run(["git", "clone", "-q", str(ROOT), str(clone)], check=True)
+    branch = subprocess.run(
+        ["git", "branch", "--show-current"], cwd=clone, capture_output=True, text=True, check=True
+    ).stdout.strip()
+    deploy = [Path(sys.executable).with_name("snakedeploy"), "deploy-workflow", clone, place]
+    subprocess.run([*map(str, deploy), "--branch", branch], check=True)
+    (place / "config" / "config.yaml").write_text(yaml.safe_dump(CONFIG))
+    text = (place / "workflow" / "Snakefile").read_text()
+    for arguments in (("-n",), ("--", ERRORS)):
+        run = host(place, text, *arguments)
+        assert run.status == 0, run.output
+    assert (place / ERRORS).is_file()

@@ -1,0 +1,105 @@
+"""The figures: of each case with its summary, and of the study; and the page with all of them."""
+
+
+def case_figures(simulated, valley):
+    """The files of the figures of a case, and its summary."""
+    drawn = case_figure_names(simulated, valley)
+    summary = shown("results/summaries/{case}.html", "pages", "summary", "{case}")
+    return [*(file for name in drawn for file in figure(name, "{case}")), summary]
+
+
+# Of a recorded trace nobody knows the target; a valley has who searches for c and c_p.
+rule case_figures:
+    input:
+        identifications="results/identifications/{case}.csv",
+        history="results/histories/{case}.parquet",
+        measurements=of_case("results/measurements/{case}/{batch}.parquet"),
+        verdicts="results/identifiability/{case}.json",
+        expected=only_of(STUDY.simulated, "results/identifiability/expected/{case}.json"),
+        target=only_of(STUDY.simulated, "results/targets/{case}.csv"),
+        calibrated=calibration_of,
+    output:
+        *case_figures(simulated=True, valley=True),
+    log:
+        "results/logs/case_figures/{case}.log",
+    wildcard_constraints:
+        case=names(case for case in STUDY.simulated if STUDY.case(case).has_valley),
+    params:
+        **settings_of(
+            *"title methods seeds published evaluation contact genetic_algorithm".split(),
+            *("identifiability.confidence", "measurement.noise", *PROBLEM),
+        ),
+    message:
+        "Drawing {wildcards.case}"
+    script:
+        "../scripts/case_figures.py"
+
+
+use rule case_figures as case_figures_without_valley with:
+    output:
+        *case_figures(simulated=True, valley=False),
+    wildcard_constraints:
+        case=names(case for case in STUDY.simulated if not STUDY.case(case).has_valley),
+
+
+use rule case_figures as recorded_case_figures with:
+    output:
+        *case_figures(simulated=False, valley=True),
+    wildcard_constraints:
+        case=names(case for case in STUDY.recorded if STUDY.case(case).has_valley),
+
+
+use rule case_figures as recorded_case_figures_without_valley with:
+    output:
+        *case_figures(simulated=False, valley=False),
+    wildcard_constraints:
+        case=names(case for case in STUDY.recorded if not STUDY.case(case).has_valley),
+
+
+rule figures:
+    input:
+        identifications=files("results/identifications/{case}.csv", STUDY.simulated),
+        targets=files("results/targets/{case}.csv", STUDY.simulated),
+        expected=files("results/identifiability/expected/{case}.json", STUDY.simulated),
+        measurements=files("results/measurements/{case}/{batch}.parquet", STUDY.simulated[:1]),
+        calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
+        differences="results/linearisation.csv" if STUDY.gripped else [],
+    output:
+        [file for name in FIGURES for file in figure(name)],
+    log:
+        "results/logs/figures.log",
+    params:
+        **settings_of(*WHOLE),
+    message:
+        "Drawing the figures of the study"
+    script:
+        "../scripts/figures.py"
+
+
+rule page:
+    input:
+        captions=[
+            workflow.source_path(f"../report/{kind}/{name}.rst")
+            for kind, items in SHOWN.items()
+            for name in dict.fromkeys(name for name, _ in items)
+        ],
+        figures=made("figures", ".png"),
+        tables=made("tables", ".html"),
+        downloads=made("tables", ".csv"),
+        identifications=files("results/identifications/{case}.csv", STUDY.cases),
+        verdicts=files("results/identifiability/{case}.json", STUDY.cases),
+        measurements=first_traces(STUDY.cases),
+        calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
+    output:
+        page=shown("results/report.html", "pages", "report", ""),
+    log:
+        "results/logs/page.log",
+    params:
+        **settings_of(
+            *(field.name for field in fields(StudyConfig) if field.name != "cases"),
+            *keys_of_cases(STUDY),
+        ),
+    message:
+        "Writing the page of the study"
+    script:
+        "../scripts/page.py"

@@ -1,0 +1,116 @@
+"""What only some configs have: sweeps, interpretations of the paper, and tables of recorded traces."""
+
+from biogrip.experiment.sample import SINGLE_BRANCH
+from biogrip.identify.table_of_traces import read_table
+
+# Simulated cases whose model has the paper's parameters, and what is read of each.
+OURS = {parameter.name for parameter in SINGLE_BRANCH}
+INTERPRETED_CASE = ["actuator", *(field.name for field in fields(CaseBlock))]
+INTERPRETED = [n for n in STUDY.simulated if set(STUDY.case(n).sample.model.names) <= OURS]
+
+
+def points(sweep):
+    """The names of the points of a sweep, cases of their own that the rules of the study identify."""
+    block = STUDY.sweeps[sweep]
+    return [point.name for case in block.cases for point in block.points(sweep, case)]
+
+
+rule sweep:
+    input:
+        identifications=lambda wildcards: files(
+            "results/identifications/{case}/{method}/{batch}.csv", points(wildcards.sweep)
+        ),
+        calibrated=lambda wildcards: files(
+            "results/calibrations/{case}.yaml",
+            [name for name in points(wildcards.sweep) if name in CALIBRATED],
+        ),
+    output:
+        points="results/robustness/{sweep}.csv",
+        table=table("robustness", "{sweep}"),
+        figure=figure("robustness", "{sweep}"),
+    log:
+        "results/logs/sweep/{sweep}.log",
+    params:
+        **settings_of("sweeps", *WHOLE),
+    message:
+        "Judging and drawing the sweep {wildcards.sweep}"
+    script:
+        "../scripts/sweep.py"
+
+
+rule interpretations_of_case:
+    input:
+        target="results/targets/{case}.csv",
+    output:
+        rows="results/interpretations/{case}.csv",
+    log:
+        "results/logs/interpretations_of_case/{case}.log",
+    resources:
+        runtime=120,
+    params:
+        **settings_of("study_seed", "seeds", "interpretations", *INTERPRETED_CASE),
+    message:
+        "Identifying {wildcards.case} under every interpretation of the paper"
+    script:
+        "../scripts/interpretations_of_case.py"
+
+
+rule interpretations:
+    input:
+        found=files("results/interpretations/{case}.csv", INTERPRETED),
+    output:
+        apart=table("interpretations"),
+        jointly=table("interpretations_jointly"),
+    log:
+        "results/logs/interpretations.log",
+    params:
+        **settings_of("interpretations", "evaluation", *keys_of_cases(STUDY)),
+    message:
+        "Comparing the interpretations of the paper"
+    script:
+        "../scripts/interpretations.py"
+
+
+if STUDY.traces:
+    ROWS = usable(read_table, Path(STUDY.traces.table))
+
+    def rows_of(wildcards):
+        """The rows of the table that a batch has, as `biogrip identify --rows` chooses them."""
+        first, last = map(int, wildcards.rows.split("-"))
+        return ROWS[first : last + 1]
+
+    # Batches have fixed rows, so that more rows redo the last at most.
+    rule traces_batch:
+        input:
+            lambda wildcards: [str(row.file) for row in rows_of(wildcards) if row.file.is_file()],
+            config=STUDY.traces.config or [],
+            table=ancient(STUDY.traces.table),
+        output:
+            found="results/traces/batches/{rows}.csv",
+        log:
+            "results/logs/traces_batch/{rows}.log",
+        resources:
+            runtime=120,
+        params:
+            **settings_of(),
+            model=STUDY.traces.model,
+            rows=lambda wildcards: [[str(r.file), r.settings, r.copied] for r in rows_of(wildcards)],
+        message:
+            "Identifying the traces in rows {wildcards.rows} of {input.table}"
+        script:
+            "../scripts/traces_batch.py"
+
+    rule traces:
+        input:
+            batches=[
+                f"results/traces/batches/{first}-{first + STUDY.traces.rows_a_batch - 1}.csv"
+                for first in range(0, len(ROWS), STUDY.traces.rows_a_batch)
+            ],
+        output:
+            table="results/tables/traces.csv",
+        log:
+            "results/logs/traces.log",
+        message:
+            "Putting together the tables of all traces"
+        script:
+            "../scripts/traces.py"

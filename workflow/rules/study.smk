@@ -1,0 +1,158 @@
+"""The stages, from the response of a case to what its traces tell."""
+
+
+rule target:
+    output:
+        target="results/targets/{case}.csv",
+    log:
+        "results/logs/target/{case}.log",
+    wildcard_constraints:
+        case=names(SIMULATED),
+    params:
+        **settings_of(
+            *"instrument gripper actuator protocol sample fixed contact models".split(),
+            *("measurement.rate_Hz", "measurement.times_s", "measurement.bursts"),
+        ),
+    message:
+        "Simulating the response of {wildcards.case}"
+    script:
+        "../scripts/target.py"
+
+
+# A recorded trace takes the place of target and measurement (rule `recording`).
+rule measurement:
+    input:
+        target="results/targets/{case}.csv",
+    output:
+        measurements="results/measurements/{case}/{batch}.parquet",
+    log:
+        "results/logs/measurement/{case}/{batch}.log",
+    wildcard_constraints:
+        case=names(SIMULATED),
+    params:
+        **settings_of("study_seed", "measurement.noise"),
+    message:
+        "Adding noise to {wildcards.case}, {wildcards.batch}"
+    script:
+        "../scripts/measurement.py"
+
+
+rule recording:
+    input:
+        recorded=lambda wildcards: STUDY.case(wildcards.case).file,
+    output:
+        measurements="results/measurements/{case}/seeds_0-0.parquet",
+    log:
+        "results/logs/recording/{case}.log",
+    wildcard_constraints:
+        case=names(STUDY.recorded),
+    params:
+        **settings_of(*PROBLEM),
+    message:
+        "Reading the recorded trace of {wildcards.case}"
+    script:
+        "../scripts/recording.py"
+
+
+rule calibration:
+    output:
+        gripper="results/calibrations/{case}.yaml",
+        records="results/calibrations/{case}.parquet",
+    log:
+        "results/logs/calibration/{case}.log",
+    params:
+        **settings_of("study_seed", "calibration", "instrument", "gripper", "protocol", "sample"),
+    message:
+        "Calibrating the gripper of {wildcards.case} without a sample"
+    script:
+        "../scripts/calibration.py"
+
+
+rule identification:
+    input:
+        measurements="results/measurements/{case}/{batch}.parquet",
+        calibrated=calibration_of,
+    output:
+        parameters="results/identifications/{case}/{method}/{batch}.csv",
+        history="results/histories/{case}/{method}/{batch}.parquet",
+        timing="results/timings/{case}/{method}/{batch}.csv",
+    log:
+        "results/logs/identification/{case}/{method}/{batch}.log",
+    resources:
+        runtime=120,
+    params:
+        **settings_of("study_seed", *PROBLEM),
+        method=method_settings,
+    message:
+        "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
+    script:
+        "../scripts/identification.py"
+
+
+rule judgement:
+    input:
+        measurements=lambda wildcards: first_traces([wildcards.case]),
+        target=only_of(STUDY.simulated, "results/targets/{case}.csv"),
+        calibrated=calibration_of,
+    output:
+        verdicts="results/identifiability/{case}.json",
+        expected="results/identifiability/expected/{case}.json",
+    log:
+        "results/logs/judgement/{case}.log",
+    wildcard_constraints:
+        case=names(STUDY.simulated),
+    resources:
+        runtime=60,
+    params:
+        **settings_of("study_seed", *JUDGED),
+    message:
+        "Computing confidence limits for the first trace of {wildcards.case}"
+    script:
+        "../scripts/judgement.py"
+
+
+# Without a target nobody knows what to expect.
+use rule judgement as recorded_judgement with:
+    output:
+        verdicts="results/identifiability/{case}.json",
+    wildcard_constraints:
+        case=names(STUDY.recorded),
+
+
+rule intervals:
+    input:
+        target="results/targets/{case}.csv",
+        expected="results/identifiability/expected/{case}.json",
+        calibrated=calibration_of,
+    output:
+        intervals="results/coverage/{case}/{batch}.csv",
+    log:
+        "results/logs/intervals/{case}/{batch}.log",
+    wildcard_constraints:
+        case=names(STUDY.covered),
+    resources:
+        runtime=120,
+    params:
+        **settings_of("study_seed", *JUDGED, "identifiability.verdicts_every"),
+    message:
+        "Estimating intervals of {wildcards.case}, {wildcards.batch}"
+    script:
+        "../scripts/intervals.py"
+
+
+rule model_fits:
+    input:
+        measurements="results/measurements/{case}/{batch}.parquet",
+        calibrated=calibration_of,
+    output:
+        fits="results/selection/{case}/{batch}.csv",
+    log:
+        "results/logs/model_fits/{case}/{batch}.log",
+    resources:
+        runtime=60,
+    params:
+        **settings_of("study_seed", *PROBLEM, "model_selection", "least_squares"),
+    message:
+        "Fitting every sample model to {wildcards.case}, {wildcards.batch}"
+    script:
+        "../scripts/model_fits.py"

@@ -1,0 +1,94 @@
+"""The tables: of each case with the identifications they are of, and of the study."""
+
+
+rule case_tables:
+    input:
+        batches=of_case("results/identifications/{case}/{method}/{batch}.csv"),
+        histories=of_case("results/histories/{case}/{method}/{batch}.parquet"),
+        verdicts="results/identifiability/{case}.json",
+        expected=only_of(STUDY.simulated, "results/identifiability/expected/{case}.json"),
+    output:
+        identifications="results/identifications/{case}.csv",
+        history="results/histories/{case}.parquet",
+        errors=table("errors", "{case}"),
+        verdicts=table("verdicts", "{case}"),
+    log:
+        "results/logs/case_tables/{case}.log",
+    wildcard_constraints:
+        case=names(STUDY.cases),
+    params:
+        **settings_of("title", "seeds", "methods", "published", *PROBLEM, "evaluation"),
+    message:
+        "Writing the tables of {wildcards.case}"
+    script:
+        "../scripts/case_tables.py"
+
+
+rule model_errors:
+    output:
+        differences="results/linearisation.csv",
+        contact_loss=table("contact_loss"),
+    log:
+        "results/logs/model_errors.log",
+    params:
+        **settings_of(
+            *("study_seed", "seeds", "actuator"),
+            *keys_of_cases(STUDY, *PROBLEM, "measurement.noise", "contact", "least_squares"),
+        ),
+    message:
+        "Comparing the linear model with the nonlinear one, and with loss of contact"
+    script:
+        "../scripts/model_errors.py"
+
+
+rule tables:
+    input:
+        errors=files("results/tables/errors_{case}.csv", STUDY.cases),
+        times=files("results/timings/{case}/{method}/{batch}.csv", STUDY.cases),
+        fits=files("results/selection/{case}/{batch}.csv", SELECTING),
+        identifications=files("results/identifications/{case}.csv", STUDY.cases),
+        targets=files("results/targets/{case}.csv", STUDY.simulated),
+        intervals=files("results/coverage/{case}/{batch}.csv", STUDY.covered),
+        measurements=files("results/measurements/{case}/{batch}.parquet", STUDY.cases),
+        calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
+        differences="results/linearisation.csv" if STUDY.gripped else [],
+    output:
+        [file for name in TABLES for file in table(name)],
+        # Not in tables/, since times are not reproducible.
+        multiext("results/timings", ".csv", ".md", ".tex"),
+        shown("results/timings.html", "tables", "timings", ""),
+    log:
+        "results/logs/tables.log",
+    params:
+        **settings_of(*WHOLE, "model_selection"),
+    message:
+        "Writing the tables of the study"
+    script:
+        "../scripts/tables.py"
+
+
+rule claims:
+    input:
+        identifications=files("results/identifications/{case}.csv", STUDY.published),
+        histories=files("results/histories/{case}.parquet", STUDY.published),
+        tables=[f"results/tables/{name}.csv" for name in TABLES]
+        + files("results/tables/verdicts_{case}.csv", STUDY.cases),
+        # As published, since these sweeps take longer than the study.
+        sweeps=[
+            str(shipped(f"results/published/{overlay}/tables/{name}.csv"))
+            for overlay, name in (
+                ("robustness", "robustness_noise"),
+                ("robustness", "robustness_gripper"),
+                ("interpretations", "interpretations"),
+            )
+        ],
+    output:
+        *table("claims"),
+    log:
+        "results/logs/claims.log",
+    params:
+        **settings_of(*WHOLE),
+    message:
+        "Judging the claims of the paper"
+    script:
+        "../scripts/claims.py"

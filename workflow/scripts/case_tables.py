@@ -1,0 +1,17 @@
+"""Put together the identifications of a case, and write its tables."""
+
+from pathlib import Path
+
+from biogrip.stages.identifications import join
+from biogrip.stages.job import job_case, logged, paths
+from biogrip.tables.errors_of_case import errors_of_case
+from biogrip.tables.layout import write
+from biogrip.tables.verdicts import verdicts
+
+with logged(snakemake):
+    case, files, made = job_case(snakemake), snakemake.input, snakemake.output
+    identifications = Path(made.identifications)
+    join(case, paths(files.batches), paths(files.histories), identifications, Path(made.history))
+    write(errors_of_case(case, identifications), Path(made.errors[0]))
+    judged = verdicts(case, Path(files.verdicts), paths(files.expected))
+    write(judged, Path(made.verdicts[0]))

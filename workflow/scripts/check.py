@@ -1,0 +1,9 @@
+"""Compare regenerated tables with the published ones."""
+
+from pathlib import Path
+
+from biogrip.stages.job import logged, paths
+from biogrip.tables.comparison import compare
+
+with logged(snakemake):
+    print(compare(Path(snakemake.params.published), paths(snakemake.input.made)))

@@ -1,0 +1,9 @@
+"""Identify a case by the genetic algorithm under every interpretation of the paper."""
+
+from pathlib import Path
+
+from biogrip.stages.interpretations import read
+from biogrip.stages.job import job_case, logged
+
+with logged(snakemake):
+    read(job_case(snakemake), Path(snakemake.input.target), Path(snakemake.output.rows))

@@ -1,0 +1,13 @@
+"""Compare the linear model with the nonlinear one, and with one whose jaws cannot pull."""
+
+from pathlib import Path
+
+from biogrip.stages.job import job_study, logged
+from biogrip.stages.model_difference import compare
+from biogrip.tables.contact_loss import contact_loss, linear_cases
+from biogrip.tables.layout import write
+
+with logged(snakemake):
+    study = job_study(snakemake)
+    compare(study.of(study.gripped), Path(snakemake.output.differences))
+    write(contact_loss(study.of(linear_cases(study))), Path(snakemake.output.contact_loss[0]))

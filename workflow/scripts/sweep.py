@@ -1,0 +1,21 @@
+"""Judge what is identified at every point of a sweep, write it as a table, and draw it."""
+
+from pathlib import Path
+
+from biogrip.figures.robustness import draw
+from biogrip.figures.style import save, styled
+from biogrip.stages.job import job_study, logged, paths
+from biogrip.stages.sweep_points import judge
+from biogrip.tables.heat_maps import heat_maps
+from biogrip.tables.layout import write
+from biogrip.tables.robustness import robustness
+
+with logged(snakemake):
+    study, sweep = job_study(snakemake), snakemake.wildcards.sweep
+    identifications = paths(snakemake.input.identifications)
+    points = Path(snakemake.output.points)
+    judge(study, sweep, identifications, paths(snakemake.input.calibrated), points)
+    maps = heat_maps(study, sweep)
+    write(robustness(maps, points), Path(snakemake.output.table[0]))
+    with styled():
+        save(draw(maps, points), Path(snakemake.output.figure[0]))
