@@ -17,6 +17,7 @@ from biogrip.page.answers import (
     say_which_method_finds_it,
 )
 from biogrip.page.explorer import explorer
+from biogrip.page.page import entry_of
 from biogrip.records.identifications import read_identifications
 from biogrip.records.rows import read_table
 from biogrip.records.traces import read_measurements
@@ -207,6 +208,20 @@ def test_the_explorer_shows_the_judged_trace_and_its_fits(
         assert np.sqrt(np.mean(residual**2)) == pytest.approx(misfit, rel=1e-4)
     assert page.locator("canvas").count() == 0
     assert opened.problems == []
+
+
+@pytest.mark.parametrize(
+    ("stem", "name", "whose"),
+    [
+        ("errors_cell", "errors", "cell"),
+        ("errors_soft_cell", "errors", "soft_cell"),
+        ("contact_loss", "contact_loss", ""),
+    ],
+)
+def test_a_table_is_of_the_case_that_its_name_ends_with(stem: str, name: str, whose: str) -> None:
+    captions = {("tables", known): known for known in ("errors", "contact_loss", "contact")}
+    entry = entry_of(Path(f"results/tables/{stem}.csv"), ["cell", "soft_cell", "loss"], captions)
+    assert (entry.name, entry.whose, entry.caption) == (name, whose, name)
 
 
 def test_a_title_cannot_end_the_script() -> None:

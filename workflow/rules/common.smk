@@ -46,10 +46,7 @@ WHOLE += ["evaluation", "reconstructed", *keys_of_cases(STUDY)]
 
 
 def settings_of(*keys):
-    """Params that make a job run again if they change: keys of the config, and the software.
-
-    A key of the job's case goes before the study's.
-    """
+    """Params of keys of the config, the case's before the study's, and of the software."""
 
     def of(key):
         return lambda wildcards: settings(STUDY, [key], wildcards.get("case", ""))

@@ -103,14 +103,14 @@ def write(
     shown_tables: list[dict[str, Any]] = [
         {"entry": entry, "html": _table(path, entry.caption), "download": _download(csv)}
         for path, csv in zip(tables, downloads, strict=True)
-        for entry in [_entry(path, owners, texts)]
+        for entry in [entry_of(path, owners, texts)]
     ]
     errors, judged, compared = (
         [row for path in downloads if path.name.startswith(name) for row in read_table(path)]
         for name in ("errors.csv", "verdicts_", "methods.csv")
     )
     shown_figures = [
-        {"entry": _entry(path, owners, texts), "image": image}
+        {"entry": entry_of(path, owners, texts), "image": image}
         for path, image in zip(figures, _images(figures), strict=True)
     ]
     environment = jinja2.Environment(
@@ -147,14 +147,17 @@ def _source(name: str) -> str:
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
-def _entry(file: Path, owners: Sequence[str], texts: Mapping[tuple[str, str], str]) -> Entry:
+def entry_of(file: Path, owners: Sequence[str], texts: Mapping[tuple[str, str], str]) -> Entry:
     """Return the entry of a file that is named after what it shows, and its case or sweep.
 
     Captions are in folders named like those of the files.
     """
-    whose = next((name for name in owners if file.stem.endswith(f"_{name}")), "")
-    name = file.stem.removesuffix(f"_{whose}")
-    return Entry(name, whose, texts[file.parent.name, name], str(file))
+    kind, stem = file.parent.name, file.stem
+    # One name may end with another, and that of a figure with that of a case.
+    ends = sorted((name for name in owners if stem.endswith(f"_{name}")), key=len)
+    whose = "" if (kind, stem) in texts or not ends else ends[-1]
+    name = stem.removesuffix(f"_{whose}")
+    return Entry(name, whose, texts[kind, name], str(file))
 
 
 def _images(paths: Sequence[Path]) -> Iterable[str | None]:

@@ -28,13 +28,12 @@ if TYPE_CHECKING:
 _Part = TypeVar("_Part")
 
 
+# Attributes, with the type of what the function returns.
 def _of_case(part: Callable[["Case"], _Part]) -> cached_property[_Part]:
-    """Make an attribute of a case, with the type of what the function returns."""
     return cached_property(part)
 
 
 def _of_study(part: Callable[["Study"], _Part]) -> cached_property[_Part]:
-    """Make an attribute of a study, with the type of what the function returns."""
     return cached_property(part)
 
 
