@@ -99,3 +99,19 @@ def test_an_error_of_ours_ends_a_job_with_its_message_alone(
         raise BiogripError("a.csv: cannot be read.")
     assert ended.value.code == 1
     assert log.read_text() == "biogrip: a.csv: cannot be read.\n"
+
+
+def test_a_default_of_a_case_goes_before_what_the_study_has() -> None:
+    study = default.study_of(
+        """
+instrument: creep
+protocol: {phases: [{duration_s: 9, stress_Pa: 4}]}
+only: [liquid_drop_2]
+cases:
+  liquid_drop_2:
+    instrument: gripper
+    protocol: {phases: [{duration_s: 9, torque_Nm: 1.0e-9}]}
+"""
+    )
+    told_of = settings(study, ["instrument"], NAME)
+    assert case_of(NAME, told_of).block.instrument == study.case(NAME).block.instrument

@@ -47,7 +47,7 @@ LEFT = {
     "howto/noise_kind.md": ["results/tables/verdicts_laplace_drop.md"],
     "howto/figure.md": ["results/figures/heights.png"],
 }
-TAKES_LONG = {"howto/relaxation.md", "howto/creep.md", "design.md"}
+TAKES_LONG = {"howto/relaxation.md", "howto/creep.md", "design.md", "tutorial.md"}
 TAKES_LONG |= {f"howto/{name}.md" for name in ("trace", "noise", "figure", "noise_kind")}
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],

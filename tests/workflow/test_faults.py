@@ -94,13 +94,8 @@ def run_beside(process: "subprocess.Popen[bytes]", folder: Path) -> None:
     assert process.wait(120) == 0
 
 
-@pytest.mark.parametrize(
-    "fault",
-    [
-        kill_snakemake,
-        *(pytest.param(f, marks=pytest.mark.nightly) for f in (kill_a_job, interrupt, run_beside)),
-    ],
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("fault", [kill_snakemake, kill_a_job, interrupt, run_beside])
 def test_the_same_command_ends_with_the_undisturbed_bytes(
     tiny: Path, tiny_copy: Path, fault: Callable[["subprocess.Popen[bytes]", Path], None]
 ) -> None:

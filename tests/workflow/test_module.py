@@ -123,7 +123,10 @@ def test_it_is_deployed_from_a_clone_and_runs_a_case(tmp_path: Path) -> None:
     deploy = [Path(sys.executable).with_name("snakedeploy"), "deploy-workflow", clone, place]
     subprocess.run([*map(str, deploy), "--branch", branch], check=True)
     (place / "config" / "config.yaml").write_text(yaml.safe_dump(CONFIG))
+    # Of a clone it names the Snakefile without the folder; of a server it names the server, too.
     text = (place / "workflow" / "Snakefile").read_text()
+    assert '"workflow/Snakefile"' in text
+    text = text.replace('"workflow/Snakefile"', f'"{clone}/workflow/Snakefile"')
     for arguments in (("-n",), ("--", ERRORS)):
         run = host(place, text, *arguments)
         assert run.status == 0, run.output

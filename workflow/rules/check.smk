@@ -1,7 +1,9 @@
 """The results beside those that are published: compared, or put in their place."""
 
 # A config of the same name has its published results in a folder of its own.
-OVERLAY = Path(workflow.overwrite_configfiles[-1]).stem if workflow.overwrite_configfiles else ""
+OVERLAYS = [Path(file).stem for file in workflow.overwrite_configfiles]
+# What has no name, on the command line or of a module, has nothing published.
+OVERLAY = OVERLAYS[-1] if OVERLAYS else "unnamed" if config else ""
 PUBLISHED = shipped("results/published") / OVERLAY
 
 

@@ -84,11 +84,14 @@ if STUDY.traces:
         input:
             lambda wildcards: [str(row.file) for row in rows_of(wildcards) if row.file.is_file()],
             config=STUDY.traces.config or [],
+            default=str(default_config()),
             table=ancient(STUDY.traces.table),
         output:
             found="results/traces/batches/{rows}.csv",
         log:
             "results/logs/traces_batch/{rows}.log",
+        wildcard_constraints:
+            rows=r"\d+-\d+",
         resources:
             runtime=120,
         params:

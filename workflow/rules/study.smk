@@ -11,7 +11,7 @@ rule target:
     params:
         **settings_of(
             *"instrument gripper actuator protocol sample fixed contact models".split(),
-            *("measurement.rate_Hz", "measurement.times_s", "measurement.bursts"),
+            *(f"measurement.{key}" for key in ("rate_Hz", "times_s", "bursts", "file")),
         ),
     message:
         "Simulating the response of {wildcards.case}"
@@ -60,8 +60,13 @@ rule calibration:
         records="results/calibrations/{case}.parquet",
     log:
         "results/logs/calibration/{case}.log",
+    wildcard_constraints:
+        case=names(CALIBRATED),
     params:
-        **settings_of("study_seed", "calibration", "instrument", "gripper", "protocol", "sample"),
+        **settings_of(
+            *"study_seed calibration instrument gripper actuator protocol sample".split(),
+            "measurement.file",
+        ),
     message:
         "Calibrating the gripper of {wildcards.case} without a sample"
     script:

@@ -29,7 +29,7 @@ def batch_names(seeds: int, batch_size: int | None = None, folder: Path | None =
     existing = sorted((r.start, r.stop) for r in map(seeds_of, _stems(there)))
     edges, covered = [], 0
     for first, stop in existing:
-        if covered <= first < stop and first < seeds:
+        if covered <= first < stop <= seeds:
             edges += [*_cut(covered, first, size), (first, stop)]
             covered = stop
     edges += _cut(covered, seeds, size)

@@ -1,5 +1,6 @@
 """What a script of the workflow does around its work: it reads its params, and says what failed."""
 
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
@@ -21,6 +22,9 @@ def logged(job: Any) -> Iterator[None]:
         except BiogripError as error:
             print(f"biogrip: {error}", file=stream)
             raise SystemExit(1) from error
+        except Exception:
+            traceback.print_exc(file=stream)
+            raise
 
 
 def job_case(job: Any) -> Case:

@@ -17,7 +17,7 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.progress import warn
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.response.whitening import MOST_SAMPLES
-from biogrip.study.study import Case, Study
+from biogrip.study.study import Case
 from biogrip.traces.columns import Columns, place
 from biogrip.traces.noise_share import proportional_deviations
 from biogrip.traces.onset import guess_onset
@@ -174,22 +174,3 @@ def notes_on_recording(trace: Measurements) -> list[str]:
             "nothing tells on which side of it they were taken."
         )
     return notes
-
-
-def check_traces(study: Study) -> None:
-    """Check all recorded traces before a run starts.
-
-    Raises
-    ------
-    BiogripError
-        One line for each trace that cannot be used.
-    """
-    problems = []
-    for name in study.recorded:
-        case = study.case(name)
-        try:
-            read_checked(Path(case.file), case.gripper, case.problem, case.columns)
-        except BiogripError as error:
-            problems.append(f"cases.{name}: {error}")
-    if problems:
-        raise BiogripError("\n".join(problems))

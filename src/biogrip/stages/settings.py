@@ -41,8 +41,13 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
     values
         By key; None for a default.
     """
-    blocks = study.case(case).plain if case else {}
-    blocks = study.plain | blocks | {"cases": {name: it.plain for name, it in study.cases.items()}}
+    blocks = study.plain
+    if case:
+        # What the case leaves at its default is not the study's: it has all of its blocks.
+        of_case = {field.name for field in fields(CaseBlock)}
+        blocks = {key: value for key, value in blocks.items() if key not in of_case}
+        blocks |= study.case(case).plain
+    blocks = blocks | {"cases": {name: it.plain for name, it in study.cases.items()}}
     return {key: _value(blocks, key) for key in keys}
 
 

@@ -156,7 +156,7 @@ class CaseBlock(Shared):
         kind = of_kind(self.instrument)
         bases = self.protocol.phases[0].bases
         fitting = [each for each in kind if each.controlled.column in bases] or kind
-        if len(fitting) == 1:
+        if len(fitting) == 1 or not self.recorded:
             return fitting[0]
         named = [each for each in fitting if each.read.name in self.measurement.readings]
         return (named or fitting)[0]

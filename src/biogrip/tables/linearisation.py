@@ -46,10 +46,3 @@ def _crossing(factor: np.ndarray, share: np.ndarray) -> float | None:
     last = above[0]
     pair = slice(last - 1, last + 1)
     return float(np.exp(np.interp(np.log(limit), np.log(share[pair]), np.log(factor[pair]))))
-
-
-CAPTION = (
-    "The largest difference of the linear from the nonlinear model over the protocol, as a share "
-    "of the peak, over the reference angle and multiples of the torque of the case's protocol. "
-    f"Left of and above the {LIMIT_PERCENT:g} % line the paper's linearisation is worse than that."
-)
