@@ -21,7 +21,7 @@ from pymoo.operators.selection.rnd import RandomSelection
 from pymoo.optimize import minimize
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import Genome
 
 creator.create("Misfit", base.Fitness, weights=(-1.0,))

@@ -11,9 +11,8 @@ from benchmarks.noisy_traces import BATCH, OURS, SIDE_BY_SIDE, NoisyTrace, noisy
 from benchmarks.report import Row, Section, number, times_ours
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array
-from biogrip.fit.genetic import evolve_many
-from biogrip.fit.genetic_settings import GeneticSettings
-from biogrip.response.misfit import combine_misfits
+from biogrip.fit.genetic import GeneticSettings, evolve_many
+from biogrip.physics.misfit import combine_misfits
 
 _GENERATIONS, _SEEDS = 80, 15
 # Misfits up to this share above the noise count as at its floor, as in the study.

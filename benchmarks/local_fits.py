@@ -13,9 +13,8 @@ from benchmarks.report import Row as ReportRow
 from benchmarks.report import Section, number, times_ours
 from benchmarks.timing import Timed, alternate
 from biogrip.arrays import Array
-from biogrip.fit.answer import Row, silent
 from biogrip.fit.multi_start import FINISHED, best_of_starts, screened
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import Problem, Row, silent
 
 _ROUNDS, _FEW = 5, 3
 

@@ -9,7 +9,7 @@ from benchmarks.noisy_traces import OURS, NoisyTrace, noisy_trace
 from benchmarks.report import Row, Section, number, times_ours
 from benchmarks.timing import alternate
 from biogrip.arrays import Array, parts
-from biogrip.response.linear import rotation, step_response
+from biogrip.physics.linear import rotation, step_response
 
 _POPULATION, _ROUNDS = 500, 7
 # Numbers formed at once: what fits a processor's cache is faster than all.

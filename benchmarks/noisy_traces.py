@@ -8,18 +8,19 @@ import numpy as np
 import yaml
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import add_noise, rms
-from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
-from biogrip.experiment.sample import SampleModel
-from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import Genome, make_genome
 from biogrip.fit.problem import Problem, make_problem
-from biogrip.instrument.gripper import GRIPPER, Gripper
-from biogrip.response.condensed import Condensed
-from biogrip.response.linear import rotation, step_response
-from biogrip.response.misfit import Misfit, make_misfit
-from biogrip.response.nuisance import nuisance_basis
-from biogrip.response.residuals import Residuals
+from biogrip.physics.condensed import Condensed
+from biogrip.physics.drift import nuisance_basis
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.misfit import Misfit, make_misfit
+from biogrip.physics.noise import add_noise, rms
+from biogrip.physics.protocol import TorqueHistory, sample_times, torque_history
+from biogrip.physics.residuals import Residuals
+from biogrip.physics.sample_model import SampleModel
 from biogrip.study.load import load_study
 from biogrip.study.study import Case
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
-from biogrip.experiment.protocol import Phase, TorqueHistory, hold, torque_history
-from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.protocol import Phase, TorqueHistory, hold, torque_history
 from tests.helpers.browser import chromium, executable
 from tests.helpers.required import cannot_run
 from tests.helpers.runs import built_once, run_tiny

@@ -225,7 +225,7 @@ def file_columns() -> str:
 def _kinds() -> Iterator[RowFile]:
     package = biogrip.records
     modules = [module.name for module in iter_modules(package.__path__, f"{package.__name__}.")]
-    for module in (*modules, "biogrip.stages.sweep_points"):
+    for module in (*modules, "biogrip.stages.sweeps"):
         values = vars(importlib.import_module(module)).values()
         yield from (value for value in values if isinstance(value, RowFile))
 

@@ -9,12 +9,12 @@ import yaml
 
 from biogrip.cli import main
 from biogrip.design import NO_BOUND, decode, make_limits, make_plausible, rated, search
-from biogrip.experiment.sampling import Sampling
 from biogrip.fit.multi_start import fit_from
 from biogrip.library import simulate
-from biogrip.response.grip import compute_grip
-from biogrip.study.defaults import default_config
+from biogrip.physics.jaw_force import compute_grip
+from biogrip.physics.protocol import Sampling
 from biogrip.study.load import load_study, read_configs
+from biogrip.study.source import default_config
 
 GRIPPER = """
 only: [endothelial_cell]

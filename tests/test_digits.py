@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from biogrip.digits import counted, rounded
-from biogrip.instrument.gripper import GRIPPER
-from biogrip.judging.whiteness import doubts_about_noise
+from biogrip.judging.doubts import doubts_about_noise
+from biogrip.physics.instruments import GRIPPER
 from biogrip.records.traces import Measurements
 from biogrip.stages.recording import notes_on_recording
 

@@ -8,15 +8,14 @@ import pytest
 from scipy.stats import chi2, norm
 
 from biogrip.arrays import Array
-from biogrip.fit.answer import silent
+from biogrip.fit.problem import silent
 from biogrip.identify.one_trace import IdentifyOptions, identify_trace, study_of
 from biogrip.identify.read_as import ReadAs
 from biogrip.identify.second_opinion import second_opinions
 from biogrip.identify.trace_case import TraceCase
 from biogrip.judging.diagnosis import Diagnosis, diagnose
-from biogrip.judging.fit_status import Note
+from biogrip.judging.doubts import Note, wandering
 from biogrip.judging.likelihood import compute_fall
-from biogrip.judging.whiteness import wandering
 from biogrip.records.traces import Measurements
 from tests.helpers.problems import clean, run
 

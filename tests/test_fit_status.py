@@ -11,9 +11,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.cli import main
-from biogrip.experiment.protocol import hold, torque_history
-from biogrip.experiment.sample import MODELS
-from biogrip.judging.fit_status import (
+from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
     HARMLESS,
@@ -25,7 +23,9 @@ from biogrip.judging.fit_status import (
     find_reasons,
     order_notes,
 )
-from biogrip.response.linear import rotation, step_response
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import hold, torque_history
 from tests.helpers.problems import GRIPPER
 
 FEW = "least_squares: {candidates: 100, starts: 4}\nmodel_selection: {models: []}\n"

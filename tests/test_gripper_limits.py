@@ -10,8 +10,8 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.cli import main
-from biogrip.instrument.actuator import voltage
-from biogrip.response.simulation import simulated_rotation
+from biogrip.physics.actuator import voltage
+from biogrip.physics.simulation import simulated_rotation
 from tests.helpers.default import STUDY
 
 FEW = """

@@ -5,7 +5,7 @@ import shlex
 import pytest
 
 from biogrip.cli import _parser, main
-from biogrip.experiment.models import MODELS
+from biogrip.physics.models import MODELS
 
 
 @pytest.mark.parametrize("command", ["identify", "groups", "design"])

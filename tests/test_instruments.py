@@ -12,9 +12,9 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import Harmonic, Load, Phase, hold
-from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.library import Sample, identify_sample, judge, set_up, simulate
+from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.protocol import Harmonic, Load, Phase, hold
 from tests.helpers.default import study_of
 from tests.helpers.places import ROOT
 

@@ -9,7 +9,7 @@ import pytest
 from flint import arb, ctx
 
 from biogrip.arrays import Array
-from biogrip.interlacing import interlaced_zeros
+from biogrip.physics.roots import interlaced_zeros
 
 
 def random_functions(count: int, poles: int, seed: int) -> tuple[Array, Array, Array]:

@@ -10,7 +10,7 @@ from biogrip import library
 from biogrip.judging.verdicts import DETERMINED
 from tests.helpers.default import STUDY
 from tests.helpers.places import ROOT
-from tests.response.test_nonlinear import ARM, TIMES, symmetric_radau
+from tests.physics.test_nonlinear import ARM, TIMES, symmetric_radau
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "library.md"
 POSTERIOR = DOCUMENT.parent / "howto" / "posterior.md"

@@ -22,10 +22,9 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.errors import BiogripError
-from biogrip.experiment.sample import CANDIDATES, MODELS
-from biogrip.fit.answer import History, Identification
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.model_choice import ranked
+from biogrip.fit.nested_fits import ranked
+from biogrip.fit.problem import History, Identification
 from biogrip.identify import one_trace
 from biogrip.identify.fitted_models import FittedModels
 from biogrip.identify.many_traces import Outcome, write_table
@@ -33,10 +32,11 @@ from biogrip.identify.one_trace import IdentifyOptions, identify_trace
 from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.identify.read_as import ReadAs
 from biogrip.identify.words import for_a_paper, side_by_side
-from biogrip.judging.fit_status import Note
+from biogrip.judging.doubts import Note
 from biogrip.judging.profiles import Profile
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import Finding
+from biogrip.physics.models import CANDIDATES, MODELS
 from biogrip.traces.late_onset import note_late_onset
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean

@@ -12,13 +12,13 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.cli import main
-from biogrip.experiment.protocol import Phase, hold, load
 from biogrip.fit.fitted_onset import OnsetFits
-from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.library import Sample, set_up, simulate
+from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.protocol import Phase, hold, load
 from biogrip.stages import judgement, recording
-from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
+from biogrip.study.source import default_config
 from biogrip.traces.onset import begins_constant, estimate_onset
 from tests.helpers.default import STUDY
 

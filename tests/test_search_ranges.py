@@ -9,11 +9,11 @@ import pytest
 import yaml
 
 from biogrip.cli import main
-from biogrip.experiment.models import MODELS
-from biogrip.experiment.protocol import hold, torque_history
 from biogrip.identify.search_ranges import ranges_of
-from biogrip.instrument.gripper import Arm, Gripper
-from biogrip.response.simulation import simulated_rotation
+from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import hold, torque_history
+from biogrip.physics.simulation import simulated_rotation
 from tests.helpers.default import STUDY
 
 # Creep of polystyrene, in Pa and Pa s, as of a gripper: jaws of l = b at 90 degrees whose arms have

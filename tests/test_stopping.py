@@ -10,7 +10,7 @@ import pytest
 BEGIN = """
 import atexit, os, sys, time
 from pathlib import Path
-from biogrip.stopping import end_when_stopped
+from biogrip.processes import end_when_stopped
 def stop():
     print("said before")
     os.kill(os.getpid(), {number})
@@ -84,5 +84,5 @@ print(*{*sys.modules} - before)
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     ours = {name for name in run.stdout.split() if name.startswith("biogrip")}
-    assert ours == {"biogrip", "biogrip.__main__", "biogrip.stopping", "biogrip.terminal"}
+    assert ours == {"biogrip", "biogrip.__main__", "biogrip.processes", "biogrip.terminal"}
     assert not {"argparse", "json", "typing", "hashlib", "pathlib"} & set(run.stdout.split())

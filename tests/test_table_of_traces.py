@@ -12,12 +12,12 @@ import yaml
 
 from biogrip.cli import main
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import torque_history
-from biogrip.experiment.sample import MODELS
 from biogrip.identify.table_of_traces import is_table, read_table
 from biogrip.library import hold
-from biogrip.response.linear import rotation, step_response
-from biogrip.tables.contact import contacts
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import torque_history
+from biogrip.tables.mechanics import contacts
 from tests.helpers.default import STUDY
 from tests.helpers.problems import GRIPPER, TORQUE
 

@@ -22,8 +22,8 @@ import numpy as np
 from benchmarks.report import Row, Section, number
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array, BoolArray
-from biogrip.fit.answer import Identification
 from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.problem import Identification
 from biogrip.identify.search_ranges import ranges_of
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.library import Phase, Sample, hold, identify_sample, judge, simulate

@@ -2,7 +2,7 @@
 
 import sys
 
-from biogrip.stopping import end_when_stopped
+from biogrip.processes import end_when_stopped
 from biogrip.terminal import open_closed_streams
 
 

@@ -72,7 +72,7 @@ class _Parser(argparse.ArgumentParser):
 
 def _models() -> str:
     """Return the names and titles of the sample models."""
-    from biogrip.experiment.models import MODELS
+    from biogrip.physics.models import MODELS
 
     width = max(map(len, MODELS))
     lines = [f"  {name:<{width}}  {model.title}" for name, model in MODELS.items()]

@@ -21,21 +21,17 @@ import yaml
 from biogrip import __version__
 from biogrip.arrays import Array, BoolArray
 from biogrip.errors import BiogripError
-from biogrip.experiment.noise import standard_deviation
-from biogrip.experiment.protocol import Phase, hold, largest_load, torque_history
-from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.files import refuse_inputs, write_text
 from biogrip.identify.outputs import WRITTEN_BY, check_output
-from biogrip.response.grip import compute_grip
-from biogrip.response.jaw_force import jaw_force_response
-from biogrip.response.modes import Modes
-from biogrip.response.protocol_modes import compute_protocol_modes
-from biogrip.response.sensitivity import linear_responses
-from biogrip.response.simulation import simulated_rotation
+from biogrip.physics.jaw_force import compute_grip, jaw_force_response
+from biogrip.physics.modes import Modes, compute_protocol_modes
+from biogrip.physics.noise import standard_deviation
+from biogrip.physics.protocol import Burst, Phase, Sampling, hold, largest_load, torque_history
+from biogrip.physics.sensitivity import linear_responses
+from biogrip.physics.simulation import simulated_rotation
 from biogrip.study.config import DesignBlock
-from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
-from biogrip.study.source import overlaid, read_config
+from biogrip.study.source import default_config, overlaid, read_config
 from biogrip.study.study import Case
 from biogrip.terminal import aligned, visible_lines
 

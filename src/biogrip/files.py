@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from biogrip.errors import BiogripError
-from biogrip.stopping import unfinished
+from biogrip.processes import unfinished
 from biogrip.terminal import visible
 
 

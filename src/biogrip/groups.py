@@ -26,7 +26,7 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs
 from biogrip.identify.many_traces import FAILED
 from biogrip.identify.outputs import WRITTEN_BY, check_output
-from biogrip.judging.fit_status import DOUBTFUL, REJECTED
+from biogrip.judging.doubts import DOUBTFUL, REJECTED
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED
 from biogrip.records.rows import read_rows, write_rows
 from biogrip.terminal import aligned, visible, visible_lines

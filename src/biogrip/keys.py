@@ -2,11 +2,15 @@
 
 A block is a frozen dataclass whose fields are its keys, with pydantic's `Field` for bounds, and a
 docstring below each. Checks, messages, the JSON Schema and the documentation follow from them.
+
+Conversion between plain values, as in YAML and JSON, and config blocks.
 """
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+import json
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Self
+from functools import cache
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -15,6 +19,7 @@ from pydantic import (
     Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
+    TypeAdapter,
     ValidationInfo,
     model_validator,
 )
@@ -123,3 +128,28 @@ def _without_twins(items: tuple[Any, ...]) -> tuple[Any, ...]:
     if any(item in items[:index] for index, item in enumerate(items)):
         raise PydanticCustomError(TWICE, "something is there twice")
     return items
+
+
+T = TypeVar("T")
+STRICT = ConfigDict(strict=True, extra="forbid")
+
+
+@cache
+def adapter(kind: Any) -> TypeAdapter[Any]:
+    """Return what pydantic checks, builds and writes a list of blocks with."""
+    # Pydantic takes a configuration for a list of dataclasses, and none for a dataclass alone.
+    return TypeAdapter(list[kind], config=STRICT)
+
+
+def built(kind: Callable[..., T], block: Any, *, check: bool = False) -> T:
+    """Return the object that a plain block describes; if asked, find conflicts of keys, too."""
+    # As JSON, for then pydantic takes blocks for dataclasses and lists for tuples.
+    found: T
+    (found,) = adapter(kind).validate_json(json.dumps([block], default=str), context=check)
+    return found
+
+
+def plain(value: object) -> Any:
+    """Return the plain value of a config block, without keys that have their default."""
+    kind: Callable[..., object] = type(value)
+    return adapter(kind).dump_python([value], mode="json", exclude_defaults=True)[0]

@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.protocol import Phase, hold
-from biogrip.experiment.sample import Sample
-from biogrip.fit.answer import Identification, silent
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
-from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Arm, Gripper
-from biogrip.instrument.instrument import Instrument
-from biogrip.instrument.instruments import INSTRUMENTS
+from biogrip.fit.problem import Identification, silent
 from biogrip.judging.diagnosis import Diagnosis, diagnose
-from biogrip.response.simulation import simulated_rotation
+from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
+from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
+from biogrip.physics.models import Sample
+from biogrip.physics.noise import Noise, add_noise
+from biogrip.physics.protocol import Phase, hold
+from biogrip.physics.simulation import simulated_rotation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

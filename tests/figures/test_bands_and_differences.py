@@ -13,9 +13,9 @@ from matplotlib.patches import Rectangle
 
 from biogrip.figures import linearisation, scatter
 from biogrip.figures.style import styled
-from biogrip.records.differences import DIFFERENCES
+from biogrip.physics.simulation import simulated_rotation
+from biogrip.records.identifications import DIFFERENCES
 from biogrip.records.traces import write_target
-from biogrip.response.simulation import simulated_rotation
 from biogrip.stages import model_difference
 from tests.helpers.default import STUDY, seen, study_of
 

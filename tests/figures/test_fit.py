@@ -5,7 +5,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.figures.fit import draw_fit
 from biogrip.figures.results import Fit
-from biogrip.instrument.relaxation import MODULUS
+from biogrip.physics.instruments import MODULUS
 
 
 def relaxing(time_s: Array, sd_rad: Array | None = None) -> Fit:

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from biogrip.figures import force
 from biogrip.figures.style import styled
-from biogrip.stages import target
+from biogrip.stages import targets as target
 from tests.helpers.default import study_of
 
 STUDY = study_of(

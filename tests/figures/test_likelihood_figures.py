@@ -10,8 +10,7 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from biogrip.figures import overview, profiles, valley
-from biogrip.figures.decades import decade_ticks
-from biogrip.figures.style import figure, lay_out, styled
+from biogrip.figures.style import decade_ticks, figure, lay_out, styled
 from biogrip.fit.methods import METHODS
 from tests.helpers.default import seen
 

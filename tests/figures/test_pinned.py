@@ -15,8 +15,8 @@ from scipy.spatial import KDTree
 
 from biogrip.figures import robustness as heat_map
 from biogrip.figures.style import COLORS, save_png, styled
-from biogrip.stages.sweep_points import POINTS
-from biogrip.tables.heat_maps import heat_maps
+from biogrip.stages.sweeps import POINTS
+from biogrip.tables.robustness import heat_maps
 from tests.helpers.default import study_of
 
 PINNED = Path(__file__).with_name("pinned")

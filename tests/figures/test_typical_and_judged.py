@@ -13,9 +13,8 @@ from biogrip.errors import BiogripError
 from biogrip.figures import evolution, fit, judged_fit
 from biogrip.figures.results import SHOWN_SEEDS, read_history
 from biogrip.figures.style import styled
-from biogrip.records.parquet import table_of
-from biogrip.records.traces import Measurements, write_measurements
-from biogrip.response.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_rotation
+from biogrip.records.traces import Measurements, table_of, write_measurements
 from tests.helpers.default import STUDY
 
 CASE = "liquid_drop_2"

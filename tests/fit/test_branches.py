@@ -5,18 +5,17 @@ import functools
 import numpy as np
 import pytest
 
-from biogrip.experiment.sample import Sample, SampleModel, with_fixed
-from biogrip.fit.answer import Identification, silent
-from biogrip.fit.identifier import identifier
 from biogrip.fit.local_fits import FINE
-from biogrip.fit.methods import METHODS
-from biogrip.fit.problem import Problem
+from biogrip.fit.methods import METHODS, identifier
+from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import parameters_and_sum
-from biogrip.response.linear import rotation, step_response
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import Sample
+from biogrip.physics.sample_model import SampleModel, with_fixed
 from tests.helpers.default import STUDY, study_of
 from tests.helpers.problems import GRIPPER, TORQUE, case_problem, clean
 

@@ -4,18 +4,15 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
-from biogrip.experiment.noise import Noise, add_noise, rms
-from biogrip.experiment.protocol import TorqueHistory
-from biogrip.experiment.sample import MODELS
-from biogrip.fit.answer import Identification
-from biogrip.fit.genetic import evolve_many
-from biogrip.fit.genetic_operators import cross, mutate
-from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genetic import GeneticSettings, cross, evolve_many, mutate
 from biogrip.fit.genome import GeneRange, Genome, make_genome
-from biogrip.instrument.gripper import Gripper
-from biogrip.response.linear import rotation, step_response
-from biogrip.response.misfit import Misfit, combine_misfits
-from biogrip.response.misfit_series import SeriesMisfit
+from biogrip.fit.problem import Identification
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.misfit import Misfit, SeriesMisfit, combine_misfits
+from biogrip.physics.models import MODELS
+from biogrip.physics.noise import Noise, add_noise, rms
+from biogrip.physics.protocol import TorqueHistory
 from tests.helpers.plain_genetic import chromosomes_of
 
 PAPER = GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 20, 40, 200)

@@ -3,8 +3,8 @@ from decimal import Decimal
 import numpy as np
 import pytest
 
-from biogrip.experiment.sample import MODELS
 from biogrip.fit.genome import GeneRange, make_genome, nearest_encodable
+from biogrip.physics.models import MODELS
 
 STIFFNESS, DAMPING = GeneRange((-3, 8), (1, 9)), GeneRange((-4, 5), (1, 9))
 RANGES = {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING}

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.sample import MODELS, Sample
 from biogrip.fit import least_squares
-from biogrip.fit.answer import Identification
 from biogrip.fit.levenberg_marquardt import Normal, bounded_step
 from biogrip.fit.local_fits import FINE, ROUGH, LocalFits, alike
 from biogrip.fit.multi_start import screened
-from biogrip.fit.problem import Problem
-from biogrip.response.linear import rotation, step_response
+from biogrip.fit.problem import Identification, Problem
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import MODELS, Sample
 from tests.helpers.places import ROOT
 from tests.helpers.problems import (
     GRIPPER,

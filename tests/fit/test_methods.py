@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import rms
 from biogrip.fit import multi_start
-from biogrip.fit.identifier import identifier
-from biogrip.fit.methods import METHODS, block_class
-from biogrip.fit.newton_refinement import refine_optima
+from biogrip.fit.methods import METHODS, block_class, identifier
+from biogrip.fit.multi_start import refine_optima
 from biogrip.fit.problem import Problem
-from biogrip.response.residuals import Residuals
+from biogrip.physics.noise import rms
+from biogrip.physics.residuals import Residuals
 from tests.helpers.default import STUDY
 from tests.helpers.problems import (
     GRIPPER,

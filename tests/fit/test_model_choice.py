@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from biogrip.fit.model_choice import advice, ranked
+from biogrip.fit.nested_fits import advice, ranked
 
 SAMPLES = 1000
 

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.nesting import contained
-from biogrip.experiment.sample import CANDIDATES, MODELS
-from biogrip.fit.answer import Identification
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.nested_fits import fit_models, is_within
-from biogrip.fit.problem import Problem
-from biogrip.response.linear import rotation, step_response
+from biogrip.fit.problem import Identification, Problem
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import CANDIDATES, MODELS, contained
 from tests.helpers.problems import GRIPPER, SAMPLES, TORQUE, case_problem, clean
 
 TRIED = (*MODELS, "generalized_maxwell_2")

@@ -5,13 +5,13 @@ import pytest
 
 from biogrip import library
 from biogrip.arrays import Array, IntArray
-from biogrip.experiment.sample import MODELS, Sample, SampleModel
 from biogrip.fit.levenberg_marquardt import Minima
 from biogrip.fit.local_fits import FINE, PRIOR_WIDTH, LocalFits
-from biogrip.fit.multi_start import fit_from
-from biogrip.fit.newton_refinement import refine_optima
+from biogrip.fit.multi_start import fit_from, refine_optima
 from biogrip.fit.problem import Problem
-from biogrip.response.linear import rotation, step_response
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.sample_model import SampleModel
 from tests.helpers.problems import (
     GRIPPER,
     TORQUE,

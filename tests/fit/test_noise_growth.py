@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from biogrip.fit.noise_growth import compute_growth
-from biogrip.fit.outliers import outliers_of
+from biogrip.fit.noise_model_fit import compute_growth, outliers_of
 
 ROTATION = np.geomspace(0.004, 1.0, 400)
 

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.noise_parts import AR1, Flicker
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, _logarithms
-from biogrip.response.whitening import NoiseModel, Whitening
-from tests.response.test_whitening import correlation
+from biogrip.physics.noise import AR1, Flicker, Noise, add_noise
+from biogrip.physics.whitening import NoiseModel, Whitening
+from tests.physics.test_whitening import correlation
 
 TIMES = np.cumsum(np.random.default_rng(0).exponential(1.0, 200))
 DIRECTIONS = np.stack((np.ones(200), TIMES, np.exp(-TIMES / 40)))

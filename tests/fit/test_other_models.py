@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from biogrip.experiment.sample import CANDIDATES
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.response.misfit_series import SeriesMisfit
+from biogrip.physics.misfit import SeriesMisfit
+from biogrip.physics.models import CANDIDATES
 from tests.helpers.default import study_of
 from tests.helpers.problems import clean
 

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.sample import CANDIDATES, MODELS, SampleModel
-from biogrip.fit.model_choice import ranked
+from biogrip.fit.nested_fits import ranked
 from biogrip.judging.likelihood import make_likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.quantities import parameters_and_sum
-from biogrip.response.linear import rotation, step_response
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import CANDIDATES, MODELS
+from biogrip.physics.sample_model import SampleModel
 from tests.helpers.problems import (
     GRIPPER,
     SETTINGS,

@@ -5,17 +5,18 @@ import pytest
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import hold, torque_history
-from biogrip.experiment.sample import MODELS
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.local_fits import LocalFits
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.problem import Problem, make_problem
-from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.quantities import parameters_and_sum
-from biogrip.response.nonlinear import nonlinear_rotation
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.models import MODELS
+from biogrip.physics.nonlinear import nonlinear_rotation
+from biogrip.physics.protocol import hold, torque_history
 from tests.helpers.problems import condensed_of, problem_alone
 
 MODEL, TRUTH = MODELS["liquid_drop"], np.array([1.0, 0.05, 10.0])

@@ -6,17 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biogrip.experiment.protocol import TorqueHistory
-from biogrip.experiment.sample import MODELS, Sample, SampleModel, with_fixed
 from biogrip.fit import genetic, genetic_refined
-from biogrip.fit.answer import Identification
-from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genetic import GeneticSettings, best, redraws
 from biogrip.fit.genome import WORD_BITS, GeneRange, Genome
-from biogrip.fit.problem import Problem, make_problem
-from biogrip.fit.redraws import redraws
-from biogrip.fit.selection import best
-from biogrip.instrument.gripper import GRIPPER, Gripper
-from biogrip.response.linear import rotation, step_response
+from biogrip.fit.problem import Identification, Problem, make_problem
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.sample_model import SampleModel, with_fixed
 from tests.helpers.plain_genetic import identified
 from tests.helpers.problems import condensed_of
 

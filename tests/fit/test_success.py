@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from biogrip.fit.success import near_noise, near_noise_words, typical
+from biogrip.fit.methods import near_noise, near_noise_words, typical
 
 
 def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:

@@ -8,18 +8,15 @@ from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.noise_parts import AR1, Drift, Outliers
-from biogrip.fit.answer import Identification
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.multi_start import identify_from
-from biogrip.fit.outliers import FAR, outliers_of
-from biogrip.fit.problem import Problem
-from biogrip.fit.trace_fit import trace_fit
-from biogrip.fit.uncertain_gripper import gripper_functions
-from biogrip.instrument.gripper import Gripper
-from biogrip.response.simulation import simulated_rotation
-from biogrip.response.whitening import MOST_SAMPLES
+from biogrip.fit.noise_model_fit import FAR, outliers_of
+from biogrip.fit.problem import Identification, Problem
+from biogrip.fit.trace_fit import gripper_functions, trace_fit
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.noise import AR1, Drift, Noise, Outliers, add_noise
+from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.whitening import MOST_SAMPLES
 from tests.helpers.default import STUDY
 
 CASE = STUDY.cases["liquid_drop_2"]

@@ -10,15 +10,13 @@ from scipy.special import chdtri
 from scipy.stats import binom
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, add_noise
-from biogrip.fit.answer import Identification
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.multi_start import identify_from
-from biogrip.fit.problem import Problem
-from biogrip.fit.trace_fit import trace_fit
-from biogrip.fit.uncertain_gripper import gripper_functions
+from biogrip.fit.problem import Identification, Problem
+from biogrip.fit.trace_fit import gripper_functions, trace_fit
 from biogrip.judging.likelihood import make_likelihood
-from biogrip.response.simulation import simulated_rotation
+from biogrip.physics.noise import Noise, add_noise
+from biogrip.physics.simulation import simulated_rotation
 from tests.helpers.default import STUDY
 
 CASE = STUDY.cases["liquid_drop_2"]

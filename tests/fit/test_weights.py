@@ -7,15 +7,14 @@ import pytest
 from scipy.optimize import curve_fit
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import hold
-from biogrip.experiment.sample import Sample
-from biogrip.fit.answer import Identification
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import Identification, Problem
 from biogrip.fit.trace_fit import trace_fit
-from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.library import set_up, simulate
+from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.models import Sample
+from biogrip.physics.protocol import hold
 from tests.helpers.problems import run
 
 # The fit of polystyrene at 190 degC that pyRheo publishes, with weights of 5 % of the compliance.

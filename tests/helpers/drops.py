@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from biogrip.experiment.sample import CANDIDATES
-from biogrip.response.simulation import simulated_rotation
+from biogrip.physics.models import CANDIDATES
+from biogrip.physics.simulation import simulated_rotation
 from tests.helpers.default import STUDY
 
 

@@ -13,8 +13,7 @@ from pydantic import TypeAdapter
 from biogrip.keys import Block
 from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.config import StudyConfig
-from biogrip.study.messages import bound
-from biogrip.study.schema import Schema, tidy
+from biogrip.study.messages import Schema, bound, tidy
 
 _NO_DEFAULT = "–"
 _MOST_LISTED = 6

@@ -6,14 +6,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.random_streams import stream
-from biogrip.fit.answer import silent
-from biogrip.fit.identifier import identifier
-from biogrip.fit.problem import Problem
+from biogrip.fit.methods import identifier
+from biogrip.fit.problem import Problem, silent
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import Quantity
+from biogrip.physics.noise import stream
 from tests.helpers.default import STUDY
 from tests.helpers.definition import rise_at, rises_along
 from tests.helpers.places import EXAMPLE

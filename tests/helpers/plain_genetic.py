@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.answer import History, Identification
-from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import Genome
+from biogrip.fit.problem import History, Identification
 
 
 def chromosomes_of(genome: Genome, codes: IntArray) -> IntArray:

@@ -16,8 +16,8 @@ from flint import acb, arb, ctx
 from scipy.integrate import quad
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import TorqueHistory
-from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.protocol import TorqueHistory
 
 Impedance = Callable[[Any], Any]
 _NODES = 45

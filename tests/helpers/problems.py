@@ -6,19 +6,19 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
-from biogrip.experiment.sample import MODELS, SampleModel
 from biogrip.fit import least_squares
-from biogrip.fit.answer import Identification, silent
-from biogrip.fit.identifier import identifier
-from biogrip.fit.problem import Problem, make_problem
-from biogrip.instrument.gripper import Gripper
-from biogrip.instrument.instruments import INSTRUMENTS
-from biogrip.response.condensed import Condensed
-from biogrip.response.linear import rotation, step_response
-from biogrip.response.nuisance import nuisance_basis
-from biogrip.response.residuals import Residuals
+from biogrip.fit.methods import identifier
+from biogrip.fit.problem import Identification, Problem, make_problem, silent
+from biogrip.physics.condensed import Condensed
+from biogrip.physics.drift import nuisance_basis
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import MODELS
+from biogrip.physics.noise import Noise, add_noise
+from biogrip.physics.protocol import TorqueHistory, sample_times, torque_history
+from biogrip.physics.residuals import Residuals
+from biogrip.physics.sample_model import SampleModel
 from tests.helpers.default import STUDY
 
 MODEL = MODELS["generalized_maxwell"]

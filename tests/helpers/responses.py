@@ -17,9 +17,10 @@ import numpy as np
 from flint import acb, acb_mat, arb, ctx
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, hold
-from biogrip.experiment.sample import MODELS, SampleModel
-from biogrip.instrument.gripper import Gripper
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import Harmonic, Load, Phase, TorqueHistory, hold
+from biogrip.physics.sample_model import SampleModel
 
 SWING = Load(1e-9, 0.0, 0.0, (Harmonic(4e-10, 0.3, -np.pi / 2),))
 PROTOCOLS = {

@@ -9,11 +9,10 @@ from biogrip.arrays import Array, IntArray
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.limits import find_limits
-from biogrip.judging.points import Points
-from biogrip.judging.profiles import Profile, compute_profiles, find_gaps
+from biogrip.judging.profiles import Points, Profile, compute_profiles, find_gaps
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import Finding
-from biogrip.stages.full_judgements import refitted, shown_of
+from biogrip.stages.intervals import refitted, shown_of
 from tests.helpers.limits import likelihood_for
 from tests.helpers.problems import MODEL, problem, run
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biogrip.experiment.sample import MODELS, Sample
 from biogrip.identify.words import limits_in_short
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.fisher import bound, covariance
@@ -24,8 +23,9 @@ from biogrip.judging.verdicts import (
     DETERMINED,
     NOT_DETERMINED,
 )
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import MODELS, Sample
 from biogrip.records.verdicts import diagnosis_data, exact_data
-from biogrip.response.linear import rotation, step_response
 from tests.helpers.problems import GRIPPER, MODEL, SAMPLES, TORQUE, clean, posed_for, problem, run
 
 DAMPER = MODELS["damper"]

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biogrip.experiment.sample import MODELS
 from biogrip.fit.local_fits import FINE
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.limits import find_limits
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED
+from biogrip.physics.models import MODELS
 from tests.helpers.definition import FitConstraint
 from tests.helpers.limits import (
     ALIKE,

@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
-from biogrip.experiment.sample import MODELS, Sample, with_fixed
 from biogrip.fit.local_fits import FINE
 from biogrip.fit.multi_start import fit_from
-from biogrip.judging.constrained_fits import ConstrainedFits
-from biogrip.judging.crossings import Brackets, crossings
+from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
-from biogrip.judging.limits import find_limits
+from biogrip.judging.limits import Brackets, crossings, find_limits
 from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
-from biogrip.judging.quantity_constraint import QuantityConstraint
-from biogrip.response.linear import rotation, step_response
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.sample_model import with_fixed
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE, identified, of_case, posed_for, run
 from tests.helpers.scipy_fits import scipy_fit
 

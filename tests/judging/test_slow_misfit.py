@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise_parts import draw_ornstein_uhlenbeck
-from biogrip.experiment.protocol import torque_history
-from biogrip.instrument.gripper import GRIPPER
 from biogrip.judging.diagnosis import diagnose
-from biogrip.judging.fit_status import DOUBT, DOUBTFUL, REJECTED, REJECTION, compute_status
-from biogrip.judging.slow_misfit import find_slow_misfit
-from biogrip.response.linear import rotation, step_response
-from biogrip.response.whitening import NoiseModel
+from biogrip.judging.doubts import (
+    DOUBT,
+    DOUBTFUL,
+    REJECTED,
+    REJECTION,
+    compute_status,
+    find_slow_misfit,
+)
+from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.noise import draw_ornstein_uhlenbeck
+from biogrip.physics.protocol import torque_history
+from biogrip.physics.whitening import NoiseModel
 from tests.helpers.default import STUDY
 from tests.helpers.problems import MODEL, SAMPLES, clean, posed_for, run
 

@@ -7,10 +7,9 @@ import pytest
 from scipy.stats import kstest
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.noise_parts import AR1, Outliers
-from biogrip.instrument.gripper import GRIPPER
-from biogrip.judging.whiteness import FALSE_ALARM, doubts_about_noise, uneven
+from biogrip.judging.doubts import FALSE_ALARM, doubts_about_noise, uneven
+from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.noise import AR1, Noise, Outliers, add_noise
 
 TIMES: Array = np.linspace(0, 400, 4001)
 SAME = np.ones(4001)

@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.records.parquet import column_names, read_columns, table_of, write_tables
+from biogrip.records.traces import column_names, read_columns, table_of, write_tables
 
 NUMBERS = {"x": np.array([0.1, -np.inf, 3.0]), "n": np.array([1, 2, 3])}
 

@@ -5,9 +5,9 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.records import traces
-from biogrip.records.parquet import column_names
 from biogrip.records.traces import (
     Measurements,
+    column_names,
     each_trace,
     read_jaw_force,
     read_measurements,

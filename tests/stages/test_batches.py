@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.stages.batches import batch_names, seeds_of
+from biogrip.stages.job import batch_names, seeds_of
 
 
 def made(folder: Path, *names: str) -> Path:

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.records.identifications import read_identifications
-from biogrip.records.interpretations import INTERPRETATIONS
+from biogrip.records.identifications import INTERPRETATIONS, read_identifications
 from biogrip.stages.identification import identify
-from biogrip.stages.interpretations import read
-from biogrip.stages.measurement import measure
-from biogrip.stages.target import simulate
+from biogrip.stages.sweeps import read
+from biogrip.stages.targets import measure, simulate
 from biogrip.study.study import Study
 from biogrip.tables.interpretations import interpretations
 from tests.helpers.default import study_of

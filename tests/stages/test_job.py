@@ -9,8 +9,17 @@ from typing import Any
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.stages.job import job_case, job_seeds, job_study, logged, paths
-from biogrip.stages.settings import case_of, keys_of_cases, settings, study_of
+from biogrip.stages.job import (
+    case_of,
+    job_case,
+    job_seeds,
+    job_study,
+    keys_of_cases,
+    logged,
+    paths,
+    settings,
+    study_of,
+)
 from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.config import StudyConfig
 from tests.helpers import default

@@ -8,19 +8,18 @@ import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.experiment.maxwell_models import generalized_maxwell
-from biogrip.experiment.protocol import hold, torque_history
-from biogrip.experiment.sample import MODELS
 from biogrip.figures import robustness as figure
 from biogrip.figures.style import styled
-from biogrip.instrument.gripper import Arm, Gripper
-from biogrip.judging.at_truth import headlines
+from biogrip.judging.fisher import headlines
+from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.maxwell_models import generalized_maxwell
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import hold, torque_history
 from biogrip.records.identifications import columns
-from biogrip.response.linear import rotation, step_response
-from biogrip.stages import sweep_points as stage
+from biogrip.stages import sweeps as stage
 from biogrip.study.study import Study
-from biogrip.tables.heat_maps import HeatMaps, heat_maps
-from biogrip.tables.robustness import robustness
+from biogrip.tables.robustness import HeatMaps, heat_maps, robustness
 from tests.helpers.default import study_of
 
 CASE = "endothelial_cell"

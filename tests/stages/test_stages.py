@@ -8,14 +8,15 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import Phase, hold
-from biogrip.experiment.sample import MODELS, Sample
-from biogrip.experiment.sampling import Sampling
-from biogrip.instrument.gripper import GRIPPER
+from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.protocol import Phase, Sampling, hold
 from biogrip.records.identifications import columns
 from biogrip.records.rows import write_rows
 from biogrip.records.traces import read_jaw_force, read_measurements, read_target
-from biogrip.stages import identifications, recording, target
+from biogrip.stages import identification as identifications
+from biogrip.stages import recording
+from biogrip.stages import targets as target
 from biogrip.traces.columns import Columns
 from tests.helpers.default import STUDY, seen
 from tests.helpers.places import EXAMPLE

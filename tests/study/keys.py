@@ -1,6 +1,6 @@
 """The keys that a config may have, as its schema says."""
 
-from biogrip.study.schema import Schema
+from biogrip.study.messages import Schema
 from tests.helpers.key_reference import documented
 
 STUDY = Schema(documented(), documented()["$defs"])

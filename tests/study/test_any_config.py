@@ -9,12 +9,12 @@ from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
 from biogrip.errors import BiogripError
-from biogrip.experiment.sample import MODELS
+from biogrip.keys import built, plain
+from biogrip.physics.models import MODELS
 from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.config import StudyConfig
 from biogrip.study.load import load_study
-from biogrip.study.plain import built, plain
-from biogrip.study.schema import Schema
+from biogrip.study.messages import Schema
 from biogrip.study.source import overlaid, read_config
 from tests.study.keys import STUDY, leaves
 

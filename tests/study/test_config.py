@@ -7,8 +7,8 @@ import pytest
 import yaml
 
 from biogrip.errors import BiogripError
-from biogrip.experiment.noise import Noise
-from biogrip.instrument.actuator import torque
+from biogrip.physics.actuator import torque
+from biogrip.physics.noise import Noise
 from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config
 from biogrip.study.study import Study

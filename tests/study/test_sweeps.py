@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.experiment.noise import Noise
+from biogrip.physics.noise import Noise
 from biogrip.study.load import load_study
 from biogrip.study.source import read_config
 from tests.helpers.places import CONFIG, ROOT

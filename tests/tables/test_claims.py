@@ -6,18 +6,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from biogrip.experiment.sample import Sample
-from biogrip.experiment.truth import Published, Truth
+from biogrip.physics.models import Published, Sample, Truth
 from biogrip.records.rows import read_table
 from biogrip.tables import claims_on_algorithm as algorithm
 from biogrip.tables import claims_on_instrument as instrument
 from biogrip.tables import claims_on_values as values
-from biogrip.tables.claim_results import LackingError, Results, Runs
 from biogrip.tables.claim_rules import (
     IN_PART,
     NOT,
     REPLICATED,
     UNDECIDED,
+    LackingError,
+    Results,
+    Runs,
     altogether,
     by_number,
     by_range,

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import f
 
-from biogrip.records.intervals import INTERVALS
+from biogrip.physics.simulation import simulated_rotation
+from biogrip.records.identifications import INTERVALS
 from biogrip.records.traces import write_target
-from biogrip.response.simulation import simulated_rotation
 from biogrip.stages import intervals as stage
 from biogrip.tables.coverage import coverage
-from biogrip.tables.verdict_counts import verdict_counts
+from biogrip.tables.verdicts import verdict_counts
 from tests.helpers.default import study_of
 
 CASE = "liquid_drop_2"

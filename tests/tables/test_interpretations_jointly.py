@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.stats import beta
 
-from biogrip.records.interpretations import INTERPRETATIONS
+from biogrip.records.identifications import INTERPRETATIONS
 from biogrip.records.rows import read_table
-from biogrip.tables.interpretations_jointly import (
+from biogrip.tables.interpretations import (
     interpretations_jointly,
     limits,
     own_shares,

@@ -9,14 +9,11 @@ import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.experiment.sample import MODELS, Sample
-from biogrip.experiment.truth import UNPUBLISHED, Truth
 from biogrip.fit.methods import METHODS
+from biogrip.physics.models import MODELS, UNPUBLISHED, Sample, Truth
 from biogrip.records.identifications import columns
 from biogrip.tables.layout import Table
-from biogrip.tables.methods import methods
-from biogrip.tables.models import models
-from biogrip.tables.timings import timings
+from biogrip.tables.methods import methods, models, timings
 from biogrip.tables.verdicts import verdicts
 from tests.helpers.default import seen, study_of
 

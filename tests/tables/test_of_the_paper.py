@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biogrip.experiment.sample import Sample
-from biogrip.experiment.truth import Published, Truth
 from biogrip.fit.genome import GeneRange
-from biogrip.instrument.actuator import torque
-from biogrip.records.differences import DIFFERENCES
-from biogrip.tables import evidence, left_out, printed_values
+from biogrip.physics.actuator import torque
+from biogrip.physics.models import Published, Sample, Truth
+from biogrip.records.identifications import DIFFERENCES
+from biogrip.tables import evidence
+from biogrip.tables import evidence as printed_values
+from biogrip.tables import mechanics as left_out
 from biogrip.tables.layout import Cell, Table
-from biogrip.tables.linearisation import linearisation
+from biogrip.tables.mechanics import linearisation
 from tests.helpers.default import STUDY, seen
 
 

@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biogrip.tables.sampling_evidence import sampling_evidence
+from biogrip.tables.evidence import sampling_evidence
 from tests.helpers.default import STUDY, seen
 
 CASES: Any = STUDY.of(STUDY.published)

@@ -6,8 +6,7 @@ import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.experiment.sample import MODELS, Sample
-from biogrip.experiment.truth import Published, Truth
+from biogrip.physics.models import MODELS, Published, Sample, Truth
 from biogrip.records.identifications import columns
 from biogrip.records.rows import escape_formula
 from biogrip.tables.errors_of_case import errors, errors_of_case

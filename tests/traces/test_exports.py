@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.instrument.creep import COMPLIANCE
-from biogrip.instrument.instrument import STRAIN, STRESS
-from biogrip.instrument.relaxation import MODULUS
+from biogrip.physics.instruments import COMPLIANCE, MODULUS, STRAIN, STRESS
 from biogrip.traces.columns import Columns
 from biogrip.traces.recordings import average_repeated, read_recording
 from biogrip.traces.units import TIME_UNITS, unit_of

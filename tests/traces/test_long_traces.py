@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import hold, torque_history
-from biogrip.experiment.sample import MODELS
 from biogrip.identify.one_trace import IdentifyOptions, identify_trace, study_of
 from biogrip.identify.read_as import ReadAs
-from biogrip.instrument.gripper import Gripper
 from biogrip.judging.diagnosis import diagnose
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import hold, torque_history
 from biogrip.records.verdicts import diagnosis_data
-from biogrip.response.linear import rotation, step_response
 from biogrip.stages import judgement
 
 SAMPLES, MEANS_OF = 200_000, 50

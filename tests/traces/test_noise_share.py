@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from biogrip.response.nuisance import nuisance_basis
+from biogrip.physics.drift import nuisance_basis
 from biogrip.traces.noise_share import proportional_deviations
 from tests.helpers.problems import GRIPPER, TORQUE, clean
 

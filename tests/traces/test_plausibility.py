@@ -6,9 +6,14 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.experiment.maxwell_models import generalized_maxwell
-from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.protocol import (
+from biogrip.physics.drift import nuisance_basis
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.maxwell_models import generalized_maxwell
+from biogrip.physics.models import MODELS
+from biogrip.physics.noise import Noise, add_noise
+from biogrip.physics.protocol import (
     Harmonic,
     Load,
     Phase,
@@ -17,10 +22,6 @@ from biogrip.experiment.protocol import (
     sample_times,
     torque_history,
 )
-from biogrip.experiment.sample import MODELS
-from biogrip.instrument.gripper import GRIPPER, Gripper
-from biogrip.response.linear import rotation, step_response
-from biogrip.response.nuisance import nuisance_basis
 from biogrip.traces.columns import Columns
 from biogrip.traces.plausibility import (
     LARGEST_SHARE,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.instrument.gripper import ROTATION
+from biogrip.physics.instruments import ROTATION
 from biogrip.traces import recordings, rows
 from biogrip.traces.columns import Columns
 from biogrip.traces.recordings import Recording, read_recording

@@ -9,11 +9,11 @@ import pyarrow.parquet as pq
 import pytest
 from matplotlib.image import imread
 
-from biogrip.experiment.maxwell_models import generalized_maxwell
-from biogrip.experiment.protocol import TorqueHistory
 from biogrip.figures.style import COLUMN_IN
-from biogrip.instrument.gripper import Gripper
-from biogrip.response.linear import rotation, step_response
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.maxwell_models import generalized_maxwell
+from biogrip.physics.protocol import TorqueHistory
 from tests.helpers.pictures import assert_drawn
 from tests.helpers.runs import TINY, snakemake
 

@@ -8,11 +8,11 @@ from snakemake.exceptions import WorkflowError
 
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
-from biogrip.stages.batches import batch_names
-from biogrip.stages.settings import keys_of_cases, settings, software
+from biogrip.stages.job import batch_names
+from biogrip.stages.job import keys_of_cases, settings, software
 from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.config import StudyConfig
-from biogrip.study.defaults import default_config, shipped
+from biogrip.study.source import default_config, shipped
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.source import overlaid

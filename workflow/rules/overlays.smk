@@ -1,6 +1,6 @@
 """What only some configs have: sweeps, interpretations of the paper, and tables of recorded traces."""
 
-from biogrip.experiment.sample import SINGLE_BRANCH
+from biogrip.physics.models import SINGLE_BRANCH
 from biogrip.identify.table_of_traces import read_table
 
 # Simulated cases whose model has the paper's parameters, and what is read of each.

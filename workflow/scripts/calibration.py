@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from biogrip.stages.calibration import run
 from biogrip.stages.job import job_case, logged
+from biogrip.stages.targets import run
 
 with logged(snakemake):
     run(

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from biogrip.stages.identifications import join
+from biogrip.stages.identification import join
 from biogrip.stages.job import job_case, logged, paths
 from biogrip.tables.errors_of_case import errors_of_case
 from biogrip.tables.layout import write

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from biogrip.stages.job import job_study, logged, paths
-from biogrip.tables.interpretations import interpretations
-from biogrip.tables.interpretations_jointly import interpretations_jointly
+from biogrip.tables.interpretations import interpretations, interpretations_jointly
 from biogrip.tables.layout import write
 
 with logged(snakemake):

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from biogrip.stages.interpretations import read
 from biogrip.stages.job import job_case, logged
+from biogrip.stages.sweeps import read
 
 with logged(snakemake):
     read(job_case(snakemake), Path(snakemake.input.target), Path(snakemake.output.rows))

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from biogrip.stages.job import job_case, job_seeds, logged
-from biogrip.stages.measurement import measure
+from biogrip.stages.targets import measure
 
 with logged(snakemake):
     measure(

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from biogrip.stages.identification import fit
 from biogrip.stages.job import job_case, job_seeds, logged, paths
-from biogrip.stages.model_fits import fit
 
 with logged(snakemake):
     fit(

@@ -5,10 +5,9 @@ from pathlib import Path
 from biogrip.figures.robustness import draw
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
-from biogrip.stages.sweep_points import judge
-from biogrip.tables.heat_maps import heat_maps
+from biogrip.stages.sweeps import judge
 from biogrip.tables.layout import write
-from biogrip.tables.robustness import robustness
+from biogrip.tables.robustness import heat_maps, robustness
 
 with logged(snakemake):
     study, sweep = job_study(snakemake), snakemake.wildcards.sweep

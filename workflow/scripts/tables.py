@@ -3,22 +3,15 @@
 from pathlib import Path
 
 from biogrip.stages.job import job_study, logged, paths
-from biogrip.tables import (
-    contact,
-    coverage,
-    errors_of_case,
-    evidence,
-    inputs,
-    left_out,
-    linearisation,
-    mechanics,
-    methods,
-    models,
-    printed_values,
-    sampling_evidence,
-    timings,
-    verdict_counts,
-)
+from biogrip.tables import coverage, errors_of_case, evidence, inputs, mechanics, methods
+from biogrip.tables import evidence as printed_values
+from biogrip.tables import evidence as sampling_evidence
+from biogrip.tables import mechanics as contact
+from biogrip.tables import mechanics as left_out
+from biogrip.tables import mechanics as linearisation
+from biogrip.tables import methods as models
+from biogrip.tables import methods as timings
+from biogrip.tables import verdicts as verdict_counts
 from biogrip.tables.layout import write
 
 with logged(snakemake):

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from biogrip.stages.job import job_case, logged
-from biogrip.stages.target import simulate
+from biogrip.stages.targets import simulate
 
 with logged(snakemake):
     simulate(job_case(snakemake), Path(snakemake.output.target))

@@ -8,10 +8,10 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Wedge
 
-from biogrip.experiment.protocol import torque_at, torque_history
 from biogrip.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, figure, panel
-from biogrip.instrument import actuator
-from biogrip.instrument.actuator import CombDrive
+from biogrip.physics import actuator
+from biogrip.physics.actuator import CombDrive
+from biogrip.physics.protocol import torque_at, torque_history
 from biogrip.study.study import Study
 
 

@@ -10,7 +10,7 @@ from matplotlib.patheffects import withStroke
 
 from biogrip.figures.results import read_history, seeds_in_words, typical_in_words
 from biogrip.figures.style import ALL_SEEDS, COLUMN_IN, FITTED, TARGET, figure
-from biogrip.fit.success import near_noise, near_noise_words, typical
+from biogrip.fit.methods import near_noise, near_noise_words, typical
 from biogrip.records.identifications import read_identifications
 from biogrip.study.study import Case
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from biogrip.digits import with_unit
 from biogrip.figures.results import read_history, seeds_in_words, typical_in_words
 from biogrip.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
-from biogrip.fit.success import typical
+from biogrip.fit.methods import typical
 from biogrip.records.identifications import read_identifications
 from biogrip.study.study import Case
 

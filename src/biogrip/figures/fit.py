@@ -8,9 +8,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.digits import with_unit
-from biogrip.figures.axis_limits import is_over_decades, scale_of_fit
 from biogrip.figures.results import Fit, typical_fit
-from biogrip.figures.style import COLUMN_IN, FITTED, MEASURED, TARGET, figure
+from biogrip.figures.style import (
+    COLUMN_IN,
+    FITTED,
+    MEASURED,
+    TARGET,
+    figure,
+    is_over_decades,
+    scale_of_fit,
+)
 from biogrip.study.study import Case
 
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}

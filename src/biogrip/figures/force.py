@@ -6,12 +6,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import torque_history
 from biogrip.figures.results import scale_of
 from biogrip.figures.style import BLACK, BLUE, COLUMN_IN, ORANGE, figure
+from biogrip.physics.jaw_force import jaw_force
+from biogrip.physics.protocol import torque_history
+from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
 from biogrip.records.traces import read_target
-from biogrip.response.jaw_force import jaw_force
-from biogrip.response.unilateral import UnilateralResponse, unilateral_response
 from biogrip.study.study import Case
 
 

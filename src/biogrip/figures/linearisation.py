@@ -7,14 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from biogrip.experiment.protocol import torque_history
 from biogrip.figures.style import BLUE, PAGE_IN, TARGET, figure, panel
-from biogrip.records.differences import DIFFERENCES
-from biogrip.response.linear import rotation, step_response
-from biogrip.response.nonlinear import FINE, correction
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.nonlinear import FINE, correction
+from biogrip.physics.protocol import torque_history
+from biogrip.records.identifications import DIFFERENCES
 from biogrip.stages.model_difference import network_of, scaled
 from biogrip.study.study import Case, Study
-from biogrip.tables.linearisation import LIMIT_PERCENT
+from biogrip.tables.mechanics import LIMIT_PERCENT
 
 _SHOWN_FACTOR = 20.0
 _MOST_CASES = 3

@@ -7,13 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
-from biogrip.experiment.protocol import torque_history
 from biogrip.figures.elements import damper, spring
 from biogrip.figures.nomenclature import nomenclature
 from biogrip.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, figure, panel
-from biogrip.instrument.contact import LARGEST_M
-from biogrip.instrument.gripper import Gripper
-from biogrip.response.simulation import simulated_rotation
+from biogrip.physics.contact import LARGEST_M
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.protocol import torque_history
+from biogrip.physics.simulation import simulated_rotation
 from biogrip.stages.model_difference import network_of
 from biogrip.study.study import Study
 

@@ -8,9 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.experiment.network import complex_modulus
-from biogrip.experiment.noise import standard_deviation
-from biogrip.experiment.sample import Network, SampleModel
 from biogrip.figures.results import first_seeds
 from biogrip.figures.style import (
     BLACK,
@@ -26,7 +23,9 @@ from biogrip.figures.style import (
     line_of,
     panel,
 )
-from biogrip.fit.success import near_noise
+from biogrip.fit.methods import near_noise
+from biogrip.physics.noise import standard_deviation
+from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
 from biogrip.records.identifications import read_identifications
 from biogrip.records.traces import read_target
 from biogrip.study.study import Case, Study

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array
-from biogrip.experiment.truth import Truth
 from biogrip.figures.fit import draw_traces
 from biogrip.figures.results import (
     SHOWN_SEEDS,
@@ -28,7 +27,8 @@ from biogrip.figures.style import (
     figure,
     panel,
 )
-from biogrip.fit.success import near_noise, near_noise_words
+from biogrip.fit.methods import near_noise, near_noise_words
+from biogrip.physics.models import Truth
 from biogrip.records.identifications import read_identifications
 from biogrip.records.verdicts import bounded_on_a_side, read_verdicts
 from biogrip.study.study import Study

@@ -12,13 +12,19 @@ from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
-from biogrip.figures.axis_limits import (
+from biogrip.figures.style import (
+    BLUE,
+    FITTED,
+    GREY,
     HIGHEST_INCREASE,
+    SHADE,
+    TARGET,
+    decade_ticks,
     is_wide,
+    panel,
     profile_limits,
+    row_of_panels,
 )
-from biogrip.figures.decades import decade_ticks
-from biogrip.figures.style import BLUE, FITTED, GREY, SHADE, TARGET, panel, row_of_panels
 from biogrip.judging.likelihood import CERTAIN
 from biogrip.records.verdicts import read_verdicts
 from biogrip.study.study import Case

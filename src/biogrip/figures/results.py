@@ -10,14 +10,13 @@ import pandas as pd
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.success import typical
-from biogrip.instrument.gripper import ROTATION
-from biogrip.instrument.instrument import Quantity
+from biogrip.fit.methods import typical
+from biogrip.physics.drift import within
+from biogrip.physics.instruments import ROTATION, Quantity
+from biogrip.physics.simulation import simulated_rotation
 from biogrip.records.identifications import read_histories, read_identifications
 from biogrip.records.traces import Measurements, read_measurements
-from biogrip.response.nuisance import within
-from biogrip.response.simulation import simulated_rotation
-from biogrip.stages.batches import seeds_of
+from biogrip.stages.job import seeds_of
 
 SHOWN_SEEDS = 100
 """Most seeds drawn individually; figures show the first ones."""

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.figures.style import PAGE_IN, figure, panel
-from biogrip.tables.heat_maps import (
+from biogrip.tables.robustness import (
     HeatMaps,
     headlines_of,
     read_points,

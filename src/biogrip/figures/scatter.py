@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import standard_deviation
 from biogrip.figures.results import SHOWN_SEEDS, seeds_in_words
 from biogrip.figures.style import (
     PAPER,
@@ -25,6 +24,7 @@ from biogrip.figures.style import (
 from biogrip.judging.fisher import bound
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED
+from biogrip.physics.noise import standard_deviation
 from biogrip.records.identifications import read_identifications
 from biogrip.records.traces import read_target
 from biogrip.records.verdicts import read_verdicts

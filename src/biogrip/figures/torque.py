@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import torque_at, torque_history
 from biogrip.figures.style import BLUE, COLUMN_IN, GREEN, ORANGE, PURPLE, figure
-from biogrip.instrument import actuator
-from biogrip.instrument.contact import LARGEST_M, SMALLEST_M, contact
+from biogrip.physics import actuator
+from biogrip.physics.contact import LARGEST_M, SMALLEST_M, contact
+from biogrip.physics.protocol import torque_at, torque_history
 from biogrip.study.study import Study
 
 

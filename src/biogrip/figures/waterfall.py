@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from biogrip.figures.style import COLUMN_IN, TARGET, figure, line_of
-from biogrip.fit.success import chi_square_increase, near_noise_words
+from biogrip.fit.methods import chi_square_increase, near_noise_words
 from biogrip.records.identifications import read_identifications
 from biogrip.study.study import Case
 

@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
-from biogrip.experiment.sample import Sample, SampleModel, with_fixed
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.problem import Problem, make_problem, searched
-from biogrip.instrument.calibrated_gripper import read_calibrated_arms
-from biogrip.instrument.gripper import Gripper
-from biogrip.instrument.instrument import Instrument
-from biogrip.response.condensed import Condensed
-from biogrip.response.misfit import Misfit
-from biogrip.response.misfit_series import SeriesMisfit
-from biogrip.response.nuisance import nuisance_basis, with_uncertain
-from biogrip.response.whitening import WEIGHTED, NoiseModel, Whitening
+from biogrip.physics.calibration import read_calibrated_arms
+from biogrip.physics.condensed import Condensed
+from biogrip.physics.drift import nuisance_basis, with_uncertain
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import Instrument
+from biogrip.physics.misfit import Misfit, SeriesMisfit
+from biogrip.physics.models import Sample
+from biogrip.physics.protocol import Phase, TorqueHistory, torque_history
+from biogrip.physics.sample_model import SampleModel, with_fixed
+from biogrip.physics.whitening import WEIGHTED, NoiseModel, Whitening
 
 SharedRows = dict[Hashable, Condensed]
 """Condensed rows by all that they depend on."""

@@ -15,8 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from biogrip.arrays import Array
-from biogrip.fit.answer import History, Identification, Progress, Row, silent
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
 from biogrip.keys import Block
 
 if TYPE_CHECKING:

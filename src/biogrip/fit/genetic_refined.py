@@ -12,11 +12,9 @@ import numpy as np
 from pydantic import Field
 
 from biogrip.arrays import Array
-from biogrip.fit.answer import History, Identification, Progress, Row, silent
-from biogrip.fit.genetic import Evolution, evolve
-from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genetic import Evolution, GeneticSettings, evolve
 from biogrip.fit.multi_start import best_of_starts
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
 from biogrip.keys import Block
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from pydantic import Field
 
 from biogrip.arrays import Array, IntArray
-from biogrip.experiment.sample import SampleModel
 from biogrip.keys import Block, Problem
+from biogrip.physics.sample_model import SampleModel
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,8 @@ from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.fit.answer import Identification, Progress, Row, silent
 from biogrip.fit.multi_start import best_of_starts, screened
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import Identification, Problem, Progress, Row, silent
 from biogrip.keys import Block
 
 

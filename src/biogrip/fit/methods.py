@@ -5,11 +5,22 @@ whose fields are the keys of its config block (`biogrip.keys`), and a function
 ``identify_many(problems, settings, rngs, progress)``, which returns an `Identification` of each
 trace, to the bit as if it were alone. Ranges and traces are the problems', the budget of each is
 in the settings, its generator is its only source of randomness, and progress is told of all.
+
+A method by its name, as what works with it calls it.
+
+Measures of success: misfits of identifications compared with one another and with noise.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from biogrip.arrays import Array
+from biogrip.fit.problem import Identification, Problem, Progress
 
 
 @dataclass(frozen=True)
@@ -96,3 +107,88 @@ def block_class(block: str) -> type:
     """Import the settings class of a config block of any method."""
     method = next(method for method in METHODS.values() if block in method.blocks)
     return method.named(method.blocks[block])
+
+
+Identify = Callable[
+    [Sequence[Problem], Sequence[np.random.Generator], Progress], list[Identification]
+]
+"""Identifies traces as the ``identify_many`` of a method does, with its settings."""
+
+
+def identifier(name: str, settings: object) -> Identify:
+    """Load a method with its settings.
+
+    Parameters
+    ----------
+    name
+        One of `biogrip.fit.methods.METHODS`.
+    settings
+        Its block, or what puts its blocks together.
+    """
+    module = import_module(f"{__package__}.{name}")
+
+    def identify(
+        problems: Sequence[Problem], rngs: Sequence[np.random.Generator], progress: Progress
+    ) -> list[Identification]:
+        answers = module.identify_many(problems, settings, rngs, progress)
+        pairs = zip(problems, answers, strict=True)
+        return [answer.in_order(problem.residuals.model) for problem, answer in pairs]
+
+    return identify
+
+
+def best_fit(
+    problem: Problem, least_squares: object, rng: np.random.Generator, progress: Progress
+) -> Identification:
+    """Identify one trace by multi-start least squares, the method of every judgement."""
+    (found,) = identifier("least_squares", least_squares)([problem], [rng], progress)
+    return found
+
+
+def typical(found: pd.DataFrame) -> pd.Series:
+    """Return the identification with the median ratio of misfit to noise in its trace.
+
+    The lowest misfit of all would be that of the quietest trace. If the noise is unknown
+    or absent, the identification of median misfit is returned. Of an even number, it is
+    the better of the two in the middle.
+    """
+    noise = found["noise_rms"].where(found["noise_rms"] > 0).fillna(1.0)
+    ranked = (found["misfit"] / noise).sort_values(kind="stable").index
+    return found.loc[ranked[(len(ranked) - 1) // 2]]
+
+
+def chi_square_increase(found: pd.DataFrame, samples: int) -> Array:
+    """Return the increase of each identification's chi^2 over the lowest of its trace, (n,).
+
+    The lowest is that of any method, or that of the true parameters where these are
+    known; the best fit of a few parameters lies below the latter.
+
+    Parameters
+    ----------
+    found
+        Identifications of one case by all methods.
+    samples
+        Number of readings in a trace.
+    """
+    misfit = found["misfit"]
+    lowest = misfit.groupby(found["seed"]).transform("min")
+    lowest = np.fmin(lowest, found["noise_rms"].where(found["noise_rms"] > 0))
+    increase: Array = samples * ((misfit / lowest) ** 2 - 1).to_numpy(float)
+    return increase
+
+
+def near_noise(found: pd.DataFrame, tolerance: float) -> NDArray[np.bool_]:
+    """Return True for each seed whose misfit is at most a share above the RMS noise, (n_seeds,).
+
+    Such a fit looks right in a plot. With thousands of readings it need not be an optimum:
+    a misfit 2 % above the noise increases chi^2 of 4001 readings by 162; see
+    `chi_square_increase`.
+    """
+    misfit, noise = (found[name].to_numpy(float) for name in ("misfit", "noise_rms"))
+    reached: NDArray[np.bool_] = misfit <= (1 + tolerance) * noise
+    return reached
+
+
+def near_noise_words(tolerance: float) -> str:
+    """Describe the criterion of `near_noise` in words."""
+    return f"within {100 * tolerance:g} % of the noise"

@@ -1,4 +1,13 @@
-"""Autocorrelation of the noise of a trace, estimated by restricted maximum likelihood (REML).
+"""Outliers: readings of a trace with far more noise than the others.
+
+Noise that grows with the rotation: a test for it, and its standard deviation.
+
+The test ranks the sizes of residuals against those of the rotation, so that outliers count no
+more than other readings [1]_. The standard deviation is that of two independent parts, one the
+same everywhere and one proportional to the rotation. Their shares are those of highest
+likelihood under Student's t distribution, which bounds the influence of outliers [2]_.
+
+Autocorrelation of the noise of a trace, estimated by restricted maximum likelihood (REML).
 
 The residuals of a fit have less noise than the trace, most of all at low frequencies,
 where parameters, offset and drift absorb noise. The restricted likelihood is that of
@@ -7,6 +16,10 @@ of 1/f noise from vanishing, as it often would by chance alone [2]_.
 
 References
 ----------
+.. [1] C. Spearman, The proof and measurement of association between two things, American Journal
+   of Psychology 15 (1904), 72-101.
+.. [2] K. L. Lange, R. J. A. Little and J. M. G. Taylor, Robust statistical modeling using the t
+   distribution, Journal of the American Statistical Association 84 (1989), 881-896.
 .. [1] H. D. Patterson and R. Thompson, Recovery of inter-block information when block sizes are
    unequal, Biometrika 58 (1971), 545-554.
 .. [2] Y. Chung, S. Rabe-Hesketh, V. Dorie, A. Gelman and J. Liu, A nondegenerate penalized
@@ -16,8 +29,112 @@ References
 
 import numpy as np
 
-from biogrip.arrays import Array
-from biogrip.response.whitening import NoiseModel, Whitening
+from biogrip.arrays import Array, BoolArray
+from biogrip.physics.whitening import ROOT_12, NoiseModel, Whitening
+
+FAR = 4.5
+"""Threshold in standard deviations of the noise, exceeded by one Gaussian reading in 150,000."""
+
+GAUSSIAN = 0.6744897501960817
+"""Median absolute deviation of a normal distribution, in standard deviations."""
+
+# Width of the running median that follows slow noise.
+_AROUND = 11
+
+
+def outliers_of(residual: Array, rounding_rad: float = 0.0) -> BoolArray:
+    """Find outliers among residuals by a Hampel filter [1]_.
+
+    Parameters
+    ----------
+    residual : (n_samples,)
+        Residuals of a fit, over the noise's standard deviation where that is not the same.
+    rounding_rad
+        Step of the readings: a reading on the next step is no outlier.
+
+    Returns
+    -------
+    (n_samples,)
+        True where a residual is further than `FAR` from the median of eleven, in standard
+        deviations estimated from the median of all such distances, and no less than those of
+        rounding errors.
+
+    References
+    ----------
+    .. [1] F. R. Hampel, The influence curve and its role in robust estimation, Journal of the
+       American Statistical Association 69 (1974), 383-393.
+    """
+    apart = measure_distances(residual)
+    # One residual in eleven is that median itself.
+    others = apart[apart > 0]
+    if not len(others):
+        return np.zeros(len(residual), dtype=bool)
+    scale = max(float(np.median(others)) / GAUSSIAN, rounding_rad / ROOT_12)
+    found: BoolArray = apart > FAR * scale
+    return found
+
+
+def measure_distances(residual: Array) -> Array:
+    """Measure how far residuals are from the median of the eleven around, (n_samples,)."""
+    from scipy.ndimage import median_filter
+
+    apart: Array = np.abs(residual - median_filter(residual, _AROUND, mode="mirror"))
+    return apart
+
+
+# Significance level: share of traces with the same noise everywhere in which it seems to grow.
+_FALSE_ALARM = 0.003
+# Degrees of freedom of Student's t; logarithms of least and largest odds of the growing part.
+_TAILS, _GROWTH_LEAST, _GROWTH_MOST = 4.0, -9.0, 20.0
+
+
+def compute_growth(residual: Array, rotation_rad: Array) -> Array:
+    """Compute how the noise grows with the rotation.
+
+    Parameters
+    ----------
+    residual : (n_samples,)
+        Residuals of a fit.
+    rotation_rad : (n_samples,)
+        Rotation of the fit.
+
+    Returns
+    -------
+    (n_samples,)
+        Standard deviation of the noise over its root mean square; ones if it does not grow.
+    """
+    from scipy.optimize import minimize_scalar
+
+    apart, size = measure_distances(residual), np.abs(rotation_rad)
+    if not _grows(apart, size):
+        return np.ones(len(residual))
+    found = minimize_scalar(
+        lambda odds: _deviance(apart, _growth(odds, size)), bounds=(_GROWTH_LEAST, _GROWTH_MOST)
+    )
+    return _growth(float(found.x), size)
+
+
+def _grows(apart: Array, size: Array) -> bool:
+    from scipy.stats import spearmanr
+
+    if np.ptp(apart) == 0 or np.ptp(size) == 0:
+        return False
+    return bool(spearmanr(size, apart, alternative="greater").pvalue < _FALSE_ALARM)
+
+
+def _growth(log_odds: float, size: Array) -> Array:
+    share = 1 / (1 + np.exp(-log_odds))
+    growth: Array = np.sqrt(1 - share + share * size**2 / np.mean(size**2))
+    return growth
+
+
+def _deviance(apart: Array, growth: Array) -> float:
+    """Return minus Student's log-likelihood, with the scale that the median tells."""
+    standard = apart / growth
+    scale = np.median(standard[standard > 0]) / GAUSSIAN
+    kernel = 0.5 * (_TAILS + 1) * np.log1p((standard / scale) ** 2 / _TAILS)
+    return float(np.sum(np.log(growth * scale) + kernel))
+
 
 # Bounds of the logarithm of a component's share over that of white noise: from none to all.
 _LEAST, _MOST = -9.0, 7.0

@@ -1,11 +1,13 @@
-"""Identification of one trace together with its noise model and an uncertain gripper.
+"""Effect of the gripper's calibration uncertainty on a rotation.
+
+Identification of one trace together with its noise model and an uncertain gripper.
 
 If the noise is white and the gripper known, this is one global fit. Otherwise the best fit,
 the autocorrelation of its residuals and the effect of the gripper's uncertainty are
 computed in turn, until none of them changes.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,16 +15,86 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
 from biogrip.errors import BiogripError
-from biogrip.fit.answer import Identification
-from biogrip.fit.case_problem import CaseProblem, SharedRows
+from biogrip.fit.case_problem import NOT_FITTED, CaseProblem, SharedRows
 from biogrip.fit.multi_start import fit_from
-from biogrip.fit.noise_growth import compute_growth
-from biogrip.fit.noise_model_fit import NoiseModelLikelihood
-from biogrip.fit.outliers import outliers_of
-from biogrip.fit.problem import Problem
-from biogrip.fit.uncertain_gripper import gripper_functions
-from biogrip.response.flow import drift_is_flow
-from biogrip.response.whitening import MOST_SAMPLES, NoiseModel
+from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
+from biogrip.fit.problem import Identification, Problem
+from biogrip.physics.drift import drift_is_flow
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel
+
+# Square of three standard uncertainties.
+_SECOND_ORDER = 9.0
+
+
+def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Array) -> Array:
+    """Compute the changes of a rotation by the uncertainties of the gripper's properties.
+
+    To the first order it is half the difference between rotations with the property a standard
+    uncertainty above and below its value, as is recommended for nonlinear models [1]_. The mean
+    of both, less the rotation itself, is its second order: it grows with the square of the error,
+    and has the amplitude of an error of three standard uncertainties. Without it limits would be
+    too narrow where the noise is far below the square.
+
+    Parameters
+    ----------
+    case_problem
+        Assumptions of the identification.
+    time_s : (n_times,)
+        Ascending times.
+    parameters : (n_parameters,)
+        Searched parameters, SI units.
+
+    Returns
+    -------
+    (2 n_properties, n_times)
+        Changes in rad of first order, a row for each uncertain property, then those of second.
+
+    References
+    ----------
+    .. [1] JCGM 100:2008, Evaluation of measurement data: guide to the expression of uncertainty
+       in measurement, section 5.1.3, note 2.
+    """
+    network = case_problem.searched.network(parameters)
+
+    def simulated(gripper: Gripper, torque: TorqueHistory) -> Array:
+        nonlinear = case_problem.nonlinear
+        return simulated_rotation(gripper, network, torque, time_s, nonlinear=nonlinear)[0]
+
+    pairs = [(simulated(*above), simulated(*below)) for above, below in _pairs(case_problem)]
+    if not pairs:
+        return np.zeros((0, len(time_s)))
+    above, below = np.stack(pairs, axis=1)
+    second = 0.5 * (above + below) - simulated(case_problem.gripper, case_problem.torque)
+    return np.vstack((0.5 * (above - below), _SECOND_ORDER * second))
+
+
+_Instrument = tuple[Gripper, TorqueHistory]
+
+
+def _pairs(case_problem: CaseProblem) -> Iterator[tuple[_Instrument, ...]]:
+    """Yield two instruments for each uncertain property, one above and one below its value."""
+    gripper, torque = case_problem.gripper, case_problem.torque
+    for name, known in case_problem.uncertainty.items():
+        for key, uncertainty in known.items():
+            if not uncertainty or key == NOT_FITTED:
+                continue
+            errors = (uncertainty, -uncertainty)
+            if name == "torque":
+                yield tuple((gripper, torque.times(1 + error)) for error in errors)
+            else:
+                yield tuple((_changed(gripper, name, key, error), torque) for error in errors)
+
+
+def _changed(gripper: Gripper, name: str, key: str, error: float) -> Gripper:
+    """Return a gripper with a property of its own or of an arm changed."""
+    if name == "gripper":
+        return replace(gripper, **{key: getattr(gripper, key) + error})
+    arm = getattr(gripper, name)
+    return replace(gripper, **{name: replace(arm, **{key: getattr(arm, key) + error})})
+
 
 _ROUNDS = 5
 # Changes of noise shares and times below this change no confidence limit in its third digit.

@@ -5,7 +5,7 @@ from importlib.metadata import version
 from typing import Any
 
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.study.plain import plain
+from biogrip.keys import plain
 from biogrip.study.study import Case
 
 

@@ -7,14 +7,14 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from biogrip.arrays import Array, IntArray
 from biogrip.digits import significant, with_unit
-from biogrip.figures.axis_limits import (
+from biogrip.figures.results import Fit, fit_of
+from biogrip.figures.style import (
     HIGHEST_INCREASE,
     is_over_decades,
     is_wide,
     profile_limits,
     scale_of_fit,
 )
-from biogrip.figures.results import Fit, fit_of
 from biogrip.identify.one_trace import Identified
 from biogrip.judging.likelihood import CERTAIN
 

@@ -6,25 +6,25 @@ from typing import Any
 
 import numpy as np
 
-from biogrip.experiment.nesting import as_richer, contained
-from biogrip.experiment.random_streams import stream
-from biogrip.experiment.sample import CANDIDATES
-from biogrip.experiment.springpot import LONGEST_S
-from biogrip.fit.answer import Identification
-from biogrip.fit.model_choice import (
+from biogrip.fit.nested_fits import (
     FittedModel,
     advice,
     asks_for_more,
+    fit_models,
+    is_within,
     preferred_simpler,
     ranked,
 )
-from biogrip.fit.nested_fits import fit_models, is_within
+from biogrip.fit.problem import Identification
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.identify.trace_case import TraceCase
 from biogrip.judging.diagnosis import Diagnosis, diagnose
-from biogrip.judging.fit_status import DOUBT, Note
+from biogrip.judging.doubts import DOUBT, Note
 from biogrip.judging.likelihood import MISSED
 from biogrip.judging.verdicts import Finding
+from biogrip.physics.models import CANDIDATES, as_richer, contained
+from biogrip.physics.noise import stream
+from biogrip.physics.springpot import LONGEST_S
 
 _MOST_SAMPLES = 50_000
 # Each of the others would take half a second to five; they are tried where the config names them.

@@ -12,7 +12,7 @@ from biogrip.identify.outputs import check_output
 from biogrip.identify.read_as import ReadAs
 from biogrip.identify.table_of_traces import Row, cases_of, is_table, read_table
 from biogrip.identify.words import in_words, side_by_side
-from biogrip.judging.fit_status import REJECTED
+from biogrip.judging.doubts import REJECTED
 from biogrip.terminal import visible
 from biogrip.traces.trace_file import trace_file_problem
 

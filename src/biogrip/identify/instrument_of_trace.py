@@ -6,9 +6,7 @@ from typing import Any
 
 from biogrip.errors import BiogripError
 from biogrip.identify.read_as import ReadAs
-from biogrip.instrument.gripper import GRIPPER
-from biogrip.instrument.instrument import Instrument
-from biogrip.instrument.instruments import INSTRUMENTS
+from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.traces.recordings import read_recording
 
 

@@ -22,12 +22,11 @@ from biogrip.identify.one_trace import (
 )
 from biogrip.identify.outputs import WRITTEN_BY, name_in_units
 from biogrip.identify.trace_case import TraceCase
-from biogrip.instrument.gripper import ROTATION
-from biogrip.instrument.instruments import INSTRUMENTS
+from biogrip.physics.instruments import INSTRUMENTS, ROTATION
+from biogrip.processes import worker_processes
 from biogrip.progress import Progress
 from biogrip.records.rows import read_rows, write_rows
 from biogrip.terminal import visible, visible_lines
-from biogrip.worker_processes import worker_processes
 
 # Most traces of a batch, and most readings of traces that are fitted together.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000

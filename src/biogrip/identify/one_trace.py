@@ -13,7 +13,6 @@ from biogrip import __version__
 from biogrip.arrays import Array
 from biogrip.digits import counted, rounded_numbers
 from biogrip.errors import BiogripError, nearest
-from biogrip.experiment.sample import CANDIDATES, Sample
 from biogrip.files import write_text
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.trace_fit import TraceFit
@@ -30,21 +29,21 @@ from biogrip.identify.outputs import WRITTEN_BY, in_own_units
 from biogrip.identify.read_as import ReadAs, laid_over, read_trace
 from biogrip.identify.second_opinion import second_opinions
 from biogrip.identify.trace_case import TraceCase
-from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all
-from biogrip.judging.fit_status import HARMLESS, REJECTED, Note
+from biogrip.judging.doubts import HARMLESS, REJECTED, Note
 from biogrip.judging.onset_profiles import profile_over_onset
+from biogrip.physics.drift import within
+from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.models import CANDIDATES, Sample
+from biogrip.physics.simulation import simulated_rotation
 from biogrip.progress import Progress
 from biogrip.records.traces import Measurements
 from biogrip.records.verdicts import exact_data
-from biogrip.response.nuisance import within
-from biogrip.response.simulation import simulated_rotation
 from biogrip.stages import recording
 from biogrip.stages.judgement import fits_judged, notes_on_fit
-from biogrip.study.defaults import default_config
+from biogrip.study.experiment_blocks import fixed_problems
 from biogrip.study.load import load_study, read_configs
-from biogrip.study.sample_block import fixed_problems
-from biogrip.study.source import KeyPath, dotted, keys_in, overlaid, shown_path
+from biogrip.study.source import KeyPath, default_config, dotted, keys_in, overlaid, shown_path
 from biogrip.study.study import Case, Study
 from biogrip.terminal import visible
 from biogrip.traces.columns import place

@@ -8,7 +8,7 @@ from typing import Any
 
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_path
-from biogrip.instrument.instrument import Quantity
+from biogrip.physics.instruments import Quantity
 from biogrip.terminal import visible
 
 WRITTEN_BY = "written_by_biogrip"

@@ -17,7 +17,7 @@ from biogrip.identify.on_page import json_in_page
 from biogrip.identify.outputs import WRITTEN_BY
 from biogrip.identify.strips import strips_of
 from biogrip.identify.words import in_unit, labels_of
-from biogrip.judging.fit_status import DOUBTFUL, OK, REJECTED
+from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.terminal import visible, visible_lines
 
 _STATUSES = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}

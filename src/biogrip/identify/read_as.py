@@ -9,8 +9,8 @@ from typing import Any
 from biogrip.errors import BiogripError, nearest
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.identify.search_ranges import with_own_ranges
-from biogrip.instrument.gripper import ROTATION, Gripper
-from biogrip.instrument.instrument import Quantity
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import ROTATION, Quantity
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
 from biogrip.study.measurement_block import COLOURED, KNOWN_NOISE, READINGS, MeasurementBlock

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import largest_load
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
+from biogrip.physics.protocol import largest_load
+from biogrip.physics.whitening import estimate_noise
 from biogrip.records.traces import Measurements
-from biogrip.response.noise_estimate import estimate_noise
 from biogrip.study.study import Case
 
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.

@@ -6,20 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from biogrip.experiment.random_streams import stream
-from biogrip.fit.answer import Identification, Progress
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.identifier import identifier
+from biogrip.fit.methods import identifier
 from biogrip.fit.multi_start import fit_from
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import Identification, Problem, Progress
 from biogrip.fit.trace_fit import TraceFit, fit_traces
 from biogrip.identify.trace_case import TraceCase
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all
-from biogrip.judging.fit_status import DOUBT, HARMLESS, REJECTED, REJECTION, Note
+from biogrip.judging.doubts import DOUBT, FALSE_ALARM, HARMLESS, REJECTED, REJECTION, Note, one_in
 from biogrip.judging.likelihood import compute_fall
 from biogrip.judging.verdicts import Finding
-from biogrip.judging.whiteness import FALSE_ALARM, one_in
-from biogrip.response.flow import drift_is_flow
+from biogrip.physics.drift import drift_is_flow
+from biogrip.physics.noise import stream
 
 
 def second_opinions(

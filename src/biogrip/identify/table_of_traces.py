@@ -17,12 +17,11 @@ from typing import Any
 import yaml
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.experiment.models import MODELS
 from biogrip.identify.many_traces import COLUMNS
 from biogrip.identify.one_trace import IdentifyOptions, study_of
+from biogrip.physics.models import MODELS
 from biogrip.study.case_blocks import CaseBlock
-from biogrip.study.messages import checked
-from biogrip.study.schema import Schema, schema_of
+from biogrip.study.messages import Schema, checked, schema_of
 from biogrip.study.source import overlaid, scalar_problem
 from biogrip.study.study import Case
 from biogrip.terminal import visible

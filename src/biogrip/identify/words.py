@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from biogrip.digits import with_unit
-from biogrip.judging.fit_status import OK, REJECTED
+from biogrip.judging.doubts import OK, REJECTED
 from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,

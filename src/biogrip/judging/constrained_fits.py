@@ -1,15 +1,199 @@
-"""Increase of chi^2 with a quantity held at a value, for many traces and quantities at once."""
+"""Constraints that hold quantities exactly at given values, in many fits at once.
+
+One member of a quantity, a parameter in it, is eliminated: it follows from the others
+and the value (generalized reduced gradients [1]_). The dominant member is eliminated,
+chosen anew at every step among those that are not at a bound: any other would move far
+in a small step. A stiff penalty residual instead would be violated, the more the better
+the trace determines the quantity.
+
+Increase of chi^2 with a quantity held at a value, for many traces and quantities at once.
+
+References
+----------
+.. [1] J. Abadie and J. Carpentier, Generalization of the Wolfe reduced gradient method to the
+   case of nonlinear constraints, in R. Fletcher (ed.), Optimization, Academic Press, 1969,
+   37-47.
+"""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.fit.levenberg_marquardt import Minima
+from biogrip.fit.levenberg_marquardt import Minima, Normal
 from biogrip.fit.local_fits import LocalFits
 from biogrip.judging.likelihood import MISSED, Likelihood
 from biogrip.judging.quantities import Quantity
-from biogrip.judging.quantity_constraint import QuantityConstraint
+
+# E-folds from a bound at which a member counts as free, and by which rounding may exceed it.
+_FREE, _ROUNDING = 1e-9, 1e-7
+# Factor on the weight of members at a bound in the choice of the eliminated one.
+_UNWILLING = 1e-9
+_SMALLEST = 1e-200
+
+
+class QuantityConstraint:
+    """A constraint on each of n fits, which holds one quantity at a given value.
+
+    Parameters
+    ----------
+    quantities
+        Quantities that may be held.
+    which : (n,)
+        Index of the quantity that each fit holds.
+    targets : (n,)
+        Logarithm of its value, within the quantity's range.
+    low, high : (n, n_parameters)
+        Bounds of the log-parameters of each fit.
+    longest_s
+        Time within which branches must relax for quantities that require it.
+    """
+
+    def __init__(
+        self,
+        quantities: Sequence[Quantity],
+        which: IntArray,
+        targets: Array,
+        low: Array,
+        high: Array,
+        longest_s: float,
+    ) -> None:
+        self._which, self._targets = which, targets
+        self._low, self._high = low, high
+        parameters = low.shape[1]
+        self._powers = np.zeros((len(quantities), parameters))
+        most = max(len(quantity.penalties) for quantity in quantities)
+        self._forms = np.zeros((len(quantities), most, parameters))
+        self._allowed, self._stiffness = np.zeros((2, len(quantities), most))
+        for index, quantity in enumerate(quantities):
+            self._powers[index, list(quantity.members)] = quantity.sign
+            for row, penalty in enumerate(quantity.penalties):
+                self._forms[index, row] = penalty.form(parameters)
+                self._allowed[index, row] = penalty.allowed(longest_s)
+                self._stiffness[index, row] = penalty.stiffness
+        self._senses = np.array([float(quantity.sense) for quantity in quantities])
+        self._most_members = max(len(quantity.members) for quantity in quantities)
+
+    def started(self, x: Array) -> Array:
+        """Move points, (n, n_parameters), onto the constraint."""
+        everyone = np.arange(len(x))
+        powers, sense = self._form(everyone)
+        by = (self._targets - self._log(x, powers, sense))[:, None]
+        first = np.cumsum(np.abs(powers), axis=1) * np.abs(powers) == 1
+        moved = x + by * np.where(sense == 0, powers * first, powers)
+        moved = np.clip(moved, self._low, self._high)
+        eliminated = self._dominant(moved, everyone, self._slopes(moved, everyone))
+        restored = self.restored(moved, everyone, eliminated)
+        if np.any(np.isnan(restored)):
+            raise ValueError("a quantity is to be held outside its range")
+        return restored
+
+    def added(self, normal: Normal, x: Array, fit: IntArray) -> Normal:
+        """Return the normal equations with penalty residuals for branches that relax too late."""
+        beyond, slopes = self._late(x, fit)
+        if not slopes.size:
+            return normal
+        return replace(
+            normal,
+            square_sum=normal.square_sum + np.sum(beyond**2, axis=1),
+            gradient=normal.gradient + np.sum(beyond[:, :, None] * slopes, axis=1),
+            information=normal.information + slopes.swapaxes(1, 2) @ slopes,
+        )
+
+    def price(self, x: Array) -> Array:
+        """Return the penalty on the sums of squares for branches that relax too late, (n,)."""
+        return np.sum(self._late(x, np.arange(len(x)))[0] ** 2, axis=1)
+
+    def eliminated(self, normal: Normal, x: Array, fit: IntArray) -> tuple[Normal, BoolArray]:
+        """Eliminate one parameter; return reduced equations and its mask, (n, n_parameters)."""
+        slopes = self._slopes(x, fit)
+        basic = self._dominant(x, fit, slopes)
+        # Minus the derivative of the eliminated parameter by each other one; 1 by itself.
+        ratio = slopes / np.sum(slopes * basic, axis=1, keepdims=True)
+        pull = np.sum(normal.gradient * basic, axis=1, keepdims=True)
+        across = np.sum(normal.information * basic[:, :, None], axis=1)
+        along = np.sum(across * basic, axis=1)[:, None, None]
+        outer = ratio[:, :, None] * across[:, None, :]
+        information = normal.information - outer - outer.swapaxes(1, 2)
+        information += along * (ratio[:, :, None] * ratio[:, None, :])
+        left_out = basic[:, :, None] | basic[:, None, :]
+        gradient = np.where(basic, 0.0, normal.gradient - pull * ratio)
+        information = np.where(left_out, np.eye(x.shape[1]), information)
+        return replace(normal, gradient=gradient, information=information), basic
+
+    def restored(self, x: Array, fit: IntArray, eliminated: BoolArray) -> Array:
+        """Move points, (n, n_parameters), onto the constraint; NaN where bounds forbid that."""
+        x, basic, tried = x.copy(), eliminated, eliminated.copy()
+        left = np.arange(len(x))
+        for _ in range(self._most_members):
+            value = self._followed(x[left], fit[left], basic)
+            inside = np.clip(value, self._low[fit[left]], self._high[fit[left]])
+            x[left] = np.where(basic, inside, x[left])
+            reached = np.any(basic & (np.abs(value - inside) <= _ROUNDING), axis=1)
+            left = left[~reached]
+            if not len(left):
+                return x
+            # The eliminated member stays at its bound, and the next one is eliminated.
+            slopes = self._slopes(x[left], fit[left])
+            basic = self._dominant(x[left], fit[left], slopes, tried[left])
+            tried[left] |= basic
+        x[left] = np.nan
+        return x
+
+    def _dominant(
+        self, x: Array, fit: IntArray, slopes: Array, tried: BoolArray | None = None
+    ) -> BoolArray:
+        """Mark the member to eliminate, none if all have been tried."""
+        weight = np.abs(slopes)
+        free = (x > self._low[fit] + _FREE) & (x < self._high[fit] - _FREE)
+        weight = np.where(free, weight, _UNWILLING * weight)
+        if tried is not None:
+            weight = np.where(tried, 0.0, weight)
+        chosen = np.argmax(weight, axis=1)[:, None] == np.arange(x.shape[1])
+        marked: BoolArray = chosen & (weight > 0)
+        return marked
+
+    def _late(self, x: Array, fit: IntArray) -> tuple[Array, Array]:
+        """Return the residuals of hinges, (n, n_hinges), and their log-parameter derivatives."""
+        which = self._which[fit]
+        forms, stiffness = self._forms[which], self._stiffness[which]
+        beyond = np.sum(forms * x[:, None], axis=2) - self._allowed[which]
+        late = (beyond > 0) & (stiffness > 0)
+        slopes = stiffness[:, :, None] * forms * late[:, :, None]
+        return np.where(late, stiffness * beyond, 0.0), slopes
+
+    def _slopes(self, x: Array, fit: IntArray) -> Array:
+        """Return the log-parameter derivatives of the quantities' logarithms on the constraint."""
+        powers, sense = self._form(fit)
+        shares = np.exp(np.minimum(sense * (x - self._targets[fit][:, None]), 0.0))
+        return np.where(sense == 0, powers, np.maximum(shares, _SMALLEST) * (powers != 0))
+
+    def _followed(self, x: Array, fit: IntArray, basic: BoolArray) -> Array:
+        """Solve the constraints for the marked members; infinite where there is no solution."""
+        powers, sense = self._form(fit)
+        target = self._targets[fit][:, None]
+        others = np.where(basic, 0.0, powers)
+        of_product = (target - np.sum(others * x, axis=1, keepdims=True)) * powers
+        taken = np.sum(np.abs(others) * np.exp(sense * (x - target)), axis=1, keepdims=True)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            of_sum = target + sense * np.log1p(-np.minimum(taken, 1.0))
+        return np.where(basic, np.where(sense == 0, of_product, of_sum), x)
+
+    @staticmethod
+    def _log(x: Array, powers: Array, sense: Array) -> Array:
+        """Return the logarithms of quantities with these powers and senses, (n,)."""
+        member = powers != 0
+        largest = np.max(np.where(member, sense * x, -np.inf), axis=1, keepdims=True)
+        terms = np.where(member, np.exp(np.minimum(sense * x - largest, 0.0)), 0.0)
+        of_sum = sense[:, 0] * (largest[:, 0] + np.log(np.sum(terms, axis=1)))
+        return np.where(sense[:, 0] == 0, np.sum(powers * x, axis=1), of_sum)
+
+    def _form(self, fit: IntArray) -> tuple[Array, Array]:
+        """Return the powers of the members, (n, n_parameters), and each sum's sense, (n, 1)."""
+        which = self._which[fit]
+        return self._powers[which], self._senses[which][:, None]
+
 
 CLOSE = 1e-7
 """Tolerance of fits that give chi^2 of some thousand readings to 0.001.

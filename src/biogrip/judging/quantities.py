@@ -10,7 +10,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.sample import SampleModel
+from biogrip.physics.sample_model import SampleModel
 
 # Slopes of hinges: a relaxation time of twice the experiment increases chi^2 by some 50, and one
 # a hundredth above that of the next branch by 1.

@@ -7,11 +7,11 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import round_increase, rounded
-from biogrip.experiment.sample import SampleModel
 from biogrip.fit.local_fits import FAIR
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
 from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.points import NEWS
+from biogrip.judging.profiles import NEWS
+from biogrip.physics.sample_model import SampleModel
 
 # Shares of the first damper in the sum, dense where either is small, and sums relative to the best
 # one, dense in the valley.

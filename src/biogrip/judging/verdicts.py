@@ -8,10 +8,10 @@ from itertools import combinations
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.sample import SampleModel
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations
+from biogrip.physics.sample_model import SampleModel
 
 DETERMINED = "determined"
 BOUNDED_BELOW = "bounded below"

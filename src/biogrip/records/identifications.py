@@ -1,4 +1,17 @@
-"""Identified parameters, histories and processor times: a row per seed and method."""
+"""Identified parameters, histories and processor times: a row per seed and method.
+
+Misfit of each sample model: a row per model and seed.
+
+Estimates with intervals: a row per quantity and seed.
+
+Quantities that traces should determine have an estimate, its limits, and the estimate with
+uninformed parameters fixed at their true values. For some seeds, all quantities also have the
+verdict and limits that users are shown, from whole profiles.
+
+Difference of the linear from the nonlinear model: a row per case, angle and torque.
+
+Identifications by the genetic algorithm, a row for each interpretation of the paper and seed.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,10 +23,10 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import significant
 from biogrip.errors import BiogripError
-from biogrip.experiment.sample import SINGLE_BRANCH, Parameter, SampleModel
-from biogrip.fit.answer import Identification
-from biogrip.records.parquet import Table, table_of, write_tables
+from biogrip.fit.problem import Identification
+from biogrip.physics.sample_model import SINGLE_BRANCH, Parameter, SampleModel
 from biogrip.records.rows import RowFile, read_frame, write_rows
+from biogrip.records.traces import Table, table_of, write_tables
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -171,3 +184,44 @@ def _history(record: Record) -> Table:
         },
         generations,
     )
+
+
+MODEL_FITS = RowFile(
+    "fits of models",
+    ("case", "model", "seed", "parameters", "samples", "misfit"),
+    "results/selection/{case}/{batch}.csv",
+)
+
+
+INTERVALS = RowFile(
+    "intervals",
+    (
+        *("case", "quantity", "seed", "estimate", "low", "high", "estimate_rest_known"),
+        *("verdict", "shown_low", "shown_high"),
+    ),
+    "results/coverage/{case}/{batch}.csv",
+    words=("verdict",),
+)
+
+
+DIFFERENCES = RowFile(
+    "a comparison",
+    ("case", "reference_angle_deg", "torque_factor", "difference_over_peak"),
+    "results/linearisation.csv",
+)
+
+
+INTERPRETATIONS = RowFile(
+    "interpretations",
+    (
+        "case",
+        "interpretation",
+        "seed",
+        *(parameter.column for parameter in SINGLE_BRANCH),
+        "misfit",
+        "noise_rms",
+        "last_improvement",
+    ),
+    "results/interpretations/{case}.csv",
+    words=("interpretation",),
+)

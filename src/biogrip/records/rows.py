@@ -1,8 +1,12 @@
-"""CSV files with a header, written atomically and safe for spreadsheets."""
+"""Reader of JSON results that checks for required keys.
+
+CSV files with a header, written atomically and safe for spreadsheets.
+"""
 
 import csv
+import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -10,6 +14,18 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from biogrip.errors import BiogripError
 from biogrip.files import atomic_write
+
+
+def read_object(path: Path, kind: str, keys: Set[str], lacking: str) -> dict[str, Any]:
+    """Read a JSON object of some kind, with a message if one of the required keys is lacking."""
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise BiogripError(f"{path}: cannot be read as {kind}: {error}.") from error
+    if not keys <= set(found):
+        raise BiogripError(f"{path}: {lacking}.")
+    return found
+
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from biogrip.digits import round_increase, rounded_numbers
-from biogrip.judging.fit_status import (
+from biogrip.judging.doubts import (
     REJECTED,
     REJECTION,
     Note,
@@ -15,7 +15,7 @@ from biogrip.judging.fit_status import (
     find_reasons,
     order_notes,
 )
-from biogrip.records.json_object import read_object
+from biogrip.records.rows import read_object
 
 if TYPE_CHECKING:
     from biogrip.judging.diagnosis import Diagnosis

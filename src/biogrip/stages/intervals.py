@@ -1,4 +1,7 @@
-"""Stage 4: estimates and intervals of many seeds, to test coverage and spread."""
+"""Full verdicts, as users are shown them, for some seeds of the coverage test.
+
+Stage 4: estimates and intervals of many seeds, to test coverage and spread.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,27 +11,70 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.experiment.noise import add_noise, standard_deviation
-from biogrip.experiment.random_streams import stream
-from biogrip.experiment.sample import SampleModel, with_fixed
-from biogrip.fit.answer import Identification, silent
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.identifier import best_fit, identifier
+from biogrip.fit.methods import best_fit, identifier
 from biogrip.fit.multi_start import fit_from
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.fit.trace_fit import trace_fit
 from biogrip.judging.fisher import covariance
-from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.judging.limits import find_limits
+from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import Quantity, parameters_and_sum
-from biogrip.judging.verdicts import DETERMINED
+from biogrip.judging.verdicts import DETERMINED, Finding
+from biogrip.physics.noise import add_noise, standard_deviation, stream
+from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.progress import Progress
-from biogrip.records.intervals import INTERVALS
+from biogrip.records.identifications import INTERVALS
 from biogrip.records.traces import read_target
 from biogrip.records.verdicts import read_verdicts
-from biogrip.stages.full_judgements import Shown, refitted, shown_of
-from biogrip.stages.groups import groups
+from biogrip.stages.identification import groups
 from biogrip.study.study import Case
+
+_MOST_RESTARTS = 3
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Verdict on a quantity, and its limits."""
+
+    verdict: str
+    low: float | None
+    high: float | None
+
+
+def refitted(likelihood: Likelihood, missed: np.ndarray, confidence: float) -> Likelihood | None:
+    """Fit again, started at parameters of a chi^2 below the optimum's; None if it did not fall."""
+    fit = fit_from([likelihood.problem], missed)
+    misfit_rad = float(fit.misfit_rad[0])
+    if likelihood.increase(misfit_rad) > -MISSED:
+        return None
+    return make_likelihood(likelihood.problem, fit.x[0], misfit_rad, confidence=confidence)
+
+
+def shown_of(
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], confidence: float
+) -> Iterator[list[Shown]]:
+    """Yield verdicts on each trace, as `diagnose` gives them, for all quantities."""
+    current = list(likelihoods)
+    profiles = compute_profiles(current, quantities, smooth=False)
+    for _ in range(_MOST_RESTARTS):
+        lowest = [min(own, key=lambda each: float(each.increases.min())) for own in profiles]
+        again = {
+            index: new
+            for index, each in enumerate(lowest)
+            if each.increases.min() < -MISSED
+            and (new := refitted(current[index], each.lowest, confidence)) is not None
+        }
+        if not again:
+            break
+        renewed = compute_profiles(list(again.values()), quantities, smooth=False)
+        for (index, likelihood), own in zip(again.items(), renewed, strict=True):
+            current[index], profiles[index] = likelihood, own
+    for own in profiles:
+        findings = [Finding(q, profile, 0.0) for q, profile in zip(quantities, own, strict=True)]
+        yield [Shown(found.verdict, found.low, found.high) for found in findings]
+
 
 # Significant digits, and those of values known to within a relative `_NARROW`.
 _DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3

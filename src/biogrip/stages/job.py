@@ -1,15 +1,192 @@
-"""What a script of the workflow does around its work: it reads its params, and says what failed."""
+"""What a job is told of the config: some of its keys, and nothing else.
 
+A rule's ``params`` name keys of the config, a case's laid over the study's. In the job the same
+keys make a `Case` or a `Study` again, in which any other key is missing: a rule that forgets to
+name one fails, and cannot give a result that Snakemake would not renew.
+
+Division of the seeds of a case into batches, one per job.
+
+What a script of the workflow does around its work: it reads its params, and says what failed.
+"""
+
+import hashlib
+import json
+import re
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr
+from dataclasses import MISSING, fields
+from functools import cache
+from importlib.metadata import version
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
+from pydantic import TypeAdapter
+
+import biogrip
 from biogrip.errors import BiogripError
-from biogrip.stages.batches import seeds_of
-from biogrip.stages.settings import case_of, study_of
+from biogrip.keys import STRICT
+from biogrip.study.case_blocks import CaseBlock
+from biogrip.study.config import StudyConfig
 from biogrip.study.study import Case, Study
+
+
+def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any]:
+    """Return some keys of a study's config as plain values, those of a case laid over them.
+
+    Parameters
+    ----------
+    study
+        The study.
+    keys
+        Names of blocks, or of single keys in a block, e.g. ``measurement.noise``; or
+        ``cases.NAME.KEY`` for a key of a case with the study's blocks merged in.
+    case
+        Name of the case, or of a point of a sweep; by default the study's own keys.
+
+    Returns
+    -------
+    values
+        By key; None for a default.
+    """
+    blocks = study.plain
+    if case:
+        # What the case leaves at its default is not the study's: it has all of its blocks.
+        of_case = {field.name for field in fields(CaseBlock)}
+        blocks = {key: value for key, value in blocks.items() if key not in of_case}
+        blocks |= study.case(case).plain
+    blocks = blocks | {"cases": {name: it.plain for name, it in study.cases.items()}}
+    return {key: _value(blocks, key) for key in keys}
+
+
+def keys_of_cases(study: Study, *keys: str) -> list[str]:
+    """Return keys of every case, by default all, as ``cases.NAME.KEY``."""
+    of_each = keys or [field.name for field in fields(CaseBlock)]
+    return [f"cases.{name}.{key}" for name in study.cases for key in of_each]
+
+
+def case_of(name: str, given: Mapping[str, Any]) -> Case:
+    """Return a case of which some keys are given, by `settings`."""
+    return Case(name, _partial(CaseBlock, given), Study(_partial(StudyConfig, given)))
+
+
+def study_of(given: Mapping[str, Any]) -> Study:
+    """Return a study of which, and of whose cases, some keys are given, by `settings`."""
+    own: dict[str, Any] = {}
+    cases: dict[str, dict[str, Any]] = {}
+    for key, value in given.items():
+        of, _, inner = key.partition(".")
+        if of == "cases":
+            name, _, inner = inner.partition(".")
+            cases.setdefault(name, {})[inner] = value
+        else:
+            own[key] = value
+    config = _partial(StudyConfig, own | {"cases": None})
+    blocks = {name: _partial(CaseBlock, block) for name, block in cases.items()}
+    object.__setattr__(config, "cases", blocks)
+    return Study(config)
+
+
+def _value(block: Mapping[str, Any] | None, key: str) -> Any:
+    """Return the plain value of a dotted key; None for its default."""
+    name, _, inner = key.partition(".")
+    value = (block or {}).get(name)
+    return _value(value, inner) if inner else value
+
+
+@cache
+def _adapter(kind: type, name: str) -> TypeAdapter[Any]:
+    hint = get_type_hints(kind, include_extras=True)[name]
+    return TypeAdapter(list[hint], config=STRICT)  # type: ignore[valid-type]
+
+
+@cache
+def _with_only(kind: Any, given: frozenset[str]) -> Any:
+    """Return a class like that of a block, in which all other fields are errors."""
+    absent = {field.name for field in fields(kind)} - given
+
+    class Part(kind):  # type: ignore[misc]
+        def __getattribute__(self, name: str) -> Any:
+            if name in absent:
+                raise AttributeError(f"{name} is not among the keys that the rule names.")
+            return super().__getattribute__(name)
+
+    return Part
+
+
+def _partial(kind: Any, given: Mapping[str, Any]) -> Any:
+    """Return a block with only the keys that are given; None stands for their default."""
+    parts: dict[str, dict[str, Any]] = {}
+    for key, value in given.items():
+        name, _, inner = key.partition(".")
+        parts.setdefault(name, {})[inner] = value
+    own = [field for field in fields(kind) if field.name in parts]
+    block = object.__new__(_with_only(kind, frozenset(field.name for field in own)))
+    for field in own:
+        part = parts[field.name]
+        if "" not in part:
+            value = _partial(get_type_hints(kind)[field.name], part)
+        elif part[""] is not None:
+            value = _adapter(kind, field.name).validate_json(json.dumps([part[""]]))[0]
+        else:
+            made = field.default_factory
+            value = field.default if made is MISSING else made()
+        object.__setattr__(block, field.name, value)
+    return block
+
+
+def software() -> dict[str, str]:
+    """Return versions of what computes results, and a digest of our source."""
+    folder = Path(biogrip.__file__).parent
+    sources = sorted(file for file in folder.rglob("*") if file.suffix in (".py", ".j2", ".css"))
+    digest = hashlib.sha256()
+    for file in sources:
+        digest.update(f"{file.relative_to(folder)}\n".encode())
+        digest.update(file.read_bytes())
+    versions = {name: version(name) for name in ("numpy", "scipy")}
+    return {"biogrip": biogrip.__version__, **versions, "source": digest.hexdigest()[:12]}
+
+
+# Least and most seeds of a job, and the number of jobs aimed at in between, as the key batch_size
+# says.
+_SMALLEST, _LARGEST, _USUAL = 500, 1000, 8
+_NAME = re.compile(r"seeds_(\d+)-(\d+)")
+
+
+def seeds_of(batch: str) -> range:
+    """Return the seeds of a batch, whose name has the first and the last, e.g. ``seeds_0-24``."""
+    found = _NAME.fullmatch(batch)
+    assert found, batch
+    return range(int(found[1]), int(found[2]) + 1)
+
+
+def batch_names(seeds: int, batch_size: int | None = None, folder: Path | None = None) -> list[str]:
+    """Return the names of the batches of a case.
+
+    Seeds are cut at multiples of the batch size, by default one that makes start-up a small part of
+    a job. Batches that a folder has files of are kept, so that more seeds renew none of them.
+    """
+    size = batch_size or min(max(_SMALLEST, -(-seeds // _USUAL)), _LARGEST)
+    there = folder.glob("seeds_*") if folder else ()
+    existing = sorted((r.start, r.stop) for r in map(seeds_of, _stems(there)))
+    edges, covered = [], 0
+    for first, stop in existing:
+        if covered <= first < stop <= seeds:
+            edges += [*_cut(covered, first, size), (first, stop)]
+            covered = stop
+    edges += _cut(covered, seeds, size)
+    return [f"seeds_{first}-{stop - 1}" for first, stop in edges]
+
+
+def _stems(files: Iterable[Path]) -> list[str]:
+    return [file.stem for file in files if _NAME.fullmatch(file.stem)]
+
+
+def _cut(start: int, stop: int, size: int) -> list[tuple[int, int]]:
+    """Cut seeds start to stop - 1 at multiples of size."""
+    edges = [start, *range((start // size + 1) * size, stop, size), stop]
+    return [(a, b) for a, b in pairwise(edges) if a < b]
 
 
 @contextmanager

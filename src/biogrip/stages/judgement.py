@@ -6,21 +6,18 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import rms, standard_deviation
-from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
-from biogrip.fit.answer import Identification, Progress, silent
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.identifier import identifier
+from biogrip.fit.methods import identifier
 from biogrip.fit.multi_start import fit_from, identify_from
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import Identification, Problem, Progress, silent
 from biogrip.fit.trace_fit import TraceFit, fit_traces
 from biogrip.judging.diagnosis import Diagnosis, diagnose
-from biogrip.judging.fit_status import HARMLESS, Note
+from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit
 from biogrip.judging.likelihood import MISSED
 from biogrip.judging.onset_profiles import profile_over_onset
-from biogrip.judging.slow_misfit import find_slow_misfit
 from biogrip.judging.valley import compute_valley
+from biogrip.physics.noise import rms, standard_deviation, stream
 from biogrip.records.traces import read_measurements, read_target
 from biogrip.records.verdicts import diagnosis_data
 from biogrip.study.study import Case

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import TorqueHistory, torque_history
-from biogrip.experiment.sample import Network
-from biogrip.instrument.gripper import Gripper
-from biogrip.records.differences import DIFFERENCES
-from biogrip.response.linear import rotation, step_response
-from biogrip.response.nonlinear import FINE, correction
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.nonlinear import FINE, correction
+from biogrip.physics.protocol import TorqueHistory, torque_history
+from biogrip.physics.sample_model import Network
+from biogrip.records.identifications import DIFFERENCES
 from biogrip.study.study import Case, Study
 
 ANGLES_DEG = np.arange(40.0, 91.0, 5.0)

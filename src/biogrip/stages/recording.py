@@ -10,13 +10,13 @@ import numpy as np
 from biogrip.arrays import BoolArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import TorqueHistory
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFits
-from biogrip.instrument.gripper import Gripper
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.whitening import MOST_SAMPLES
 from biogrip.progress import warn
 from biogrip.records.traces import Measurements, write_measurements
-from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case
 from biogrip.traces.columns import Columns, place
 from biogrip.traces.noise_share import proportional_deviations

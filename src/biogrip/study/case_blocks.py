@@ -9,24 +9,26 @@ from pydantic import Field, Tag
 
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
-from biogrip.experiment.sample import Parameter
-from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
-from biogrip.experiment.truth import Published
 from biogrip.fit.genome import GeneRange, SearchRange
 from biogrip.fit.methods import METHODS, block_class
-from biogrip.instrument.actuator import CombDrive
-from biogrip.instrument.calibration import CalibrationTest
-from biogrip.instrument.gripper import GRIPPER, Gripper
-from biogrip.instrument.gripper_block import GripperBlock
-from biogrip.instrument.instrument import Instrument
-from biogrip.instrument.instruments import KINDS, of_kind
-from biogrip.keys import BY_KIND, Block, OneOf, Printed, Problem, below
-from biogrip.response.whitening import MOST_SAMPLES
+from biogrip.keys import BY_KIND, Block, OneOf, Printed, Problem, below, plain
+from biogrip.physics.actuator import CombDrive
+from biogrip.physics.calibration import CalibrationTest
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import GRIPPER, KINDS, Instrument, of_kind
+from biogrip.physics.models import Published
+from biogrip.physics.sample_model import Parameter
+from biogrip.physics.springpot import LONGEST_S, SHORTEST_S
+from biogrip.physics.whitening import MOST_SAMPLES
+from biogrip.study.experiment_blocks import (
+    LARGEST_PARAMETER,
+    GripperBlock,
+    ProtocolBlock,
+    SampleBlock,
+    fixed_problems,
+)
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.messages import checked
-from biogrip.study.plain import plain
-from biogrip.study.protocol_block import ProtocolBlock
-from biogrip.study.sample_block import LARGEST_PARAMETER, SampleBlock, fixed_problems
 from biogrip.study.source import overlaid
 
 METHOD_BLOCKS = tuple(dict.fromkeys(name for it in METHODS.values() for name in it.blocks))

@@ -7,13 +7,12 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from biogrip.errors import nearest
-from biogrip.experiment.sample import CANDIDATES
-from biogrip.experiment.springpot import LONGEST_S
 from biogrip.fit.methods import METHODS
-from biogrip.instrument.actuator import CombDrive
-from biogrip.keys import Block, Distinct, OneOf, Printed, Problem, below
+from biogrip.keys import Block, Distinct, OneOf, Printed, Problem, adapter, below
+from biogrip.physics.actuator import CombDrive
+from biogrip.physics.models import CANDIDATES
+from biogrip.physics.springpot import LONGEST_S
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
-from biogrip.study.plain import adapter
 from biogrip.study.sweeps import MOST_POINTS, SweepBlock, list_points, name_problems
 
 _MOST_CASES = 2000

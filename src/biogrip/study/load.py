@@ -6,12 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.errors import BiogripError
-from biogrip.keys import Problem, below
+from biogrip.keys import Problem, below, plain
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig
-from biogrip.study.messages import checked
-from biogrip.study.plain import plain
-from biogrip.study.schema import schema_of
+from biogrip.study.messages import checked, schema_of
 from biogrip.study.source import (
     KeyPath,
     Source,

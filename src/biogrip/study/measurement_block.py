@@ -7,11 +7,10 @@ from typing import Annotated
 from pydantic import Field
 
 from biogrip.errors import nearest
-from biogrip.experiment.noise import Noise
-from biogrip.experiment.sampling import Burst, Sampling
-from biogrip.instrument.gripper import ROTATION
-from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.keys import Block, OneOf, Problem
+from biogrip.physics.instruments import INSTRUMENTS, ROTATION
+from biogrip.physics.noise import Noise
+from biogrip.physics.protocol import Burst, Sampling
 from biogrip.traces.columns import Columns
 from biogrip.traces.trace_file import trace_file_problem
 from biogrip.traces.units import TIME_UNITS

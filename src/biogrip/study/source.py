@@ -1,4 +1,7 @@
-"""Reading of YAML config files: their keys, and the lines of these for messages."""
+"""Paths of the default config, the Snakefile and other files, installed or in the repository.
+
+Reading of YAML config files: their keys, and the lines of these for messages.
+"""
 
 import re
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -11,6 +14,26 @@ import yaml
 
 from biogrip.errors import BiogripError
 from biogrip.terminal import visible
+
+# The wheel contains a copy of these files of the repository.
+_PACKAGED = Path(__file__).parents[1] / "workflow"
+_TOP = _PACKAGED if _PACKAGED.is_dir() else Path(__file__).parents[3]
+
+
+def default_config() -> Path:
+    """Return the config file of the default study."""
+    return _TOP / "config" / "config.yaml"
+
+
+def snakefile() -> Path:
+    """Return the Snakefile that runs a study."""
+    return _TOP / "Snakefile"
+
+
+def shipped(name: str) -> Path:
+    """Return another file that comes with the code, by its path in the repository."""
+    return _TOP / name
+
 
 KeyPath = tuple[Hashable, ...]
 Lines = Mapping[KeyPath, int | None]

@@ -7,18 +7,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from biogrip.experiment.protocol import Phase, torque_history
-from biogrip.experiment.sample import CANDIDATES, Sample, with_fixed
-from biogrip.experiment.truth import UNPUBLISHED, Truth
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.genetic_settings import GeneticSettings
+from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.methods import METHODS, Method
-from biogrip.instrument.contact import Contact
-from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Gripper
+from biogrip.keys import built, plain
+from biogrip.physics.contact import Contact
+from biogrip.physics.gripper import NO_ARMS, Gripper
+from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.models import CANDIDATES, UNPUBLISHED, Sample, Truth
+from biogrip.physics.protocol import Phase, torque_history
+from biogrip.physics.sample_model import with_fixed
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
-from biogrip.study.plain import built, plain
 from biogrip.study.source import overlaid
 from biogrip.study.sweeps import point_blocks
 

@@ -9,9 +9,8 @@ from typing import Annotated, Any
 from pydantic import BaseModel, Field, Tag
 
 from biogrip.errors import nearest
-from biogrip.keys import BY_KIND, OPEN, Block, Distinct, Printed, Problem
+from biogrip.keys import BY_KIND, OPEN, Block, Distinct, Printed, Problem, plain
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
-from biogrip.study.plain import plain
 
 MOST_POINTS = 2000
 

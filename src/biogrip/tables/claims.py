@@ -9,8 +9,7 @@ from biogrip.study.study import Study
 from biogrip.tables import claims_on_algorithm as algorithm
 from biogrip.tables import claims_on_instrument as instrument
 from biogrip.tables import claims_on_values as values
-from biogrip.tables.claim_results import LackingError, Results, read_results
-from biogrip.tables.claim_rules import RULES, UNDECIDED, Judged
+from biogrip.tables.claim_rules import RULES, UNDECIDED, Judged, LackingError, Results, read_results
 from biogrip.tables.layout import Column, Table
 
 

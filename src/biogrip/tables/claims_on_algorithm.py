@@ -3,13 +3,14 @@
 import numpy as np
 import pandas as pd
 
-from biogrip.tables.claim_results import LackingError, Results
 from biogrip.tables.claim_rules import (
     IN_PART,
     NOT,
     REPLICATED,
     UNDECIDED,
     Judged,
+    LackingError,
+    Results,
     altogether,
     by_range,
     by_share,

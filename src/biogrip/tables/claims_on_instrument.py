@@ -3,12 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.protocol import sample_times
-from biogrip.experiment.random_streams import stream
-from biogrip.instrument.calibrated_gripper import ARM_KEYS
-from biogrip.instrument.calibration import FreeMotion, calibrate, free_motion
-from biogrip.tables.claim_results import LackingError, Results
+from biogrip.physics.calibration import ARM_KEYS, FreeMotion, calibrate, free_motion
+from biogrip.physics.noise import Noise, add_noise, stream
+from biogrip.physics.protocol import sample_times
 from biogrip.tables.claim_rules import (
     CLOSE,
     FEW,
@@ -17,12 +14,14 @@ from biogrip.tables.claim_rules import (
     REPLICATED,
     UNDECIDED,
     Judged,
+    LackingError,
+    Results,
     altogether,
     by_number,
     by_share,
     plain,
 )
-from biogrip.tables.linearisation import LIMIT_PERCENT
+from biogrip.tables.mechanics import LIMIT_PERCENT
 
 _FELT = 1.1
 """Ratio of bounds from which the gripper's stiffness is said to matter."""

@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from biogrip.tables.claim_results import Results, Runs
 from biogrip.tables.claim_rules import (
     IN_PART,
     NOT,
     Judged,
+    Results,
+    Runs,
     altogether,
     by_share,
     by_value,

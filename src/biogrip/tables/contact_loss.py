@@ -5,15 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import add_noise
-from biogrip.experiment.protocol import torque_history
-from biogrip.experiment.random_streams import stream
-from biogrip.fit.answer import Identification
 from biogrip.fit.least_squares import identify_many
+from biogrip.fit.problem import Identification
+from biogrip.physics.jaw_force import compute_grip
+from biogrip.physics.noise import add_noise, stream
+from biogrip.physics.protocol import torque_history
+from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.unilateral import unilateral_response
 from biogrip.records.traces import as_written
-from biogrip.response.grip import compute_grip
-from biogrip.response.simulation import simulated_rotation
-from biogrip.response.unilateral import unilateral_response
 from biogrip.study.study import Case, Study
 from biogrip.tables.layout import Cell, Column, Table
 

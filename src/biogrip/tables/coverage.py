@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import standard_deviation
 from biogrip.judging.fisher import bound
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import (
@@ -16,7 +15,8 @@ from biogrip.judging.verdicts import (
     DETERMINED,
     NOT_DETERMINED,
 )
-from biogrip.records.intervals import INTERVALS
+from biogrip.physics.noise import standard_deviation
+from biogrip.records.identifications import INTERVALS
 from biogrip.records.traces import read_target
 from biogrip.study.study import Study
 from biogrip.tables.layout import Cell, Column, Table

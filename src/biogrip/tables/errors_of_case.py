@@ -6,9 +6,9 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import counted
-from biogrip.experiment.sample import Parameter
-from biogrip.experiment.truth import Truth
-from biogrip.fit.success import near_noise, near_noise_words, typical
+from biogrip.fit.methods import near_noise, near_noise_words, typical
+from biogrip.physics.models import Truth
+from biogrip.physics.sample_model import Parameter
 from biogrip.records.identifications import read_identifications
 from biogrip.records.rows import read_rows
 from biogrip.study.study import Case, Study

@@ -1,6 +1,6 @@
 """Tables 1 to 4: inputs of the study, from its config."""
 
-from biogrip.experiment.sample import SINGLE_BRANCH
+from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.study.study import Study
 from biogrip.tables.layout import Column, Table
 

@@ -1,17 +1,68 @@
-"""Comparison of interpretations of section 4: success rate, errors and last improvement."""
+"""How close seeds come to the truth, beside the paper, in all parameters of a table at once.
 
+Comparison of interpretations of section 4: success rate, errors and last improvement.
+
+How probable the paper's tables are together, under every interpretation of section 4.
+"""
+
+from collections.abc import Callable, Iterator
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.special import betaincinv
+from scipy.stats import qmc
 
-from biogrip.experiment.sample import SINGLE_BRANCH
-from biogrip.experiment.truth import Truth
-from biogrip.fit.success import near_noise, near_noise_words
-from biogrip.records.interpretations import INTERPRETATIONS
+from biogrip.arrays import Array, BoolArray
+from biogrip.fit.methods import near_noise, near_noise_words
+from biogrip.physics.models import Truth
+from biogrip.physics.sample_model import SINGLE_BRANCH
+from biogrip.records.identifications import INTERPRETATIONS
 from biogrip.study.study import Study
-from biogrip.tables.closeness import COMPARED, as_small, compared_parameters
 from biogrip.tables.layout import Cell, Column, Table
+
+COMPARED = ("k", "k_p", "c")
+"""Parameters compared with the paper's at once; of c_p it says only that it errs by over 100 %."""
+ROUNDING = 0.005
+"""Relative error by which the paper's values may be rounded."""
+_HALF_A_DECADE = 10**0.5
+_RESOLVED = 0.01
+"""What two digits resolve at best; smaller errors are of this order."""
+
+
+def compared_parameters(truth: Truth) -> list[str]:
+    """Return the parameters that are compared, of those that the paper identifies."""
+    published = truth.published.identified
+    return [name for name in COMPARED if name in published and truth.parameters.get(name)]
+
+
+def relative_errors(truth: Truth, found: pd.DataFrame) -> Array:
+    """Return absolute relative errors of every seed, shape (n_parameters, n_seeds)."""
+    columns = {p.name: p.column for p in SINGLE_BRANCH}
+    names = compared_parameters(truth)
+    return np.abs(
+        [found[columns[name]].to_numpy(float) / truth.parameters[name] - 1 for name in names]
+    )
+
+
+def as_small(truth: Truth, found: pd.DataFrame) -> BoolArray:
+    """Return True for each seed whose errors are all as small as the paper's."""
+    allowed = _printed_errors(truth) + ROUNDING
+    return np.all(relative_errors(truth, found) <= allowed[:, None], axis=0)
+
+
+def of_same_order(truth: Truth, found: pd.DataFrame) -> BoolArray:
+    """Return True for each seed with all errors at most half a decade above the paper's."""
+    allowed = _HALF_A_DECADE * np.maximum(_printed_errors(truth), _RESOLVED)
+    return np.all(relative_errors(truth, found) <= allowed[:, None], axis=0)
+
+
+def _printed_errors(truth: Truth) -> Array:
+    published = truth.published.identified
+    return np.array(
+        [abs(published[name] / truth.parameters[name] - 1) for name in compared_parameters(truth)]
+    )
 
 
 def interpretations(study: Study, found: list[Path]) -> Table:
@@ -66,3 +117,113 @@ def _rows(study: Study, case: str, truth: Truth, found: pd.DataFrame) -> list[tu
 
 def _median(errors: "np.ndarray | None") -> float | None:
     return None if errors is None else float(np.median(errors))
+
+
+ALL = "all"
+"""In the column of the paper's table: all of them."""
+AS_SMALL, SAME_ORDER = "as small", "of the same order"
+_CRITERIA: dict[str, Callable[[Truth, pd.DataFrame], BoolArray]] = {
+    AS_SMALL: as_small,
+    SAME_ORDER: of_same_order,
+}
+_TAILS = 0.025, 0.975
+_LOG2_DRAWS = 14
+_ROUNDING = 1e-9
+"""Products of shares that differ by less are equal."""
+
+_COLUMNS = (
+    Column("interpretation", "Interpretation"),
+    Column("errors", "Errors beside the printed ones"),
+    Column("table", "Table of the paper"),
+    Column("seeds", "Seeds"),
+    Column("as_close", "As close"),
+    Column("probability", "Probability", 2),
+    Column("low", "from", 2),
+    Column("high", "to", 2),
+    Column("as_improbable", "As improbable", 2),
+    Column("as_improbable_low", "from", 2),
+    Column("as_improbable_high", "to", 2),
+)
+
+
+def interpretations_jointly(study: Study, found: list[Path]) -> Table:
+    """Compute the probabilities from the rows of each case, CSV."""
+    caption = (
+        f"How probable the errors of the paper's tables are: share of seeds whose errors of "
+        f"{', '.join(COMPARED)} are all as small as those that follow from the printed values "
+        "(with half a percent for rounding), or at most half a decade larger (errors below 1 %, "
+        "which two digits do not resolve, taken as 1 %), with 95 % limits by Jeffreys. The tables "
+        "are independent runs: the probability of all is the product, its limits those of products "
+        "of draws. As any product of three is small, as improbable is the share of combinations of "
+        "seeds for which, taken in the place of the paper's runs, it is not larger."
+    )
+    cases = [
+        (case.truth, INTERPRETATIONS.read(path))
+        for path, case in zip(found, study.cases.values(), strict=True)
+        if compared_parameters(case.truth)
+    ]
+    rows = [
+        row
+        for name, title in study.interpretation_titles.items()
+        for row in _joint_rows(
+            title, [(truth, rows[rows["interpretation"] == name]) for truth, rows in cases]
+        )
+    ]
+    return Table(caption, _COLUMNS, rows)
+
+
+def _joint_rows(title: str, cases: list[tuple[Truth, pd.DataFrame]]) -> Iterator[tuple[Cell, ...]]:
+    own = [own_shares(relative_errors(truth, found)) for truth, found in cases]
+    for criterion, is_close in _CRITERIA.items():
+        counts = [(int(is_close(truth, found).sum()), len(found)) for truth, found in cases]
+        for (truth, _), (count, seeds) in zip(cases, counts, strict=True):
+            number = truth.published.table
+            low, high = limits([(count, seeds)])
+            yield (title, criterion, number, seeds, count, count / seeds, low, high, *3 * (None,))
+        product = float(np.prod([count / seeds for count, seeds in counts]))
+        ends = limits(counts)
+        improbable = [share_not_larger(own, value) for value in (product, *ends)]
+        rarity = improbable if criterion == AS_SMALL else 3 * [None]
+        yield (title, criterion, ALL, None, None, product, *ends, *rarity)
+
+
+def limits(counts: list[tuple[int, int]]) -> tuple[float, float]:
+    """Return 95 % limits of the product of independent probabilities.
+
+    Parameters
+    ----------
+    counts
+        Successes and trials of each. Their posteriors under Jeffreys' prior are drawn from with a
+        Sobol sequence, so that the limits are the same wherever they are computed.
+    """
+    points = qmc.Sobol(len(counts), scramble=False).random_base2(_LOG2_DRAWS)
+    draws = [
+        betaincinv(count + 0.5, trials - count + 0.5, points[:, column])
+        for column, (count, trials) in enumerate(counts)
+    ]
+    low, high = np.quantile(np.prod(draws, axis=0), _TAILS)
+    # As usual with Jeffreys' limits, what never or always happened leaves that side open.
+    none = any(count == 0 for count, _ in counts)
+    always = all(count == trials for count, trials in counts)
+    return 0.0 if none else float(low), 1.0 if always else float(high)
+
+
+def own_shares(errors: Array) -> Array:
+    """Return for every seed the share of seeds whose errors are all as small as its own.
+
+    Parameters
+    ----------
+    errors
+        Shape (n_parameters, n_seeds). A seed counts itself.
+    """
+    within = np.all(errors[:, :, None] <= errors[:, None, :], axis=0)
+    return np.asarray(within.mean(axis=0))
+
+
+def share_not_larger(shares: list[Array], product: float) -> float:
+    """Return the share of combinations, one of each array, whose product is at most `product`."""
+    *others, last = shares
+    of_others = reduce(np.multiply.outer, others, np.ones(())).ravel()
+    allowed = product * (1 + _ROUNDING) / of_others
+    ranks = np.searchsorted(np.sort(last), allowed, side="right")
+    return float(ranks.mean() / len(last))

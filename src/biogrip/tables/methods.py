@@ -1,4 +1,9 @@
-"""Comparison of identification methods on the same traces."""
+"""Comparison of identification methods on the same traces.
+
+Model selection by AIC and BIC, counted over seeds.
+
+Processor time of the methods on the machine that ran them.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from biogrip.experiment.sample import Parameter
-from biogrip.experiment.truth import Truth
-from biogrip.fit.success import chi_square_increase, near_noise, near_noise_words
-from biogrip.records.identifications import read_identifications
+from biogrip.fit.methods import chi_square_increase, near_noise, near_noise_words
+from biogrip.fit.nested_fits import aic_and_bic
+from biogrip.physics.models import Truth
+from biogrip.physics.sample_model import Parameter
+from biogrip.records.identifications import MODEL_FITS, TIMINGS, read_identifications
 from biogrip.study.study import Study
 from biogrip.tables.errors_of_case import error_percent
 from biogrip.tables.layout import Cell, Column, Table
@@ -76,3 +82,70 @@ def _errors(found: pd.DataFrame, truth: Truth, labels: list[str]) -> list[Cell]:
 
 def _label(quantity: list[Parameter]) -> str:
     return " + ".join(parameter.name for parameter in quantity)
+
+
+_COLUMNS = (
+    Column("case", "Case"),
+    Column("model", "Model"),
+    Column("parameters", "Parameters"),
+    Column("median_delta_aic", "Median ΔAIC", 3),
+    Column("median_delta_bic", "Median ΔBIC", 3),
+    Column("chosen_by_aic", "Chosen by AIC"),
+    Column("chosen_by_bic", "Chosen by BIC"),
+    Column("seeds", "Seeds"),
+)
+
+
+def models(study: Study, fits: list[Path]) -> Table:
+    """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
+    found = pd.concat([MODEL_FITS.read(path) for path in fits])
+    found["aic"], found["bic"] = aic_and_bic(found["misfit"], found["samples"], found["parameters"])
+    rows: list[tuple[Cell, ...]] = []
+    for case, made in study.cases.items():
+        maker = None if made.recorded else made.sample.candidate
+        of_case = found[found["case"] == case]
+        delta = {}
+        for criterion in ("aic", "bic"):
+            wide = of_case.pivot(index="seed", columns="model", values=criterion)
+            # In the configured order, since idxmin takes the first of equals.
+            wide = wide[list(of_case["model"].unique())]
+            delta[criterion] = wide.sub(wide.min(axis=1), axis=0)
+        for name in of_case["model"].unique():
+            medians = [float(table[name].median()) for table in delta.values()]
+            chosen = [int((table.idxmin(axis=1) == name).sum()) for table in delta.values()]
+            model = made.models[name].model
+            title = model.title + (" (made the traces)" if name == maker else "")
+            rows.append((case, title, len(model.names), *medians, *chosen, len(delta["aic"])))
+    caption = (
+        "Simplest adequate model: by how much each model's AIC and BIC exceed the lowest, and in "
+        "how many seeds it has the lowest."
+    )
+    return Table(caption, _COLUMNS, rows)
+
+
+_TIMING_COLUMNS = (
+    Column("case", "Case"),
+    Column("method", "Method"),
+    Column("seeds", "Seeds"),
+    Column("median_cpu_s", "Median CPU time (s)", 2),
+    Column("total_cpu_s", "Total CPU time (s)", 3),
+)
+
+
+def timings(study: Study, times: list[Path]) -> Table:
+    """Summarise processor time per identification by case and method, from CSV."""
+    spent = pd.concat([TIMINGS.read(path) for path in times])
+    rows: list[tuple[Cell, ...]] = [
+        (
+            case,
+            study.identifiers[method].title,
+            len(mine),
+            float(mine["cpu_s"].median()),
+            float(mine["cpu_s"].sum()),
+        )
+        for (case, method), mine in spent.groupby(["case", "method"], sort=False)
+    ]
+    return Table("Processor time of the identifications on this machine.", _TIMING_COLUMNS, rows)
+
+
+# Not in tables/, since times are not reproducible.

@@ -9,7 +9,7 @@ References
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.instrument.gripper import Gripper
+from biogrip.physics.gripper import Gripper
 
 
 def extreme_responses(lagged: Array, gripper: Gripper, lags: int) -> Array:

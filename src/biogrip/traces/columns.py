@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from biogrip.instrument.gripper import ROTATION
-from biogrip.instrument.instrument import Quantity
-from biogrip.instrument.instruments import INSTRUMENTS
+from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Quantity
 from biogrip.terminal import visible
 
 _MOST_LISTED = 50

@@ -5,7 +5,7 @@ from scipy.special import chdtri
 from biogrip.arrays import Array
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFits
-from biogrip.judging.fit_status import REJECTION, Note
+from biogrip.judging.doubts import REJECTION, Note
 from biogrip.judging.likelihood import compute_fall
 from biogrip.traces.onset import begins_constant, guess_onset
 

@@ -8,9 +8,9 @@ of any retardation time let the arm do, which needs no sample model.
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import TorqueHistory
-from biogrip.instrument.gripper import Gripper
-from biogrip.response.lagged_torques import lagged_torques
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.modes import lagged_torques
+from biogrip.physics.protocol import TorqueHistory
 from biogrip.traces.any_response import extreme_responses
 
 # Retardation times a decade; shortest over the sampling interval, longest over the protocol.

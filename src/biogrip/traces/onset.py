@@ -8,12 +8,12 @@ hundred small fits; `biogrip.fit.fitted_onset` refines it with the sample model.
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.experiment.protocol import TorqueHistory
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.instrument.gripper import Gripper
-from biogrip.response.lagged_torques import lagged_torques
-from biogrip.response.noise_estimate import estimate_noise
-from biogrip.response.nuisance import nuisance_basis, without
+from biogrip.physics.drift import nuisance_basis, without
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.modes import lagged_torques
+from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.whitening import estimate_noise
 from biogrip.traces.any_response import extreme_responses, left_over
 
 # Relaxation times over the protocol's duration.

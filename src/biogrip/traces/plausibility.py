@@ -17,12 +17,12 @@ import numpy as np
 
 from biogrip.arrays import Array, parts
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import TorqueHistory, torque_at
-from biogrip.instrument.gripper import Gripper
-from biogrip.instrument.instrument import Instrument, Quantity
-from biogrip.response.lagged_torques import lagged_torques
-from biogrip.response.noise_estimate import estimate_noise
-from biogrip.response.nuisance import without
+from biogrip.physics.drift import without
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import Instrument, Quantity
+from biogrip.physics.modes import lagged_torques
+from biogrip.physics.protocol import TorqueHistory, torque_at
+from biogrip.physics.whitening import estimate_noise
 from biogrip.traces.any_response import extreme_responses, left_over
 from biogrip.traces.columns import Columns, place
 from biogrip.traces.onset import begins_constant, estimate_onset

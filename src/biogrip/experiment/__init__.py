@@ -1,1 +1,0 @@
-"""The experiment: sample models, torque protocols, sampling and noise."""

@@ -1,1 +1,0 @@
-"""The instrument: gripper, comb drive and calibration."""

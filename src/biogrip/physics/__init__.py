@@ -1,0 +1,1 @@
+"""Gripper, samples, protocols and noise, and the responses that they give."""

@@ -1,0 +1,120 @@
+"""The two gripper arms and the lever with which they squeeze the sample (Table 1).
+
+The linkage: rotation of an arm and displacement of its tip.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from biogrip.arrays import Array
+from biogrip.keys import Block, Problem
+
+_LARGEST_QUALITY = 1e6
+
+
+@dataclass(frozen=True)
+class Arm(Block):
+    """One arm on its flexure hinge, reduced to a rigid body on a pivot: eqs. (1) and (2)."""
+
+    inertia_kgm2: Annotated[float, Field(ge=1e-20, le=1.0)]
+    """Moment of inertia I of the arm about its pivot."""
+    damping_Nms_per_rad: Annotated[float, Field(ge=1e-20, le=1.0)]
+    """Rotational damping c of the arm; at least what makes its quality factor a million."""
+    stiffness_Nm_per_rad: Annotated[float, Field(ge=1e-12, le=1e3)]
+    """Rotational stiffness k of the arm's flexure hinge."""
+
+    @property
+    def natural_frequency_Hz(self) -> float:
+        """Undamped frequency of the free arm."""
+        return math.sqrt(self.stiffness_Nm_per_rad / self.inertia_kgm2) / (2 * math.pi)
+
+    @property
+    def quality_factor(self) -> float:
+        """Quality factor of the free arm."""
+        return math.sqrt(self.inertia_kgm2 * self.stiffness_Nm_per_rad) / self.damping_Nms_per_rad
+
+    def problems(self) -> Iterator[Problem]:
+        """Find a quality factor so large that the decay would be lost in rounding."""
+        if self.quality_factor > _LARGEST_QUALITY:
+            text = f"makes the arm's quality factor {self.quality_factor:.3g}, "
+            yield ("damping_Nms_per_rad",), f"{text}allowed is at most {_LARGEST_QUALITY:g}."
+
+
+@dataclass(frozen=True)
+class Gripper(Block):
+    """The chain A-B-C-D: left arm AB (index 2), right arm DC (index 4), sample BC.
+
+    The reference angle is hat-theta_2; the right arm stands at 180 degrees minus it.
+    """
+
+    # Pydantic takes no docstrings from the class that a class inherits from.
+    arm_length_m: Annotated[
+        float,
+        Field(ge=1e-6, le=1.0, description="Length l of both arms, from pivot to tip."),
+    ]
+    reference_angle_deg: Annotated[
+        float,
+        Field(
+            ge=10,
+            le=90,
+            description="Angle of the left arm when the jaws just touch the sample; for a case "
+            "that gives its sample's size, the angle in the neutral configuration, from which the "
+            "other follows. Only its sine enters the linear model.",
+        ),
+    ]
+    left: Arm
+    right: Arm
+
+    @property
+    def lever_m(self) -> float:
+        """Tip displacement per closing rotation at the reference, l sin(hat-theta_2)."""
+        return self.arm_length_m * math.sin(math.radians(self.reference_angle_deg))
+
+    @property
+    def has_inertia(self) -> bool:
+        """True if any of its arms has an inertia, so that it may ring."""
+        return bool(self.left.inertia_kgm2 or self.right.inertia_kgm2)
+
+    @property
+    def jaw_stiffness_N_per_m(self) -> float:
+        """Stiffness of both hinges as seen from the sample: force over closing of the jaws."""
+        yielding = 1 / self.left.stiffness_Nm_per_rad + 1 / self.right.stiffness_Nm_per_rad
+        return 1 / (self.lever_m**2 * yielding)
+
+
+# Far below what any sample has, in any units; the squares of its reciprocals are no overflow.
+_NOTHING = 1e-40
+
+NO_ARMS = Gripper(math.sqrt(0.5), 90.0, Arm(0.0, _NOTHING, _NOTHING), Arm(0.0, _NOTHING, _NOTHING))
+"""Arms that do nothing: they turn by what a sample yields to a load, its creep.
+
+With twice their squared lever one, a torque of theirs is the load on the sample.
+"""
+
+
+def rotation_of_tip(gripper: Gripper, displacement_m: Array) -> Array:
+    """Return the rotation phi in rad that moves a tip by u = l [cos(hat - phi) - cos hat].
+
+    The solution has no cancellation of nearly equal cosines. It is NaN beyond the
+    displacement at which the arms lie flat.
+    """
+    angle = np.radians(gripper.reference_angle_deg)
+    cos, sin = np.cos(angle), np.sin(angle)
+    x = displacement_m / gripper.arm_length_m
+    rest = x * (2 * cos + x)
+    with np.errstate(invalid="ignore"):
+        new_sin = np.sqrt(sin * sin - rest)
+    return np.arctan2(sin * x + cos * rest / (sin + new_sin), cos * (cos + x) + sin * new_sin)
+
+
+def displacement_of_tip(gripper: Gripper, rotation_rad: Array) -> Array:
+    """Return the displacement in m of a tip whose arm turns, u = l [cos(hat - phi) - cos hat]."""
+    angle = np.radians(gripper.reference_angle_deg)
+    half = 0.5 * rotation_rad
+    moved: Array = 2 * gripper.arm_length_m * np.sin(angle - half) * np.sin(half)
+    return moved

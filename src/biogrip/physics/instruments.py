@@ -1,0 +1,135 @@
+"""Declaration of an instrument: what it holds, what it reads, and its words for both.
+
+Creep: a load is held, and what a sample yields is read; micropipettes, stretchers, rheometers.
+
+A sample under the force F is displaced by x, with F(s) = [k_p + c_p s + ...] x(s); under a stress
+it is strained, and its springs and dampers are in Pa and Pa s.
+
+Relaxation: a deformation is held, and the load that is left is read; AFM dwells, rheometers.
+
+The instruments that there are, by what they read.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity that an instrument holds or reads."""
+
+    name: str
+    """Name in messages, in the config, and of the option for its column."""
+    unit: str
+    """SI unit; empty for a pure number."""
+    units: Mapping[str, float] = field(hash=False, compare=False)
+    """Units of a file's column, as multiples of the SI unit."""
+    label: str = ""
+    """Name on axes, where it says more."""
+
+    @property
+    def title(self) -> str:
+        """Name on axes."""
+        return self.label or self.name
+
+    @property
+    def suffix(self) -> str:
+        """End of the names of columns and keys: the SI unit."""
+        plain = self.unit.replace("1/", "per_").replace(" ", "")
+        return f"_{plain}" if plain else ""
+
+    @property
+    def column(self) -> str:
+        """Usual name of a column or key: the name with the unit."""
+        return self.name + self.suffix
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What an instrument holds and reads."""
+
+    kind: str
+    """`gripper`, `creep` or `relaxation`."""
+    controlled: Quantity
+    """What the protocol holds."""
+    read: Quantity
+    """What a trace is of."""
+    per_area: bool = False
+    """True if stiffness is a modulus, in Pa."""
+    relative: bool = False
+    """True if what is read is divided by the largest value that is held."""
+
+    @property
+    def deforms(self) -> bool:
+        """True if a deformation is held and a load is read."""
+        return self.kind == "relaxation"
+
+    def suspects(self, article: str = "the ", *, unit: bool = False) -> str:
+        """Return what may be wrong if a model does not fit, and with `unit` the file's unit too."""
+        parts = ["model", "protocol", *(["gripper"] if self.has_jaws else []), *["unit"][:unit]]
+        *first, last = (f"{article}{part}" for part in parts)
+        return f"{', '.join(first)} or {last}"
+
+    @property
+    def has_jaws(self) -> bool:
+        """True if it grips the sample between arms, which yield and may let it go."""
+        return self.kind == "gripper"
+
+
+TORQUE = Quantity("torque", "N m", {"N m": 1.0})
+ROTATION = Quantity(
+    "rotation",
+    "rad",
+    {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180},
+    "closing rotation",
+)
+GRIPPER = Instrument("gripper", TORQUE, ROTATION)
+"""The gripper holds a torque, and the closing rotation of its left arm is read."""
+
+STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "mPa": 1e-3}
+"""Units of stresses and moduli."""
+
+FORCE = Quantity("force", "N", {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "pN": 1e-12})
+DISPLACEMENT = Quantity("displacement", "m", {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9})
+STRESS = Quantity("stress", "Pa", STRESS_UNITS)
+STRAIN = Quantity("strain", "", {"1": 1.0, "%": 1e-2})
+
+
+_PER_STRESS = {f"1/{unit}": 1 / size for unit, size in STRESS_UNITS.items()}
+
+COMPLIANCE = Quantity("compliance", "1/Pa", _PER_STRESS)
+
+CREEP = (
+    Instrument("creep", FORCE, DISPLACEMENT),
+    Instrument("creep", STRESS, STRAIN, per_area=True),
+    Instrument("creep", STRESS, COMPLIANCE, per_area=True, relative=True),
+)
+"""What may be held and read."""
+
+
+MODULUS = Quantity("modulus", "Pa", STRESS_UNITS)
+
+RELAXATION = (
+    Instrument("relaxation", DISPLACEMENT, FORCE),
+    Instrument("relaxation", STRAIN, STRESS, per_area=True),
+    Instrument("relaxation", STRAIN, MODULUS, per_area=True, relative=True),
+)
+"""What may be held and read."""
+
+
+INSTRUMENTS: dict[str, Instrument] = {
+    instrument.read.name: instrument for instrument in (GRIPPER, *CREEP, *RELAXATION)
+}
+"""Instruments by the name of the quantity that they read."""
+
+KINDS = tuple(dict.fromkeys(instrument.kind for instrument in INSTRUMENTS.values()))
+"""Values of the config key `instrument`."""
+
+CONTROLLED = tuple(dict.fromkeys(instrument.controlled for instrument in INSTRUMENTS.values()))
+"""Quantities that protocols hold."""
+
+
+def of_kind(kind: str) -> list[Instrument]:
+    """Return the instruments of a kind."""
+    return [each for each in INSTRUMENTS.values() if each.kind == kind]

@@ -1,0 +1,339 @@
+"""Closed form of the linear model with two modes: equal arms, one Maxwell branch, no inertia.
+
+This special case of `biogrip.physics.linear` is written out for speed: populations of the
+genetic algorithm are small, and most time goes into calls.
+
+RMS misfit of whole populations against traces, without forming a response.
+
+Between two torque steps the inertia-free response is a constant plus
+exponentials, so at uniform sampling it is sum_j a_j z_j^n. Its squared distance
+from the samples y_n expands into geometric series in z_i z_j, and into the
+projections of the trace on the response of each mode. These projections are long sums,
+but functions of the mode's rate alone: computed once at some hundred rates, they are
+interpolated for all others.
+
+The misfit of an individual is computed element by element, in a fixed order, without
+reductions of arrays: it does not depend, to the last bit, on the rest of the population
+or on the number of populations.
+
+Misfit of populations to traces, with a fast method for the paper's protocols.
+"""
+
+from collections.abc import Callable, Sequence
+from copy import copy
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+
+from biogrip.arrays import Array, IntArray, parts
+from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.linear import LEFT, is_symmetric, step_response
+from biogrip.physics.mode_rows import DecayTable
+from biogrip.physics.protocol import TorqueHistory, drives
+from biogrip.physics.residuals import Residuals
+from biogrip.physics.roots import real_quadratic_roots
+from biogrip.physics.sample_model import Network, SampleModel
+
+
+def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array, Array]:
+    """Compute the response of either of two equal arms to a unit step of both torques.
+
+    Returns
+    -------
+    static : (n,)
+        Final rotation in rad per N m.
+    rates : (2, n)
+        Exponents in 1/s.
+    weights : (2, n)
+        Weights of the exponentials, in rad per N m.
+    """
+    k_p, c_p, c = network.k_p, network.c_p, network.c[:, 0]
+    relaxation_s = c / network.k[:, 0]
+    coupling = 2 * lever_m**2
+    stiffness, damping = arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad
+    # The denominator Z Q + 2 b^2 P, ascending powers.
+    denominator = np.empty((3, len(k_p)))
+    denominator[0] = coupling * k_p + stiffness
+    denominator[1] = coupling * (k_p * relaxation_s + c_p + c) + (
+        stiffness * relaxation_s + damping
+    )
+    denominator[2] = (coupling * c_p + damping) * relaxation_s
+    rates = real_quadratic_roots(denominator.T).T
+    slope = denominator[2] * (rates[0] - rates[1])
+    weights = (1 + relaxation_s * rates) / (rates * slope)
+    np.negative(weights[1], out=weights[1])
+    return 1 / denominator[0], rates, weights
+
+
+# Individuals computed together: many enough for few calls, few enough for the cache.
+_AT_ONCE = 7000
+# Most modes with rates in closed form; the rates of more are iterated until all have converged.
+_CLOSED_FORM = 2
+
+
+class SeriesMisfit:
+    """RMS difference between the model's rotation and uniformly sampled traces.
+
+    For torque steps, by the linear model without inertia; the first sample is at t = 0. Traces of
+    the left arm are (n_samples,) or (n_traces, n_samples).
+    """
+
+    def __init__(
+        self,
+        gripper: Gripper,
+        model: SampleModel,
+        torque: TorqueHistory,
+        interval_s: float,
+        rotation_rad: Array,
+    ) -> None:
+        self._simulated = (gripper, model, torque, interval_s)
+        self._traces = np.atleast_2d(rotation_rad)
+        self._samples = self._traces.shape[1]
+        heights = drives(torque.left[:, 0], torque.right[:, 0], torque.symmetric)
+        # Change of each drive at the start of each phase, and level after it.
+        self._heights = heights[:, :, None, None]
+        self._levels = np.cumsum(heights, axis=1)[:, :, None]
+        # Times in sampling intervals; a reading at a step must not precede it by rounding.
+        steps, nearest = torque.time_s / interval_s, np.rint(torque.time_s / interval_s)
+        steps = np.where(np.isclose(steps, nearest, rtol=1e-12, atol=0), nearest, steps)
+        starts = np.minimum(np.ceil(steps), self._samples)
+        self._first_samples = starts.astype(np.int64)
+        # Time from a step to the first reading of its phase.
+        self._late = np.maximum(starts - steps, 0)
+        # Numbers of readings: one, and those of each phase.
+        lengths = np.concatenate(([1], np.diff(starts, append=self._samples)))
+        self._lengths = lengths[:, None, None]
+        self._square_sums = np.array([np.dot(trace, trace) for trace in self._traces])
+
+    @classmethod
+    def joined(cls, misfits: Sequence["SeriesMisfit"]) -> "SeriesMisfit":
+        """Combine the traces of several objects that agree in all else, see `joins`."""
+        return cls(*misfits[0]._simulated, np.concatenate([one._traces for one in misfits]))
+
+    def of_model(self, model: SampleModel) -> "SeriesMisfit":
+        """Return the misfit of another model to the same traces, sharing their table."""
+        other = copy(self)
+        other._simulated = (self._simulated[0], model, *self._simulated[2:])
+        other.__dict__.pop("_closed_form", None)
+        other.projections = self.projections
+        return other
+
+    def joins(self, other: "SeriesMisfit") -> bool:
+        """Return True if misfits to traces of both have the same bits together as apart."""
+        gripper, model, torque, interval_s = self._simulated
+        others, others_model, others_torque, others_interval_s = other._simulated
+        return (
+            (model is others_model and torque is others_torque)
+            and (gripper, interval_s, self._samples) == (others, others_interval_s, other._samples)
+            and self._closed_form
+        )
+
+    @cached_property
+    def _closed_form(self) -> bool:
+        _, rates, _ = self._modes(np.full((1, len(self._simulated[1].parameters)), 0.5))
+        return len(rates) <= _CLOSED_FORM
+
+    @cached_property
+    def projections(self) -> DecayTable:
+        """Table that interpolates `exact_projections`; made when it is first needed."""
+        shortest = float(np.min(self._late, where=self._late > 0, initial=1.0))
+        return DecayTable(self.exact_projections, self._samples, shortest)
+
+    def __call__(self, parameters: Array) -> Array:
+        """Compute misfits in rad, (n,), of parameters, (n, n_parameters), to the first trace."""
+        return self.of_each(parameters[None], np.zeros(1, dtype=np.int64))[0]
+
+    def of_each(self, parameters: Array, traces: IntArray) -> Array:
+        """Compute the misfits in rad of populations, each to one trace, (n_populations, n).
+
+        Populations are (n_populations, n, n_parameters), in the model's order and SI units; traces
+        are given by their indices, (n_populations,).
+        """
+        populations, size = parameters.shape[:2]
+        some = max(1, _AT_ONCE // size)
+        misfit = np.empty((populations, size))
+        for these in parts(populations, some):
+            misfit[these] = self._of_some(parameters[these], traces[these])
+        return misfit
+
+    def _of_some(self, parameters: Array, traces: IntArray) -> Array:
+        shape = parameters.shape[:2]
+        static, rates, weights = self._modes(parameters.reshape(-1, parameters.shape[2]))
+        trace = traces.repeat(shape[1])
+        square = self._model_square_sums(static, rates, weights)
+        square += self._square_sums.take(trace)
+        drives = len(weights)
+        for drive, (at_rest, decaying) in enumerate(zip(static, weights, strict=True)):
+            which = trace if drives == 1 else drives * trace + drive
+            product = at_rest * self._projections_of_constant.take(which)
+            product += _sum(decaying * self.projections.of(which, rates))
+            product *= 2
+            square -= product
+        np.maximum(square, 0, out=square)
+        square /= self._samples
+        return np.sqrt(square, out=square).reshape(shape)
+
+    def _modes(self, parameters: Array) -> tuple[Array, Array, Array]:
+        """Return static (n_drives, n), rates (n_modes, n) and weights (n_drives, n_modes, n)."""
+        gripper, model, torque, interval_s = self._simulated
+        network = model.network(parameters)
+        if is_symmetric(gripper, torque) and network.k.shape[1] == 1:
+            static, rates, weights = two_modes(gripper.left, gripper.lever_m, network)
+            return static[None], rates * interval_s, weights[None]
+        response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
+        return (
+            np.ascontiguousarray(response.static[:, LEFT].T),
+            np.ascontiguousarray(response.rates.T) * interval_s,
+            np.ascontiguousarray(response.weights[:, LEFT].transpose(1, 2, 0)),
+        )
+
+    @cached_property
+    def _projections_of_constant(self) -> Array:
+        return self.projections(np.zeros(1))[:, 0]
+
+    def _model_square_sums(self, static: Array, rates: Array, weights: Array) -> Array:
+        """Sum squared responses over all readings, shape (n,).
+
+        A phase of N readings has ((z_i z_j)^N - 1) / (z_i z_j - 1) for each pair of modes, which
+        follows from z^N - 1 and z - 1 without cancellation.
+        """
+        decayed = np.expm1(self._lengths * rates)
+        amplitudes = self._amplitudes(rates, weights, 1 + decayed[1:])
+        constants = _sum(self._levels * static[:, None])[:, None]
+        mixed = decayed[1:] / decayed[0]
+        mixed *= constants
+        for i, j in combinations(range(len(rates)), 2):
+            both = decayed[:, i] * decayed[:, j]
+            both += decayed[:, i]
+            both += decayed[:, j]
+            series = both[1:] / both[0]
+            series *= amplitudes[:, i]
+            mixed[:, j] += series
+        mixed *= 2
+        decayed *= 2 + decayed
+        terms = decayed[1:] / decayed[0]
+        terms *= amplitudes
+        terms += mixed
+        terms *= amplitudes
+        constants *= constants
+        constants *= self._lengths[1:]
+        return _sum(_sum(terms)) + _sum(constants)[0]
+
+    def _amplitudes(self, rates: Array, weights: Array, decays: Array) -> Array:
+        """Compute amplitudes of modes at the first reading of each phase, (n_phases, n_modes, n).
+
+        Weights, (n_drives, n_modes, n), are those of unit steps; decays, (n_phases, n_modes, n),
+        the shares that remain of modes at the end of each phase.
+        """
+        amplitudes = _sum(self._heights * weights[:, None])
+        for phase, late in enumerate(self._late):
+            if late > 0:
+                amplitudes[phase] *= np.exp(late * rates)
+            if phase > 0:
+                amplitudes[phase] += decays[phase - 1] * amplitudes[phase - 1]
+        return amplitudes
+
+    def exact_projections(self, rates: Array) -> Array:
+        """Project each trace on the response of a mode to each drive, by direct summation.
+
+        For rates in units of the sampling rate, (n,), the result is (n_traces * n_drives, n).
+        """
+        sums = _power_sums(self._traces, self._first_samples, rates)
+        decays = np.exp(self._lengths[1:] * rates)
+        units = np.eye(len(self._heights))[:, :, None, None] * np.ones_like(rates)
+        projections = [
+            _sum(self._amplitudes(rates[None], unit, decays) * sums.swapaxes(0, 1))
+            for unit in units
+        ]
+        return np.stack(projections, axis=1).reshape(-1, len(rates))
+
+
+def _sum(terms: Array) -> Array:
+    """Sum over the first axis in order, whatever the shape."""
+    total: Array = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def _power_sums(traces: Array, first_samples: IntArray, rates: Array) -> Array:
+    """Compute sum_n exp(rate n) y_n of phases, shape (n_traces, n_phases, n_rates).
+
+    With n = B a + b, it is one matrix product with the phases folded to (B, N/B), and
+    one weighted sum over rows. Traces are treated one by one, so that none depends on
+    the others.
+    """
+    longest = int(np.diff(first_samples, append=traces.shape[1]).max())
+    block = max(1, int(np.sqrt(longest)))
+    within = np.exp(rates[:, None] * np.arange(block))
+    across = np.exp(rates[:, None] * (block * np.arange(-(-longest // block))))
+    sums = []
+    for trace in traces:
+        folded, columns = _fold(np.split(trace, first_samples[1:]), block)
+        rows = within @ folded
+        sums.append(
+            [
+                np.einsum("mr,mr->m", rows[:, start:stop], across[:, : stop - start])
+                for start, stop in columns
+            ]
+        )
+    return np.array(sums)
+
+
+def _fold(pieces: list[Array], block: int) -> tuple[Array, list[tuple[int, int]]]:
+    """Fold each piece to (block, rows), side by side; return also the columns of each."""
+    folded, columns, start = [], [], 0
+    for piece in pieces:
+        rows = -(-len(piece) // block)
+        padded = np.zeros(block * rows)
+        padded[: len(piece)] = piece
+        folded.append(padded.reshape(rows, block).T)
+        columns.append((start, start + rows))
+        start += rows
+    return np.ascontiguousarray(np.concatenate(folded, axis=1)), columns
+
+
+Misfit = Callable[[Array], Array]
+"""Function from parameters, (n, n_parameters), to RMS misfits in rad, (n,)."""
+
+Misfits = Callable[[Array, IntArray], Array]
+"""The same from (n_populations, n, n_parameters) and trace indices to (n_populations, n)."""
+
+
+def make_misfit(
+    residuals: Residuals,
+    gripper: Gripper,
+    torque: TorqueHistory,
+    time_s: Array,
+    rotation_rad: Array,
+) -> Misfit:
+    """Return the RMS misfit as a function of parameters of shape (n, n_parameters).
+
+    That of residuals serves any protocol, sampling and noise. `SeriesMisfit` is used for steps of
+    a torque, sampled uniformly from the start on, with the linear model, in white noise
+    alone.
+    """
+    uniform = np.arange(len(time_s)) * (time_s[-1] / max(len(time_s) - 1, 1))
+    is_uniform = np.allclose(time_s, uniform, rtol=0, atol=1e-9 * time_s[-1])
+    if is_uniform and torque.only_steps and not torque.deforms and residuals.plain:
+        interval_s = float(time_s[-1]) / (len(time_s) - 1)
+        return SeriesMisfit(gripper, residuals.model, torque, interval_s, rotation_rad)
+    return residuals.condensed_misfit
+
+
+def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:
+    """Combine the misfit functions of several traces into one of a population for each trace.
+
+    Its results equal those of the single functions to the last bit.
+    """
+    series = [misfit for misfit in misfits if isinstance(misfit, SeriesMisfit)]
+    if len(series) == len(misfits) and all(map(series[0].joins, series)):
+        return SeriesMisfit.joined(series).of_each
+
+    def one_by_one(parameters: Array, traces: IntArray) -> Array:
+        return np.stack(
+            [misfits[trace](own) for own, trace in zip(parameters, traces, strict=True)]
+        )
+
+    return one_by_one

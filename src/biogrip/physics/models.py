@@ -1,0 +1,220 @@
+"""The sample models that there are, by name.
+
+Each is declared, beside its network, in a module here.
+
+Constitutive models of the sample: spring-dashpot networks between the two jaws (Figure 5).
+
+Every network is a parallel spring k_p and damper c_p beside any number of
+Maxwell branches (a spring k and a damper c in series). Its force follows the
+shortening delta of the sample as
+
+    F(s) = [k_p + c_p s + sum_j k_j c_j s / (k_j + c_j s)] delta(s)
+
+A model is one entry of `biogrip.physics.models`; genome, tables and figures follow from it. Its
+network is made by arithmetic alone, so that parameters with a small imaginary
+part carry derivatives through it (`biogrip.physics.sensitivity`).
+
+Nested sample models: limits in which a model becomes a simpler one.
+
+Where an element vanishes, a model becomes a simpler one: a spring or damper beside others at
+zero, one in series with others rigid, at infinity; a springpot is a spring at an exponent of
+zero, and a damper at one. The simpler model's parameters are turned into those of the richer
+one, zeros and infinities among them (`biogrip.physics.models` gives such samples the same
+response). Each model says which it contains directly; those in these are in it as well.
+
+True parameters of simulated samples, and the paper's results for comparison.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, TypeAlias
+
+import numpy as np
+from pydantic import Field
+
+from biogrip.arrays import Array
+from biogrip.keys import Block, OneOf
+from biogrip.physics.fractional import FRACTIONAL_MODELS
+from biogrip.physics.maxwell_models import (
+    BURGERS,
+    DAMPER,
+    GENERALIZED_MAXWELL,
+    KELVIN_VOIGT,
+    LIQUID_DROP,
+    MAXWELL,
+    ZENER_KELVIN,
+    ZENER_MAXWELL,
+)
+from biogrip.physics.sample_model import (
+    MOST_BRANCHES,
+    SINGLE_BRANCH,
+    Parameter,
+    SampleModel,
+    Turned,
+    in_pascals,
+)
+
+MODELS: dict[str, SampleModel] = {
+    model.name: model
+    for model in (
+        GENERALIZED_MAXWELL,
+        LIQUID_DROP,
+        DAMPER,
+        KELVIN_VOIGT,
+        MAXWELL,
+        ZENER_MAXWELL,
+        ZENER_KELVIN,
+        BURGERS,
+        *FRACTIONAL_MODELS,
+    )
+}
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Name of a sample's constitutive model, and its number of branches."""
+
+    name: str
+    """Name of the model."""
+    branches: int = 1
+    """Number of Maxwell branches of a generalized one."""
+    per_area: bool = False
+    """True if its elements relate stress and strain, and have units of moduli."""
+
+    @property
+    def model(self) -> SampleModel:
+        """The constitutive model."""
+        model = MODELS[self.name]
+        if self.branches != 1:
+            if model.branched is None:
+                raise ValueError(f"{self.name} has no number of branches")
+            model = model.branched(self.branches)
+        return in_pascals(model) if self.per_area else model
+
+    @property
+    def candidate(self) -> str:
+        """Its name among `CANDIDATES`."""
+        return self.name if self.branches == 1 else f"{self.name}_{self.branches}"
+
+
+CANDIDATES: dict[str, Sample] = {
+    sample.candidate: sample
+    for sample in (
+        *(Sample(name) for name in MODELS),
+        *(
+            Sample(name, branches)
+            for name, model in MODELS.items()
+            if model.branched
+            for branches in range(2, MOST_BRANCHES + 1)
+        ),
+    )
+}
+"""Models that a trace may be fitted with, by name with the number of branches."""
+
+
+Way: TypeAlias = tuple[Turned, ...]
+"""Conversions of parameters, from one model to the next."""
+
+
+def _directly(candidate: str) -> dict[str, Turned]:
+    """Models that one contains, as it and they declare."""
+    others = {name: other.model.within for name, other in CANDIDATES.items()}
+    said = {name: within[candidate] for name, within in others.items() if candidate in within}
+    return {**CANDIDATES[candidate].model.contains, **said}
+
+
+@cache
+def contained(candidate: str) -> Mapping[str, Way]:
+    """Return the candidates nested in one, each with the shortest way of conversions to it."""
+    found: dict[str, Way] = {candidate: ()}
+    ahead = [candidate]
+    for richer in ahead:
+        for name, turned in _directly(richer).items():
+            if name not in found:
+                found[name] = (turned, *found[richer])
+                ahead.append(name)
+    del found[candidate]
+    return found
+
+
+def contained_in(candidate: str, others: Collection[str]) -> list[str]:
+    """Return the names of those candidates among `others` that are nested in one."""
+    return [name for name in contained(candidate) if name in others]
+
+
+def different_in(candidate: str, others: Collection[str]) -> list[str]:
+    """Return the same names, with only one of models that are equivalent in other parameters."""
+    found: list[str] = []
+    for name in contained_in(candidate, others):
+        if not any(name in contained(other) and other in contained(name) for other in found):
+            found.append(name)
+    return found
+
+
+def as_richer(candidate: str, simpler: str, parameters: Array) -> Array:
+    """Convert a nested model's parameters, (n_parameters,), to those of a richer model."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for turned in contained(candidate)[simpler]:
+            parameters = np.array(turned(*parameters), dtype=float)
+    return parameters
+
+
+_Parameter = Annotated[str, OneOf(tuple(parameter.name for parameter in SINGLE_BRANCH))]
+_Signed = Annotated[
+    str,
+    Field(
+        pattern=r"^[<>]?[+-]?[0-9]{1,6}(\.[0-9]{1,3})?$",
+        json_schema_extra={
+            "form": "a number of at most 12 characters, with < or > before it where the paper has "
+            "it"
+        },
+    ),
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Published(Block):
+    """Results of the paper for a sample, to compare with."""
+
+    table: Annotated[int | None, Field(ge=1, le=1000)]
+    """Number of the paper's table."""
+    figure: Annotated[int | None, Field(ge=1, le=1000)] = None
+    """Number of the paper's figure of the fit."""
+    generation: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
+    """Generation at which the paper shows the fit."""
+    axis_rad: Annotated[
+        tuple[Annotated[float, Field(ge=-10, le=10)], ...], Field(min_length=2, max_length=2)
+    ] = ()
+    """Ends of the rotation axis of the paper's figure."""
+    identified: Mapping[_Parameter, Annotated[float, Field(ge=0, le=1e12)]]
+    """Identified parameters as printed, SI units."""
+    error_percent: Mapping[_Parameter, _Signed]
+    """Their errors in percent as printed, in quotes, for some are no numbers."""
+
+
+UNPUBLISHED = Published(table=None, identified={}, error_percent={})
+"""Record of a sample that the paper does not have."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Model and true parameters of a simulated sample, and the paper's results for it."""
+
+    title: str
+    """Name in print."""
+    sample: Sample
+    """Its constitutive model."""
+    parameters: Mapping[str, float]
+    """True values by name, SI units; empty if the trace was recorded."""
+    published: Published
+    """Results of the paper."""
+
+    @property
+    def model(self) -> SampleModel:
+        """Constitutive model."""
+        return self.sample.model
+
+    def target(self, quantity: list[Parameter]) -> float | None:
+        """Return the true value of a parameter or a sum; None if the trace was recorded."""
+        return sum(self.parameters[p.name] for p in quantity) if self.parameters else None

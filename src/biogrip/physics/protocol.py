@@ -1,0 +1,346 @@
+"""Protocol of the experiment: torque of both arms against time, and sampling times.
+
+Within a phase a torque is a quadratic in time plus sinusoids, which covers holds,
+ramps and sinusoids given as torque or, since torque goes with the square of the
+voltage, as voltage.
+
+Sampling times of the rotation.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
+
+from biogrip.arrays import Array, ComplexArray
+from biogrip.keys import Block
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """A sinusoid amplitude_Nm * cos(omega t + phase), t from the start of its phase."""
+
+    amplitude_Nm: float
+    omega_rad_per_s: float
+    phase_rad: float
+
+    @property
+    def frequency_Hz(self) -> float:
+        """Frequency in Hz."""
+        return self.omega_rad_per_s / (2 * math.pi)
+
+
+@dataclass(frozen=True)
+class Load:
+    """Closing torque of one arm within a phase, as a function of the time since its start."""
+
+    value_Nm: float
+    """Value of the quadratic value + slope t + curvature t^2 / 2."""
+    slope_Nm_per_s: float = 0.0
+    """Its slope."""
+    curvature_Nm_per_s2: float = 0.0
+    """Its curvature."""
+    harmonics: tuple[Harmonic, ...] = ()
+    """Sinusoids on top of it."""
+
+    def at(self, elapsed: ArrayLike) -> Array:
+        """Return the torque in N m at times in s after the start of the phase."""
+        t = np.asarray(elapsed, dtype=float)
+        torque = self.value_Nm + self.slope_Nm_per_s * t + self.curvature_Nm_per_s2 * t**2 / 2
+        for h in self.harmonics:
+            torque = torque + h.amplitude_Nm * np.cos(h.omega_rad_per_s * t + h.phase_rad)
+        return torque
+
+    def divided(self, by: float) -> "Load":
+        """Return the load divided by a number."""
+        return Load(
+            self.value_Nm / by,
+            self.slope_Nm_per_s / by,
+            self.curvature_Nm_per_s2 / by,
+            tuple(replace(h, amplitude_Nm=h.amplitude_Nm / by) for h in self.harmonics),
+        )
+
+    def squared(self, kappa: float) -> "Load":
+        """Return kappa times the square of a load V + r t or V + A sin(omega t).
+
+        The squared sinusoid is V^2 + A^2/2 + 2 V A sin(omega t) - A^2/2 cos(2 omega t).
+        """
+        value, mean = self.value_Nm, self.value_Nm**2
+        harmonics: list[Harmonic] = []
+        for h in self.harmonics:
+            a, omega = h.amplitude_Nm, h.omega_rad_per_s
+            mean += a**2 / 2
+            harmonics.append(Harmonic(2 * kappa * value * a, omega, h.phase_rad))
+            harmonics.append(Harmonic(kappa * a**2 / 2, 2 * omega, math.pi))
+        return Load(
+            kappa * mean,
+            2 * kappa * value * self.slope_Nm_per_s,
+            2 * kappa * self.slope_Nm_per_s**2,
+            tuple(harmonics),
+        )
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of the protocol."""
+
+    duration_s: float
+    left: Load
+    """Closing torque tau_2, as an increment on that which closes the arm onto the sample."""
+    right: Load
+    """Closing torque tau_4, likewise."""
+
+
+@dataclass(frozen=True)
+class TorqueHistory:
+    """A protocol as a list of torque changes, to which linear responses superpose."""
+
+    time_s: Array
+    """Starts of the phases, (n_events,)."""
+    left: Array
+    """Jumps of value (N m), slope (N m/s) and curvature (N m/s^2) of tau_2 at these times,
+    (n_events, 3)."""
+    right: Array
+    """Those of tau_4, (n_events, 3)."""
+    harmonic_time_s: Array
+    """Starts of sinusoids Re(a e^(i omega (t - start))), (n_harmonics,); each is followed by one of
+    opposite sign, which switches it off."""
+    omega_rad_per_s: Array
+    """Their angular frequencies, (n_harmonics,)."""
+    harmonic_left: ComplexArray
+    """Their complex amplitudes a of tau_2 in N m, (n_harmonics,)."""
+    harmonic_right: ComplexArray
+    """Those of tau_4, (n_harmonics,)."""
+    end_s: float
+    """End of the protocol."""
+    deforms: bool = False
+    """True if it is a deformation that is held, and the load is read: relaxation. `left` and
+    `right` are then equal, and so are units of deformation everywhere."""
+
+    @cached_property
+    def symmetric(self) -> bool:
+        """True if both arms are driven alike."""
+        same = np.array_equal(self.left, self.right)
+        return bool(same and np.array_equal(self.harmonic_left, self.harmonic_right))
+
+    @cached_property
+    def jumps(self) -> list[tuple[float, int, Array]]:
+        """Torque changes proportional to t^order/order!: start, order, height of each drive."""
+        heights = drives(self.left, self.right, self.symmetric)
+        return [
+            (float(start), order, heights[:, event, order])
+            for event, start in enumerate(self.time_s)
+            for order in range(heights.shape[2])
+            if np.any(heights[:, event, order])
+        ]
+
+    @cached_property
+    def swings(self) -> list[tuple[float, float, ComplexArray]]:
+        """Sinusoids that start: time, angular frequency, complex amplitude of each drive."""
+        amplitudes = drives(self.harmonic_left, self.harmonic_right, self.symmetric)
+        rows = zip(self.harmonic_time_s, self.omega_rad_per_s, amplitudes.T, strict=True)
+        return [(float(start), float(omega), a) for start, omega, a in rows]
+
+    @cached_property
+    def within_phases(self) -> tuple[Array, list[list[tuple[float, ComplexArray]]]]:
+        """Torque of each drive within phases: (n_phases, n_drives, 3) and sinusoids of each phase.
+
+        Value, slope and curvature at the start; angular frequency and amplitudes.
+        """
+        jumps = np.moveaxis(drives(self.left, self.right, self.symmetric), 1, 0)
+        powers = jumps.copy()
+        for k, gap in enumerate(np.diff(self.time_s)):
+            value, slope, curvature = powers[k].T
+            carried = (value + slope * gap + curvature * gap**2 / 2, slope + curvature * gap)
+            powers[k + 1] += np.stack((*carried, curvature), axis=1)
+        harmonics: list[list[tuple[float, ComplexArray]]] = [[] for _ in self.time_s]
+        for start, omega, amplitudes in self.swings[::2]:
+            harmonics[self.time_s.searchsorted(start)].append((omega, amplitudes))
+        return powers, harmonics
+
+    def times(self, factor: float) -> "TorqueHistory":
+        """Return the protocol with all torques multiplied by a factor."""
+        names = ("left", "right", "harmonic_left", "harmonic_right")
+        return replace(self, **{name: factor * getattr(self, name) for name in names})
+
+    @cached_property
+    def only_steps(self) -> bool:
+        """True if the torque is piecewise constant."""
+        ramps = np.any(self.left[:, 1:]) or np.any(self.right[:, 1:])
+        return not ramps and len(self.harmonic_time_s) == 0
+
+
+def hold(duration_s: float, torque_left_Nm: float, torque_right_Nm: float | None = None) -> Phase:
+    """Return a phase that holds a torque, the same on both arms unless a right one is given."""
+    right = torque_left_Nm if torque_right_Nm is None else torque_right_Nm
+    return Phase(duration_s, Load(torque_left_Nm), Load(right))
+
+
+def load(
+    duration_s: float,
+    torque_Nm: float,
+    to_torque_Nm: float | None = None,
+    amplitude_Nm: float | None = None,
+    frequency_Hz: float | None = None,
+) -> Load:
+    """Return a torque that is held, changes linearly, or has a sinusoid on top.
+
+    Parameters
+    ----------
+    duration_s, torque_Nm
+        Duration of the phase, and torque at its start.
+    to_torque_Nm
+        Torque at its end, if it changes linearly.
+    amplitude_Nm, frequency_Hz
+        Those of a sinusoid that starts at its mean, rising.
+    """
+    slope = ((torque_Nm if to_torque_Nm is None else to_torque_Nm) - torque_Nm) / duration_s
+    harmonics: tuple[Harmonic, ...] = ()
+    if amplitude_Nm is not None and frequency_Hz is not None:
+        harmonics = (Harmonic(amplitude_Nm, 2 * math.pi * frequency_Hz, -math.pi / 2),)
+    return Load(torque_Nm, slope, 0.0, harmonics)
+
+
+def drives(left: NDArray[Any], right: NDArray[Any], symmetric: bool) -> NDArray[Any]:
+    """Combine torques, or jumps, of both arms, (...), into the drives of `step_response`.
+
+    One drive, the common one, if both arms are driven alike; else that of the left arm, and left
+    minus right: (n_drives, ...).
+    """
+    return left[None] if symmetric else np.stack((left, left - right))
+
+
+def torque_history(phases: tuple[Phase, ...], *, deforms: bool = False) -> TorqueHistory:
+    """Convert phases that follow one another from t = 0 into a list of changes.
+
+    They are of a torque or, if the protocol `deforms`, of a deformation.
+    """
+    ends = np.cumsum([phase.duration_s for phase in phases])
+    starts = np.concatenate(([0.0], ends[:-1]))
+    jumps, harmonics = [], []
+    before = {"left": np.zeros(3), "right": np.zeros(3)}
+    for start, phase in zip(starts, phases, strict=True):
+        row = []
+        for arm in ("left", "right"):
+            load: Load = getattr(phase, arm)
+            now = np.array([load.value_Nm, load.slope_Nm_per_s, load.curvature_Nm_per_s2])
+            row.append(now - before[arm])
+            t, (value, slope, curvature) = phase.duration_s, now
+            before[arm] = np.array(
+                [value + slope * t + curvature * t**2 / 2, slope + curvature * t, curvature]
+            )
+        jumps.append(row)
+        harmonics += _harmonic_events(start, phase)
+    left, right = np.moveaxis(np.array(jumps), 1, 0)
+    times, omegas, a_left, a_right = (
+        (np.array(c) for c in zip(*harmonics, strict=True))
+        if (harmonics)
+        else (np.zeros(0), np.zeros(0), np.zeros(0, complex), np.zeros(0, complex))
+    )
+    return TorqueHistory(
+        starts, left, right, times, omegas, a_left, a_right, float(ends[-1]), deforms
+    )
+
+
+def _harmonic_events(start: float, phase: Phase) -> list[tuple[float, float, complex, complex]]:
+    """Return the events that switch the sinusoids of a phase on, and at its end off."""
+    events = []
+    for arm in ("left", "right"):
+        for h in getattr(phase, arm).harmonics:
+            for time, sign in ((0.0, 1), (phase.duration_s, -1)):
+                angle = h.phase_rad + h.omega_rad_per_s * time
+                a = sign * h.amplitude_Nm * complex(math.cos(angle), math.sin(angle))
+                both = (a, 0j) if arm == "left" else (0j, a)
+                events.append((start + time, h.omega_rad_per_s, *both))
+    return _merged(events)
+
+
+def _merged(
+    events: list[tuple[float, float, complex, complex]],
+) -> list[tuple[float, float, complex, complex]]:
+    """Merge the events of both arms that have the same time and frequency."""
+    merged: dict[tuple[float, float], list[complex]] = {}
+    for time, omega, left, right in events:
+        pair = merged.setdefault((time, omega), [0j, 0j])
+        pair[0] += left
+        pair[1] += right
+    return [(time, omega, left, right) for (time, omega), (left, right) in merged.items()]
+
+
+def torque_at(history: TorqueHistory, time_s: ArrayLike, arm: str = "left") -> Array:
+    """Return the torque of an arm in N m; at the instant of a step, its value after the step."""
+    t = np.asarray(time_s, dtype=float)
+    torque = np.zeros_like(t)
+    for start, (value, slope, curvature) in zip(history.time_s, getattr(history, arm), strict=True):
+        elapsed = t - start
+        gain = value + slope * elapsed + curvature * elapsed**2 / 2
+        torque += np.where(elapsed >= 0, gain, 0.0)
+    amplitudes = getattr(history, f"harmonic_{arm}")
+    for start, omega, a in zip(
+        history.harmonic_time_s, history.omega_rad_per_s, amplitudes, strict=True
+    ):
+        elapsed = t - start
+        torque += np.where(elapsed >= 0, (a * np.exp(1j * omega * elapsed)).real, 0.0)
+    return torque
+
+
+def largest_load(phases: Iterable[Phase]) -> float:
+    """Return the torque of either arm, or what else phases hold, of the largest magnitude.
+
+    Within a phase nothing but a sinusoid turns round, which counts with its whole amplitude.
+    """
+    found: list[float] = []
+    for phase in phases:
+        for own in (phase.left, phase.right):
+            swing = sum(abs(harmonic.amplitude_Nm) for harmonic in own.harmonics)
+            ends = replace(own, harmonics=()).at([0.0, phase.duration_s])
+            found += [*(ends + swing).tolist(), *(ends - swing).tolist()]
+    return max(found, key=abs)
+
+
+def sample_times(duration_s: float, rate_Hz: float) -> Array:
+    """Return uniform sampling times in s from 0, including the end if it falls on one."""
+    count = int(np.floor(duration_s * rate_Hz * (1 + 1e-12))) + 1
+    return np.arange(count) / rate_Hz
+
+
+@dataclass(frozen=True)
+class Burst(Block):
+    """Successive readings at a rate of their own."""
+
+    from_s: Annotated[float, Field(ge=0, le=1e9)]
+    """Time of its first reading."""
+    rate_Hz: Annotated[float, Field(ge=1e-9, le=1e9)]
+    """Rate within the burst."""
+    samples: Annotated[int, Field(ge=1, le=10_000_000)]
+    """Number of readings."""
+
+    @property
+    def times_s(self) -> Array:
+        """Sampling times in s, (n_samples,)."""
+        return self.from_s + np.arange(self.samples) / self.rate_Hz
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Sampling of the rotation: a uniform rate, listed times, or bursts."""
+
+    rate_Hz: float = 0.0
+    """Uniform rate, from 0 to the end of the protocol."""
+    times_s: tuple[float, ...] = ()
+    """Sampling times, instead of a rate."""
+    bursts: tuple[Burst, ...] = ()
+    """Bursts, instead of a rate."""
+
+    def over(self, end_s: float) -> Array:
+        """Return the sampling times in s, (n_samples,), of a protocol that ends at `end_s`."""
+        if self.bursts:
+            return np.concatenate([burst.times_s for burst in self.bursts])
+        if self.times_s:
+            return np.array(self.times_s, dtype=float)
+        return sample_times(end_s, self.rate_Hz)

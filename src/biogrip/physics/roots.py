@@ -1,0 +1,346 @@
+"""Root finding for polynomials with positive coefficients, many at once.
+
+The coefficients of a gripper-sample polynomial span dozens of decades. An
+eigenvalue solver loses the small roots there; iterating on the polynomial
+itself, from starting radii read off its Newton polygon, keeps every root to
+full relative accuracy.
+
+Zeros of sums of simple poles, which interlace with the poles: relaxation rates of networks.
+
+A network of springs and dampers with parallel Maxwell branches has as many modes as branches, or
+one more. With branch rates p_0 < p_1 < ... the rates of the modes are the zeros of
+
+    f(x) = sum_j w_j / (x - p_j) - b,    w_j, b > 0,
+
+one in each interval between neighbouring rates and one beyond the last. Each zero is found
+independently, as its distance from the nearer pole. So a zero close to a pole keeps all its
+digits, and no polynomial is needed, whose coefficients would span hundreds of decades.
+
+References
+----------
+.. [1] L. W. Ehrlich, A modified Newton method for polynomials, Communications of the ACM 10
+   (1967), 107-108.
+.. [2] O. Aberth, Iteration methods for finding all zeros of a polynomial simultaneously,
+   Mathematics of Computation 27 (1973), 339-344.
+.. [3] D. A. Bini, Numerical computation of polynomial zeros by means of Aberth's method,
+   Numerical Algorithms 13 (1996), 179-200: starting radii from the Newton polygon.
+.. [1] R.-C. Li, Solving secular equations stably and efficiently, LAPACK Working Note 89
+   (1994): both neighbouring poles matched in value and slope, the middle way.
+.. [2] J. R. Bunch, C. P. Nielsen and D. C. Sorensen, Rank-one modification of the symmetric
+   eigenproblem, Numerische Mathematik 31 (1978), 31-48.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biogrip.arrays import Array, ComplexArray, IntArray
+
+SMALLEST_GAP = 1e-6
+"""Relative distance below which two roots are moved apart.
+
+The partial fractions of two roots a relative gap g apart lose eps/g; moving a
+double root symmetrically apart by g changes the response by g^2. Both stay
+below 1e-9 here.
+"""
+
+AnyRoot = TypeVar("AnyRoot", np.float64, np.complex128)
+
+_SWEEPS = 80
+
+
+def real_quadratic_roots(coefficients: Array) -> Array:
+    """Compute the roots, (n, 2), of a + b s + c s^2 that are known to be real and negative.
+
+    Coefficients are positive, (n, 3). The fast root comes first; the two are never closer together
+    than `SMALLEST_GAP`.
+
+    References
+    ----------
+    .. [1] N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM, 2002,
+       section 1.8: the quadratic formula without cancellation.
+    """
+    a, b, c = coefficients.T
+    discriminant = np.maximum(b * b - 4 * a * c, (SMALLEST_GAP * b) ** 2)
+    q = -0.5 * (b + np.sqrt(discriminant))
+    return np.array((q / c, a / q)).T
+
+
+def roots(coefficients: Array) -> ComplexArray:
+    """Compute the roots of polynomials with positive coefficients (Ehrlich-Aberth iteration).
+
+    Coefficients are in ascending powers, (n, degree + 1); roots, (n, degree), are pairwise at least
+    `SMALLEST_GAP` apart.
+    """
+    degree = coefficients.shape[1] - 1
+    radii = _newton_polygon_radii(coefficients)
+    # No symmetry, so that no two starting points can move in step.
+    angles = np.pi + np.array([0.4, -0.9, 1.1, -0.25, 0.7, -1.3, 0.15])[np.arange(degree) % 7]
+    z = radii * np.exp(1j * (angles + 0.05 * np.arange(degree)))
+    return separate(find_zeros(z, lambda z: _newton_step(coefficients, z)))
+
+
+def find_zeros(
+    z: ComplexArray,
+    newton_step: Callable[[ComplexArray], ComplexArray],
+    between: Array | None = None,
+) -> ComplexArray:
+    """Move points onto the zeros of functions, all zeros of each at once (Ehrlich-Aberth).
+
+    Starts are (n, n_points), for each function as many as it has zeros; a Newton step is the
+    function divided by its derivative. If each point is counted from an origin of its own, the
+    differences of origins, (n, n_points, n_points), are added to differences of points.
+    """
+    off_diagonal = ~np.eye(z.shape[1], dtype=bool)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        converged = resting = np.zeros((len(z), 1), dtype=bool)
+        for _ in range(_SWEEPS):
+            newton = newton_step(z)
+            distance = z[:, :, None] - z[:, None, :]
+            if between is not None:
+                distance = between + distance
+            repulsion = np.where(off_diagonal, 1 / distance, 0).sum(axis=2)
+            step = newton / (1 - newton * repulsion)
+            # Converged points rest, so that their last bits do not depend on other functions.
+            step = np.where(np.isfinite(step) & ~resting, step, 0)
+            z = z - step
+            if np.all(converged):
+                break
+            # The error is cubed in a sweep, so one more takes it below rounding.
+            resting = converged
+            converged = np.all(np.abs(step) <= 1e-8 * np.abs(z), axis=1, keepdims=True)
+    return z
+
+
+def separate(z: NDArray[AnyRoot]) -> NDArray[AnyRoot]:
+    """Move roots that (nearly) coincide symmetrically apart to `SMALLEST_GAP`."""
+    z = z.copy()
+    first, second = _pairs(z.shape[1])
+    if not np.any(np.abs(z[:, first] - z[:, second]) < SMALLEST_GAP * np.abs(z[:, first])):
+        return z
+    for i, j in zip(first, second, strict=True):
+        close = np.abs(z[:, i] - z[:, j]) < SMALLEST_GAP * np.abs(z[:, i])
+        middle = 0.5 * (z[:, i] + z[:, j])
+        z[:, i] = np.where(close, middle * (1 + SMALLEST_GAP / 2), z[:, i])
+        z[:, j] = np.where(close, middle * (1 - SMALLEST_GAP / 2), z[:, j])
+    return z
+
+
+@cache
+def _pairs(count: int) -> tuple[IntArray, IntArray]:
+    return np.triu_indices(count, 1)
+
+
+def _newton_step(coefficients: Array, z: ComplexArray) -> ComplexArray:
+    highest, *others = coefficients.T[::-1, :, None]
+    slope = highest + np.zeros_like(z)
+    value = slope * z + others[0]
+    for coefficient in others[1:]:
+        slope = slope * z + value
+        value = value * z + coefficient
+    return value / slope
+
+
+def _newton_polygon_radii(coefficients: Array) -> Array:
+    """Return moduli of the roots: slopes of the concave hull of log(coefficient) over power."""
+    degree = coefficients.shape[1] - 1
+    log = np.log(coefficients)
+    hull = log.copy()
+    for k in range(1, degree):
+        for i in range(k):
+            for j in range(k + 1, degree + 1):
+                chord = log[:, i] + (log[:, j] - log[:, i]) * (k - i) / (j - i)
+                hull[:, k] = np.maximum(hull[:, k], chord)
+    return np.exp(hull[:, :-1] - hull[:, 1:])
+
+
+_MOST_SWEEPS = 60
+_ROUNDING, _SHORT = 4e-16, 1e-9
+# Numbers in an array that fits into a processor's cache.
+_FITS = 70_000
+
+
+@dataclass(frozen=True)
+class Zeros:
+    """Zeros of n functions, as distances from poles."""
+
+    pole: Array
+    """Pole that each zero is counted from, (n_zeros, n)."""
+    beyond: NDArray[Any]
+    """Distance of the zero from that pole; for complex weights its derivative is the imaginary
+    part."""
+
+    @property
+    def values(self) -> NDArray[Any]:
+        """Zeros, (n_zeros, n), ascending."""
+        return self.pole + self.beyond
+
+    def from_pole(self, pole: Array) -> NDArray[Any]:
+        """Return distances of zeros from a pole of each function, (n,), without cancellation."""
+        return (self.pole - pole) + self.beyond
+
+
+def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -> Zeros:
+    """Return the zeros of sum_j w_j / (x - p_j) - b: each above its own pole and below the next.
+
+    The zeros of a function are bitwise independent of the other functions. Weights and poles are
+    (n_poles, n), levels (n,). Weights and levels are positive; an imaginary part, far smaller than
+    the real one, carries a derivative. Poles are ascending and real.
+    """
+    if not (np.iscomplexobj(weights) or np.iscomplexobj(level)):
+        return _real_zeros(weights, poles, level)
+    # Samples that differ only in which derivative they carry have the same real parts.
+    real = np.concatenate((weights.real, poles, level.real[None]))
+    _, first, which = np.unique(real, axis=1, return_index=True, return_inverse=True)
+    of_some = _real_zeros(weights.real[:, first], poles[:, first], level.real[first])
+    found = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
+    # A Newton step is exact for an infinitesimal change of the weights.
+    change = -np.imag(level) * np.ones_like(found.pole)
+    slope = np.zeros_like(found.pole)
+    for pole, weight in zip(poles, weights, strict=True):
+        distance = found.from_pole(pole)
+        term = weight / distance
+        change += term.imag
+        slope -= term.real / distance
+    return Zeros(found.pole, found.beyond - 1j * change / slope)
+
+
+@dataclass(frozen=True)
+class _Sides:
+    """Sums over the poles below given points and over those above, and derivatives of the sums."""
+
+    below: Array
+    below_slope: Array
+    above: Array
+    above_slope: Array
+
+    def reshaped(self, shape: tuple[int, ...]) -> "_Sides":
+        """Return the sums in another shape."""
+        return _Sides(*(of.reshape(shape) for of in vars(self).values()))
+
+
+def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
+    pole, side, gap, start = _intervals(weights, poles, level)
+    found = start.copy()
+    # State of the search for each unfinished zero: its pole, the side of it, the gap to the next
+    # one, bounds of the distance, and the distance.
+    search = np.array([pole, side, gap, np.zeros_like(pole), 0.5 * gap, start]).reshape(6, -1)
+    left = np.arange(pole.size)
+    for _ in range(_MOST_SWEEPS):
+        zero, which = np.divmod(left, len(level))
+        origin, sign, whole, low, high, at = search
+        sides = _sides(weights, poles, zero, which, Zeros(origin, sign * at))
+        value = sides.below + sides.above - level[which]
+        converged = np.abs(value) <= _ROUNDING * (sides.below - sides.above + level[which])
+        np.copyto(low, at, where=sign * value > 0)
+        np.copyto(high, at, where=sign * value < 0)
+        last = int(np.searchsorted(zero, len(poles) - 1))
+        moved = _nearer(value, sides, sign, whole, at, level[which], last)
+        outside = ~((moved > low) & (moved < high))
+        np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * at)), where=outside)
+        np.copyto(moved, at, where=converged)
+        # Convergence is quadratic, so after a short step the error is below rounding.
+        converged |= np.abs(moved - at) <= _SHORT * moved
+        at[:] = found.flat[left] = moved
+        left, search = left[~converged], search[:, ~converged]
+        if not len(left):
+            break
+    return Zeros(pole, side * found)
+
+
+def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array, Array, Array]:
+    """Return for each zero the nearest pole, the side of it, the gap to the next, and a start."""
+    gaps = np.diff(poles, axis=0)
+    # The sign at the middle of a gap tells which pole the zero is nearer to.
+    zero, which = np.divmod(np.arange(gaps.size), len(level))
+    halves = Zeros(poles[:-1].ravel(), 0.5 * gaps.ravel())
+    middle = _sides(weights, poles, zero, which, halves).reshaped(gaps.shape)
+    value = middle.below + middle.above - level
+    pole = np.concatenate((np.where(value > 0, poles[1:], poles[:-1]), poles[-1:]))
+    side, gap, start = np.ones_like(pole), np.full_like(pole, np.inf), np.empty_like(pole)
+    side[:-1], gap[:-1] = np.where(value > 0, -1.0, 1.0), gaps
+    guess = _between(value, middle.below_slope, middle.above_slope, side[:-1], gaps, 0.5 * gaps)
+    start[:-1] = np.where((guess > 0) & (guess < 0.5 * gaps), guess, 0.25 * gaps)
+    # Lower bounds of the last zero: with the last pole only, and with all poles at zero.
+    start[-1] = np.maximum(weights[-1], sum(weights) - level * poles[-1]) / level
+    return pole, side, gap, start
+
+
+def _sides(weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros) -> _Sides:
+    """Return the sums in the order of the poles, vectorised if that fits into the cache.
+
+    Points are given in the order of `zero`, the poles up to which are below; `which` is their
+    function.
+    """
+    few = len(poles) * len(zero) <= _FITS
+    return (_sides_at_once if few else _sides_in_turn)(weights, poles, zero, which, at)
+
+
+def _sides_at_once(
+    weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros
+) -> _Sides:
+    slope = at.pole - poles[:, which]
+    slope += at.beyond
+    term = weights[:, which] / slope
+    np.divide(term, slope, out=slope)
+    is_below = np.arange(len(poles))[:, None] <= zero
+    every = np.zeros((len(poles), 4, len(zero)))
+    for place, of in enumerate((term, slope)):
+        np.copyto(every[:, place], of, where=is_below)
+        np.copyto(every[:, 2 + place], of, where=~is_below)
+    # Reducing the first of several axes adds in sequence, so the result is reproducible.
+    below, below_slope, above, above_slope = np.add.reduce(every, axis=0)
+    return _Sides(below, -below_slope, above, -above_slope)
+
+
+def _sides_in_turn(
+    weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros
+) -> _Sides:
+    below, below_slope, above, above_slope = np.zeros((4, len(zero)))
+    term, slope = np.empty((2, len(zero)))
+    firsts = np.searchsorted(zero, np.arange(len(poles))).tolist()
+    for first, weight, pole in zip(firsts, weights, poles, strict=True):
+        np.subtract(at.pole, pole[which], out=slope)
+        slope += at.beyond
+        np.divide(weight[which], slope, out=term)
+        np.divide(term, slope, out=slope)
+        below[first:] += term[first:]
+        below_slope[first:] -= slope[first:]
+        above[:first] += term[:first]
+        above_slope[:first] -= slope[:first]
+    return _Sides(below, below_slope, above, above_slope)
+
+
+def _nearer(
+    value: Array, sides: _Sides, side: Array, gap: Array, at: Array, level: Array, last: int
+) -> Array:
+    """Return improved distances of zeros from their poles; those from `last` on are beyond all."""
+    inner = (value, sides.below_slope, sides.above_slope, side, gap, at)
+    found = np.empty_like(value)
+    found[:last] = _between(*(of[:last] for of in inner))
+    # Beyond all poles the reciprocal of the sum is concave and nearly linear: Newton's method.
+    slope = level[last:] * sides.below_slope[last:]
+    found[last:] = at[last:] - sides.below[last:] * value[last:] / slope
+    return found
+
+
+def _between(
+    value: Array, below_slope: Array, above_slope: Array, side: Array, gap: Array, at: Array
+) -> Array:
+    """Return the zero of c + p/d - q/(gap - d), matched in value and slopes, one pole per side [1].
+
+    Distances are from the nearer pole, so that d keeps all its digits.
+    """
+    rest = gap - at
+    p = -np.where(side > 0, below_slope, above_slope) * at * at
+    q = -np.where(side > 0, above_slope, below_slope) * rest * rest
+    c = side * value - p / at + q / rest
+    half = 0.5 * (p + q - c * gap)
+    root = np.sqrt(np.maximum(half * half + c * p * gap, 0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found: Array = np.where(half > 0, p * gap / (half + root), (root - half) / c)
+    return found

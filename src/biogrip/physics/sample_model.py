@@ -1,0 +1,260 @@
+"""Networks of springs and dampers, the common form of all constitutive models.
+
+Sample models and their parameters, and the parameters that several models share.
+"""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from math import inf
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from biogrip.arrays import Array, IntArray
+
+
+@dataclass(frozen=True)
+class Network:
+    """Springs and dampers of n samples."""
+
+    k_p: Array
+    """Parallel spring in N/m, (n,)."""
+    c_p: Array
+    """Parallel damper in N s/m, (n,)."""
+    k: Array
+    """Spring of each Maxwell branch in N/m, (n, n_branches)."""
+    c: Array
+    """Damper of each Maxwell branch in N s/m, (n, n_branches)."""
+
+
+# Stiffness or damping of a rigid element, in N/m or N s/m, too large to affect a response.
+_RIGID = 1e18
+
+
+def columns_of(parameters: ArrayLike) -> Array:
+    """Return columns of parameters, (n, n_parameters), with infinite ones replaced by rigid."""
+    columns = np.atleast_2d(np.asarray(parameters) * 1.0).T
+    rigid = np.isinf(columns)
+    return np.where(rigid, _RIGID, columns) if np.any(rigid) else columns
+
+
+def complex_modulus(network: Network, omega: Array) -> tuple[Array, Array]:
+    """Return storage and loss moduli of n samples, in N/m or Pa, each (n, n_omega).
+
+    Angular frequencies are in rad/s, (n_omega,).
+    """
+    rates = (network.k / network.c)[:, :, None]
+    share = network.k[:, :, None] / (omega**2 + rates**2)
+    storage = network.k_p[:, None] + np.sum(share * omega**2, axis=1)
+    loss = network.c_p[:, None] * omega + np.sum(share * omega * rates, axis=1)
+    return storage, loss
+
+
+MOST_BRANCHES = 8
+"""Most branches for which polynomials are used; springpots have more of them."""
+
+
+_UNITS = {"stiffness": "N/m", "damping": "N s/m", "springpot": "N/m", "exponent": ""}
+_SUFFIXES = {
+    "stiffness": "_N_per_m",
+    "damping": "_Ns_per_m",
+    "springpot": "_N_per_m",
+    "exponent": "",
+}
+# Where a sample is under stress, and strained.
+_UNITS_PER_AREA = {"stiffness": "Pa", "damping": "Pa s", "springpot": "Pa", "exponent": ""}
+_SUFFIXES_PER_AREA = {
+    "stiffness": "_Pa",
+    "damping": "_Pa_s",
+    "springpot": "_Pa",
+    "exponent": "",
+}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a sample model."""
+
+    name: str
+    """Identifier in config, columns and code."""
+    kind: str
+    """``"stiffness"``, ``"damping"``, ``"springpot"`` (a modulus at 1 rad/s) or ``"exponent"``;
+    decides the unit."""
+    meaning: str
+    """A few words for tables."""
+    range_name: str
+    """Entry of the search range that holds for the parameter."""
+    may_vanish: bool = False
+    """True if zero is a possible value: the element is then absent."""
+    below: float = inf
+    """Upper bound of all values, if there is one."""
+    per_area: bool = False
+    """True if it relates stress and strain."""
+
+    @property
+    def unit(self) -> str:
+        """SI unit; empty if it has none."""
+        return (_UNITS_PER_AREA if self.per_area else _UNITS)[self.kind]
+
+    @property
+    def column(self) -> str:
+        """Name of the parameter's column in result files."""
+        return self.name + (_SUFFIXES_PER_AREA if self.per_area else _SUFFIXES)[self.kind]
+
+    @property
+    def symbol(self) -> str:
+        """The symbol as mathtext."""
+        letter, _, index = re.sub("(alpha|beta)", r"\\\1", self.name).partition("_")
+        return f"${letter}_{{{index}}}$" if index else f"${letter}$"
+
+
+Turned: TypeAlias = Callable[..., tuple[Array | float, ...]]
+"""Of the simpler model's parameters, one by one, those of the richer one."""
+
+
+@dataclass(frozen=True)
+class SampleModel:
+    """A named constitutive model."""
+
+    name: str
+    """Name in the config."""
+    title: str
+    """Name in print."""
+    parameters: tuple[Parameter, ...]
+    """Parameters to identify, in the order of the columns of a population."""
+    network: Callable[[ArrayLike], Network]
+    """Turns parameters of shape (n, n_parameters) into a `Network`."""
+    example: tuple[float, ...]
+    """Parameters of some sample, which tests are about."""
+    exchangeable: tuple[str, ...] = ()
+    """Parameters whose sum deserves a row of its own in tables, because stiff branches make them
+    trade against each other."""
+    branches: tuple[tuple[str, str], ...] = ()
+    """Spring and damper of each Maxwell branch, or modulus and exponent of each springpot, by
+    name, where a trace is the same whichever is called which; in ascending order (`in_order`)."""
+    contains: Mapping[str, Turned] = field(default_factory=dict, hash=False)
+    """Models that it becomes where elements vanish, by candidate, and how their parameters are
+    turned into its own (`biogrip.physics.models`)."""
+    within: Mapping[str, Turned] = field(default_factory=dict, hash=False)
+    """Likewise, candidates that become it, and how its parameters are turned into theirs."""
+    branched: "Callable[[int], SampleModel] | None" = None
+    """Makes the model with a number of Maxwell branches, if there is such."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameter names in column order."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def stiffness_unit(self) -> str:
+        """Unit of the stiffnesses of its elements."""
+        per_area = any(parameter.per_area for parameter in self.parameters)
+        return (_UNITS_PER_AREA if per_area else _UNITS)["stiffness"]
+
+    @property
+    def power_law(self) -> bool:
+        """True if it has a springpot, which stands for branches of all relaxation times."""
+        return any(parameter.kind == "springpot" for parameter in self.parameters)
+
+    @property
+    def quantities(self) -> list[list[Parameter]]:
+        """Rows of tables: every parameter, and the sum of the exchangeable ones."""
+        exchangeable = [p for p in self.parameters if p.name in self.exchangeable]
+        return [[p] for p in self.parameters] + ([exchangeable] if exchangeable else [])
+
+    @property
+    def free_branches(self) -> tuple[tuple[int, int], ...]:
+        """Indices of both parameters of each branch of which both are to be identified."""
+        places = {name: index for index, name in enumerate(self.names)}
+        return tuple(
+            (places[spring], places[damper])
+            for spring, damper in self.branches
+            if spring in places and damper in places
+        )
+
+    @property
+    def branch_power(self) -> int:
+        """Power of k in c/k^power, by which branches ascend: 0 for the exponents of springpots."""
+        return 0 if self.power_law else 1
+
+    def in_order(self, parameters: Array) -> IntArray:
+        """Order in which branches of samples, (n, n_parameters), relax, the fastest first.
+
+        A trace is the same whichever branch is called which; so that samples and fits
+        can be compared, branches are counted by their relaxation times c/k, and springpots by their
+        exponents. For every column it is the one that belongs there, (n, n_parameters), as of
+        `numpy.take_along_axis`.
+        """
+        order = np.tile(np.arange(len(self.names)), (len(parameters), 1))
+        if len(self.free_branches) > 1:
+            springs, dampers = np.array(self.free_branches).T
+            times = parameters[:, dampers] / parameters[:, springs] ** self.branch_power
+            ranks = np.argsort(times, axis=1, kind="stable")
+            order[:, springs], order[:, dampers] = springs[ranks], dampers[ranks]
+        return order
+
+    def named_in_order(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Return a sample's parameters, by name, with its branches in their order."""
+        values = np.array([[parameters[name] for name in self.names]])
+        order = self.in_order(values)[0]
+        return {**parameters, **dict(zip(self.names, values[0, order].tolist(), strict=True))}
+
+    def sample(self, parameters: Mapping[str, float]) -> Network:
+        """Return the elements of the one sample that has these parameters, by name."""
+        return self.network([[parameters[name] for name in self.names]])
+
+
+@dataclass(frozen=True)
+class _Filled:
+    """A model's network with some parameters at known values; columns are the others."""
+
+    model: SampleModel
+    fixed: tuple[tuple[str, float], ...]
+
+    def __call__(self, parameters: ArrayLike) -> Network:
+        fixed = dict(self.fixed)
+        given = np.atleast_2d(np.asarray(parameters) * 1.0)
+        free = (name for name in self.model.names if name not in fixed)
+        columns = dict(zip(free, given.T, strict=True))
+        filled = [
+            columns.get(name, np.full(len(given), fixed.get(name, np.nan)))
+            for name in self.model.names
+        ]
+        return self.model.network(np.stack(filled, axis=1))
+
+
+def with_fixed(model: SampleModel, fixed: Mapping[str, float]) -> SampleModel:
+    """Return the model with some parameters at known values, and only the others to identify."""
+    if not fixed:
+        return model
+    free = [index for index, name in enumerate(model.names) if name not in fixed]
+    return replace(
+        model,
+        parameters=tuple(model.parameters[index] for index in free),
+        network=_Filled(model, tuple(fixed.items())),
+        example=tuple(model.example[index] for index in free),
+    )
+
+
+@cache
+def in_pascals(model: SampleModel) -> SampleModel:
+    """Return the model of a sample under stress, whose elements are moduli and viscosities."""
+    parameters = tuple(replace(parameter, per_area=True) for parameter in model.parameters)
+    return replace(model, parameters=parameters)
+
+
+K = Parameter("k", "stiffness", "Maxwell spring", "k")
+K_P = Parameter("k_p", "stiffness", "parallel (membrane) spring", "k_p", may_vanish=True)
+C = Parameter("c", "damping", "Maxwell damper", "c")
+C_P = Parameter("c_p", "damping", "parallel damper", "c_p", may_vanish=True)
+
+SINGLE_BRANCH: tuple[Parameter, ...] = (K, K_P, C, C_P)
+"""The paper's parameters, which every file of identifications has columns for."""
+
+K_S = Parameter("k_s", "stiffness", "series spring", "k")
+C_S = Parameter("c_s", "damping", "series damper", "c")
+K_V = Parameter("k_v", "stiffness", "spring of the Kelvin-Voigt element", "k")
+C_V = Parameter("c_v", "damping", "damper of the Kelvin-Voigt element", "c")

@@ -1,0 +1,176 @@
+"""Noise of a trace, estimated without a model, and the rounding of its readings.
+
+Whitening of autocorrelated noise, for generalised least squares.
+
+The autocorrelation is that of white noise plus exponentials of the time between two
+readings (Ornstein-Uhlenbeck processes): one of any relaxation time, and a geometric
+series of them for 1/f noise. White noise may have a part that grows with the rotation.
+The Cholesky factor L of its matrix C is computed, and
+solved with, in linear time [1]_. Residuals r become L^-1 r, which are white and on
+average as large as r. Least squares of these are generalised least squares [2]_.
+
+References
+----------
+.. [1] D. Foreman-Mackey, E. Agol, S. Ambikasaran and R. Angus, Fast and scalable Gaussian
+   process modeling with applications to astronomical time series, The Astronomical Journal 154
+   (2017), 220: celerite.
+.. [2] A. C. Aitken, On least squares and linear combination of observations, Proceedings of the
+   Royal Society of Edinburgh 55 (1936), 42-48.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.physics.drift import with_uncertain, without
+from biogrip.physics.noise import flicker_rates
+
+ROOT_12 = np.sqrt(12.0)
+"""Step of rounded readings over the standard deviation of the rounding errors."""
+
+# Shares of equal neighbours from which on readings are rounded, and of second differences that are
+# none of jumps; the error of the written digits, in steps.
+_OFTEN, _ALL_BUT_JUMPS, _MULTIPLE = 0.05, 0.98, 0.05
+
+
+def estimate_noise(rotation_rad: Array, rounding_rad: float | None = None) -> float:
+    """Estimate the standard deviation of white noise on a smooth trace without a model.
+
+    The median of second differences is used, on which slopes and jumps of a protocol have
+    next to no effect. Where an instrument rounds so coarsely that neighbouring readings are often
+    the same, it is their mean square without the largest, and no less than the rounding errors'
+    [1]_. Of a trace without noise the estimate is tiny.
+
+    Parameters
+    ----------
+    rotation_rad : (n_samples,)
+        Trace, or what a fit leaves of it.
+    rounding_rad
+        Step of the readings; by default that of `rotation_rad`.
+
+    References
+    ----------
+    .. [1] B. Widrow, I. Kollar and M.-C. Liu, Statistical theory of quantization, IEEE Transactions
+       on Instrumentation and Measurement 45 (1996), 353-361: step over the root of 12.
+    """
+    second = np.abs(np.diff(rotation_rad, 2))
+    # Gaussian: the median is 0.6745 standard deviations, and those of second differences sqrt 6.
+    noise = float(np.median(second)) / (0.6745 * np.sqrt(6.0)) if len(second) else 0.0
+    step = measure_rounding(rotation_rad) if rounding_rad is None else rounding_rad
+    if len(second) and step:
+        most = second[second <= np.quantile(second, _ALL_BUT_JUMPS)]
+        noise = max(float(np.sqrt(np.mean(most**2) / 6)), step / ROOT_12)
+    return max(noise, 1e-9 * float(np.max(np.abs(rotation_rad))))
+
+
+def measure_rounding(rotation_rad: Array) -> float:
+    """Return the step in rad that the readings of a trace are multiples of.
+
+    It is zero if neighbouring readings are seldom the same: rounding is then not seen beside the
+    noise.
+    """
+    same = np.count_nonzero(rotation_rad[1:] == rotation_rad[:-1])
+    if same < max(1.0, _OFTEN * len(rotation_rad)):
+        return 0.0
+    apart = np.diff(np.unique(rotation_rad))
+    step = float(apart.min()) if len(apart) else 0.0
+    multiples = apart / step if step else apart
+    return step if np.all(np.abs(multiples - np.rint(multiples)) < _MULTIPLE) else 0.0
+
+
+MOST_SAMPLES = 50_000
+"""Most readings with autocorrelated noise, which cannot be condensed to fewer nodes."""
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Autocorrelation model of noise, by the shares of its components in the variance."""
+
+    ar1: float
+    """Share of an Ornstein-Uhlenbeck process, AR(1) at uniform sampling."""
+    time_s: float
+    """Its relaxation time."""
+    flicker: float
+    """Share of noise with spectrum 1/f."""
+    proportional: float = 0.0
+    """Share of white noise whose standard deviation is proportional to the rotation, on average
+    over the readings. The rest is white noise that is the same everywhere."""
+
+    @property
+    def white(self) -> float:
+        """Share of white noise that is the same everywhere."""
+        return 1 - self.ar1 - self.flicker - self.proportional
+
+
+WEIGHTED = NoiseModel(ar1=0.0, time_s=1.0, flicker=0.0, proportional=1.0)
+"""Independent noise whose standard deviations are given."""
+
+
+class Whitening:
+    """Transforms autocorrelated into white noise of the same variance, and projects nuisance out.
+
+    Parameters
+    ----------
+    time_s : (n_samples,)
+        Ascending sampling times.
+    noise_model
+        Autocorrelation model of the noise.
+    nuisance : (n_functions, n_samples)
+        Functions that the instrument may have added, with any amplitude.
+    uncertain : (n_functions, n_samples), optional
+        Functions added with a random amplitude, see `with_uncertain`.
+    growing : (n_samples,), optional
+        Standard deviation of the proportional part up to a factor; required if there is one.
+    """
+
+    def __init__(
+        self,
+        time_s: Array,
+        noise_model: NoiseModel,
+        nuisance: Array,
+        uncertain: Array | None = None,
+        growing: Array | None = None,
+    ) -> None:
+        # Imported here, for loading celerite takes a tenth of a second.
+        from celerite2 import driver
+
+        flicker = flicker_rates(time_s)
+        rates = np.append(1 / noise_model.time_s, flicker)
+        shares = np.append(
+            noise_model.ar1, np.full(len(flicker), noise_model.flicker / len(flicker))
+        )
+        self._solve = driver.solve_lower
+        self._time_s, self._rates = np.ascontiguousarray(time_s, float), rates
+        self._left = np.tile(shares, (len(time_s), 1))
+        ones = np.ones_like(self._left)
+        # White noise keeps the matrix regular, however small its share.
+        diagonal = np.full(len(time_s), 1.0)
+        if growing is not None:
+            diagonal += noise_model.proportional * (growing**2 / np.mean(growing**2) - 1)
+        pivots, self._right = driver.factor(
+            self._time_s, rates, diagonal, self._left, ones, np.empty_like(diagonal), ones.copy()
+        )
+        self._deviations = np.sqrt(pivots)
+        self.log_determinant = float(np.sum(np.log(pivots)))
+        """Logarithm of the determinant of the covariance matrix, over the mean variance."""
+        self.nuisance = self._white(nuisance, uncertain)
+        """Whitened functions that are projected out, (n_functions, n_samples)."""
+
+    def __call__(self, rows: Array) -> Array:
+        """Whiten functions of time, shape (..., n_samples), and project the nuisance out."""
+        return without(self.nuisance, self._whitened(rows))
+
+    def _white(self, nuisance: Array, uncertain: Array | None) -> Array:
+        if not len(nuisance) and uncertain is None:
+            return nuisance
+        basis = np.linalg.qr(self._whitened(nuisance).T)[0].T
+        known = nuisance[:0] if uncertain is None else self._whitened(uncertain)
+        return with_uncertain(basis, known)
+
+    def _whitened(self, rows: Array) -> Array:
+        columns = np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]).T)
+        solved = self._solve(
+            self._time_s, self._rates, self._left, self._right, columns, np.empty_like(columns)
+        )
+        return (solved / self._deviations[:, None]).T.reshape(rows.shape)

@@ -1,0 +1,89 @@
+"""Handlers that end a command at once with a one-line message when it is stopped.
+
+An exception would not do: libraries that are loading, or call back, replace or swallow it. Files
+are written atomically, so only scratch files need to be removed.
+
+Processes that work side by side for a command, and end with it.
+"""
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from multiprocessing import get_context
+from types import FrameType
+
+from biogrip.terminal import visible
+
+_SAID = {signal.SIGINT: "stopped", signal.SIGTERM: "ended by SIGTERM"}
+_CLEARED = "\r\x1b[K"
+
+unfinished: set[str] = set()
+"""Scratch files that are being written, to be removed if the command is stopped."""
+
+
+def end_when_stopped() -> None:
+    """Install handlers for stop signals, except those ignored, as with ``nohup``."""
+    for number in _SAID:
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, _end)
+
+
+def end_at_once(number: int, line: str) -> None:
+    """Exit with a message after the command's name, as if ended by a signal.
+
+    The exit status is 128 plus the signal's number, as in a shell.
+    """
+    # Ignore further signals.
+    for other in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(other, signal.SIG_IGN)
+    for path in unfinished:
+        with suppress(OSError):
+            os.unlink(path)
+    # A signal may arrive during a write to either stream.
+    with suppress(OSError, RuntimeError, ValueError):
+        sys.stdout.flush()
+    with suppress(OSError):
+        cleared = _CLEARED if os.isatty(2) else ""
+        os.write(2, f"{cleared}biogrip: {visible(line)}\n".encode())
+    os._exit(128 + number)
+
+
+def _end(number: int, _: FrameType | None) -> None:
+    end_at_once(number, f"{_SAID[signal.Signals(number)]}; no file was left half-written.")
+
+
+_EVERY_S = 0.5
+
+
+def worker_processes(count: int, begin: Callable[[], None] | None = None) -> ProcessPoolExecutor:
+    """Return an executor whose processes end when this one does, however that ends.
+
+    They are forked; a callback that is given is called first in each, and may hold what cannot be
+    pickled.
+    """
+    return ProcessPoolExecutor(
+        count, get_context("fork"), initializer=_begin, initargs=(os.getpid(), begin)
+    )
+
+
+def _begin(parent: int, begin: Callable[[], None] | None) -> None:
+    """Leave signals of the terminal to the parent, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+    if begin is not None:
+        begin()
+
+
+def _watch(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_EVERY_S)
+    for path in unfinished:
+        with suppress(OSError):
+            os.unlink(path)
+    os._exit(1)

@@ -1,1 +1,0 @@
-"""Rotation of the gripper's arms while they squeeze a sample."""

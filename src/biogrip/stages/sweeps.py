@@ -1,0 +1,235 @@
+"""Stage 3: identifications by the genetic algorithm under other interpretations of the paper.
+
+Identification errors at every point of a sweep.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from biogrip.arrays import Array, BoolArray
+from biogrip.fit.genetic import identify_many
+from biogrip.fit.genome import nearest_encodable
+from biogrip.fit.methods import near_noise
+from biogrip.fit.problem import Identification
+from biogrip.judging.fisher import bounds_percent, headlines
+from biogrip.judging.quantities import Quantity
+from biogrip.physics.noise import add_noise, rms, stream
+from biogrip.physics.sample_model import SINGLE_BRANCH
+from biogrip.physics.simulation import simulated_rotation
+from biogrip.progress import Progress
+from biogrip.records.identifications import INTERPRETATIONS, read_identifications
+from biogrip.records.rows import RowFile
+from biogrip.records.traces import read_target
+from biogrip.stages.identification import groups
+from biogrip.study.study import Case, Study
+from biogrip.study.sweeps import Point
+
+
+def read(case: Case, target: Path, rows: Path) -> None:
+    """Identify every noisy trace of a case under every interpretation by the genetic algorithm.
+
+    Random streams are those of the study, so a interpretation that changes nothing reproduces the
+    study's results.
+    """
+    INTERPRETATIONS.write(rows, _interpretation_rows(case, target))
+
+
+def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
+    time_s, _, rotation = read_target(target)
+    progress = Progress(f"{case.name}, interpretations", len(case.interpretations) * case.seeds)
+    for name, interpretation in case.interpretations.items():
+        case_problem = interpretation.problem
+        for seeds in groups(range(case.seeds)):
+            streams = {
+                purpose: [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]
+                for purpose in ("noise", "genetic")
+            }
+            traces = [
+                add_noise(rotation, interpretation.noise, rng, time_s) for rng in streams["noise"]
+            ]
+            problems = [case_problem.of(time_s, trace) for trace in traces]
+            found = identify_many(problems, interpretation.genetic, streams["genetic"])
+            for seed, trace, answer in zip(seeds, traces, found, strict=True):
+                names = case_problem.searched.names
+                values = {**case_problem.fixed, **dict(zip(names, answer.parameters, strict=True))}
+                yield (
+                    case.name,
+                    name,
+                    seed,
+                    *(f"{values.get(p.name, 0.0):.6g}" for p in SINGLE_BRANCH),
+                    f"{answer.misfit_rad:.6e}",
+                    f"{rms(trace - rotation):.6e}",
+                    _last_improvement(answer),
+                )
+            progress.done(len(seeds))
+
+
+def _last_improvement(answer: Identification) -> int:
+    """Return the last generation in which the best misfit fell."""
+    falls = np.flatnonzero(np.diff(answer.history.best_misfit) < 0)
+    return int(falls[-1]) + 1 if len(falls) else 0
+
+
+POINTS = RowFile(
+    "a sweep",
+    (
+        *("point", "row", "column", "method", "quantity", "seeds"),
+        *("near_noise_share", "basin_share"),
+        *("median_absolute_error_percent", "basin_error_percent", "bound_percent"),
+    ),
+    "results/robustness/{sweep}.csv",
+    words=("row", "column"),
+)
+
+# Log factor, and multiple of the bound, within which a value is in the basin of the truth.
+_FACTOR, _BOUNDS = math.log(2), 4.0
+
+
+def judge(
+    study: Study,
+    sweep: str,
+    identifications: list[Path],
+    calibrated: list[Path],
+    points: Path,
+) -> None:
+    """Compute errors and shares of successful seeds at every point of a sweep.
+
+    Parameters
+    ----------
+    study
+        The study.
+    sweep
+        Name of the sweep.
+    identifications
+        Batches of the points, in folders named like point and method.
+    calibrated
+        Calibrations, named like their point.
+    points
+        The file to write.
+    """
+    files: dict[tuple[str, str], list[Path]] = {}
+    for path in identifications:
+        files.setdefault((path.parts[-3], path.parts[-2]), []).append(path)
+    calibrations = {path.stem: [path] for path in calibrated}
+    block = study.sweeps[sweep]
+    rows = [
+        row
+        for case in block.cases
+        for row in _rows(study, block.points(sweep, case), files, calibrations)
+    ]
+    POINTS.write(points, rows)
+
+
+def _rows(
+    study: Study,
+    points: list[Point],
+    files: Mapping[tuple[str, str], list[Path]],
+    calibrations: Mapping[str, list[Path]],
+) -> Iterator[tuple[str | int, ...]]:
+    """Yield a row for every point of a case, method and quantity."""
+    true = study.cases[points[0].case].parameters
+    bounds = {}
+    for point in points:
+        case = study.points[point.name]
+        problem = case.problem.calibrated(calibrations.get(point.name, []))
+        time_s = case.sampling.over(problem.torque.end_s)
+        bounds[point.name] = bounds_percent(problem, case.noise, true, time_s)
+    heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
+    for point in points:
+        case = study.points[point.name]
+        for method in study.methods:
+            batches = files[point.name, method]
+            found = pd.concat([read_identifications(path, method) for path in batches])
+            tolerance = study.near_noise_tolerance
+            for judged in _judged(case, true, found, bounds[point.name], heads, tolerance):
+                yield point.name, point.row.text, point.column.text, method, *judged
+
+
+def _judged(
+    point: Case,
+    true: Mapping[str, float],
+    found: pd.DataFrame,
+    bounds: list[tuple[Quantity, float]],
+    heads: list[str],
+    tolerance: float,
+) -> Iterator[tuple[str | int, ...]]:
+    """Yield what one method finds at a point, for every quantity."""
+    searched = point.searched.parameters
+    members = {q.label: [searched[index] for index in q.members] for q, _ in bounds}
+    truths = {label: sum(true[p.name] for p in of) for label, of in members.items()}
+    values = {
+        label: found[[p.column for p in of]].sum(axis=1).to_numpy(float)
+        for label, of in members.items()
+    }
+    near = float(np.mean(_succeeded(point, true, found, tolerance)))
+    inside = np.ones(len(found), dtype=bool)
+    for q, percent in bounds:
+        if q.label in heads:
+            inside &= in_basin(values[q.label], truths[q.label], percent / 100)
+    for q, percent in bounds:
+        errors = _errors_percent(values[q.label], truths[q.label])
+        within = _median(errors[inside])
+        share = float(np.mean(inside)) if heads else np.nan
+        numbers = (near, share, _median(errors), within, percent)
+        yield q.label, len(found), *(_text(number) for number in numbers)
+
+
+def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
+    """Return True where identified values lie in the basin of the truth, (n_seeds,).
+
+    The basin reaches to a factor of two or, where the noise allows no more, to four times the
+    bound of the logarithm. Without noise the bound is NaN and the factor holds.
+    """
+    with np.errstate(divide="ignore"):
+        away = np.abs(np.log(values / truth))
+    return away <= np.fmax(_FACTOR, _BOUNDS * bound)
+
+
+def _errors_percent(values: Array, truth: float) -> Array:
+    if not truth:
+        return np.full(len(values), np.nan)
+    return 100 * np.abs(values - truth) / truth
+
+
+def _median(values: Array) -> float:
+    return float(np.median(values)) if len(values) else np.nan
+
+
+def _succeeded(
+    point: Case, true: Mapping[str, float], found: pd.DataFrame, tolerance: float
+) -> np.ndarray:
+    """Return True for each seed near the noise, (n_seeds,).
+
+    Without noise, the misfit of the true values rounded to the genes' two digits takes its
+    place.
+    """
+    if point.noise.absent:
+        found = found.assign(noise_rms=_resolution_rad(point, true))
+    return near_noise(found, tolerance)
+
+
+def _resolution_rad(point: Case, true: Mapping[str, float]) -> float:
+    """Return the noise-free RMS misfit of the encodable parameters nearest to the truth."""
+    problem = point.problem
+    time_s = point.sampling.over(problem.torque.end_s)
+    truth = [true[p.name] for p in problem.model.parameters]
+    rounded = [
+        problem.fixed.get(p.name, nearest_encodable(value, problem.ranges[p.range_name]))
+        for p, value in zip(problem.model.parameters, truth, strict=True)
+    ]
+    both = simulated_rotation(
+        problem.gripper,
+        problem.model.network(np.array([truth, rounded])),
+        problem.torque,
+        time_s,
+        nonlinear=problem.nonlinear,
+    )
+    return rms(both[1] - both[0])
+
+
+def _text(number: float) -> str:
+    return "" if np.isnan(number) else f"{number:.6g}"

@@ -1,0 +1,375 @@
+"""Config block of the gripper.
+
+Config block of the protocol: what is held over time, as torques or voltages of comb drives.
+
+Config block of the sample: constitutive model and true parameters.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+from pydantic import BaseModel, Field
+
+from biogrip.errors import nearest
+from biogrip.keys import OPEN, Block, Checked, OneOf, Problem
+from biogrip.physics.actuator import CombDrive, capacitance_slope, torque_uncertainty
+from biogrip.physics.calibration import ARM_KEYS
+from biogrip.physics.contact import LARGEST_M, SMALLEST_M, Contact, contact
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import CONTROLLED, Instrument
+from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.protocol import Phase, largest_load, load
+from biogrip.physics.sample_model import MOST_BRANCHES, SampleModel
+
+# Share of a property; a larger change of the response would not be linear.
+_MOST_UNCERTAIN = 0.5
+_OWN = ("arm_length_m", "reference_angle_deg")
+_OF_COMB = ("finger_gap_m", "thickness_m")
+
+_Uncertainties = Mapping[Annotated[str, OneOf(ARM_KEYS)], Annotated[float, Field(ge=0, le=1e3)]]
+
+
+@dataclass(frozen=True)
+class Uncertainty(Block):
+    """Standard uncertainties of the gripper; all intervals include them."""
+
+    left: _Uncertainties | None = None
+    """Uncertainties of the left arm's keys."""
+    right: _Uncertainties | None = None
+    """Uncertainties of the right arm's keys."""
+    arm_length_m: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Uncertainty of the length of both arms."""
+    reference_angle_deg: Annotated[float, Field(ge=0, le=45)] = 0.0
+    """Uncertainty of the reference angle. At 90 degrees it has no effect."""
+    torque_percent: Annotated[float, Field(ge=0, le=50)] = 0.0
+    """Uncertainty of the torque, a factor that both arms and all phases share."""
+    voltage_percent: Annotated[float, Field(ge=0, le=25)] = 0.0
+    """Uncertainty of the voltage, a factor likewise. This key and the next two are for a protocol
+    in voltages: the uncertainties of its torques (eq. 9) add up in quadrature."""
+    finger_gap_m: Annotated[float, Field(ge=0, le=1e-2)] = 0.0
+    """Uncertainty of the comb drives' gap. The mask fixes the pitch, so that a wider gap is a
+    narrower finger."""
+    thickness_m: Annotated[float, Field(ge=0, le=1e-2)] = 0.0
+    """Uncertainty of the height of the comb drives' fingers."""
+
+    @property
+    def by_part(self) -> dict[str, Mapping[str, float]]:
+        """Uncertainties of the arms and of the gripper's own keys, as far as they are given."""
+        own = {key: known for key in _OWN if (known := getattr(self, key))}
+        parts = {"left": self.left, "right": self.right, "gripper": own}
+        return {name: known for name, known in parts.items() if known}
+
+    def torque_share(self, comb: CombDrive) -> float:
+        """Return the relative standard uncertainty of the torque."""
+        of_comb = torque_uncertainty(
+            comb, 0.01 * self.voltage_percent, self.finger_gap_m, self.thickness_m
+        )
+        return math.hypot(0.01 * self.torque_percent, of_comb)
+
+
+@dataclass(frozen=True)
+class GripperBlock(Gripper):
+    """The gripper's two arms and jaw gap (Table 1)."""
+
+    jaw_gap_m: Annotated[float, Field(ge=1e-9, le=1.0)]
+    """Distance between the jaws in the neutral configuration."""
+    uncertainty: Uncertainty | None = None
+
+    def uncertainties(self, comb: CombDrive) -> dict[str, Mapping[str, float]]:
+        """Return standard uncertainties by part of the gripper, see `CaseProblem`."""
+        if self.uncertainty is None:
+            return {}
+        share = self.uncertainty.torque_share(comb)
+        return self.uncertainty.by_part | ({"torque": {"share": share}} if share else {})
+
+    def problems(self) -> Iterator[Problem]:
+        """Refuse uncertainties of half a property or more."""
+        for part, known in self.uncertainty.by_part.items() if self.uncertainty else ():
+            owner, path = (self, ()) if part == "gripper" else (getattr(self, part), (part,))
+            for key, uncertainty in known.items():
+                yield from _too_uncertain(("uncertainty", *path, key), uncertainty, owner)
+
+    def comb_problems(self, comb: CombDrive, *, in_volts: bool) -> Iterator[Problem]:
+        """Refuse uncertainties of half the comb's size or more, or without voltages."""
+        for key in ("voltage_percent", *_OF_COMB) if self.uncertainty else ():
+            known, path = getattr(self.uncertainty, key), ("uncertainty", key)
+            if known and not in_volts:
+                text = "needs a protocol in voltages; allowed with torques is torque_percent."
+                yield path, text
+            elif key in _OF_COMB:
+                yield from _too_uncertain(path, known, comb)
+
+    @property
+    def neutral(self) -> Gripper:
+        """The gripper in its neutral configuration."""
+        return Gripper(self.arm_length_m, self.reference_angle_deg, self.left, self.right)
+
+    def contact(self, comb: CombDrive, size_m: float) -> Contact:
+        """Return the gripper's state when it is closed onto a sample."""
+        return contact(self.neutral, self.jaw_gap_m, comb, size_m)
+
+
+def _too_uncertain(path: tuple[str, ...], uncertainty: float, owner: object) -> Iterator[Problem]:
+    value = getattr(owner, path[-1])
+    if uncertainty >= _MOST_UNCERTAIN * value:
+        yield path, f"found {uncertainty:g}, allowed is less than half of {value:g}."
+
+
+_LONGEST_S = 1e9
+_VOLTAGE = "voltage_V"
+_BASES = (CONTROLLED[0].column, _VOLTAGE, *(each.column for each in CONTROLLED[1:]))
+# What a comb drive pulls with.
+_PULLS = _BASES[:2]
+# A load or a deformation, either way.
+_Signed = Annotated[float | None, Field(ge=-1e12, le=1e12)]
+
+
+@dataclass(frozen=True)
+class PhaseBlock(Block):
+    """A phase of the protocol: a hold, a ramp or a sinusoid, of one quantity in all phases."""
+
+    duration_s: Annotated[float, Field(ge=1e-6, le=_LONGEST_S)]
+    """Duration of the phase; of all together at most 1e9 s."""
+    torque_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
+    """Closing torque of both arms, held or, with to_torque_Nm, at the start of a ramp."""
+    to_torque_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
+    """Torque at the end of a ramp."""
+    amplitude_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
+    """Amplitude of a sinusoid on top of a held torque; needs frequency_Hz."""
+    torque_right_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
+    """Held torque of the right arm, where it differs."""
+    voltage_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
+    """Voltage on both comb drives, instead of torque_Nm. As in the paper, eq. (9) converts it to
+    grip torque, counted from contact; the voltage that closes the jaws onto a sample comes on
+    top."""
+    to_voltage_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
+    """Voltage at the end of a ramp of the voltage."""
+    amplitude_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
+    """Amplitude of a sinusoid on top of a held voltage; needs frequency_Hz."""
+    voltage_right_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
+    """Held voltage of the right arm, where it differs."""
+    force_N: _Signed = None
+    """Force on the sample, instead of torque_Nm, where the instrument is `creep`; so is stress_Pa.
+    Where it is `relaxation`, displacement_m or strain."""
+    to_force_N: _Signed = None
+    """Force at the end of a ramp."""
+    amplitude_N: _Signed = None
+    """Amplitude of a sinusoid on top of a held force."""
+    stress_Pa: _Signed = None
+    """Stress on the sample."""
+    to_stress_Pa: _Signed = None
+    """Stress at the end of a ramp."""
+    amplitude_Pa: _Signed = None
+    """Amplitude of a sinusoid on top of a held stress."""
+    displacement_m: _Signed = None
+    """Displacement of the sample."""
+    to_displacement_m: _Signed = None
+    """Displacement at the end of a ramp, as the ramp of loading."""
+    amplitude_m: _Signed = None
+    """Amplitude of a sinusoid on top of a held displacement."""
+    strain: _Signed = None
+    """Strain of the sample."""
+    to_strain: _Signed = None
+    """Strain at the end of a ramp, as the ramp of loading."""
+    amplitude_strain: _Signed = None
+    """Amplitude of a sinusoid on top of a held strain."""
+    frequency_Hz: Annotated[float | None, Field(ge=1e-9, le=1e9)] = None
+    """Frequency of the sinusoid, which starts at its mean, rising."""
+
+    @property
+    def bases(self) -> list[str]:
+        """Keys that say what is held; in a valid phase, one."""
+        return [key for key in _BASES if getattr(self, key) is not None]
+
+    @property
+    def drives(self) -> bool:
+        """True if anything that the phase holds differs from zero."""
+        own = vars(self).items()
+        return any(value for key, value in own if key not in ("duration_s", "frequency_Hz"))
+
+    def phase(self, per_square_volt: float) -> Phase:
+        """Return the phase in torques; a voltage's torque is `per_square_volt` V^2 (eq. 9)."""
+        (base,) = self.bases
+        value, to, amplitude = (getattr(self, key) for key in (base, *further_keys(base)))
+        left = right = load(self.duration_s, value, to, amplitude, self.frequency_Hz)
+        of_right = getattr(self, base.replace("_", "_right_")) if base in _PULLS else None
+        if of_right is not None:
+            right = replace(left, value_Nm=of_right)
+        if base == _VOLTAGE:
+            left, right = left.squared(per_square_volt), right.squared(per_square_volt)
+        return Phase(self.duration_s, left, right)
+
+    def problems(self) -> Iterator[Problem]:
+        """Find keys that are in conflict."""
+        given = {name: value for name, value in vars(self).items() if value is not None}
+        if len(self.bases) != 1:
+            found, others = " and ".join(self.bases) or "neither", ", ".join(_BASES[2:])
+            text = f"found {found}, allowed is one of {' and '.join(_PULLS)}, or with another "
+            yield (), f"{text}instrument of {others}."
+            return
+        by = self.bases[0]
+        ramp, swing = further_keys(by)
+        right = by.replace("_", "_right_") if by in _PULLS else ""
+        for key in sorted(given.keys() - {"duration_s", by, right, ramp, swing, "frequency_Hz"}):
+            yield (key,), f"does not go with {by}."
+        if (swing in given) != ("frequency_Hz" in given):
+            yield (), f"has one of {swing} and frequency_Hz; allowed are both or neither."
+        if right in given and ramp in given:
+            yield (right,), "does not go with a ramp; allowed is a held torque."
+        if swing in given and ramp in given:
+            yield (), "has a ramp and a sinusoid; allowed is one of them in a phase."
+        if by in _PULLS and given.get(swing, 0) > min(given[by], given.get(right, given[by])):
+            text = f"found {given[swing]}, allowed is at most {by}: comb drives only pull."
+            yield (swing,), text
+
+
+@dataclass(frozen=True)
+class ProtocolBlock(Block):
+    """Torques or voltages of the comb drives over time (Figure 3)."""
+
+    phases: Annotated[tuple[PhaseBlock, ...], Field(min_length=1, max_length=1000)]
+    """Phases that follow one another from t = 0; the experiment ends with the last."""
+
+    @property
+    def end_s(self) -> float:
+        """Duration of the protocol."""
+        return sum(phase.duration_s for phase in self.phases)
+
+    def make_phases(self, instrument: Instrument, comb: CombDrive) -> tuple[Phase, ...]:
+        """Return all phases in units of what the instrument holds, or of the largest load."""
+        per_square_volt = 0.5 * capacitance_slope(comb)
+        phases = tuple(phase.phase(per_square_volt) for phase in self.phases)
+        if not instrument.relative:
+            return phases
+        largest = largest_load(phases)
+        divided = [(phase.duration_s, phase.left.divided(largest)) for phase in phases]
+        return tuple(Phase(duration_s, load, load) for duration_s, load in divided)
+
+    def problems(self) -> Iterator[Problem]:
+        """Refuse a protocol that is too long, or in which all torques are zero."""
+        if self.end_s > _LONGEST_S:
+            text = f"found {self.end_s:g} s in all phases together, allowed is at most "
+            yield ("phases",), f"{text}{_LONGEST_S:g} s."
+        if not any(phase.drives for phase in self.phases):
+            name = self.phases[0].bases[0].partition("_")[0]
+            text = f"no phase has a {name}, so nothing would move; allowed is at least one above 0."
+            yield ("phases",), text
+
+    def instrument_problems(self, instruments: Sequence[Instrument]) -> Iterator[Problem]:
+        """Find phases that hold what none of some instruments, of one kind, holds."""
+        columns = list(dict.fromkeys(instrument.controlled.column for instrument in instruments))
+        allowed = [*columns, _VOLTAGE] if _BASES[0] in columns else columns
+        for index, phase in enumerate(self.phases):
+            for base in phase.bases:
+                if base not in allowed:
+                    text = f"is not what {instruments[0].kind} holds; allowed is "
+                    yield ("phases", index, base), f"{text}{' or '.join(allowed)}."
+                elif base not in _PULLS and base != self.phases[0].bases[0]:
+                    text = f"does not go with {self.phases[0].bases[0]} in another phase; allowed "
+                    yield ("phases", index, base), f"{text}is one of them."
+
+
+def further_keys(base: str) -> tuple[str, str]:
+    """Return the keys of a ramp's end and of a sinusoid's amplitude."""
+    return f"to_{base}", f"amplitude_{base.rpartition('_')[2]}"
+
+
+LARGEST_PARAMETER = 1e12
+_LEAST = 1e-18
+
+
+class SampleBlock(Checked, BaseModel):
+    """Constitutive model of the sample and its true parameters."""
+
+    model_config = OPEN
+    __pydantic_extra__: dict[
+        str,
+        Annotated[
+            float,
+            Field(
+                le=LARGEST_PARAMETER,
+                description="True values of the model's parameters, by name, SI units.",
+            ),
+        ],
+    ] = Field(init=False)
+
+    model: Annotated[
+        str,
+        OneOf(MODELS),
+        Field(
+            description='Constitutive model; which parameters it has is listed under "Sample '
+            'models".'
+        ),
+    ]
+    branches: Annotated[
+        int,
+        Field(
+            ge=1,
+            le=MOST_BRANCHES,
+            description="Number of Maxwell branches of `generalized_maxwell`; with more than one, "
+            "its parameters are k_1, k_2, ..., k_p, c_1, c_2, ..., c_p. By default 1.",
+        ),
+    ] = 1
+    size_m: Annotated[
+        float | None,
+        Field(
+            ge=SMALLEST_M,
+            le=LARGEST_M,
+            description="Diameter of the sample. It decides at which angle the jaws touch the "
+            "sample.",
+        ),
+    ] = None
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """True values of the model's parameters, by name."""
+        return self.__pydantic_extra__
+
+    @property
+    def sample(self) -> Sample:
+        """Constitutive model, with its number of branches."""
+        return Sample(self.model, self.branches)
+
+    def problems(self) -> Iterator[Problem]:
+        """Find parameters that the model does not have, or whose values it does not allow."""
+        if self.branches != 1 and MODELS[self.model].branched is None:
+            yield ("branches",), "only generalized_maxwell has a number of branches."
+            return
+        model = self.sample.model
+        yield from _parameter_problems(model, self.parameters, model.name)
+
+    def missing(self) -> Iterator[Problem]:
+        """Find parameters of the model without a true value."""
+        model = self.sample.model
+        for name in model.names:
+            if name not in self.parameters:
+                yield (name,), f"is missing: {model.name} needs {', '.join(model.names)}."
+
+
+def fixed_problems(model: SampleModel, values: Mapping[str, float]) -> Iterator[Problem]:
+    """Find fixed parameters that the model does not have, or whose values it does not allow."""
+    yield from _parameter_problems(model, values, "the sample")
+    if set(model.names) <= set(values):
+        yield (), "leaves nothing to identify; allowed are fewer parameters."
+
+
+def _parameter_problems(
+    model: SampleModel, values: Mapping[str, float], called: str
+) -> Iterator[Problem]:
+    """Find unknown names, and values out of range; 0 is allowed for those that may vanish."""
+    by_name = {parameter.name: parameter for parameter in model.parameters}
+    for name, value in values.items():
+        if name not in by_name:
+            text = f"is no parameter of {called}, which has {', '.join(model.names)}."
+            yield (name,), text + nearest(name, model.names)
+            continue
+        parameter = by_name[name]
+        vanishes = value == 0 and parameter.may_vanish
+        if not (vanishes or _LEAST <= value <= LARGEST_PARAMETER) or value >= parameter.below:
+            zero = "0 or " if parameter.may_vanish else ""
+            bounded = parameter.below < LARGEST_PARAMETER
+            most = f"below {parameter.below:g}" if bounded else f"at most {LARGEST_PARAMETER:g}"
+            text = f"found {value:g}, allowed is {zero}at least {_LEAST:g} and {most}"
+            yield (name,), f"{text} {parameter.unit}".rstrip() + "."

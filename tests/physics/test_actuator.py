@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+from biogrip.physics.actuator import (
+    CombDrive,
+    capacitance_slope,
+    torque,
+    torque_uncertainty,
+    voltage,
+)
+
+REST = 66, 321e-6, 6.0, 4.5, 1.5
+TABLE_2 = CombDrive(40e-6, 4e-6, 3e-6, *REST)
+
+
+def test_slope_is_the_sum_of_cylindrical_capacitors() -> None:
+    """Eq. (7) term by term as printed, in 30 digits."""
+    mp.dps = 30
+    r_0, d, g = mpf("321e-6"), mpf("4e-6"), mpf("3e-6")
+    total = mpf(0)
+    for i in range(66):
+        if i:
+            total += 1 / mp.log((r_0 + 2 * i * (d + g)) / (r_0 + 2 * i * (d + g) - g))
+        total += 1 / mp.log((r_0 + (2 * i + 1) * (d + g)) / (r_0 + 2 * i * (d + g) + d))
+    expected = mpf("8.8541878128e-12") * mpf("40e-6") * total
+    # ln(outer/inner) of radii 1 % apart loses two of sixteen digits.
+    assert capacitance_slope(TABLE_2) == pytest.approx(float(expected), rel=1e-13)
+
+
+def test_thin_gaps_become_plate_capacitors() -> None:
+    """For a large radius, a gap's 1/ln(r_outer/r_inner) is r/g, as of parallel plates."""
+    wide = CombDrive(40e-6, 4e-6, 3e-6, 2, 1.0, 6.0, 4.5, 1.5)
+    plates = 8.8541878128e-12 * 40e-6 * 3 * 1.0 / 3e-6
+    assert capacitance_slope(wide) == pytest.approx(plates, rel=3e-5)  # pitch / radius
+
+
+@pytest.mark.parametrize(("torque_Nm", "printed_V"), [(1.6e-9, 17), (0.32e-9, 7)])
+def test_operating_points_of_the_paper(torque_Nm: float, printed_V: float) -> None:
+    """Section 3 says "about" 17 and 7 V: half of the last printed digit, and a little."""
+    assert abs(float(voltage(TABLE_2, torque_Nm)) - printed_V) < 0.75
+
+
+def test_torque_is_the_slope_of_the_stored_energy() -> None:
+    """Eq. (8): tau = d(C V^2 / 2)/dtheta, by central difference."""
+    step, volts = 1e-3, 16.3
+    overlap_rad = np.array([0.02 - step, 0.02 + step])
+    # Eq. (7): the capacitance is in proportion to the overlap.
+    stored = 0.5 * capacitance_slope(TABLE_2) * overlap_rad * volts**2
+    slope = np.diff(stored)[0] / (2 * step)
+    assert float(torque(TABLE_2, volts)) == pytest.approx(slope, rel=1e-12)
+
+
+def test_voltage_inverts_torque() -> None:
+    volts = np.linspace(0, 100, 11)
+    np.testing.assert_allclose(voltage(TABLE_2, torque(TABLE_2, volts)), volts, rtol=1e-14)
+
+
+def test_a_comb_drive_does_not_push() -> None:
+    with pytest.raises(ValueError, match="only pulls"):
+        voltage(TABLE_2, -1e-9)
+
+
+def test_the_torque_is_as_uncertain_as_that_of_combs_that_vary() -> None:
+    """Torques of combs drawn at random scatter so, to the standard error of 20 000 draws."""
+    rng = np.random.default_rng(3)
+    volts, gap, height = 16.3, 0.06e-6, 0.8e-6
+    drawn = [
+        torque(
+            CombDrive(40e-6 + height * z[0], 4e-6 - gap * z[1], 3e-6 + gap * z[1], *REST),
+            volts * (1 + 0.01 * z[2]),
+        )
+        for z in rng.standard_normal((20_000, 3))
+    ]
+    scatter = np.std(drawn) / float(torque(TABLE_2, volts))
+    found = torque_uncertainty(TABLE_2, 0.01, gap, height)
+    assert found == pytest.approx(scatter, rel=3 / np.sqrt(2 * len(drawn)))
+    assert torque_uncertainty(TABLE_2, 0.01, 0.0, 0.0) == pytest.approx(0.02)
+    assert torque_uncertainty(TABLE_2, 0.0, 0.0, height) == pytest.approx(0.02)

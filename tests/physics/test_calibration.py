@@ -1,0 +1,96 @@
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from biogrip.errors import BiogripError
+from biogrip.physics.calibration import (
+    FreeMotion,
+    calibrate,
+    calibration_yaml,
+    free_motion,
+    read_calibrated_arms,
+)
+from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.noise import Noise, add_noise
+
+ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)
+TIME_S = np.arange(3001) / 100e3
+CAUSES = (1.6e-9, 2e-13)
+
+
+@pytest.mark.parametrize(
+    "damping", [3.3e-12, 1.3266e-10, 9e-10], ids=["rings", "critical", "creeps"]
+)
+def test_free_motion_against_radau(damping: float) -> None:
+    arm = dataclasses.replace(ARM, damping_Nms_per_rad=damping)
+    motion = free_motion(arm, TIME_S, *CAUSES)
+    for record, torque, rate in (
+        (motion.step_rad, CAUSES[0], 0.0),
+        (motion.impulse_rad, 0.0, CAUSES[1] / ARM.inertia_kgm2),
+    ):
+        solved = solve_ivp(
+            lambda _, y, torque=torque: [y[1], (torque - damping * y[1] - 4.4e-7 * y[0]) / 1e-14],
+            (0, TIME_S[-1]),
+            [0.0, rate],
+            "DOP853",
+            TIME_S,
+            rtol=1e-11,
+            atol=1e-15,
+        )
+        assert np.max(np.abs(record - solved.y[0])) < 1e-8 * np.abs(record).max()
+
+
+def noisy(arm: Arm, level: float, seed: int) -> FreeMotion:
+    motion = free_motion(arm, TIME_S, *CAUSES)
+    rng, noise = np.random.default_rng(seed), Noise("gaussian", level, "peak")
+    return FreeMotion(
+        TIME_S, add_noise(motion.step_rad, noise, rng), add_noise(motion.impulse_rad, noise, rng)
+    )
+
+
+def test_without_noise_the_arm_itself_is_found() -> None:
+    found = calibrate(noisy(ARM, 0.0, 0), *CAUSES).arm
+    np.testing.assert_allclose(dataclasses.astuple(found), dataclasses.astuple(ARM), rtol=1e-7)
+
+
+def test_uncertainties_are_honest() -> None:
+    """Over 100 records the errors have the spread that each record's own uncertainty says."""
+    pulls = []
+    for seed in range(100):
+        found = calibrate(noisy(ARM, 0.05, seed), *CAUSES)
+        error = np.subtract(dataclasses.astuple(found.arm), dataclasses.astuple(ARM))
+        pulls.append(error / dataclasses.astuple(found.uncertainty))
+    # The standard deviation of 100 draws is known to 7 %, three times that is allowed.
+    np.testing.assert_allclose(np.std(pulls, axis=0), 1.0, rtol=0.22)
+
+
+@pytest.mark.parametrize("scale", [0.3, 3.0])
+def test_other_grippers_are_found_too(scale: float) -> None:
+    arm = Arm(1e-14 * scale, 3.3e-12, 4.4e-7 * scale)
+    found = calibrate(noisy(arm, 0.02, 1), *CAUSES).arm
+    np.testing.assert_allclose(dataclasses.astuple(found), dataclasses.astuple(arm), rtol=0.05)
+
+
+def test_a_dead_arm_is_no_calibration() -> None:
+    still = FreeMotion(TIME_S, -np.ones_like(TIME_S), np.ones_like(TIME_S))
+    with pytest.raises(BiogripError, match="does not follow"):
+        calibrate(still, *CAUSES)
+
+
+def test_calibration_is_written_and_read_back(tmp_path: Path) -> None:
+    found = calibrate(noisy(ARM, 0.05, 2), *CAUSES)
+    path, nominal = tmp_path / "gripper.yaml", Gripper(1.5e-3, 75.0, ARM, ARM)
+    path.write_text(calibration_yaml(found, found))
+    read, known = read_calibrated_arms(path, nominal)
+    assert known["left"]["stiffness_Nm_per_rad"] == pytest.approx(
+        found.uncertainty.stiffness_Nm_per_rad, rel=0.05
+    )
+    np.testing.assert_allclose(
+        dataclasses.astuple(read.left), dataclasses.astuple(found.arm), rtol=1e-6
+    )
+    path.write_text("gripper: {left: 3}")
+    with pytest.raises(BiogripError, match="cannot be read as a calibration"):
+        read_calibrated_arms(path, nominal)

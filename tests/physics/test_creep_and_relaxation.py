@@ -1,0 +1,161 @@
+"""Creep under a load, and relaxation under a deformation, without a gripper."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb
+
+from biogrip.arrays import Array
+from biogrip.physics.condensed import Condensed
+from biogrip.physics.gripper import NO_ARMS
+from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import Load, Phase, TorqueHistory, hold, load, torque_history
+from biogrip.physics.residuals import Residuals
+from biogrip.physics.sample_model import Network, SampleModel
+from biogrip.physics.sensitivity import rotations_and_sensitivities
+from biogrip.physics.simulation import simulated_rotation
+from tests.helpers.power_law import inverted
+
+DRIVEN = pytest.mark.parametrize("deforms", [False, True], ids=["creep", "relaxation"])
+EVERY_MODEL = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+
+
+def _alike(duration_s: float, given: Load) -> Phase:
+    return Phase(duration_s, given, given)
+
+
+# A ramp of finite rate, a hold, a sinusoid on a level that ends with a jump, recovery.
+PHASES = (
+    _alike(0.5, load(0.5, 0.0, 2.0)),
+    hold(3.0, 2.0),
+    _alike(2.0, load(2.0, 1.0, None, 0.5, 0.3)),
+    hold(2.0, 0.0),
+)
+
+
+def simulated(network: Network, history: TorqueHistory, time_s: Array) -> Array:
+    return simulated_rotation(NO_ARMS, network, history, time_s, nonlinear=False)[0]
+
+
+def example(model: SampleModel) -> Network:
+    return model.network([model.example])
+
+
+def impedance(network: Network) -> Callable[[Any], Any]:
+    """Load over deformation of the first sample in the Laplace domain."""
+    branches = list(zip(network.k[0].tolist(), network.c[0].tolist(), strict=True))
+    k_p, c_p = float(network.k_p[0]), float(network.c_p[0])
+    return lambda s: k_p + c_p * s + sum((k * c * s / (k + c * s) for k, c in branches), arb(0))
+
+
+def by_laplace(network: Network, history: TorqueHistory, time_s: float) -> float:
+    """Response by numerical inversion: of each change of what is held, by itself."""
+    given = impedance(network)
+
+    def power(height: float, order: int) -> Callable[[Any], Any]:
+        return lambda s: height / s ** (order + 1)
+
+    def swing(a: complex, omega: float) -> Callable[[Any], Any]:
+        return lambda s: (a.real * s - a.imag * omega) / (s * s + omega * omega)
+
+    def response(held: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        return lambda s: held(s) * given(s) if history.deforms else held(s) / given(s)
+
+    changes = [(start, power(height[0], order)) for start, order, height in history.jumps]
+    changes += [(start, swing(complex(a[0]), omega)) for start, omega, a in history.swings]
+    return sum(
+        inverted(response(held), time_s - start) for start, held in changes if start < time_s
+    )
+
+
+@DRIVEN
+@pytest.mark.parametrize("name", ["kelvin_voigt", "generalized_maxwell", "burgers", "zener_kelvin"])
+def test_responses_to_ramps_and_sinusoids_are_inverse_laplace_transforms(
+    name: str, deforms: bool
+) -> None:
+    network = example(MODELS[name])
+    history = torque_history(PHASES, deforms=deforms)
+    times = np.array([0.2, 0.5001, 2.9, 3.5001, 4.4, 6.8])
+    found = simulated(network, history, times)
+    expected = [by_laplace(network, history, float(time)) for time in times]
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.max(np.abs(expected)))
+
+
+@pytest.mark.parametrize("model", [m for m in MODELS.values() if not m.power_law])
+def test_moduli_and_compliances_have_the_limits_of_their_networks(model: SampleModel) -> None:
+    network = example(model)
+    ends = np.array([1e-9, 1e9])
+    held = torque_history((hold(2e9, 1.0),)), torque_history((hold(2e9, 1.0),), deforms=True)
+    creep, modulus = (simulated(network, history, ends) for history in held)
+    at_once, at_rest = network.k_p[0] + network.k[0].sum(), network.k_p[0]
+    assert modulus[0] == pytest.approx(at_once, rel=1e-7)
+    assert modulus[1] == pytest.approx(at_rest, rel=1e-6, abs=1e-12)
+    if network.c_p[0] > 0:
+        assert creep[0] == pytest.approx(1e-9 / network.c_p[0], rel=1e-2)
+    else:
+        assert creep[0] == pytest.approx(1 / at_once, rel=1e-6)
+    viscosity = network.c_p[0] + network.c[0].sum()
+    settled = 1 / at_rest if at_rest else 1e9 / viscosity
+    assert creep[1] == pytest.approx(settled, rel=1e-6)
+
+
+@DRIVEN
+@EVERY_MODEL
+def test_derivatives_are_those_of_finite_differences(model: SampleModel, deforms: bool) -> None:
+    history = torque_history(PHASES, deforms=deforms)
+    times, step = np.linspace(0.0, 7.4, 40), 1e-4
+    logs = np.log([model.example])
+
+    def rows(at: Array) -> Array:
+        return rotations_and_sensitivities(
+            NO_ARMS, model, history, times, np.exp(at), nonlinear=False
+        )[0]
+
+    found = rows(logs)
+    assert found[0] == pytest.approx(simulated(example(model), history, times), rel=1e-12)
+    for i, unit in enumerate(np.eye(logs.shape[1])):
+        up, down = rows(logs + step * unit)[0], rows(logs - step * unit)[0]
+        scale = np.max(np.abs(found[1 + i])) or 1.0
+        # The error of a central difference is of the second order in the step.
+        assert found[1 + i] == pytest.approx((up - down) / (2 * step), abs=1e-6 * scale)
+
+
+@DRIVEN
+@pytest.mark.parametrize("held", [PHASES, (hold(5.0, 1.0), hold(2.5, 0.3))], ids=["mixed", "steps"])
+@EVERY_MODEL
+def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
+    model: SampleModel, held: tuple[Phase, ...], deforms: bool
+) -> None:
+    history = torque_history(held, deforms=deforms)
+    times = np.linspace(0.004, 7.5, 1801)
+    true = simulated(example(model), history, times)
+    trace = true + 0.01 * (np.ptp(true) or 1.0) * np.random.default_rng(5).standard_normal(
+        len(times)
+    )
+    condensed = Condensed(history, times, np.zeros((0, len(times))))
+    residuals = Residuals(NO_ARMS, model, history, times, trace, condensed, instrument=GRIPPER)
+    # Exponents stay below one.
+    moved = [parameter.kind != "exponent" for parameter in model.parameters]
+    logs = np.log([model.example]) + np.linspace(-0.3, 0.4, 5)[:, None] * moved
+    found = residuals.condensed_misfit(np.exp(logs))
+    expected = [np.sqrt(np.mean(residuals(at)[0] ** 2)) for at in logs]
+    assert found == pytest.approx(expected, rel=1e-10)
+    rows = residuals.condensed_responses(logs)
+    residual = rows[:, 0] - residuals.condensed_trace
+    gradient = np.einsum("npr,nr->np", rows[:, 1:], residual)
+    for at, own in zip(logs, gradient, strict=True):
+        left, slopes = residuals(at)
+        scale = float(np.linalg.norm(slopes) * np.linalg.norm(left))
+        assert np.abs(own - slopes @ left) == pytest.approx(0, abs=1e-9 * scale + 1e-15)
+
+
+def test_a_reading_at_the_instant_of_a_step_is_taken_before_it() -> None:
+    network = example(MODELS["zener_maxwell"])
+    history = torque_history((hold(1.0, 1.0), hold(1.0, 3.0)), deforms=True)
+    found = simulated(network, history, np.array([0.0, 1.0, np.nextafter(1.0, 2.0)]))
+    assert found[0] == 0
+    at_once = network.k_p[0] + network.k[0, 0]
+    assert found[2] - found[1] == pytest.approx(2 * at_once)

@@ -1,0 +1,137 @@
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.jaw_force import jaw_force, jaw_force_response, linear_jaw_force
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.maxwell_models import damper, generalized_maxwell, maxwell
+from biogrip.physics.nonlinear import nonlinear_rotation
+from biogrip.physics.protocol import TorqueHistory, hold, torque_at, torque_history
+from tests.helpers.responses import jaw_force_50_digits, random_samples
+from tests.physics.test_linear import TIMES
+from tests.physics.test_nonlinear import ARM, symmetric_states
+from tests.physics.test_protocols import TORQUE
+
+DROPS = np.array([[9.5, 1e-4, 10.0, 1e-4], [1.0, 1e-4, 10.0, 1e-3]])
+CELL = np.array([[35.0, 12.3, 299.9, 1e-3]])
+
+
+def worst_error(gripper: Gripper, torque: TorqueHistory, samples: Array) -> float:
+    """Against 50 digits, as a share of each sample's largest force."""
+    ours = jaw_force(gripper, generalized_maxwell(samples), torque, TIMES, nonlinear=False)
+    exact = np.array([jaw_force_50_digits(gripper, s, torque, TIMES) for s in samples])
+    return float(np.max(np.abs(ours - exact) / np.abs(exact).max(axis=1, keepdims=True)))
+
+
+@pytest.mark.parametrize("chunk", range(3))
+def test_equal_arms_over_the_whole_search_range(
+    gripper: Gripper, steps: TorqueHistory, chunk: int
+) -> None:
+    """Every weight is a quotient of sums of positive terms; rounding is all that is left."""
+    assert worst_error(gripper, steps, random_samples(100, 300 + chunk)) < 1e-11
+
+
+def test_unequal_arms_and_torques(unequal_gripper: Gripper, steps: TorqueHistory) -> None:
+    assert worst_error(unequal_gripper, steps, random_samples(100, 310)) < 1e-11
+    apart = torque_history((hold(50.0, 1.6e-9, 0.9e-9), hold(350.0, 0.32e-9, 0.4e-9)))
+    assert worst_error(unequal_gripper, apart, random_samples(50, 311)) < 1e-10
+
+
+@pytest.mark.parametrize("inertia", [False, True])
+def test_the_arms_equation_closes_under_ramps_and_sinusoids(
+    gripper: Gripper, inertia: bool
+) -> None:
+    """b F = tau - k phi - c phi' (- I phi'', which is nothing beside these a moment later)."""
+    network = generalized_maxwell(np.concatenate((DROPS, CELL, random_samples(20, 5))))
+    time_s = np.linspace(0.3, 89.8, 301)
+    response = step_response(gripper, network, inertia=False)
+    rest = torque_at(TORQUE, time_s) - ARM.stiffness_Nm_per_rad * rotation(response, TORQUE, time_s)
+    rest -= ARM.damping_Nms_per_rad * rotation(response, TORQUE, time_s, rate=True)
+    of_steps = jaw_force_response(gripper, network, inertia=inertia)
+    force = linear_jaw_force(of_steps, TORQUE, time_s)
+    largest = torque_at(TORQUE, time_s).max()
+    np.testing.assert_allclose(
+        gripper.lever_m * force, rest, rtol=0, atol=(3e-6 if inertia else 1e-12) * largest
+    )
+
+
+@pytest.mark.parametrize("case", range(12))
+def test_nonlinear_against_radau(case: int) -> None:
+    rng = np.random.default_rng([52, case])
+    gripper = Gripper(1.5e-3, rng.uniform(40, 90), ARM, ARM)
+    # Of stiffer samples Radau's own force is a difference of nearly equal displacements.
+    sample, factor = 10 ** rng.uniform([-1, -3, 0, -3], [2, 1, 2, 1]), rng.uniform(1, 10)
+    taus = 1.6e-9 * factor, 0.32e-9 * factor
+    torque = torque_history(tuple(hold(200.0, tau) for tau in taus))
+    time_s = np.concatenate((np.geomspace(0.1, 200, 25), 200 + np.geomspace(0.1, 200, 25)))
+    time_s[24] = np.nextafter(200, 0)
+    network = generalized_maxwell(sample)
+    ours = jaw_force(gripper, network, torque, time_s, nonlinear=True, inertia=False)[0]
+    ends = [(200.0, taus[0]), (400.0, taus[1])]
+    _, expected = symmetric_states(gripper, sample, ends, time_s, taus[0] / 4.4e-7)
+    assert np.max(np.abs(ours - expected)) < 1e-6 * np.abs(expected).max()
+    linear = jaw_force(gripper, network, torque, time_s, nonlinear=False, inertia=False)[0]
+    assert np.max(np.abs(ours - linear)) > 1e-5 * np.abs(expected).max()
+
+
+def test_nonlinear_force_follows_the_work_of_unequal_arms(unequal_gripper: Gripper) -> None:
+    """Of a bare damper the force's impulse is what it gave way times c_p."""
+    c_p = 20.0
+    torque = torque_history((hold(40.0, 3e-9, 2e-9),))
+    x, weights = np.polynomial.legendre.leggauss(40)
+    edges = np.concatenate(([0.0], np.geomspace(1e-6, 40.0, 40)))
+    half = 0.5 * np.diff(edges)
+    time_s = (edges[:-1, None] + half[:, None] * (1 + x)).ravel()
+    force = jaw_force(unequal_gripper, damper(c_p), torque, time_s, nonlinear=True, inertia=False)
+    impulse = np.sum(half[:, None] * weights * force.reshape(len(half), -1))
+    end, hat = np.array([40.0]), np.radians(unequal_gripper.reference_angle_deg)
+    shortening = 0.0
+    for arm in (0, 1):
+        phi = float(nonlinear_rotation(unequal_gripper, damper(c_p), torque, end, arm)[0, 0])
+        shortening += 2 * 1.5e-3 * np.sin(hat - phi / 2) * np.sin(phi / 2)
+    assert impulse == pytest.approx(c_p * shortening, rel=1e-8)
+
+
+def test_what_is_left_in_the_end(gripper: Gripper) -> None:
+    """The springs' share of a held torque; nothing for a liquid, without a digit lost."""
+    samples = random_samples(300, 12)
+    response = jaw_force_response(gripper, generalized_maxwell(samples))
+    b, k_p = gripper.lever_m, samples[:, 1]
+    expected = 2 * b * k_p / (ARM.stiffness_Nm_per_rad + 2 * b**2 * k_p)
+    np.testing.assert_allclose(response.static[:, 0, 0], expected, rtol=1e-14)
+    liquid = jaw_force_response(gripper, maxwell([[1.0, 10.0]]))
+    assert liquid.static[0, 0, 0] == 0
+    torque = torque_history((hold(5000.0, 1.6e-9),))
+    late = linear_jaw_force(liquid, torque, np.array([1000.0, 2000.0]))[0]
+    slow = liquid.rates.real.max()
+    assert late[1] / late[0] == pytest.approx(np.exp(1000 * slow), rel=1e-12)
+    assert 0 < late[1] < 1e-14
+
+
+def test_jaws_press_while_the_torque_is_held(gripper: Gripper) -> None:
+    """Without inertia nothing overshoots: a first step presses every sample, ever less."""
+    torque = torque_history((hold(400.0, 1.6e-9),))
+    network = generalized_maxwell(random_samples(1000, 14))
+    force = jaw_force(
+        gripper, network, torque, np.geomspace(1e-3, 400, 60), nonlinear=False, inertia=False
+    )
+    peak = force.max(axis=1, keepdims=True)
+    assert np.all(force > -1e-12 * peak)
+    assert np.all(np.diff(force, axis=1) < 1e-12 * peak)
+
+
+def test_no_force_before_anything_moves(gripper: Gripper, steps: TorqueHistory) -> None:
+    network = generalized_maxwell(CELL)
+    for nonlinear in (False, True):
+        assert (
+            abs(jaw_force(gripper, network, steps, np.zeros(1), nonlinear=nonlinear)[0, 0]) < 1e-20
+        )
+    arm = Arm(1e-14, 3.3e-12, 4.4e-7)
+    jumping = jaw_force(
+        Gripper(1.5e-3, 75.0, arm, arm), network, steps, np.zeros(1), nonlinear=False, inertia=False
+    )
+    # The damper takes nearly the whole torque at once: c_p u over c_g + c_p u.
+    share = 1e-3 * 2 * gripper.lever_m**2
+    expected = share / (share + 3.3e-12) * 1.6e-9 / gripper.lever_m
+    assert jumping[0, 0] == pytest.approx(expected, rel=1e-12)

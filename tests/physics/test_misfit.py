@@ -1,0 +1,137 @@
+import math
+
+import numpy as np
+import pytest
+
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.misfit import SeriesMisfit
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import TorqueHistory, drives, hold, sample_times, torque_history
+from tests.helpers.responses import random_samples
+
+MODEL = MODELS["generalized_maxwell"]
+TRUTH = np.array([35.0, 12.3, 299.9, 1e-3])
+
+PROTOCOLS = {
+    "paper": ((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)), 10.0),
+    "one phase": ((hold(300.0, 1.6e-9),), 3.0),
+    "step between samples": ((hold(33.37, 1e-9), hold(60.0, 2e-9)), 1.7),
+    "phase shorter than a sample": (
+        (hold(20.0, 1e-9), hold(0.05, 9e-9), hold(30.0, 0.0)),
+        2.0,
+    ),
+    "unequal torques": ((hold(50.0, 1e-9, 2e-9), hold(50.0, 2e-9, 0.0)), 5.0),
+}
+
+
+def direct(
+    gripper: Gripper,
+    steps: TorqueHistory,
+    time_s: np.ndarray,
+    trace: np.ndarray,
+    samples: np.ndarray,
+) -> np.ndarray:
+    """Form every response, subtract, square, average."""
+    response = step_response(
+        gripper, MODEL.network(samples), symmetric=steps.symmetric, inertia=False
+    )
+    return np.sqrt(np.mean((rotation(response, steps, time_s) - trace) ** 2, axis=1))
+
+
+@pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
+@pytest.mark.parametrize("name", PROTOCOLS)
+def test_agrees_with_forming_the_responses(
+    name: str, arms: str, request: pytest.FixtureRequest
+) -> None:
+    gripper = request.getfixturevalue(arms)
+    phases, rate_Hz = PROTOCOLS[name]
+    steps = torque_history(phases)
+    time_s = sample_times(steps.end_s, rate_Hz)
+    response = step_response(gripper, MODEL.network(TRUTH), symmetric=steps.symmetric)
+    noise = np.random.default_rng(1).standard_normal(len(time_s))
+    clean = rotation(response, steps, time_s)[0]
+    trace = clean + 0.1 * np.abs(clean).max() * noise
+    samples = np.vstack((TRUTH, random_samples(500, 3)))
+    misfit = SeriesMisfit(gripper, MODEL, steps, 1 / rate_Hz, trace)
+    expected = direct(gripper, steps, time_s, trace, samples)
+    # Large sums cancel: eps times (squares summed / squares left), 1e6 for the
+    # stiffest samples under this much noise.
+    np.testing.assert_allclose(misfit(samples), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", PROTOCOLS)
+def test_projections_agree_with_direct_sums(name: str, gripper: Gripper) -> None:
+    """From modes that stand still to those that are over at once, each drive by itself."""
+    phases, rate_Hz = PROTOCOLS[name]
+    steps = torque_history(phases)
+    count = len(sample_times(steps.end_s, rate_Hz))
+    trace = np.random.default_rng(5).standard_normal(count)
+    misfit = SeriesMisfit(gripper, MODEL, steps, 1 / rate_Hz, trace)
+    rates = -np.concatenate(([1e-300], np.geomspace(1e-9, 1e9, 500)))
+    found = misfit.projections(rates)
+    heights = drives(steps.left[:, 0], steps.right[:, 0], steps.symmetric)
+    expected, scale = np.zeros((2, len(heights), len(rates)))
+    for start, height in zip(steps.time_s * rate_Hz, heights.T, strict=True):
+        first = math.ceil(start - 1e-9)
+        terms = np.exp(np.outer(rates, np.arange(first, count) - start)) * trace[first:]
+        expected += height[:, None] * terms.sum(axis=1)
+        scale += np.abs(height[:, None]) * np.abs(terms).sum(axis=1)
+    assert np.all(np.abs(found - expected) <= 1e-14 * scale)
+    np.testing.assert_allclose(misfit.exact_projections(rates), expected, atol=1e-14 * scale.max())
+
+
+def test_times_of_steps_are_rounded_to_samples(gripper: Gripper) -> None:
+    """0.3 s is 2.9999999999999996 intervals of 0.1 s or 3; the mode must not notice."""
+    trace = np.random.default_rng(9).standard_normal(9)
+    samples = random_samples(200, 10)
+    held_s = [0.1 + 0.2, 0.3, 0.29999999999999993]
+    misfits = [
+        SeriesMisfit(
+            gripper, MODEL, torque_history((hold(t, 1e-9), hold(0.5, 2e-9))), 0.1, 1e-6 * trace
+        )(samples)
+        for t in held_s
+    ]
+    np.testing.assert_allclose(misfits[1:], misfits[:1] * 2, rtol=1e-12)
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 1_000_001])
+def test_few_and_many_samples(count: int, gripper: Gripper) -> None:
+    steps = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
+    time_s = np.linspace(0, 400.0, count)
+    trace = 1e-5 * np.random.default_rng(11).standard_normal(count)
+    samples = np.vstack((TRUTH, random_samples(7, 12)))
+    misfit = SeriesMisfit(gripper, MODEL, steps, 400.0 / (count - 1), trace)
+    expected = direct(gripper, steps, time_s, trace, samples)
+    np.testing.assert_allclose(misfit(samples), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("level", "rtol"), [(1e-4, 1e-9), (0.0, 1e-8)])
+def test_a_constant_trace(
+    level: float, rtol: float, gripper: Gripper, steps: TorqueHistory
+) -> None:
+    """Against zero the misfit is the response itself, in the slowest samples what is left of it.
+
+    Of their way to rest, 1e6 s, they go a fraction 4e-4; constant and mode cancel to its square.
+    """
+    trace = np.full(4001, level)
+    samples = np.vstack((TRUTH, random_samples(500, 13)))
+    misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, trace)
+    expected = direct(gripper, steps, np.arange(4001) / 10, trace, samples)
+    np.testing.assert_allclose(misfit(samples), expected, rtol=rtol)
+
+
+def test_parameters_that_are_not_numbers_have_no_misfit(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, np.ones(4001))
+    assert np.isnan(misfit(np.vstack((TRUTH, np.full(4, np.nan))))).tolist() == [False, True]
+
+
+def test_a_perfect_fit_is_zero_up_to_cancellation(gripper: Gripper, steps: TorqueHistory) -> None:
+    """Without noise the sums cancel to sqrt(eps) of the signal."""
+    time_s = np.arange(4001) / 10
+    response = step_response(gripper, MODEL.network(TRUTH), inertia=False)
+    trace = rotation(response, steps, time_s)[0]
+    misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, trace)
+    assert misfit(TRUTH[None, :])[0] < 1e-7 * trace.max()

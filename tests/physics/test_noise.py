@@ -1,0 +1,141 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter, periodogram
+
+from biogrip.arrays import Array
+from biogrip.physics.noise import (
+    AR1,
+    KINDS,
+    Drift,
+    Flicker,
+    Noise,
+    Outliers,
+    add_noise,
+    draw_ornstein_uhlenbeck,
+    rms,
+)
+
+CLEAN = np.concatenate((np.zeros(100_000), np.full(100_000, 2.0)))
+
+
+def estimate_noise(kind: str, reference: str) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    return add_noise(CLEAN, Noise(kind, 0.1, reference), rng) - CLEAN
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_level_is_the_standard_deviation_over_the_peak(kind: str) -> None:
+    noise = estimate_noise(kind, "peak")
+    # 2e5 samples: the standard deviation is known to 0.2 %, three times that is allowed.
+    assert rms(noise) == pytest.approx(0.2, rel=6e-3)
+    assert rms(noise[:100_000]) == pytest.approx(rms(noise[100_000:]), rel=2e-2)
+    # Of the mean, to 0.0004; four times that is allowed.
+    assert abs(noise.mean()) < 2e-3
+
+
+def test_proportional_noise_vanishes_with_the_signal() -> None:
+    noise = estimate_noise("gaussian", "signal")
+    assert np.all(noise[:100_000] == 0)
+    assert rms(noise[100_000:]) == pytest.approx(0.2, rel=1e-2)
+
+
+def test_uniform_noise_is_bounded() -> None:
+    bound = 0.2 * np.sqrt(3)
+    noise = estimate_noise("uniform", "peak")
+    assert 0.999 * bound < np.abs(noise).max() <= bound * (1 + 1e-12)
+
+
+def test_the_peak_is_the_largest_rotation_either_way() -> None:
+    """Unequal torques can turn an arm the other way."""
+    rng = np.random.default_rng(0)
+    noisy = add_noise(-CLEAN, Noise("gaussian", 0.1, "peak"), rng)
+    assert rms(noisy + CLEAN) == pytest.approx(0.2, rel=6e-3)
+
+
+def test_an_instruments_noise_does_not_depend_on_the_sample() -> None:
+    noise = Noise("uniform", 0.1, "peak", 3e-6)
+    for size in (1e-5, 3e-3):
+        rng = np.random.default_rng(0)
+        assert rms(add_noise(size * CLEAN, noise, rng) - size * CLEAN) == pytest.approx(
+            3e-6, rel=6e-3
+        )
+    assert not noise.absent
+    for nothing in (Noise("gaussian", 0.0, "peak"), Noise("gaussian", 0.1, "peak", 0.0)):
+        assert nothing.absent
+        np.testing.assert_array_equal(add_noise(CLEAN, nothing, rng), CLEAN)
+
+
+TIMES: Array = np.linspace(0, 399.9, 4000)
+
+
+def noises(count: int = 200, times: np.ndarray = TIMES, **parts: Any) -> np.ndarray:
+    """Unit noise on a trace of ones, a row a seed."""
+    noise, clean = Noise("gaussian", 1.0, "peak", **parts), np.ones(len(times))
+    rngs = [np.random.default_rng(seed) for seed in range(count)]
+    return np.array([add_noise(clean, noise, rng, times) - clean for rng in rngs])
+
+
+def test_a_part_that_remembers_is_an_autoregressive_process() -> None:
+    """SciPy's recursion on the same draws; and its correlation at uneven times."""
+    rng = np.random.default_rng(0)
+    draws = np.random.default_rng(0).standard_normal((4000, 1))[:, 0]
+    coefficient = np.exp(-0.1 / 2.0)
+    draws[1:] *= np.sqrt(1 - coefficient**2)
+    expected = lfilter([1.0], [1.0, -coefficient], draws)
+    found = draw_ornstein_uhlenbeck(TIMES, np.array([1.0]), np.array([0.5]), rng)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    times = np.array([0.0, 0.3, 0.4, 2.0, 7.0])
+    seen = noises(20_000, times, ar1=AR1(1.0, 2.0))
+    expected = np.exp(-np.abs(np.subtract.outer(times, times)) / 2.0)
+    # A correlation of 20,000 pairs is known to 0.007.
+    np.testing.assert_allclose(np.cov(seen.T), expected, atol=4 * 0.01)
+
+
+def test_flicker_has_equal_power_in_every_octave() -> None:
+    """The slope of its spectrum is -1, as SciPy's periodogram and a straight line have it."""
+    seen = noises(200, flicker=Flicker(1.0))
+    frequency, power = periodogram(seen, fs=10.0, window="hann")
+    band = (frequency > 0.01) & (frequency < 0.5)
+    slope = np.polyfit(np.log(frequency[band]), np.log(power.mean(axis=0)[band]), 1)[0]
+    assert slope == pytest.approx(-1, abs=0.05)
+    assert np.mean(seen**2) == pytest.approx(1, rel=0.1)
+
+
+def test_shares_leave_the_variance_as_it_is() -> None:
+    seen = noises(400, TIMES[::10], ar1=AR1(0.3, 1.0), flicker=Flicker(0.2))
+    assert np.mean(seen**2) == pytest.approx(1, rel=0.05)
+
+
+def test_a_drift_goes_either_way() -> None:
+    plain, drifting = noises(40), noises(40, drift=Drift(3.0))
+    course = drifting - plain
+    np.testing.assert_allclose(course[:, 0], 0, atol=1e-12)
+    np.testing.assert_allclose(np.abs(course[:, -1]), 3.0, rtol=1e-12)
+    np.testing.assert_allclose(np.diff(course, 2), 0, atol=1e-12)
+    assert 10 < np.sum(course[:, -1] > 0) < 30
+
+
+def test_outliers_are_few_and_far() -> None:
+    away = noises(40, outliers=Outliers(0.02, 50.0)) - noises(40)
+    struck = np.abs(away) > 0
+    # 160,000 samples: a share of 0.02 is known to 0.00035, a standard deviation to 1.3 %.
+    assert struck.mean() == pytest.approx(0.02, abs=0.0015)
+    assert away[struck].std() == pytest.approx(50.0, rel=0.06)
+
+
+def test_white_noise_is_what_it_was() -> None:
+    """Parts are drawn after it, so that a study without them keeps its noise."""
+    plain = add_noise(CLEAN, Noise("gaussian", 0.1, "peak"), np.random.default_rng(1))
+    timed = add_noise(CLEAN, Noise("gaussian", 0.1, "peak"), np.random.default_rng(1), CLEAN)
+    np.testing.assert_array_equal(plain, timed)
+    with pytest.raises(ValueError, match="sampling times"):
+        add_noise(CLEAN, Noise("gaussian", 0.1, "peak", drift=Drift(1.0)), np.random.default_rng(1))
+
+
+def test_parts_are_no_more_than_the_whole() -> None:
+    noise = Noise("gaussian", 0.1, "peak", ar1=AR1(0.7, 1.0), flicker=Flicker(0.4))
+    ((path, text),) = noise.problems()
+    assert path == ("flicker", "share")
+    assert "found 1.1" in text

@@ -1,0 +1,187 @@
+"""Exact derivatives, against 50 digits and against differences of independent code."""
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.physics import residuals as of_residuals
+from biogrip.physics import sensitivity
+from biogrip.physics.condensed import Condensed
+from biogrip.physics.drift import nuisance_basis, with_uncertain, within, without
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.nonlinear import nonlinear_rotation
+from biogrip.physics.protocol import TorqueHistory, torque_history
+from biogrip.physics.residuals import Residuals
+from biogrip.physics.sample_model import SampleModel, with_fixed
+from biogrip.physics.sensitivity import rotation_and_sensitivity
+from tests.helpers.responses import (
+    MODEL_PARAMETERS,
+    PROTOCOLS,
+    random_samples,
+    rotation_50_digits,
+)
+
+TIMES = np.array([0.1, 1.0, 7.5, 60.0, 199.0, 200.1, 201.0, 230.0, 399.0])
+# Without inertia the response itself differs by up to 3.1e-8 s^2 / t^2 (docs/model.md), t the
+# time since a step, and its derivatives by some times that.
+INERTIA = 5 * 3.1e-8 / np.where(TIMES < 200, TIMES, TIMES - 200) ** 2
+
+
+def test_against_50_digits(gripper: Gripper, steps: TorqueHistory) -> None:
+    """Central differences with a step of 1e-4 of a solution with 50 digits, extrapolated."""
+    for sample in random_samples(6, seed=5):
+        _, slopes = rotation_and_sensitivity(
+            gripper, MODELS["generalized_maxwell"], steps, TIMES, sample
+        )
+        peak = np.abs(rotation_50_digits(gripper, sample, steps, TIMES)).max()
+        for index in range(4):
+            coarse, fine = (
+                _difference(gripper, steps, sample, index, step) for step in (2e-3, 1e-3)
+            )
+            # The error of a central difference falls with the square of its step.
+            exact = (4 * fine - coarse) / 3
+            assert np.all(np.abs(slopes[index] - exact) < (1e-9 + INERTIA) * peak)
+
+
+def _difference(
+    gripper: Gripper, steps: TorqueHistory, sample: Array, index: int, step: float
+) -> Array:
+    ahead, behind = sample.copy(), sample.copy()
+    ahead[index] *= np.exp(step)
+    behind[index] *= np.exp(-step)
+    values = [rotation_50_digits(gripper, one, steps, TIMES) for one in (ahead, behind)]
+    difference: Array = (values[0] - values[1]) / (2 * step)
+    return difference
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_many_samples_are_looked_at_in_parts(
+    gripper: Gripper, monkeypatch: pytest.MonkeyPatch, protocol: str
+) -> None:
+    """Which give what all of them do at once, but for the order of a product's few sums."""
+    (sample,) = random_samples(1, seed=8)
+    torque, model = torque_history(PROTOCOLS[protocol]), MODELS["generalized_maxwell"]
+    time_s = np.linspace(0, torque.end_s, 1001)
+    whole = rotation_and_sensitivity(gripper, model, torque, time_s, sample)
+    monkeypatch.setattr(sensitivity, "_AT_ONCE", 90)
+    parts = rotation_and_sensitivity(gripper, model, torque, time_s, sample)
+    for one, other in zip(whole, parts, strict=True):
+        np.testing.assert_allclose(other, one, rtol=0, atol=1e-14 * np.abs(whole[0]).max())
+
+
+def test_every_model_is_covered() -> None:
+    assert set(MODEL_PARAMETERS) == set(MODELS)
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("name", MODEL_PARAMETERS)
+@pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
+def test_against_differences(
+    request: pytest.FixtureRequest, arms: str, name: str, protocol: str
+) -> None:
+    """Every model, equal and unequal arms, every kind of load."""
+    model = Sample(name).model
+    _check(request.getfixturevalue(arms), model, protocol, np.array(MODEL_PARAMETERS[name]))
+
+
+def test_two_branches_and_a_known_parameter(gripper: Gripper) -> None:
+    two = Sample("generalized_maxwell", 2).model
+    _check(gripper, two, "steps", np.array([5.0, 0.2, 1.0, 9.0, 99.0, 0.5]))
+    known = with_fixed(MODELS["burgers"], {"c_s": 200.0})
+    _check(gripper, known, "steps", np.array([3.0, 2.0, 40.0]))
+
+
+def _check(gripper: Gripper, model: SampleModel, protocol: str, sample: Array) -> None:
+    torque = torque_history(PROTOCOLS[protocol])
+    phi, slopes = rotation_and_sensitivity(gripper, model, torque, TIMES, sample)
+
+    def simulated(parameters: Array) -> Array:
+        response = step_response(
+            gripper, model.network(parameters), symmetric=torque.symmetric, inertia=False
+        )
+        return rotation(response, torque, TIMES)[0]
+
+    np.testing.assert_allclose(phi, simulated(sample), rtol=1e-12, atol=1e-12 * np.abs(phi).max())
+    for index in range(len(sample)):
+        unit = np.eye(len(sample))[index]
+        pairs = [
+            (simulated(sample * np.exp(h * unit)) - simulated(sample * np.exp(-h * unit))) / (2 * h)
+            for h in (2e-3, 1e-3)
+        ]
+        # Extrapolated: h^4 = 1e-12, and rounding 1e-16 / h = 1e-13; derivatives cancel some more.
+        exact = (4 * pairs[1] - pairs[0]) / 3
+        assert np.max(np.abs(slopes[index] - exact)) < 1e-9 * np.abs(phi).max()
+
+
+def test_nonlinear_sensitivity_is_that_of_the_nonlinear_model(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    model, sample = MODELS["generalized_maxwell"], np.array([1.0, 0.05, 10.0, 0.5])
+    phi, slopes = rotation_and_sensitivity(gripper, model, steps, TIMES, sample, nonlinear=True)
+    exact = nonlinear_rotation(gripper, model.network(sample), steps, TIMES)[0]
+    # The population's mesh is coarse: 1e-6 of the peak (see test_nonlinear).
+    assert np.max(np.abs(phi - exact)[1:]) < 3e-6 * exact.max()
+    for index in range(4):
+        h = 1e-3 * np.eye(4)[index]
+        ahead, behind = (
+            nonlinear_rotation(gripper, model.network(sample * np.exp(s)), steps, TIMES)[0]
+            for s in (h, -h)
+        )
+        difference = (ahead - behind) / 2e-3
+        assert np.max(np.abs(slopes[index] - difference)[1:]) < 1e-5 * exact.max()
+
+
+@pytest.mark.parametrize(("offset", "drift"), [(True, False), (False, True), (True, True)])
+def test_nuisance_takes_out_offset_and_drift_and_nothing_else(offset: bool, drift: bool) -> None:
+    times = np.linspace(0.0, 10.0, 101)
+    basis = nuisance_basis(times, offset=offset, drift=drift)
+    np.testing.assert_allclose(basis @ basis.T, np.eye(offset + drift), atol=1e-14)
+    added = 3.0 * offset + 0.2 * drift * times
+    wave = without(basis, np.sin(times))
+    np.testing.assert_allclose(without(basis, wave + added), wave, atol=1e-12)
+    np.testing.assert_allclose(within(basis, wave + added), added, atol=1e-12)
+    degree = 1 if drift else 0
+    if offset:
+        fitted = np.polyval(np.polyfit(times, np.cos(times), degree), times)
+        np.testing.assert_allclose(within(basis, np.cos(times)), fitted, atol=1e-12)
+
+
+def test_residuals_do_not_see_what_the_instrument_added(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    model, x = MODELS["maxwell"], np.log([2.0, 50.0])
+    times = np.arange(401.0)
+    trace = np.random.default_rng(0).standard_normal(len(times)) * 1e-4
+    basis = nuisance_basis(times, offset=True, drift=True)
+    condensed = Condensed(steps, times, basis)
+    plain, shifted = (
+        Residuals(gripper, model, steps, times, trace + added, condensed, instrument=GRIPPER)
+        for added in (0.0, 5e-3 + 1e-5 * times)
+    )
+    np.testing.assert_allclose(plain(x)[0], shifted(x)[0], atol=1e-15)
+    assert np.all(np.abs(plain(x)[1] @ basis.T) < 1e-12)
+    assert plain.free == len(times) - 2
+
+
+def test_the_gradient_of_many_samples_is_summed_in_parts(
+    gripper: Gripper, steps: TorqueHistory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever part of an amplitude is taken out, and whatever the residual leaves."""
+    model, x = MODELS["maxwell"], np.log([2.0, 50.0])
+    times = np.arange(401.0)
+    trace = np.random.default_rng(0).standard_normal(len(times)) * 1e-4
+    basis = with_uncertain(
+        nuisance_basis(times, offset=True, drift=False), 0.1 * np.sin(times / 30)[None]
+    )
+    condensed = Condensed(steps, times, basis)
+    residuals = Residuals(gripper, model, steps, times, trace, condensed, instrument=GRIPPER)
+    residual, slopes = residuals(x)
+    np.testing.assert_array_equal(residuals.left(x), residual)
+    for at_once in (1000, 90):
+        monkeypatch.setattr(of_residuals, "_SAMPLES_AT_ONCE", at_once)
+        (gradient,), (misfit_rad,) = residuals.gradients(x[None], [residuals])
+        np.testing.assert_allclose(gradient, slopes @ residual, rtol=1e-11)
+        assert misfit_rad == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)

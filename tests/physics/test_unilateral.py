@@ -1,0 +1,269 @@
+"""Jaws that press but do not pull, against the equations integrated with events."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from biogrip.arrays import Array
+from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.jaw_force import jaw_force
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.maxwell_models import (
+    damper,
+    generalized_maxwell,
+    kelvin_voigt,
+    liquid_drop,
+    maxwell,
+)
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import (
+    Harmonic,
+    Load,
+    Phase,
+    TorqueHistory,
+    hold,
+    torque_at,
+    torque_history,
+)
+from biogrip.physics.unilateral import UnilateralResponse, smooth_pieces, unilateral_response
+from tests.helpers.responses import random_samples
+from tests.physics.test_protocols import EDGES, TORQUE
+
+# Slow arms, which an integrator can follow through contact and flight.
+SLOW = Arm(1e-14, 4e-8, 4.4e-7)
+OTHER = Arm(1e-14, 7e-8, 6.0e-7)
+THREE = torque_history((hold(20.0, 1.6e-9), hold(20.0, 0.2e-9), hold(20.0, 2.4e-9)))
+SWING = Load(1e-9, 0.0, 0.0, (Harmonic(0.95e-9, 1.3, 0.4),))
+SWINGING = torque_history(
+    (hold(5.0, 1.6e-9), Phase(25.0, SWING, SWING), Phase(10.0, Load(2e-9, -1.5e-10), Load(1e-9)))
+)
+
+
+def integrated(
+    gripper: Gripper, sample: Array, torque: TorqueHistory, time_s: Array
+) -> tuple[Array, list[float]]:
+    """phi_2, phi_4, delta, y by SciPy, regime by regime; and when they change."""
+    k, k_p, c, c_p = (float(value) for value in sample)
+    arms, b = (gripper.left, gripper.right), gripper.lever_m
+    c_2, c_4 = (arm.damping_Nms_per_rad for arm in arms)
+    k_2, k_4 = (arm.stiffness_Nm_per_rad for arm in arms)
+
+    def touching_rates(t: float, z: Array) -> tuple[Array, float]:
+        delta, spring = b * (z[0] + z[1]), 0.0
+        spring = k_p * delta + k * (delta - z[3])
+        tau = [float(torque_at(torque, t, arm)) for arm in ("left", "right")]
+        free = (tau[0] - k_2 * z[0]) / c_2, (tau[1] - k_4 * z[1]) / c_4
+        # phi_i' = free_i - b F/c_i and F = spring + c_p b (phi_2' + phi_4').
+        force = (spring + c_p * b * sum(free)) / (1 + c_p * b * b * (1 / c_2 + 1 / c_4))
+        rates = np.array([free[0] - b * force / c_2, free[1] - b * force / c_4, 0.0, 0.0])
+        rates[2], rates[3] = b * (rates[0] + rates[1]), k / c * (delta - z[3])
+        return rates, force
+
+    def apart_rates(t: float, z: Array) -> Array:
+        tau = [float(torque_at(torque, t, arm)) for arm in ("left", "right")]
+        damper_rate = k / c * (z[2] - z[3])
+        delta_rate = -(k_p * z[2] + k * (z[2] - z[3])) / c_p if c_p else k / (k + k_p) * damper_rate
+        return np.array(
+            [(tau[0] - k_2 * z[0]) / c_2, (tau[1] - k_4 * z[1]) / c_4, delta_rate, damper_rate]
+        )
+
+    def lets_go(t: float, z: Array) -> float:
+        return touching_rates(t, z)[1]
+
+    def meets(t: float, z: Array) -> float:
+        return float(z[2] - b * (z[0] + z[1]))
+
+    for event in (lets_go, meets):
+        event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
+    edges = [*torque.time_s, torque.end_s]
+    z, touching, found, changes = np.zeros(4), True, [], []
+    for start, end in pairwise(edges):
+        here, end = start, np.nextafter(end, 0)
+        if touching and lets_go(start, z) < 0:
+            touching = False
+            changes.append(start)
+        while here < end:
+            slope = (lambda t, z: touching_rates(t, z)[0]) if touching else apart_rates
+            solved = solve_ivp(
+                slope,
+                (here, end),
+                z,
+                "LSODA",
+                events=lets_go if touching else meets,
+                dense_output=True,
+                rtol=1e-12,
+                atol=[1e-15, 1e-15, 1e-18, 1e-18],
+                max_step=0.1,
+            )
+            inside = time_s[(time_s >= here) & (time_s < solved.t[-1])]
+            if len(inside):
+                found.append(solved.sol(inside))
+            here, z = float(solved.t[-1]), solved.y[:, -1]
+            if solved.status == 1:
+                touching = not touching
+                changes.append(here)
+    return np.concatenate(found, axis=1), changes
+
+
+@pytest.mark.parametrize(
+    ("torque", "right"), [(THREE, SLOW), (SWINGING, OTHER)], ids=["steps", "swinging"]
+)
+@pytest.mark.parametrize("c_p", [0.0, 0.04])
+@pytest.mark.parametrize("k_p", [0.0, 0.02])
+def test_against_lsoda_with_events(
+    k_p: float, c_p: float, torque: TorqueHistory, right: Arm
+) -> None:
+    gripper = Gripper(1.5e-3, 75.0, SLOW, right)
+    sample = np.array([0.5, k_p, 1.5, c_p])
+    time_s = np.linspace(0, torque.end_s, 401)[:-1] + 1e-3
+    expected, changes = integrated(gripper, sample, torque, time_s)
+    ours = unilateral_response(gripper, generalized_maxwell(sample), torque, time_s)
+    states = np.vstack((ours.rotation_rad, ours.shortening_m, ours.dampers_m))
+    scale = np.abs(expected).max(axis=1, keepdims=True)
+    # The integrator's tolerance over some hundred steps and a few events.
+    assert np.max(np.abs(states - expected) / scale) < 1e-7
+    assert len(changes) >= 2
+    np.testing.assert_allclose(sorted(ours.parted_s + ours.met_s), changes, rtol=0, atol=1e-6)
+    assert not np.all(ours.touching)
+    assert np.all(ours.jaw_force_N >= 0)
+    assert np.all(ours.jaw_force_N[~ours.touching] == 0)
+
+
+def test_contact_lost_and_regained(gripper: Gripper) -> None:
+    """A drop is left when the torque drops, does not move, and is met when it rises again."""
+    torque = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9), hold(200.0, 2e-9)))
+    time_s = np.array([100.0, 199.9, 200.1, 399.9, 400.1, 600.0])
+    found = unilateral_response(gripper, generalized_maxwell([9.5, 1e-4, 10, 1e-4]), torque, time_s)
+    assert found.touching.tolist() == [True, True, False, False, True, True]
+    assert (len(found.parted_s), len(found.met_s)) == (1, 1)
+    assert 200 <= found.parted_s[0] < 200.001
+    assert 400 < found.met_s[0] < 400.001
+    # Meanwhile the arms stand where their hinges hold the second torque.
+    np.testing.assert_allclose(found.rotation_rad[:, 2:4], 0.32e-9 / 4.4e-7, rtol=1e-12)
+    np.testing.assert_allclose(found.shortening_m[2], found.shortening_m[3], rtol=3e-3)
+
+
+def test_a_sample_that_recovers_meets_the_jaws_by_itself(gripper: Gripper) -> None:
+    torque = torque_history((hold(200.0, 1.6e-9), hold(400.0, 0.32e-9)))
+    found = unilateral_response(gripper, kelvin_voigt([0.05, 5.0]), torque, np.array([600.0]))
+    (parted,), (met,) = found.parted_s, found.met_s
+    # It creeps back by e^(-k_p t/c_p) until it reaches the arms.
+    before = unilateral_response(gripper, kelvin_voigt([0.05, 5.0]), torque, np.array([parted]))
+    b = gripper.lever_m
+    shortening = before.shortening_m[0] * math.exp(-0.05 / 5.0 * (met - parted))
+    assert shortening == pytest.approx(2 * b * 0.32e-9 / 4.4e-7, rel=1e-9)
+    assert found.touching[0]
+
+
+@pytest.mark.parametrize("k_p", [12.3, 1e4])
+def test_jaws_that_always_press_do_what_they_did(
+    unequal_gripper: Gripper, steps: TorqueHistory, k_p: float
+) -> None:
+    network, time_s = generalized_maxwell([35.0, k_p, 299.9, 1e-3]), np.linspace(0.1, 400, 77)
+    found = unilateral_response(unequal_gripper, network, steps, time_s)
+    assert found.parted_s == ()
+    response = step_response(unequal_gripper, network, inertia=False, both_arms=True)
+    for arm in (0, 1):
+        expected = rotation(response, steps, time_s, arm)[0]
+        assert np.max(np.abs(found.rotation_rad[arm] - expected)) < 1e-10 * expected.max()
+    force = jaw_force(unequal_gripper, network, steps, time_s, nonlinear=False, inertia=False)[0]
+    assert np.max(np.abs(found.jaw_force_N - force)) < 1e-10 * force.max()
+
+
+def test_over_the_whole_search_range_the_jaws_never_pull(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    time_s = np.concatenate((np.geomspace(1e-3, 200, 40), 200 + np.geomspace(1e-3, 200, 40)))
+    for sample in random_samples(60, 77):
+        network = generalized_maxwell(sample)
+        found = unilateral_response(gripper, network, steps, time_s)
+        both = jaw_force(gripper, network, steps, time_s, nonlinear=False, inertia=False)[0]
+        assert np.all(found.jaw_force_N >= 0)
+        assert np.all(np.isfinite(found.rotation_rad))
+        gap = found.shortening_m - gripper.lever_m * found.rotation_rad.sum(axis=0)
+        assert np.all(gap > -1e-9 * found.shortening_m.max())
+        # Up to the first loss it is the bilateral response.
+        first = found.parted_s[0] if found.parted_s else 400.0
+        until = time_s < first
+        assert np.max(np.abs(found.jaw_force_N - both)[until]) < 1e-6 * both.max()
+        assert bool(found.parted_s) == bool(both.min() < -1e-9 * both.max())
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model(gripper: Gripper, steps: TorqueHistory, name: str) -> None:
+    model = MODELS[name]
+    values = {"stiffness": 0.3, "damping": 20.0, "springpot": 1.0, "exponent": 0.3}
+    network = model.network(np.array([[values[p.kind] for p in model.parameters]]))
+    found = unilateral_response(gripper, network, steps, np.linspace(0, 400, 41))
+    assert np.all(np.isfinite(found.rotation_rad))
+    assert np.all(found.jaw_force_N >= 0)
+
+
+def test_samples_that_lack_elements(gripper: Gripper, steps: TorqueHistory) -> None:
+    time_s = np.array([199.9, 200.1, 400.0])
+    for network in (maxwell([1.0, 10.0]), damper([10.0]), liquid_drop([1.0, 0.0, 10.0])):
+        found = unilateral_response(gripper, network, steps, time_s)
+        assert found.touching.tolist() == [True, False, False]
+        # No spring brings a liquid back.
+        assert found.shortening_m[2] == pytest.approx(found.shortening_m[1], rel=1e-12)
+    spring = unilateral_response(gripper, kelvin_voigt([0.05, 0.0]), steps, time_s)
+    assert np.all(spring.touching)
+
+
+def test_energy_balance() -> None:
+    """Work = stored + dissipated, through contact, flight and contact, to 1e-8."""
+    slow = Gripper(1.5e-3, 75.0, SLOW, OTHER)
+    k, k_p, c, c_p = sample = np.array([0.5, 0.02, 1.5, 0.04])
+    network, b = generalized_maxwell(sample), slow.lever_m
+    events = unilateral_response(slow, network, THREE, np.zeros(1))
+    stops = np.unique([0.0, 20.0, 40.0, 60.0, *events.parted_s, *events.met_s])
+    assert len(stops) > 4
+    x, weights = np.polynomial.legendre.leggauss(20)
+    work = dissipated = 0.0
+    for start, end in pairwise(stops):
+        edges = start + np.append(0, np.geomspace(1e-6, end - start, 60))
+        for low, high in pairwise(edges):
+            half = 0.5 * (high - low)
+            t = low + half * (1 + x)
+            z = unilateral_response(slow, network, THREE, t)
+            tau = np.stack([torque_at(THREE, t, arm) for arm in ("left", "right")])
+            hinge = np.array([[SLOW.stiffness_Nm_per_rad], [OTHER.stiffness_Nm_per_rad]])
+            drag = np.array([[SLOW.damping_Nms_per_rad], [OTHER.damping_Nms_per_rad]])
+            rate = (tau - hinge * z.rotation_rad - b * z.jaw_force_N) / drag
+            y = z.dampers_m[0]
+            springs = k_p * z.shortening_m + k * (z.shortening_m - y)
+            given = (z.jaw_force_N - springs) / c_p
+            y_rate = k / c * (z.shortening_m - y)
+            work += half * weights @ (tau * rate).sum(axis=0)
+            lost = (drag * rate**2).sum(axis=0) + c_p * given**2 + c * y_rate**2
+            dissipated += half * weights @ lost
+    last = unilateral_response(slow, network, THREE, np.array([60.0]))
+    phi, delta, y_end = last.rotation_rad[:, 0], last.shortening_m[0], last.dampers_m[0, 0]
+    stored = 0.5 * (hinge[:, 0] @ phi**2 + k_p * delta**2 + k * (delta - y_end) ** 2)
+    assert stored + dissipated == pytest.approx(work, rel=1e-8)
+
+
+def test_ends_do_not_depend_on_when_one_looks(gripper: Gripper) -> None:
+    time_s = np.linspace(0, 40, 1000)
+    network = liquid_drop([1.0, 0.1, 10.0])
+
+    def seen(times: Array) -> UnilateralResponse:
+        return unilateral_response(gripper, network, SWINGING, times)
+
+    whole, some = seen(time_s), seen(time_s[::37])
+    np.testing.assert_array_equal(whole.rotation_rad[:, ::37], some.rotation_rad)
+    assert whole.parted_s == some.parted_s
+    assert len(whole.parted_s) > 3
+
+
+def test_pieces_of_a_protocol_are_its_torque() -> None:
+    """A ramp, sinusoids, and what squares of voltages make of them."""
+    pieces = smooth_pieces(TORQUE)
+    assert [start for start, _, _ in pieces] == EDGES[:-1].tolist()
+    for start, length, forcing in pieces:
+        elapsed = np.linspace(0, length, 50, endpoint=False)
+        expected = torque_at(TORQUE, start + elapsed)
+        np.testing.assert_allclose(forcing.at(elapsed)[0], expected, rtol=0, atol=1e-21)
