@@ -268,6 +268,7 @@ def _table(rows: Iterator[dict[str, str]]) -> str:
 PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "config" / "README.md": {"keys": config_keys},
     ROOT / "README.md": {"answer": answer, "example": identified_example},
+    ROOT / "docs" / "tutorial.md": {"example": identified_example},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
     ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "rules": rules},
     ROOT / "docs" / "identifiability.md": {"methods": methods_compared},
