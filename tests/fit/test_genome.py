@@ -16,15 +16,6 @@ def test_ranges_are_those_of_table_4() -> None:
     assert (DAMPING.low, DAMPING.high) == (1.1e-5, 9.9e4)
 
 
-def test_decoding_is_equation_10_in_decimal() -> None:
-    chromosomes = GENOME.draw(2000, np.random.default_rng(0))
-    decoded = GENOME.decode(chromosomes)
-    for genes, values in zip(chromosomes.reshape(-1, 4, 3), decoded, strict=True):
-        for (g1, g2, g3), value in zip(genes.tolist(), values, strict=True):
-            expected = (Decimal(g2) / 10 + Decimal(g3) / 100) * Decimal(10) ** g1
-            assert value == float(expected)
-
-
 def test_genes_are_drawn_uniformly_from_their_whole_range() -> None:
     chromosomes = GENOME.draw(20_000, np.random.default_rng(1))
     for gene in range(GENOME.genes):
@@ -34,24 +25,8 @@ def test_genes_are_drawn_uniformly_from_their_whole_range() -> None:
         assert np.abs(counts - expected).max() < 5 * np.sqrt(expected)
 
 
-def test_codes_tell_all_chromosomes_apart() -> None:
-    chromosomes = np.unique(GENOME.draw(50_000, np.random.default_rng(2)), axis=0)
-    assert len(np.unique(GENOME.code(chromosomes), axis=1).T) == len(chromosomes)
-    widest = {name: GeneRange((-18, 18), (1, 9)) for name in RANGES}
-    genome = make_genome(MODELS["generalized_maxwell"], widest)
-    extremes = np.stack((genome.low, genome.high))
-    assert genome.code(extremes).tolist() == [[0, 37**4 * 81**4 - 1]]
-
-
 def test_a_model_with_fewer_parameters_has_fewer_genes() -> None:
     assert make_genome(MODELS["liquid_drop"], RANGES).genes == 9
-
-
-@pytest.mark.parametrize(
-    ("value", "nearest"), [(10.0, 9.9), (12.3, 12.0), (32.8, 33.0), (1e-9, 1.1e-5), (1e9, 9.9e4)]
-)
-def test_nearest_encodable(value: float, nearest: float) -> None:
-    assert nearest_encodable(value, DAMPING) == nearest
 
 
 @pytest.mark.parametrize("digits", range(1, 7))

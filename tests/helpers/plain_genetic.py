@@ -1,4 +1,4 @@
-"""The genetic algorithm gene by gene, one population at a time: what the codes must do as well."""
+"""The genetic algorithm gene by gene, one population at a time."""
 
 from collections.abc import Callable
 
@@ -8,12 +8,6 @@ from biogrip.arrays import Array, IntArray
 from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import Genome
 from biogrip.fit.problem import History, Identification
-
-
-def chromosomes_of(genome: Genome, codes: IntArray) -> IntArray:
-    """Genes of codes (n_words, n)."""
-    digits = codes[genome._word].T // genome._weight % genome.values
-    return digits + genome.low
 
 
 def decoded(genome: Genome, chromosomes: IntArray) -> Array:

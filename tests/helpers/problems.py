@@ -111,11 +111,10 @@ def case_problem(
     count: int,
     model: SampleModel = MODEL,
     level: float = 0.1,
-    *,
-    nonlinear: bool = False,
+    **assumed: Any,
 ) -> list[Problem]:
-    """Problems that share everything but the noise."""
-    condensed = condensed_of(TORQUE, times, nonlinear=nonlinear)
+    """Problems that share everything but the noise; assumed is as `condensed_of`'s."""
+    condensed = condensed_of(TORQUE, times, **assumed)
     noise = Noise("gaussian", level, "peak")
     traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
     return [

@@ -1,13 +1,12 @@
 """The chromosome: exponent and digits of each parameter are genes (eq. 10, Tables 3, 4)."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from itertools import accumulate, pairwise
-from math import prod
-from typing import Annotated
+from functools import cached_property
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from biogrip.arrays import Array, IntArray
@@ -82,6 +81,10 @@ class SearchRange(Block):
             yield ("alpha", "exponent"), f"{text}most 0."
 
 
+Chromosomes = NDArray[np.integer[Any]]
+"""Genes of individuals, (..., n_genes)."""
+
+
 @dataclass(frozen=True)
 class Genome:
     """Encoding of a sample model's parameters as genes."""
@@ -103,204 +106,66 @@ class Genome:
         """Draw chromosomes uniformly, shape (count, n_genes)."""
         return rng.integers(self.low, self.high, size=(count, self.genes), endpoint=True)
 
-    def decode(self, chromosomes: IntArray) -> Array:
+    def decode(self, chromosomes: Chromosomes) -> Array:
         """Decode chromosomes into parameters, 10^g_1 (0.1 g_2 + 0.01 g_3 + ...) (eq. 10).
 
         Parameters
         ----------
-        chromosomes : (n, n_genes)
-
-        Returns
-        -------
-        (n, n_parameters)
-            Each is the double nearest to the encoded decimal number.
-        """
-        return self.parameters(self.code(chromosomes))
-
-    def code(self, chromosomes: IntArray) -> IntArray:
-        """Encode chromosomes as integers, one or several words each, that sort like their genes.
-
-        A word is a mixed-radix number whose digits are genes, counted from their smallest
-        values. So crossover and mutation are arithmetic on codes.
-
-        Parameters
-        ----------
-        chromosomes : (n, n_genes)
-
-        Returns
-        -------
-        (n_words, n)
-        """
-        shifted = chromosomes - self.low
-        codes = np.zeros((self._words, len(chromosomes)), dtype=np.int64)
-        for gene, (word, weight) in enumerate(zip(self._word, self._weight, strict=True)):
-            codes[word] += shifted[:, gene] * weight
-        return codes
-
-    def parameters(self, codes: IntArray) -> Array:
-        """Decode the codes of chromosomes into parameters, as `decode` does with chromosomes.
-
-        Parameters
-        ----------
-        codes : (n_words, ...)
+        chromosomes : (..., n_genes)
 
         Returns
         -------
         (..., n_parameters)
+            Each is the double nearest to the encoded decimal number: the digits form an integer,
+            and powers of ten up to 10^22 are exact, so that only one operation rounds.
         """
-        parameters = np.empty((len(self.sizes), *codes.shape[1:]))
-        rest = codes
-        for parameter, (own, values) in enumerate(zip(self._own, self._values_of, strict=True)):
-            word, weight = self._word[own.start], int(self._weight[own.stop - 1])
-            if parameter == 0 or word != self._word[own.start - 1]:
-                rest = codes[word]
-            which = rest // weight if weight > 1 else rest
-            if weight > 1:
-                rest = rest - which * weight
-            values(which, parameters[parameter])
-        return np.moveaxis(parameters, 0, -1)
+        digits = np.array(self.sizes) - 1
+        powers = chromosomes[..., self._exponents] - digits + _LARGEST_POWER
+        parameters: Array = chromosomes @ self._places
+        parameters *= _TIMES.take(powers)
+        parameters /= _OVER.take(powers)
+        return parameters
 
-    def crossed(self, parents: IntArray, cut: IntArray) -> IntArray:
-        """Return both children of each pair, with all genes from the cut on swapped.
+    def keys(self, chromosomes: Chromosomes) -> list[Array]:
+        """Return numbers that order chromosomes, (..., n_genes), by their first unequal gene.
 
-        Parameters
-        ----------
-        parents : (n_words, ..., 2, n_pairs)
-            Codes of mothers and fathers.
-        cut : (..., n_pairs)
-            Number of genes before the cut.
-
-        Returns
-        -------
-        Codes like the parents', the children that begin like their mothers first.
+        The number of the last genes comes first, as for `numpy.lexsort`. There are several where
+        one, a double, would not be exact.
         """
-        tails = parents % self._modulus.take(cut, axis=1)[..., None, :]
-        children: IntArray = parents - tails
-        children += tails[..., ::-1, :]
-        return children
-
-    def redraw(self, codes: IntArray, which: IntArray, gene: IntArray, value: IntArray) -> None:
-        """Set one gene of each of some chromosomes to a new value, in place.
-
-        Parameters
-        ----------
-        codes : (n_words, n)
-        which, gene, value : (n_redrawn,)
-            Index of the chromosome, none twice; index of its gene; the gene's new value.
-        """
-        weight = self._weight.take(gene)
-        if self._words > 1:
-            which = which + codes.shape[1] * self._word.take(gene)
-        before = codes.take(which)
-        change = value - self.low.take(gene)
-        change -= before // weight % self.values.take(gene)
-        change *= weight
-        change += before
-        codes.put(which, change)
+        numbers = (chromosomes - self.low) @ self._weights
+        return [numbers[..., column] for column in range(numbers.shape[-1])]
 
     @cached_property
-    def values(self) -> IntArray:
-        """Number of values of each gene, (n_genes,)."""
-        return self.high - self.low + 1
+    def _exponents(self) -> IntArray:
+        """Index of the exponent of each parameter."""
+        return np.cumsum((0, *self.sizes[:-1]))
 
     @cached_property
-    def _word(self) -> IntArray:
-        """Index of the word that contains each gene; the genes of a parameter share one."""
-        words, filled = [0], 1
-        for own in self._own:
-            values = prod(self.values[own].tolist())
-            filled *= values
-            if filled > 2**WORD_BITS:
-                words.append(words[-1] + 1)
-                filled = values
-            else:
-                words.append(words[-1])
-        return np.repeat(words[1:], self.sizes)
+    def _places(self) -> Array:
+        """Place value of each digit in the integer of its parameter, (n_genes, n_parameters)."""
+        places = np.zeros((self.genes, len(self.sizes)))
+        for parameter, (exponent, size) in enumerate(zip(self._exponents, self.sizes, strict=True)):
+            places[exponent + 1 : exponent + size, parameter] = 10.0 ** np.arange(size - 2, -1, -1)
+        return places
 
     @cached_property
-    def _own(self) -> list[slice]:
-        """Slices of the chromosome with the genes of each parameter."""
-        return [slice(*ends) for ends in pairwise(accumulate(self.sizes, initial=0))]
+    def _weights(self) -> Array:
+        """Place value of each gene in the numbers of `keys`, (n_genes, n_numbers)."""
+        columns, weight = [np.zeros(self.genes)], 1
+        for gene in range(self.genes)[::-1]:
+            values = int(self.high[gene] - self.low[gene]) + 1
+            if weight * values > 2**53:
+                columns, weight = [*columns, np.zeros(self.genes)], 1
+            columns[-1][gene] = weight
+            weight *= values
+        return np.stack(columns, axis=1)
 
-    @cached_property
-    def _words(self) -> int:
-        return int(self._word[-1]) + 1
-
-    @cached_property
-    def _weight(self) -> IntArray:
-        """Place value of each gene in its word."""
-        weights = np.ones(self.genes, dtype=np.int64)
-        for gene in range(self.genes - 2, -1, -1):
-            if self._word[gene] == self._word[gene + 1]:
-                weights[gene] = weights[gene + 1] * self.values[gene + 1]
-        return weights
-
-    @cached_property
-    def _modulus(self) -> IntArray:
-        """Moduli that reduce a word to its genes from each cut on, (n_words, n_genes)."""
-        moduli = np.empty((self._words, self.genes), dtype=np.int64)
-        for word in range(self._words):
-            own = np.flatnonzero(self._word == word)
-            every = self._weight[own[0]] * self.values[own[0]]
-            moduli[word] = np.where(np.arange(self.genes) < own[0], every, 1)
-            moduli[word, own] = self._weight[own] * self.values[own]
-        return moduli
-
-    @cached_property
-    def _values_of(self) -> list["_Values"]:
-        """Functions from the number that a parameter's genes form to the parameter's value."""
-        ends = [(self.low[own].tolist(), self.high[own].tolist()) for own in self._own]
-        return [_values(tuple(low), tuple(high)) for low, high in ends]
-
-
-_Values = Callable[[IntArray, Array], None]
-"""Function that writes the parameter values of given numbers to an array of their shape."""
-
-
-@lru_cache(maxsize=64)
-def _values(low: tuple[int, ...], high: tuple[int, ...]) -> _Values:
-    """Return a function from the number that a parameter's genes form to its value."""
-    exponents, mantissas = np.arange(low[0], high[0] + 1), _mantissas(low[1:], high[1:])
-    # Both powers are exact doubles, and one of them is 1, so this rounds once.
-    power = exponents + (_LARGEST_POWER - len(low) + 1)
-    multiplier, divisor = _MULTIPLIER[power], _DIVISOR[power]
-    if len(exponents) * len(mantissas) <= _LARGEST_TABLE:
-        table = (mantissas * multiplier[:, None] / divisor[:, None]).ravel()
-
-        def look_up(which: IntArray, out: Array) -> None:
-            table.take(which, out=out, mode="clip")
-
-        return look_up
-
-    def computed(which: IntArray, out: Array) -> None:
-        exponent = which // len(mantissas)
-        mantissas.take(which - exponent * len(mantissas), out=out, mode="clip")
-        out *= multiplier.take(exponent)
-        out /= divisor.take(exponent)
-
-    return computed
-
-
-@lru_cache(maxsize=64)
-def _mantissas(low: tuple[int, ...], high: tuple[int, ...]) -> Array:
-    """Return all allowed sequences of digits as integers, ascending."""
-    numbers = np.zeros(1)
-    for least, most in zip(low, high, strict=True):
-        numbers = (10 * numbers[:, None] + np.arange(least, most + 1)).ravel()
-    return numbers
-
-
-# Largest table of all values of a parameter; with six digits it would take 100 MB.
-_LARGEST_TABLE = 2**17
-
-WORD_BITS = 48
-"""Number of bits in a word of a code."""
 
 # The largest power of ten that is an exact double.
 _LARGEST_POWER = 22
 _POWERS = range(-_LARGEST_POWER, _LARGEST_POWER + 1)
-_MULTIPLIER = np.array([10.0 ** max(power, 0) for power in _POWERS])
-_DIVISOR = np.array([10.0 ** max(-power, 0) for power in _POWERS])
+_TIMES = np.array([10.0 ** max(power, 0) for power in _POWERS])
+_OVER = np.array([10.0 ** max(-power, 0) for power in _POWERS])
 
 
 def make_genome(model: SampleModel, ranges: Mapping[str, GeneRange]) -> Genome:
@@ -321,7 +186,9 @@ def make_genome(model: SampleModel, ranges: Mapping[str, GeneRange]) -> Genome:
 
 def nearest_encodable(value: float, genes: GeneRange) -> float:
     """Return the number closest to a positive value that the genes can encode."""
-    mantissas = _mantissas(genes.least[1:], genes.most[1:])
+    mantissas = np.zeros(1)
+    for least, most in zip(genes.least[1:], genes.most[1:], strict=True):
+        mantissas = (10 * mantissas[:, None] + np.arange(least, most + 1)).ravel()
     found = []
     for exponent in range(genes.exponent[0], genes.exponent[1] + 1):
         scaled = value / 10.0 ** (exponent - genes.digits)
