@@ -10,8 +10,8 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import COMPLIANCE, MODULUS, STRAIN, STRESS
 from biogrip.traces.columns import Columns
-from biogrip.traces.recordings import average_repeated, read_recording
-from biogrip.traces.units import TIME_UNITS, unit_of
+from biogrip.traces.reader import average_repeated, read_recording
+from biogrip.traces.columns import TIME_UNITS, unit_of
 
 ROWS = 14
 """Rows of each block."""

@@ -7,7 +7,7 @@ import pytest
 
 from biogrip.traces.columns import Columns
 from biogrip.traces.plain_rows import plain_rows
-from biogrip.traces.recordings import read_recording
+from biogrip.traces.reader import read_recording
 
 VALUES = np.random.default_rng(0).standard_normal(50).tolist()
 NUMBERS = [f"{t:.6g},{y!r}" for t, y in enumerate(VALUES)]

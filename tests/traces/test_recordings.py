@@ -9,8 +9,8 @@ from biogrip.errors import BiogripError
 from biogrip.physics.instruments import ROTATION
 from biogrip.traces import recordings, rows
 from biogrip.traces.columns import Columns
-from biogrip.traces.recordings import Recording, read_recording
-from biogrip.traces.units import TIME_UNITS, unit_of
+from biogrip.traces.reader import Recording, read_recording
+from biogrip.traces.columns import TIME_UNITS, unit_of
 
 PLAIN = Columns("time_s", "rotation_rad")
 ROWS = tuple(f"{i},{i}e-6" for i in range(12))

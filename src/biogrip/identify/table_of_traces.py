@@ -25,8 +25,8 @@ from biogrip.study.messages import Schema, checked, schema_of
 from biogrip.study.source import overlaid, scalar_problem
 from biogrip.study.study import Case
 from biogrip.terminal import visible
-from biogrip.traces.cells import SEPARATORS, cells_or_none
 from biogrip.traces.columns import listed, place
+from biogrip.traces.tables import SEPARATORS, cells_or_none
 
 FILE = "file"
 """The column that every table has."""

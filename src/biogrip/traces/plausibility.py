@@ -24,10 +24,9 @@ from biogrip.physics.modes import lagged_torques
 from biogrip.physics.protocol import TorqueHistory, torque_at
 from biogrip.physics.whitening import estimate_noise
 from biogrip.traces.any_response import extreme_responses, left_over
-from biogrip.traces.columns import Columns, place
+from biogrip.traces.columns import TIME_UNITS, Columns, place, unit_of
 from biogrip.traces.onset import begins_constant, estimate_onset
-from biogrip.traces.recordings import FEWEST_SAMPLES, Recording
-from biogrip.traces.units import TIME_UNITS, unit_of
+from biogrip.traces.reader import FEWEST_SAMPLES, Recording
 
 LARGEST_SHARE = 1.5
 """Largest plausible rotation, as a multiple of the free rotation.
