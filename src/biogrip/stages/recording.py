@@ -18,8 +18,8 @@ from biogrip.physics.whitening import MOST_SAMPLES
 from biogrip.progress import warn
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.study.study import Case
+from biogrip.traces.any_sample import proportional_deviations
 from biogrip.traces.columns import Columns, place
-from biogrip.traces.noise_share import proportional_deviations
 from biogrip.traces.onset import guess_onset
 from biogrip.traces.plausibility import check_recording
 from biogrip.traces.reader import Recognised, Recording, read_recording

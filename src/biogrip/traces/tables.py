@@ -5,8 +5,8 @@ Anton Paar's programs write lines like ``Interval:``, a row of names, perhaps an
 row of units in brackets. TRIOS writes ``[step]``, the name of the step, names, and bare units.
 """
 
-import csv
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from io import StringIO
@@ -44,8 +44,8 @@ _ENCODINGS = {
     "cp1252": "Windows-1252",
 }
 _LINE_END = re.compile(r"\r\n|\r|\n")
-# Spreadsheet errors like #REF!, #DIV/0! or #NAME? followed by a separator are cells, not comments.
-_COMMENT = re.compile(r" *#(?!(?:[A-Z0-9/_]+[!?]|N/A|NV)\s*[,;\t])")
+# Empty lines and comments; #REF!, #DIV/0! or #NAME? followed by a separator are cells.
+_LEFT_OUT = re.compile(r" *(?:$|#(?!(?:[A-Z0-9/_]+[!?]|N/A|NV)\s*[,;\t]))")
 # Begins like a row of numbers.
 _ROW = re.compile(r'[\s",;]*[-+]?[.\d][\d.,eE+-]*[\s",;]')
 _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
@@ -115,11 +115,7 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
 
     encoding, text = _read_text(path)
     lines = _LINE_END.split(text)
-    kept = [
-        i
-        for i, line in enumerate(lines)
-        if line.strip(" ") and not ("#" in line and _COMMENT.match(line))
-    ]
+    kept = [i for i, line in enumerate(lines) if not _LEFT_OUT.match(line)]
     if not kept:
         raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
     lines, numbers = [lines[i] for i in kept], np.array(kept) + 1
@@ -143,7 +139,7 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
         frame = pd.DataFrame()
     if len(frame) != len(lines):
         is_open = re.compile(rf'(?:^|{separator}) *"(?:[^"]|"")*$')
-        row = next(row for row, line in enumerate(lines) if is_open.search(line))
+        row = next((i for i, line in enumerate(lines) if is_open.search(line)), 0)
         raise BiogripError(
             f"{place(path, numbers[row])}: found a quote without its end, allowed are quoted cells "
             "that end on their line."
@@ -167,11 +163,12 @@ def _read_text(path: Path) -> tuple[str, str]:
     best = next((match for match in matches if match.encoding == "utf_8"), matches.best())
     if best is not None:
         return _ENCODINGS[best.encoding], str(best)
+    codec = "utf-16" if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8"
     line, found = None, "binary data"
     try:
-        content.decode()
+        content.decode(codec)
     except UnicodeDecodeError as error:
-        line = len(_LINE_END.split(content[: error.start].decode()))
+        line = len(_LINE_END.split(content[: error.start].decode(codec)))
         found = f"the byte 0x{content[error.start]:02x}"
     raise BiogripError(
         f"{place(path, line)}: found {found}, allowed is text in UTF-8, UTF-16 or Windows-1252."
@@ -335,12 +332,3 @@ def number_or_inf(cell: str) -> float:
         return inf if "_" in cell else float(cell)
     except ValueError:
         return nan if cell.lower() in _GAPS else inf
-
-
-def cells_or_none(line: str, separator: str) -> list[str]:
-    """Return the cells of a line without padding; none of one that cannot be read as a row."""
-    try:
-        row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
-    except csv.Error:
-        return []
-    return [cell.strip() for cell in row]
