@@ -15,11 +15,10 @@ from biogrip.traces.columns import (
     Columns,
     listed,
     place,
-    plain_name,
     shortened,
     unit_of,
 )
-from biogrip.traces.tables import Sheet, Table, find_table, number_or_inf, read_sheet
+from biogrip.traces.tables import Sheet, Table, find_tables, number_or_inf, read_sheet
 
 FEWEST_SAMPLES = 10
 
@@ -143,7 +142,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         or more than `MOST_ROWS` rows.
     """
     sheet = read_sheet(path, columns)
-    table, block, blocks = find_table(path, sheet, columns)
+    tables, index = find_tables(path, sheet, columns)
+    table = tables[index]
     header_line = int(sheet.numbers[table.at])
     indices = _indices(path, header_line, table, columns)
     units = _units(path, table, indices, columns)
@@ -156,7 +156,7 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         _check_positive(path, columns.sd, kept[:, 2], lines)
     averaged = 0
     if columns.average_repeated:
-        kept, lines, averaged = average_repeated(kept, lines)
+        kept, lines, averaged = _averaged(kept, lines)
     _check_order(path, columns, kept[:, 0], lines)
     time_s = kept[:, 0] * TIME_UNITS[units[0]]
     first = -np.inf if columns.from_s is None else columns.from_s
@@ -173,8 +173,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         decimal=decimal,
         header_line=header_line,
         units_line=None if table.units is None else int(sheet.numbers[table.first - 1]),
-        block=block if blocks > 1 else None,
-        blocks=blocks if blocks > 1 else None,
+        block=index + 1 if len(tables) > 1 else None,
+        blocks=len(tables) if len(tables) > 1 else None,
         preamble=table.title or None,
         columns=dict(zip(columns.named, names_and_units, strict=True)),
         rows=len(values),
@@ -194,8 +194,7 @@ def _indices(path: Path, line: int, table: Table, columns: Columns) -> list[int]
     """Return where the columns to read are in a table."""
     found: dict[int, str] = {}
     for key, column in columns.named.items():
-        same = [i for i, name in enumerate(table.names) if plain_name(name) == plain_name(column)]
-        where = place(path, line, column)
+        same, where = table.indices(column), place(path, line, column)
         if not same:
             raise BiogripError(
                 f"{where}: found no such column, allowed are {listed(table.names)}."
@@ -214,15 +213,14 @@ def _indices(path: Path, line: int, table: Table, columns: Columns) -> list[int]
 
 def _units(path: Path, table: Table, indices: list[int], columns: Columns) -> list[str]:
     """Return the units of the columns to read."""
-    names = columns.named.values()
     below = [table.units[i] if table.units else "" for i in indices]
-    said_by, allowed = columns.said_by(columns.unit_key), columns.quantity.units
-    stated = columns.time_unit, TIME_UNITS, columns.said_by("time_unit")
-    units: list[str] = []
-    for column, cell in zip(names, below, strict=True):
-        units.append(unit_of(path, column, *stated, cell))
+    said_by = columns.said_by("time_unit"), columns.said_by(columns.unit_key)
+    time = unit_of(path, columns.time, columns.time_unit, TIME_UNITS, said_by[0], below[0])
+    units, unit = [time], columns.reading_unit
+    for column, cell in zip(list(columns.named.values())[1:], below[1:], strict=True):
         # Standard deviations are in the unit of the readings.
-        stated = units[1] if len(units) > 1 else columns.reading_unit, allowed, said_by
+        unit = unit_of(path, column, unit, columns.quantity.units, said_by[1], cell)
+        units.append(unit)
     return units
 
 
@@ -258,25 +256,12 @@ def _numbers(path: Path, sheet: Sheet, table: Table, indices: list[int]) -> tupl
     return values, decimal
 
 
-def average_repeated(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:
+def _averaged(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:
     """Average successive rows of equal times, as a rounded clock writes them.
 
-    Parameters
-    ----------
-    values : (n_rows, n_columns)
-        Times, readings and, if there is a third column, standard deviations; of a mean that is the
-        root of their sum of squares over their number.
-    lines : (n_rows,)
-        Line numbers.
-
-    Returns
-    -------
-    values : (n_times, n_columns)
-        Means.
-    lines : (n_times,)
-        Line of the first row of each time.
-    int
-        Number of rows that are averaged with others.
+    A third column, (n_rows,), has standard deviations; that of a mean is the root of their sum of
+    squares over their number. Returns the means, the lines of the first rows, and the number of
+    rows that are averaged with others.
     """
     starts = np.flatnonzero(np.append(True, np.diff(values[:, 0]) != 0))
     counts = np.diff(np.append(starts, len(values)))

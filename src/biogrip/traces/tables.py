@@ -9,7 +9,7 @@ import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from io import StringIO
+from io import BytesIO
 from itertools import pairwise
 from math import inf, isfinite, nan
 from pathlib import Path
@@ -93,13 +93,17 @@ class Table:
     title: str = ""
     """Some words of the preamble."""
 
+    def indices(self, column: str) -> list[int]:
+        """Return which columns have a name."""
+        return [i for i, name in enumerate(self.names) if plain_name(name) == plain_name(column)]
+
     def common(self, columns: Columns) -> int:
         """Count the columns to read that it has."""
-        return len(columns.plain_names & {*map(plain_name, self.names)})
+        return sum(bool(self.indices(name)) for name in columns.named.values())
 
     def has(self, columns: Columns) -> bool:
         """Return True if it has all columns to read."""
-        return self.common(columns) == len(columns.plain_names)
+        return self.common(columns) == len(columns.named)
 
 
 def read_sheet(path: Path, columns: Columns) -> Sheet:
@@ -124,12 +128,12 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
     widths = np.array([line.count(separator) for line in lines]) + 1
     try:
         frame = pd.read_csv(
-            StringIO("\n".join(lines)),
+            BytesIO("\n".join(lines).encode()),
             sep=separator,
             header=None,
             names=range(widths.max()),
             index_col=False,
-            dtype=str,
+            dtype=object,
             na_filter=False,
             skip_blank_lines=False,
             skipinitialspace=True,
@@ -144,7 +148,7 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
             f"{place(path, numbers[row])}: found a quote without its end, allowed are quoted cells "
             "that end on their line."
         )
-    cells = frame.apply(lambda column: column.str.strip()).to_numpy(object)
+    cells = np.vectorize(str.strip, otypes=[object])(frame.to_numpy())
     return Sheet(encoding, separator, cells, widths, numbers, headers)
 
 
@@ -186,15 +190,8 @@ def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -
     return max(SEPARATORS, key=merit)
 
 
-def find_table(path: Path, sheet: Sheet, columns: Columns) -> tuple[Table, int, int]:
-    """Find the table to read: the block that is asked for, or the only one with the columns.
-
-    Returns
-    -------
-    Table
-        The table; if none has the columns, that with most of them, for a message.
-    int, int
-        Its number among the tables of the file, from 1, and their number.
+def find_tables(path: Path, sheet: Sheet, columns: Columns) -> tuple[list[Table], int]:
+    """Find the tables of a file, and the index of the block to read, or the only one that can be.
 
     Raises
     ------
@@ -202,27 +199,24 @@ def find_table(path: Path, sheet: Sheet, columns: Columns) -> tuple[Table, int, 
         With a list of the tables, if there is no such block, or no block is asked for and several
         have the columns.
     """
-    tables = _tables(sheet, columns)
-    if not tables:
-        return _likely_table(sheet), 1, 1
-    which, allowed = f"no block {columns.block}", f"are 1 to {len(tables)}:"
+    tables = _tables(sheet, columns) or [_likely_table(sheet)]
+    common = [table.common(columns) for table in tables]
+    count = common.count(len(columns.named))
+    if columns.block is None and count <= 1:
+        return tables, common.index(max(common))
+    if columns.block is not None and columns.block <= len(tables):
+        return tables, columns.block - 1
+    found, allowed = f"no block {columns.block}", f"are 1 to {len(tables)}:"
     if columns.block is None:
-        count = sum(table.has(columns) for table in tables)
-        if count <= 1:
-            common = [table.common(columns) for table in tables]
-            best = common.index(max(common))
-            return tables[best], best + 1, len(tables)
         names = ", ".join(f"'{name}'" for name in columns.named.values())
-        which = f"{counted(count, 'block')} with the columns {names}"
+        found = f"{counted(count, 'block')} with the columns {names}"
         allowed = f"is one: say which by {columns.said_by('block')}."
-    elif columns.block <= len(tables):
-        return tables[columns.block - 1], columns.block, len(tables)
     shown = [
         f"\n  {number}: {_in_words(sheet, table, columns)}"
         for number, table in enumerate(tables[:_TABLES_SHOWN], 1)
     ]
     more = [f"\n  and {len(tables)} in all"] if len(tables) > _TABLES_SHOWN else []
-    raise BiogripError(f"{place(path)}: found {which}, allowed {allowed}{''.join(shown + more)}")
+    raise BiogripError(f"{place(path)}: found {found}, allowed {allowed}{''.join(shown + more)}")
 
 
 def _in_words(sheet: Sheet, table: Table, columns: Columns) -> str:
@@ -231,13 +225,12 @@ def _in_words(sheet: Sheet, table: Table, columns: Columns) -> str:
     names = [name for name in table.names if name and not name.endswith(":")]
     rows = counted(table.end - table.first, "row")
     said = f"line {sheet.numbers[table.at]}{title}; {listed(names, _NAMES_SHOWN)}; {rows}"
-    plain = [*map(plain_name, table.names)]
-    if plain_name(columns.time) not in plain or table.end <= table.first:
-        return said
-    at = plain.index(plain_name(columns.time))
-    first, last = (shortened(cell) for cell in sheet.cells[[table.first, table.end - 1], at])
-    unit = table.units[at].strip("[]() ") if table.units else ""
-    return f"{said}, {first} to {last} {unit}".rstrip()
+    for time in table.indices(columns.time)[:1]:
+        if table.end > table.first:
+            first, last = map(shortened, sheet.cells[[table.first, table.end - 1], time])
+            unit = table.units[time].strip("[]() ") if table.units else ""
+            said += f", {first} to {last} {unit}".rstrip()
+    return said
 
 
 def _tables(sheet: Sheet, columns: Columns) -> list[Table]:
@@ -266,15 +259,11 @@ def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
     if below and not any(sheet.cells[below[0], len(names) :]):
         units = sheet.cells[below[0], : len(names)].tolist()
         numbers = _count_numbers(sheet.cells[below[1]]) if len(below) > 1 else 0
-        of_time = [
-            unit_in_cell(unit, TIME_UNITS)
-            for name, unit in zip(names, units, strict=False)
-            if plain_name(name) == plain_name(columns.time)
-        ]
+        times = [units[i] for i in table.indices(columns.time) if i < len(units)]
         if (
             (is_step and numbers > _count_numbers(units))
             or (all(in_brackets(unit) for unit in units if unit) and (has_columns or numbers > 0))
-            or (has_columns and any(of_time))
+            or (has_columns and any(unit_in_cell(unit, TIME_UNITS) for unit in times))
         ):
             return replace(table, units=units, first=below[0] + 1)
     return table if has_columns else None
