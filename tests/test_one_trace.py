@@ -37,7 +37,7 @@ from biogrip.judging.profiles import Profile
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.models import CANDIDATES, MODELS
-from biogrip.traces.late_onset import note_late_onset
+from biogrip.traces.onset import note_late_onset
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean
 

@@ -30,7 +30,7 @@ from biogrip.judging.doubts import DOUBTFUL, REJECTED
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED
 from biogrip.records.rows import read_rows, write_rows
 from biogrip.terminal import aligned, visible, visible_lines
-from biogrip.traces.trace_file import trace_file_problem
+from biogrip.traces.columns import trace_file_problem
 
 FEWEST_CELLS = 3
 """Fewest cells of which a median is estimated."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biogrip.physics.drift import nuisance_basis
-from biogrip.traces.noise_share import proportional_deviations
+from biogrip.traces.any_sample import proportional_deviations
 from tests.helpers.problems import GRIPPER, TORQUE, clean
 
 TIMES, CLEAN = clean("endothelial_cell", 2.0)

@@ -29,7 +29,7 @@ from biogrip.traces.plausibility import (
     check_recording,
     free_rotation,
 )
-from biogrip.traces.recordings import Recording
+from biogrip.traces.reader import Recording
 
 FILE = Path("trace.csv")
 SI = Columns("time_s", "rotation_rad")

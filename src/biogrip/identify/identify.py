@@ -14,7 +14,7 @@ from biogrip.identify.table_of_traces import Row, cases_of, is_table, read_table
 from biogrip.identify.words import in_words, side_by_side
 from biogrip.judging.doubts import REJECTED
 from biogrip.terminal import visible
-from biogrip.traces.trace_file import trace_file_problem
+from biogrip.traces.columns import trace_file_problem
 
 
 def identify(

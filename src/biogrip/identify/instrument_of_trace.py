@@ -7,7 +7,7 @@ from typing import Any
 from biogrip.errors import BiogripError
 from biogrip.identify.read_as import ReadAs
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
-from biogrip.traces.recordings import read_recording
+from biogrip.traces.reader import read_recording
 
 
 def with_instrument(

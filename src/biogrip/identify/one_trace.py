@@ -46,9 +46,8 @@ from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import KeyPath, default_config, dotted, keys_in, overlaid, shown_path
 from biogrip.study.study import Case, Study
 from biogrip.terminal import visible
-from biogrip.traces.columns import place
-from biogrip.traces.late_onset import note_late_onset
-from biogrip.traces.trace_file import trace_file_problem
+from biogrip.traces.columns import place, trace_file_problem
+from biogrip.traces.onset import note_late_onset
 
 _NOT_COMPARED = (
     "With fixed parameters no other sample models are tried: a value that is known in this model "

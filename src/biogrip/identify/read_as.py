@@ -17,7 +17,7 @@ from biogrip.study.measurement_block import COLOURED, KNOWN_NOISE, READINGS, Mea
 from biogrip.study.messages import checked
 from biogrip.study.study import Case
 from biogrip.traces.columns import Columns
-from biogrip.traces.recognised import Recognised
+from biogrip.traces.reader import Recognised
 
 _USUAL_TIME = "time_s"
 # Options that are no keys of ``measurement``.
@@ -115,7 +115,6 @@ class ReadAs:
             named.get(read.name) or read.column,
             self.time_unit,
             self.rotation_unit if is_rotation else self.reading_unit,
-            self.skip or 0,
             1.0 if self.scale is None else self.scale,
             self.start_s,
             by_options=True,

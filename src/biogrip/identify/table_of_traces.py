@@ -25,8 +25,8 @@ from biogrip.study.messages import Schema, checked, schema_of
 from biogrip.study.source import overlaid, scalar_problem
 from biogrip.study.study import Case
 from biogrip.terminal import visible
-from biogrip.traces.cells import SEPARATORS, cells_or_none
 from biogrip.traces.columns import listed, place
+from biogrip.traces.tables import SEPARATORS
 
 FILE = "file"
 """The column that every table has."""
@@ -66,7 +66,9 @@ def is_table(path: Path) -> bool:
     with path.open("rb") as stream:
         first = stream.readline(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
     # Another spelling, as File, is a table, too, whose reader says what is wrong.
-    return any(name.lower() == FILE for each in SEPARATORS for name in cells_or_none(first, each))
+    return any(
+        name.strip('" \r\n').lower() == FILE for each in SEPARATORS for name in first.split(each)
+    )
 
 
 def read_table(path: Path) -> list[Row]:

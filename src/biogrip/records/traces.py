@@ -23,7 +23,7 @@ from biogrip.errors import BiogripError
 from biogrip.files import atomic_write
 from biogrip.physics.instruments import INSTRUMENTS, Instrument
 from biogrip.records.rows import write_rows
-from biogrip.traces.recognised import Recognised
+from biogrip.traces.reader import Recognised
 
 Table: TypeAlias = pa.Table
 

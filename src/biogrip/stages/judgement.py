@@ -21,7 +21,7 @@ from biogrip.physics.noise import rms, standard_deviation, stream
 from biogrip.records.traces import read_measurements, read_target
 from biogrip.records.verdicts import diagnosis_data
 from biogrip.study.study import Case
-from biogrip.traces.late_onset import note_late_onset
+from biogrip.traces.onset import note_late_onset
 
 TRACE = 0
 """Seed of the trace that is judged."""

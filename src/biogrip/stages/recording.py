@@ -18,12 +18,11 @@ from biogrip.physics.whitening import MOST_SAMPLES
 from biogrip.progress import warn
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.study.study import Case
+from biogrip.traces.any_sample import proportional_deviations
 from biogrip.traces.columns import Columns, place
-from biogrip.traces.noise_share import proportional_deviations
 from biogrip.traces.onset import guess_onset
 from biogrip.traces.plausibility import check_recording
-from biogrip.traces.recognised import Recognised
-from biogrip.traces.recordings import Recording, read_recording
+from biogrip.traces.reader import Recognised, Recording, read_recording
 
 
 def record(case: Case, recorded: Path, measurements: Path) -> None:

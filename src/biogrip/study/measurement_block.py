@@ -11,9 +11,7 @@ from biogrip.keys import Block, OneOf, Problem
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION
 from biogrip.physics.noise import Noise
 from biogrip.physics.protocol import Burst, Sampling
-from biogrip.traces.columns import Columns
-from biogrip.traces.trace_file import trace_file_problem
-from biogrip.traces.units import TIME_UNITS
+from biogrip.traces.columns import TIME_UNITS, Columns, trace_file_problem
 
 COLOURED = "coloured"
 NOISE_MODELS = ("white", COLOURED)
@@ -24,7 +22,7 @@ READINGS = tuple(INSTRUMENTS)
 """Keys that name the column of the readings, one for each quantity that an instrument reads."""
 
 _OF_FILE = (
-    *("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "skip", "scale", "block"),
+    *("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "scale", "block"),
     *("average_repeated", "from_s", "until_s", *KNOWN_NOISE, "start_s", "fit_start"),
 )
 _Name = Annotated[str | None, Field(min_length=1, max_length=4000)]
@@ -71,9 +69,6 @@ class MeasurementBlock(Block):
     reading_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
     """Unit of what another instrument reads, where the column's name does not end in it; of strains
     by default 1."""
-    skip: Annotated[int | None, Field(ge=0, le=1_000_000)] = None
-    """Number of lines in the file before its header, as programs of instruments write them; of
-    those of rheometers the header is found."""
     block: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
     """Number of the block to read, where several tables follow one another in the file."""
     average_repeated: bool = False
@@ -129,7 +124,6 @@ class MeasurementBlock(Block):
             self.time,
             getattr(self, name),
             reading_unit=self.rotation_unit or self.reading_unit,
-            skip=self.skip or 0,
             scale=1.0 if self.scale is None else self.scale,
             quantity=INSTRUMENTS[name].read,
             **{key: getattr(self, key) for key in same},

@@ -15,7 +15,7 @@ from biogrip.digits import counted
 from biogrip.errors import nearest
 from biogrip.keys import CONFLICT, TWICE, Problem, adapter, built, kind_of
 from biogrip.physics.instruments import ROTATION
-from biogrip.traces.units import TIME_UNITS, nearest_unit
+from biogrip.traces.columns import TIME_UNITS, nearest_unit
 
 _SCHEMA_UNITS = {
     **{name: name for name in ("s", "m", "Hz", "rad", "deg", "V")},

@@ -1,18 +1,51 @@
-"""Columns of a recording's file, and words for them in messages."""
+"""What the user says of a recording's file: the columns to read, and their units.
 
+A unit is stated, stands at the end of the column's name, as in ``rotation_urad``, ``phi (mrad)`` or
+``time [s]``, or in a row below the names. It is never guessed, and no two of these may differ.
+"""
+
+import re
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from unicodedata import normalize
 
+from biogrip.errors import BiogripError, nearest
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Quantity
 from biogrip.terminal import visible
 
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+
+_SPELLED_OUT = {
+    "s": ("sec", "secs", "second", "seconds"),
+    "ms": ("msec", "millisecond", "milliseconds"),
+    "min": ("mins", "minute", "minutes"),
+    "h": ("hr", "hrs", "hour", "hours"),
+    "rad": ("radian", "radians"),
+    "mrad": ("milliradian", "milliradians"),
+    "urad": ("microrad", "microradian", "microradians"),
+    "deg": ("degree", "degrees"),
+}
+_UNIT_AT_END = re.compile(r"(?:(_per)?_([^\W_]+)|\(([^()]*)\)|\[([^\[\]]*)\])$")
+_IN_BRACKETS = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)")
+# Pa^-1, Pa**-1, Pa-1, and with digits above the line, which `plain_name` brings down.
+_RECIPROCAL = re.compile(r"([A-Za-z]+)(?:\^|\*\*)?\(?[-\u2212]1\)?")
+# Keys that no option of the command sets but `--set`, with what they may say.
+_BY_SET = {
+    "time_unit": "UNIT",
+    "rotation_unit": "UNIT",
+    "reading_unit": "UNIT",
+    "average_repeated": "true",
+    "scale": "-1",
+}
 _MOST_LISTED = 50
 _LONGEST_SHOWN = 40
+_LONGEST_PATH = 200
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Names and units of the columns of a trace."""
+    """Names and units of the columns of a trace, and which of its rows are used."""
 
     time: str
     """Name of the column of times."""
@@ -22,8 +55,6 @@ class Columns:
     """Key of `TIME_UNITS`; None if the file has the unit."""
     reading_unit: str | None = None
     """Key of the quantity's units, likewise."""
-    skip: int = 0
-    """Number of lines before the header, or before its preamble."""
     scale: float = 1.0
     """Reading in its unit over the number in the column."""
     start_s: float | None = None
@@ -35,7 +66,7 @@ class Columns:
     quantity: Quantity = ROTATION
     """What is read."""
     block: int | None = None
-    """Number of the block to read, from 1, where a file has several; None for the only one."""
+    """Number of the table to read, from 1, where a file has several; None for the only one."""
     average_repeated: bool = False
     """True to average the readings of equal times."""
     from_s: float | None = None
@@ -54,28 +85,131 @@ class Columns:
         names = {"time": self.time, self.quantity.name: self.reading}
         return names if self.sd is None else {**names, "sd": self.sd}
 
-    def said_by(self, *names: str) -> str:
-        """Return the options or config keys that set something."""
-        return said_by(self.by_options, *names)
+    @property
+    def plain_names(self) -> set[str]:
+        """Names of the columns as `plain_name` writes them."""
+        return {*map(plain_name, self.named.values())}
+
+    def said_by(self, *keys: str) -> str:
+        """Return the options or config keys that say something, for messages."""
+        if self.by_options:
+            return " and ".join(map(_option, keys))
+        values = {key: _BY_SET.get(key, "UNIT") for key in keys}
+        said = [key if value == "UNIT" else f"{key}: {value}" for key, value in values.items()]
+        return f"{' and '.join(said)} under measurement"
 
 
-def said_by(by_options: bool, *names: str) -> str:
-    """Return the options or config keys that set something, for messages."""
-    if by_options:
-        others = set(INSTRUMENTS) - {ROTATION.name}
-        options = ("reading" if name in others else name for name in names)
-        return " and ".join(f"--{option.replace('_', '-')}" for option in options)
-    return f"{' and '.join(names)} under measurement"
+def _option(key: str) -> str:
+    if key in _BY_SET:
+        return f"--set measurement.{key}={_BY_SET[key]}"
+    return "--reading" if key in INSTRUMENTS and key != ROTATION.name else f"--{key}"
+
+
+def unit_of(
+    path: Path,
+    column: str,
+    given: str | None,
+    allowed: Mapping[str, float],
+    said_by: str,
+    below: str = "",
+) -> str:
+    """Return the unit of a column, a key of `allowed`.
+
+    Parameters
+    ----------
+    path, column
+        File, for messages, and name of the column, which may end with the unit.
+    given
+        Unit that the user states, or None.
+    allowed
+        Allowed units; if ``1`` is among them, none need be given.
+    said_by
+        What states the unit, for messages.
+    below
+        The column's cell in a row of units, if there is one.
+
+    Raises
+    ------
+    BiogripError
+        If no allowed unit is given, or two of name, cell and statement contradict each other.
+    """
+    where, choices = place(path, column=column), ", ".join(allowed)
+    at_end, in_row = _unit_at_end(column, allowed), unit_in_cell(below, allowed)
+    unit = (at_end or in_row) if given is None else plain_name(given)
+    if unit is None and "1" in allowed and _bare(below) in ("", "-"):
+        return "1"
+    if unit is None:
+        row = f" (but '{shortened(below)}' below it)" if below else ""
+        raise BiogripError(
+            f"{where}: found no unit{row}, neither stated (by {said_by}) nor at the end of the "
+            f"name; allowed are {choices}."
+        )
+    if unit not in allowed:
+        raise BiogripError(
+            f"{where}: found the unit '{given}', allowed are {choices}."
+            + nearest_unit(given, allowed)
+        )
+    for other, said in ((at_end, "the name"), (in_row, "the row of units")):
+        if other not in (None, unit):
+            raise BiogripError(
+                f"{where}: found the unit '{given or unit}' where {said} says '{other}', allowed "
+                "is one unit."
+            )
+    return unit
+
+
+def nearest_unit(name: object, allowed: Collection[str]) -> str:
+    """Return a hint like ``" Did you mean 'h'?"`` for ``hours``; otherwise that of `nearest`."""
+    unit = _spelled_out(str(name), allowed)
+    return f" Did you mean '{unit}'?" if unit else nearest(name, allowed)
+
+
+def unit_in_cell(cell: str, allowed: Collection[str]) -> str | None:
+    """Return the unit in a cell of a row of units, with brackets or without; None for others."""
+    return _known(_bare(cell), allowed) or _spelled_out(_bare(cell), allowed)
+
+
+def in_brackets(cell: str) -> bool:
+    """Return True if a cell has nothing but brackets and what they hold."""
+    return _IN_BRACKETS.fullmatch(cell) is not None
+
+
+def plain_name(name: str) -> str:
+    """Return a name without padding, with either micro sign written as u, and ° as deg."""
+    return normalize("NFKC", name).strip().replace("\u03bc", "u").replace("°", "deg")
+
+
+def _unit_at_end(column: str, allowed: Collection[str]) -> str | None:
+    ending = _UNIT_AT_END.search(plain_name(column))
+    if ending is None:
+        return None
+    # A name may end with something other than a unit, as in rotation_left or phi (2).
+    per, *units = ending.groups()
+    unit = "".join(filter(None, units)).strip()
+    return _known(f"1/{unit}" if per else unit, allowed)
+
+
+def _bare(cell: str) -> str:
+    plain = plain_name(cell)
+    return plain[1:-1].strip() if in_brackets(plain) else plain
+
+
+def _known(unit: str, allowed: Collection[str]) -> str | None:
+    power = _RECIPROCAL.fullmatch(unit)
+    written = f"1/{power[1]}" if power else unit
+    return written if written in allowed else None
+
+
+def _spelled_out(word: str, allowed: Collection[str]) -> str | None:
+    plain = plain_name(word).lower()
+    return next((unit for unit in allowed if plain in _SPELLED_OUT.get(unit, ())), None)
 
 
 def place(path: Path, line: int | None = None, column: str | None = None) -> str:
     """Return the file, line and column at the beginning of a message."""
-    where = visible(path)
-    if line is not None:
-        where += f", line {line}"
-    if column is not None:
-        where += f", column '{visible(column)}'"
-    return where
+    at = "" if line is None else f", line {line}"
+    of = "" if column is None else f", column '{visible(column)}'"
+    return f"{visible(path)}{at}{of}"
 
 
 def shortened(cell: str) -> str:
@@ -87,3 +221,22 @@ def listed(names: list[str], most: int = _MOST_LISTED) -> str:
     """Return the names of columns, of many the first."""
     found = ", ".join(map(shortened, names[:most]))
     return found if len(names) <= most else f"{found} and {len(names)} in all"
+
+
+def trace_file_problem(path: str | Path) -> str | None:
+    """Return what is wrong with the path of a trace, or None if it is a file."""
+    file, shown = Path(path), visible(path)
+    shown = shown if len(shown) <= _LONGEST_PATH else f"{shown[:_LONGEST_PATH]}..."
+    found = f"found '{shown}', allowed is a file that exists."
+    try:
+        if file.is_file():
+            return None
+        if file.is_dir():
+            return f"found the folder '{shown}', allowed is a file."
+        if file.exists():
+            return f"found '{shown}', which is no regular file; allowed is one."
+        beside = [str(other) for other in file.parent.glob("*") if other.is_file()]
+    except (OSError, ValueError):
+        # A name that is too long or invalid for the system: no neighbours to suggest.
+        return found
+    return found + nearest(str(file), beside)

@@ -1,20 +1,25 @@
 """Onset of a recorded trace: the time of its clock from which it follows the torque.
 
-The trace is fitted by any sample's possible responses to the delayed torque, and the delay with
-the least residual sum of squares is found on ever finer grids. That needs no sample model and some
-hundred small fits; `biogrip.fit.fitted_onset` refines it with the sample model.
+`estimate_onset` needs no sample model: the trace is fitted by any sample's possible responses to
+the delayed torque, and the delay with the least residual sum of squares is found on ever finer
+grids. That needs some hundred small fits; `biogrip.fit.fitted_onset` refines it with the model.
+`note_late_onset` tests if a trace begins before its protocol where the user did not say so.
 """
 
 import numpy as np
+from scipy.special import chdtri
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.fitted_onset import OnsetFits
+from biogrip.judging.doubts import REJECTION, Note
+from biogrip.judging.likelihood import compute_fall
 from biogrip.physics.drift import nuisance_basis, without
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lagged_torques
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.whitening import estimate_noise
-from biogrip.traces.any_response import extreme_responses, left_over
+from biogrip.traces.any_sample import extreme_responses, left_over
 
 # Relaxation times over the protocol's duration.
 _LAG_SHARES = tuple(np.geomspace(1e-6, 10.0, 16))
@@ -24,11 +29,12 @@ _DELAYS = 65
 _MOST_READINGS = 2000
 # Least share of the protocol that has to be after the onset.
 _LEAST_AFTER = 0.02
+# Fewest readings before an onset by which a late one is recognised.
+_FEWEST_BEFORE = 3
 # Standard deviation of readings that are constant, in noise, and in peaks of noise-free traces.
 _CONSTANT, _CONSTANT_OF_PEAK = 2.0, 1e-3
-
-FEWEST_BEFORE = 3
-"""Fewest readings before an onset by which a late one is recognised."""
+# So that correlated noise does not look like a late onset.
+_FALSE_ALARM = 1e-9
 
 
 def estimate_onset(
@@ -69,18 +75,6 @@ def estimate_onset(
             return float(onsets[best])
 
 
-def guess_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> float:
-    """Estimate the onset of a trace, (n_samples,), without a sample model, in s of its clock."""
-    return estimate_onset(
-        time_s,
-        rotation_rad,
-        problem.gripper,
-        problem.torque,
-        offset=problem.offset,
-        drift=problem.drift,
-    )
-
-
 def _thinned(samples: int, within: IntArray) -> BoolArray:
     """Choose readings of the whole trace, and more of those within, (2,) indices."""
     first, last = max(within[0] - 1, 0), min(within[1], samples - 1)
@@ -90,12 +84,59 @@ def _thinned(samples: int, within: IntArray) -> BoolArray:
     return some
 
 
+def guess_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> float:
+    """Estimate the onset of a trace, (n_samples,), without a sample model, in s of its clock."""
+    known = {"offset": problem.offset, "drift": problem.drift}
+    return estimate_onset(time_s, rotation_rad, problem.gripper, problem.torque, **known)
+
+
+def note_late_onset(
+    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, near: Array
+) -> list[Note]:
+    """Fit the onset of a trace that begins constant, and reject the fit if that is far better.
+
+    The test is a likelihood ratio. A trace that shows a later onset tells nothing of the sample
+    under the protocol as given, whatever noise model absorbs the misfit.
+
+    Parameters
+    ----------
+    case_problem
+        Assumptions of the identification, with a protocol that starts at 0.
+    time_s, rotation_rad : (n_samples,)
+        The trace, times ascending.
+    near : (n_parameters,)
+        Log-parameters of the best fit with that protocol.
+
+    Returns
+    -------
+    list of Note
+        At most one.
+    """
+    if not begins_constant(time_s, rotation_rad):
+        return []
+    guess_s = guess_onset(case_problem, time_s, rotation_rad)
+    if not begins_constant(time_s, rotation_rad, guess_s):
+        return []
+    fits = OnsetFits(case_problem, time_s, rotation_rad)
+    found, given = fits.best(guess_s), fits.at(0.0, near)
+    fall = compute_fall(len(time_s), given.misfit_rad, found.misfit_rad, case_problem.noise_rad)
+    if not begins_constant(time_s, rotation_rad, found.onset_s) or fall < chdtri(1, _FALSE_ALARM):
+        return []
+    text = (
+        f"The trace is constant until {found.onset_s:.4g} s of its clock, and fits far better if "
+        f"the protocol starts there (χ² falls by {fall:.3g}). If it does, say --start "
+        f"{found.onset_s:.4g} (measurement.start_s), or --start fit (measurement.fit_start), which "
+        "allows for its uncertainty."
+    )
+    return [Note(REJECTION, text)]
+
+
 def begins_constant(time_s: Array, rotation_rad: Array, onset_s: float | None = None) -> bool:
     """Return True if the readings before an onset are constant within the noise of the trace.
 
-    Without an onset, the first `FEWEST_BEFORE` readings are looked at.
+    Without an onset, the first few readings are looked at.
     """
-    before = rotation_rad[:FEWEST_BEFORE] if onset_s is None else rotation_rad[time_s < onset_s]
+    before = rotation_rad[:_FEWEST_BEFORE] if onset_s is None else rotation_rad[time_s < onset_s]
     noise_rad, peak_rad = estimate_noise(rotation_rad), float(np.ptp(rotation_rad))
     size = max(_CONSTANT * noise_rad, _CONSTANT_OF_PEAK * peak_rad)
-    return len(before) >= FEWEST_BEFORE and float(np.std(before)) < size
+    return len(before) >= _FEWEST_BEFORE and float(np.std(before)) < size

@@ -1,16 +1,15 @@
-"""Plausibility of a recorded trace as the response of a gripper to a protocol.
+"""Plausibility of a recorded trace: what a wrong unit, sign or protocol would show.
 
-Tests use the part of a trace that follows the torque. A linear viscoelastic sample makes the
-gripper a sum of lags with real relaxation times: between proportional to the torque (a spring)
-and to its integral (a damper). So the trace is fitted by linear least squares with the torque
-lagged by three relaxation times: a negligible one, a tenth of the protocol, and ten protocols.
-Three lags are too few to identify a sample, but enough to find its response under noise. The
-peak of the readings would be a peak of the noise, and block means would lose a sinusoid.
+A linear viscoelastic sample makes the gripper a sum of lags with real relaxation times: between
+proportional to the torque (a spring) and to its integral (a damper). So the trace is fitted by
+linear least squares with the torque lagged by three relaxation times: a negligible one, a tenth of
+the protocol, and ten protocols. Three lags are too few to identify a sample, but enough to find its
+response under noise. The peak of the readings would be a peak of the noise, and block means would
+lose a sinusoid.
 """
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,15 +18,12 @@ from biogrip.arrays import Array, parts
 from biogrip.errors import BiogripError
 from biogrip.physics.drift import without
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.instruments import Instrument, Quantity
+from biogrip.physics.instruments import Instrument
 from biogrip.physics.modes import lagged_torques
 from biogrip.physics.protocol import TorqueHistory, torque_at
-from biogrip.physics.whitening import estimate_noise
-from biogrip.traces.any_response import extreme_responses, left_over
-from biogrip.traces.columns import Columns, place
-from biogrip.traces.onset import begins_constant, estimate_onset
-from biogrip.traces.recordings import FEWEST_SAMPLES, Recording
-from biogrip.traces.units import TIME_UNITS, unit_of
+from biogrip.traces.any_sample import extreme_responses, left_over
+from biogrip.traces.columns import TIME_UNITS, Columns, place, unit_of
+from biogrip.traces.reader import Recording
 
 LARGEST_SHARE = 1.5
 """Largest plausible rotation, as a multiple of the free rotation.
@@ -61,44 +57,10 @@ _NO_CONSTANT = 1e-6
 _ROUNDING = 1e-9
 # Multiple of a given noise from which a rotation is seen, however small it is.
 _FAR_ABOVE = 10.0
-# Multiple of the free rotation that neither noise nor a wrong unit explains.
+# Multiple of the free rotation beyond which its square could overflow.
 _ABSURD = 1e9
-# Ratio of scatter from which a part of a trace looks like none.
-_UNEVEN = 10.0
 # Number of samples processed at once.
 _AT_ONCE = 65_536
-
-
-@dataclass(frozen=True)
-class _Functions:
-    """Functions of time, projected to short vectors that have the same inner products.
-
-    All tests need only inner products. The functions themselves would take too much memory for
-    a million samples.
-    """
-
-    lagged: Array
-    """Lagged torques, first of the left arm, then of the difference of both, (n_lagged, n_rows)."""
-    nuisance: Array
-    """Orthonormal nuisance functions of the instrument, (n_functions, n_rows)."""
-    constant: Array
-    """Constant function of norm 1, (1, n_rows)."""
-    trace: Array
-    """Measured rotation in rad, (n_rows,)."""
-    samples: int
-    """Number of samples that the vectors stand for."""
-
-
-@dataclass(frozen=True)
-class _Fit:
-    """Fit of a trace by lagged torques."""
-
-    response: Array
-    """Fitted part of the trace, without nuisance functions, (n_rows,)."""
-    weights: Array
-    """Weights of the lagged torques, (n_lagged,)."""
-    unknowns: int
-    """Number of linearly independent lagged torques."""
 
 
 def check_recording(
@@ -132,7 +94,7 @@ def check_recording(
     nuisance : (n_functions, n_samples)
         Orthonormal nuisance functions of the instrument, see `nuisance_basis`.
     instrument
-        What is held and read.
+        What is controlled and read.
     noise_rad
         Standard deviation of the noise, if known; otherwise it is estimated from the residuals
         of the fit.
@@ -153,62 +115,38 @@ def check_recording(
         With file, line, column, what was found and allowed, and the unit that would be
         plausible.
     """
-    _check_times(recording, gripper, torque, path, columns, onset_s)
-    trace, lagged = recording.rotation_rad, lagged_torques(torque, _LAG_SHARES)
-    free = free_rotation(gripper, torque)
+    _check_times(recording, torque, path, columns, onset_s)
+    trace, free = recording.rotation_rad, free_rotation(gripper, torque)
     largest = float(np.abs(trace).max())
     if largest > _ABSURD * free:
-        # Beyond this its square could overflow.
         _check_turn(recording, largest, free, path, columns, None)
-    functions = _functions(recording, lagged, nuisance)
-    fit = _fit(functions)
+    lagged = lagged_torques(torque, _LAG_SHARES)
+    functions = _reduced(recording, lagged, nuisance)
+    weights = _response_weights(functions, len(trace), noise_rad, constant=instrument.deforms)
+    where = f"{_extent(recording, path)}, column '{columns.reading}'"
     read, controlled = columns.quantity, instrument.controlled.name
     # Only the force of a spring is constant, as long as its deformation is.
-    constant, still = instrument.deforms, np.ptp(trace) == 0 and not instrument.deforms
-    if still or not _responds(functions, fit, noise_rad, constant=constant):
+    if weights is None or (np.ptp(trace) == 0 and not instrument.deforms):
+        unit = f" {read.unit}".rstrip()
         raise BiogripError(
-            f"{_extent(recording, path)}, column '{columns.reading}': found no response to the "
-            f"{controlled}, but {trace.mean():.3g}{_unit(read)} throughout, give or take "
-            f"{trace.std():.2g}{_unit(read)}; allowed is a {read.name} from zero that follows the "
-            f"{controlled} and stands out of the noise."
-            f"{_hint_on_part(recording, columns)}"
+            f"{where}: found no response to the {controlled}, but {trace.mean():.3g}{unit} "
+            f"throughout, give or take {trace.std():.2g}{unit}; allowed is a {read.name} from zero "
+            f"that follows the {controlled} and stands out of the noise."
         )
-    if _mirrored(functions, gripper, noise_rad):
+    if _is_mirrored(functions, len(trace), gripper, noise_rad):
+        sign = "one of the same sign"
+        if instrument.has_jaws:
+            sign = "the closing rotation, positive where the arm closes"
         raise BiogripError(
-            f"{_extent(recording, path)}, column '{columns.reading}': found a {read.name} that "
-            f"goes against the {controlled}, allowed is {_sign(instrument)}, or if an offset or "
-            "drift of the instrument, where it has one, were declared."
+            f"{where}: found a {read.name} that goes against the {controlled}, allowed is {sign}. "
+            f"It would fit if it were -1 times (then say {columns.said_by('scale')}), or if an "
+            "offset or drift of the instrument, where it has one, were declared."
         )
     if not instrument.has_jaws:
         return None
-    turns = (fit.weights @ lagged(recording.time_s[some]) for some in parts(len(trace), _AT_ONCE))
+    turns = (weights @ lagged(recording.time_s[some]) for some in parts(len(trace), _AT_ONCE))
     turn = max(float(np.abs(part).max()) for part in turns)
     return _check_turn(recording, turn, free, path, columns, typical_rad)
-
-
-def _hint_on_part(recording: Recording, columns: Columns) -> str:
-    """Return a hint if the readings scatter far more in the first than in the last tenth."""
-    few = max(FEWEST_SAMPLES, len(recording.time_s) // 10)
-    tenths = recording.rotation_rad[:few], recording.rotation_rad[-few:]
-    early, late = map(estimate_noise, tenths)
-    if max(early, late) < _UNEVEN * min(early, late):
-        return ""
-    where, how = ("first", "from") if early > late else ("last", "until")
-    said = f"--{how}" if columns.by_options else f"{how}_s under measurement"
-    return f" The {where} readings scatter far more than the others: {said} leaves them out."
-
-
-def _unit(quantity: Quantity) -> str:
-    return f" {quantity.unit}".rstrip()
-
-
-def _sign(instrument: Instrument) -> str:
-    if instrument.has_jaws:
-        return (
-            "the closing rotation, positive where the arm closes. It would fit if it were -1 times "
-            "(is opening counted as positive? Then scale it by -1)"
-        )
-    return "one of the same sign. It would fit if it were -1 times (then scale it by -1)"
 
 
 def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
@@ -226,12 +164,7 @@ def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
 
 
 def _check_times(
-    recording: Recording,
-    gripper: Gripper,
-    torque: TorqueHistory,
-    path: Path,
-    columns: Columns,
-    onset_s: float | None,
+    recording: Recording, torque: TorqueHistory, path: Path, columns: Columns, onset_s: float | None
 ) -> None:
     end_s, slack = torque.end_s, _TIME_SLACK * torque.end_s
     begins = onset_s or 0.0
@@ -245,11 +178,14 @@ def _check_times(
 
     if fits(1.0):
         return
-    unit = unit_of(path, columns.time, columns.time_unit, TIME_UNITS, "time_unit")
+    unit = unit_of(path, columns.time, columns.time_unit, TIME_UNITS, columns.said_by("time_unit"))
     hint = _other_units(unit, TIME_UNITS, fits)
     for sample in np.flatnonzero((time_s < earliest) | (time_s > end_s + slack))[:1]:
         if not hint and onset_s is None:
-            hint = _hint_on_start(recording, gripper, torque, columns)
+            how = "--start says when, or --start fit finds it"
+            if not columns.by_options:
+                how = "start_s under measurement says when, or fit_start: true finds it"
+            hint = f" If the protocol starts at another time of the clock than 0, {how}."
         raise BiogripError(
             f"{place(path, recording.lines[sample], columns.time)}: found "
             f"{clock_s[sample]:.12g} s, allowed is the protocol's time, {begins:g} to "
@@ -262,32 +198,54 @@ def _check_times(
     )
 
 
-def _hint_on_start(
-    recording: Recording, gripper: Gripper, torque: TorqueHistory, columns: Columns
-) -> str:
-    """Return a hint on the option that says when a clock's protocol starts, with an estimate."""
-    time_s, rotation_rad = recording.time_s, recording.rotation_rad
-    onset_s = estimate_onset(time_s, rotation_rad, gripper, torque, offset=True, drift=False)
-    moves = begins_constant(time_s, rotation_rad, onset_s)
-    still = f" The trace moves only from {onset_s:.4g} s on." if moves else ""
-    how = "--start" if columns.by_options else "start_s under measurement"
-    return f"{still} If the protocol starts at another time of the clock than 0, {how} says when."
-
-
-def _functions(
+def _reduced(
     recording: Recording, lagged: Callable[[Array], Array], nuisance: Array
-) -> _Functions:
+) -> tuple[Array, Array, Array, Array]:
+    """Return lagged torques, nuisance functions, a constant of norm 1, and the trace.
+
+    They are projected to short vectors, (..., n_rows), that have the same inner products: a million
+    samples would take too much memory.
+    """
     samples = len(recording.time_s)
     constant = np.full(samples, samples**-0.5)
     rows: Array | None = None
     for some in parts(samples, _AT_ONCE):
         own = lagged(recording.time_s[some])
-        columns = np.vstack((own, nuisance[:, some], constant[some], recording.rotation_rad[some]))
-        below = columns.T if rows is None else np.vstack((rows, columns.T))
+        both = np.vstack((own, nuisance[:, some], constant[some], recording.rotation_rad[some]))
+        below = both.T if rows is None else np.vstack((rows, both.T))
         rows = np.asarray(np.linalg.qr(below, mode="r"))
     assert rows is not None
     lags, others = np.split(rows.T, [len(own)])
-    return _Functions(lags, others[:-2], others[-2:-1], others[-1], samples)
+    return lags, others[:-2], others[-2:-1], others[-1]
+
+
+def _response_weights(
+    functions: tuple[Array, Array, Array, Array],
+    samples: int,
+    noise_rad: float | None,
+    *,
+    constant: bool,
+) -> Array | None:
+    """Return the weights of the lagged torques in the trace, or None if it does not follow them.
+
+    It does not if a constant describes it better, or if white noise about zero would have as
+    large a fit by an F test (chi-squared test with known noise).
+    """
+    from scipy.special import chdtri, fdtri
+
+    lagged, nuisance, one, readings = functions
+    basis, trace = _cleared(nuisance, lagged), without(nuisance, readings)
+    weights, _, unknowns, _ = np.linalg.lstsq(basis.T, trace, _ROUNDING)
+    response = weights @ basis
+    explained, rest = np.sum(response**2), np.sum((trace - response) ** 2)
+    if not constant and np.sum(without(one, trace) ** 2) <= rest:
+        return None
+    if noise_rad is not None:
+        least = noise_rad**2 * chdtri(unknowns, FALSE_ALARM)
+    else:
+        freedom = samples - unknowns
+        least = unknowns * fdtri(unknowns, freedom, 1 - FALSE_ALARM) * rest / freedom
+    return np.asarray(weights, np.float64) if explained > least else None
 
 
 def _cleared(basis: Array, functions: Array) -> Array:
@@ -301,45 +259,22 @@ def _cleared(basis: Array, functions: Array) -> Array:
     return np.where(left[:, None] > _ROUNDING * whole[:, None], rest, 0.0)
 
 
-def _fit(functions: _Functions) -> _Fit:
-    nuisance = functions.nuisance
-    basis, trace = _cleared(nuisance, functions.lagged), without(nuisance, functions.trace)
-    found, _, rank, _ = np.linalg.lstsq(basis.T, trace, _ROUNDING)
-    weights: Array = np.asarray(found, np.float64)
-    return _Fit(weights @ basis, weights, int(rank))
-
-
-def _responds(functions: _Functions, fit: _Fit, noise_rad: float | None, *, constant: bool) -> bool:
-    """Return True if the trace follows the torque.
-
-    It does not if a constant describes it better, or if white noise about zero would have as
-    large a fit by an F test (chi-squared test with known noise).
-    """
-    from scipy.special import chdtri, fdtri
-
-    trace = without(functions.nuisance, functions.trace)
-    explained = np.sum(fit.response**2)
-    rest = np.sum((trace - fit.response) ** 2)
-    if not constant and np.sum(without(functions.constant, trace) ** 2) <= rest:
-        return False
-    if noise_rad is not None:
-        return bool(explained > noise_rad**2 * chdtri(fit.unknowns, FALSE_ALARM))
-    freedom = functions.samples - fit.unknowns
-    ratio = fdtri(fit.unknowns, freedom, 1 - FALSE_ALARM)
-    return bool(explained / fit.unknowns > ratio * rest / freedom)
-
-
-def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) -> bool:
+def _is_mirrored(
+    functions: tuple[Array, Array, Array, Array],
+    samples: int,
+    gripper: Gripper,
+    noise_rad: float | None,
+) -> bool:
     """Return True if the mirrored trace is far more likely to be a response.
 
     It must be so also with a constant fitted along: an undeclared offset is not a wrong
     sign.
     """
-    nuisance, trace = functions.nuisance, functions.trace
-    rest = without(nuisance, functions.constant)
+    lagged, nuisance, constant, trace = functions
+    rest = without(nuisance, constant)
     norm = np.linalg.norm(rest)
     also = np.vstack((nuisance, rest / norm)) if norm > _NO_CONSTANT else nuisance
-    responses = extreme_responses(functions.lagged, gripper, len(_LAG_SHARES))
+    responses = extreme_responses(lagged, gripper, len(_LAG_SHARES))
     declared, freed = (
         [left_over(without(basis, trace), sign * _cleared(basis, responses)) for sign in (1, -1)]
         for basis in (nuisance, also)
@@ -347,7 +282,7 @@ def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) 
     if noise_rad is not None:
         likelier = declared[0] - declared[1] > _FAR_LIKELIER * noise_rad**2
     else:
-        likelier = declared[0] > declared[1] * math.exp(_FAR_LIKELIER / functions.samples)
+        likelier = declared[0] > declared[1] * math.exp(_FAR_LIKELIER / samples)
     return bool(likelier and freed[0] > freed[1])
 
 
@@ -366,37 +301,35 @@ def _check_turn(
 
     if fits(1.0):
         return None
-    allowed = columns.quantity.units
-    unit = unit_of(path, columns.reading, columns.reading_unit, allowed, columns.unit_key)
+    allowed, said_by = columns.quantity.units, columns.said_by(columns.unit_key)
+    unit = unit_of(path, columns.reading, columns.reading_unit, allowed, said_by)
     hint = _other_units(unit, allowed, fits)
+    alone = f"without any sample the arm turns by {free:.3g} rad"
     if noise_rad is not None and _FAR_ABOVE * noise_rad < turn < smallest:
         return (
-            f"The largest rotation is {turn:.3g} rad, where without any sample the arm turns by "
-            f"{free:.3g} rad: the sample is very stiff, or the unit is not the right one.{hint}"
+            f"The largest rotation is {turn:.3g} rad, where {alone}: the sample is very stiff, or "
+            f"the unit is not the right one.{hint}"
         )
-    limit = (
-        f"at most {largest:.3g} rad: without any sample the arm turns by"
-        if turn > largest
-        else f"at least {smallest:.3g} rad, or less with a given noise (--noise) {_FAR_ABOVE:g} "
-        "times smaller still, where without any sample the arm turns by"
-    )
+    limit = f"at most {largest:.3g} rad: {alone}"
+    if turn < smallest:
+        limit = (
+            f"at least {smallest:.3g} rad, or less with a given noise (--noise) {_FAR_ABOVE:g} "
+            f"times smaller still, where {alone}"
+        )
     sample = np.argmax(np.abs(recording.rotation_rad))
     raise BiogripError(
         f"{place(path, recording.lines[sample], columns.reading)}: found "
         f"{recording.rotation_rad[sample]:.3g} rad as the largest rotation, and {turn:.3g} rad as "
-        f"the largest with the noise smoothed out; allowed is {limit} {free:.3g} rad."
-        f"{hint}"
+        f"the largest with the noise smoothed out; allowed is {limit}.{hint}"
     )
 
 
 def _other_units(unit: str, units: Mapping[str, float], fits: Callable[[float], bool]) -> str:
     """Return a hint on units, or else factors, in which the numbers would be plausible."""
-    factors = {size / units[unit]: f" (is it in {name}?)" for name, size in units.items()}
-    named = [factor for factor in factors if fits(factor)]
-    unnamed = [factor for factor in (1e-6, 1e-3, 1e3, 1e6) if fits(factor)]
-    which = " or ".join(f"{factor:.4g} times{factors[factor]}" for factor in named)
-    which = which or " or ".join(f"{factor:g} times" for factor in unnamed)
-    return f" It would fit if it were {which}." if which else ""
+    named = [(size / units[unit], name) for name, size in units.items()]
+    found = [f"{factor:.4g} times (is it in {name}?)" for factor, name in named if fits(factor)]
+    found = found or [f"{factor:g} times" for factor in (1e-6, 1e-3, 1e3, 1e6) if fits(factor)]
+    return f" It would fit if it were {' or '.join(found)}." if found else ""
 
 
 def _extent(recording: Recording, path: Path) -> str:

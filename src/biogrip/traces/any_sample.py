@@ -1,8 +1,14 @@
-"""Standard deviations of readings whose noise is a share of the rotation.
+"""What a gripper's arm may do with any sample, by which a trace is judged without a model of it.
 
-Weights that followed each reading's own noise would favour readings that are too low by chance.
-So the share is one of the smooth rotation: the best non-negative sum of what springs and dampers
-of any retardation time let the arm do, which needs no sample model.
+A linear viscoelastic sample relaxes by a sum of non-negative exponentials, so a response is a
+non-negative combination of the `extreme_responses`, fitted by non-negative least squares [1]_.
+`proportional_deviations` smooths a trace so: weights that followed each reading's own noise would
+favour readings that are too low by chance.
+
+References
+----------
+.. [1] C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, Prentice-Hall, 1974,
+   chapter 23.
 """
 
 import numpy as np
@@ -11,7 +17,6 @@ from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lagged_torques
 from biogrip.physics.protocol import TorqueHistory
-from biogrip.traces.any_response import extreme_responses
 
 # Retardation times a decade; shortest over the sampling interval, longest over the protocol.
 _A_DECADE, _SHORTEST, _LONGEST = 4, 0.01, 10.0
@@ -26,6 +31,39 @@ _EXCESS = 2.03
 _ROUNDING = 1e-7
 
 
+def extreme_responses(lagged: Array, gripper: Gripper, lags: int) -> Array:
+    """Return extreme responses, (n, n_rows), of which all samples' are non-negative combinations.
+
+    A sample turns the left arm by phi_2 = tau_2/k_2 - x (tau_2/k_2 - (tau_2 - tau_4)/(k_2 + k_4)),
+    where x is the sample's rigidity and decreases, as it relaxes, from at most 1 to at least 0.
+    The extremes are: no sample, rigid ones that relax with one of the lags, and a rigid one.
+
+    Parameters
+    ----------
+    lagged : (n_lagged, n_rows)
+        Torques from `lagged_torques`; the shortest lag is negligible.
+    gripper, lags
+        The gripper, and the number of lags.
+    """
+    k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
+    alone = lagged[:lags] / k_2
+    if len(lagged) == lags:
+        return alone
+    pushed = lagged[lags:] / (k_2 + k_4)
+    return np.vstack((alone - pushed + pushed[0], pushed[0]))
+
+
+def left_over(trace: Array, responses: Array) -> float:
+    """Return the residual sum of squares of a non-negative least-squares fit of the responses."""
+    from scipy.optimize import nnls
+
+    scale = np.linalg.norm(responses, axis=1)
+    scaled = scale > 0
+    if not np.any(scaled):
+        return float(trace @ trace)
+    return float(nnls((responses[scaled] / scale[scaled, None]).T, trace)[1] ** 2)
+
+
 def proportional_deviations(
     time_s: Array,
     rotation_rad: Array,
@@ -35,7 +73,7 @@ def proportional_deviations(
     share: float,
     noise_rad: float | None = None,
 ) -> Array:
-    """Compute standard deviations in proportion to the smooth rotation.
+    """Compute standard deviations of readings in proportion to the smooth rotation.
 
     Parameters
     ----------
@@ -57,7 +95,12 @@ def proportional_deviations(
     (n_samples,)
         In rad.
     """
-    family = _family(time_s, gripper, torque)
+    shortest = _SHORTEST * float(np.diff(time_s).min()) / torque.end_s
+    lags = np.geomspace(shortest, _LONGEST, 2 + int(_A_DECADE * np.log10(_LONGEST / shortest)))
+    lagged = lagged_torques(torque, lags.tolist())(time_s)
+    family = extreme_responses(lagged, gripper, len(lags))
+    sizes = np.linalg.norm(family, axis=1)
+    family = family[sizes > 0] / sizes[sizes > 0, None]
     deviations = np.full(len(time_s), share * np.max(np.abs(rotation_rad)))
     for _ in range(_ROUNDS):
         smooth, rest = _smooth(family, nuisance, rotation_rad, deviations)
@@ -67,19 +110,6 @@ def proportional_deviations(
         else:
             deviations = np.maximum(deviations, _least(np.abs(smooth), rest, share))
     return np.maximum(deviations, _ROUNDING * float(np.max(np.abs(rotation_rad))))
-
-
-def _family(time_s: Array, gripper: Gripper, torque: TorqueHistory) -> Array:
-    """Return responses of the arm whose non-negative sums are all responses, (n, n_samples)."""
-    shortest = _SHORTEST * float(np.diff(time_s).min()) / torque.end_s
-    decades = np.log10(_LONGEST / shortest)
-    shares = np.geomspace(shortest, _LONGEST, 2 + int(_A_DECADE * decades))
-    responses = extreme_responses(
-        lagged_torques(torque, shares.tolist())(time_s), gripper, len(shares)
-    )
-    sizes = np.linalg.norm(responses, axis=1)
-    family: Array = responses[sizes > 0] / sizes[sizes > 0, None]
-    return family
 
 
 def _smooth(

@@ -1,0 +1,310 @@
+"""Reader of recorded traces in the user's own files, with gaps, units and line numbers."""
+
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biogrip.arrays import Array, IntArray
+from biogrip.digits import counted
+from biogrip.errors import BiogripError, nearest
+from biogrip.terminal import visible
+from biogrip.traces.columns import (
+    TIME_UNITS,
+    Columns,
+    listed,
+    place,
+    shortened,
+    unit_of,
+)
+from biogrip.traces.tables import Sheet, Table, find_tables, number_or_inf, read_sheet
+
+FEWEST_SAMPLES = 10
+
+# Relative to the last time: smaller steps are damaged numbers, not a clock's.
+_SHORTEST_STEP = 1e-18
+_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """What was recognised in a file, for people to check before they believe a fit."""
+
+    encoding: str
+    """Name of the encoding."""
+    separator: str
+    """``commas``, ``semicolons`` or ``tabs``."""
+    decimal: str
+    """``point`` or ``comma``."""
+    header_line: int
+    """Line of the names."""
+    units_line: int | None
+    """Line of the row of units, if there is one."""
+    block: int | None
+    """Number of the table, from 1; None if the file has only one."""
+    blocks: int | None
+    """Number of tables, likewise."""
+    preamble: str | None
+    """Some words of the table's preamble."""
+    columns: dict[str, dict[str, str]]
+    """Name, as `column`, and `unit` of each column by its quantity."""
+    rows: int
+    """Number of rows."""
+    gaps: int
+    """Number of rows that were left out as gaps."""
+    averaged: int | None
+    """Number of readings that were averaged, for they have equal times, if any."""
+    outside: int | None
+    """Number of readings that were left out, for they are not among the times to use, if any."""
+    first_s: float
+    """First time."""
+    last_s: float
+    """Last time."""
+
+    def is_usual(self, columns: Columns) -> bool:
+        """Return True if the file is a table as biogrip itself would write it."""
+        odd = (self.units_line, self.block, self.preamble, self.averaged, self.outside)
+        return (
+            (self.encoding, self.separator, self.decimal) == ("UTF-8", "commas", "point")
+            and not any((*odd, columns.block))
+            and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
+        )
+
+    def stated(self, columns: Columns) -> Columns:
+        """Return columns with the units that the file has."""
+        time_unit, unit, *_ = (each["unit"] for each in self.columns.values())
+        return replace(columns, time_unit=time_unit, reading_unit=unit)
+
+    def data(self) -> dict[str, Any]:
+        """Return the form as plain data, without what there is not."""
+        return {key: value for key, value in asdict(self).items() if value is not None}
+
+    def in_words(self, path: Path) -> str:
+        """Return the form as a small table."""
+        found = self.data()
+        columns = found.pop("columns")
+        named = {key: f"{each['column']}, in {each['unit']}" for key, each in columns.items()}
+        rows = (f"\n  {key:<13}{visible(value)}" for key, value in (found | named).items())
+        return f"{visible(path)} is read as{''.join(rows)}"
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recorded trace."""
+
+    time_s: Array
+    """Strictly increasing times, (n_samples,)."""
+    rotation_rad: Array
+    """Closing rotation of the left arm, or another reading in SI units, (n_samples,)."""
+    lines: IntArray
+    """Line number of each sample, from 1, (n_samples,)."""
+    without_number: int
+    """Number of rows left out as gaps."""
+    sd_rad: Array | None = None
+    """Standard deviations of the rotations, (n_samples,), where the file has them."""
+    recognised: Recognised | None = None
+    """What was recognised in the file."""
+
+
+def read_recording(path: Path, columns: Columns) -> Recording:
+    """Read a recorded trace.
+
+    The file is text in UTF-8, UTF-16 or Windows-1252. Empty lines and lines that start with ``#``
+    are ignored. The header is the line that has the columns, or has a row of units below it; of
+    several such tables, ``block`` says which. The header decides the separator: comma, semicolon or
+    tab. With the last two, numbers may have a decimal comma. Cells may be quoted and padded with
+    blanks, but a quoted cell ends on its line. Other columns may hold anything.
+
+    An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
+    row is left out and counted; nothing is interpolated. Other spreadsheet errors, as ``#REF!``,
+    are refused.
+
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        Columns to read; units as `unit_of` finds them.
+
+    Returns
+    -------
+    Recording
+        Trace in SI units.
+
+    Raises
+    ------
+    BiogripError
+        If the file cannot be read as text, lacks a column or repeats it, has it in several blocks
+        of which none is named, its unit is unknown or contradicts the name, a row has too few or
+        too many cells, or text that is neither a finite number nor a gap, a standard deviation is
+        not positive, the time does not increase, or there are fewer than `FEWEST_SAMPLES` samples
+        or more than `MOST_ROWS` rows.
+    """
+    sheet = read_sheet(path, columns)
+    tables, index = find_tables(path, sheet, columns)
+    table = tables[index]
+    header_line = int(sheet.numbers[table.at])
+    indices = _indices(path, header_line, table, columns)
+    units = _units(path, table, indices, columns)
+    values, decimal = _numbers(path, sheet, table, indices)
+    gaps = np.any(np.isnan(values), axis=1)
+    kept, lines = values[~gaps], sheet.numbers[table.first : table.end][~gaps]
+    without_number = int(np.count_nonzero(gaps))
+    _check_count(path, columns, len(kept), without_number)
+    if columns.sd is not None:
+        _check_positive(path, columns.sd, kept[:, 2], lines)
+    averaged = 0
+    if columns.average_repeated:
+        kept, lines, averaged = _averaged(kept, lines)
+    _check_order(path, columns, kept[:, 0], lines)
+    time_s = kept[:, 0] * TIME_UNITS[units[0]]
+    first = -np.inf if columns.from_s is None else columns.from_s
+    last = np.inf if columns.until_s is None else columns.until_s
+    used = (time_s >= first) & (time_s <= last)
+    kept, lines, time_s = kept[used], lines[used], time_s[used]
+    _check_count(path, columns, len(kept), without_number, "usable time")
+    names_and_units = (
+        {"column": table.names[i], "unit": unit} for i, unit in zip(indices, units, strict=True)
+    )
+    recognised = Recognised(
+        encoding=sheet.encoding,
+        separator=_SEPARATORS[sheet.separator],
+        decimal=decimal,
+        header_line=header_line,
+        units_line=None if table.units is None else int(sheet.numbers[table.first - 1]),
+        block=index + 1 if len(tables) > 1 else None,
+        blocks=len(tables) if len(tables) > 1 else None,
+        preamble=table.title or None,
+        columns=dict(zip(columns.named, names_and_units, strict=True)),
+        rows=len(values),
+        gaps=without_number,
+        averaged=averaged or None,
+        outside=int(np.count_nonzero(~used)) or None,
+        first_s=float(time_s[0]),
+        last_s=float(time_s[-1]),
+    )
+    unit = columns.quantity.units[units[1]]
+    sd_rad = None if columns.sd is None else kept[:, 2] * (unit * abs(columns.scale))
+    rotation_rad = kept[:, 1] * (unit * columns.scale)
+    return Recording(time_s, rotation_rad, lines, without_number, sd_rad, recognised)
+
+
+def _indices(path: Path, line: int, table: Table, columns: Columns) -> list[int]:
+    """Return where the columns to read are in a table."""
+    found: dict[int, str] = {}
+    for key, column in columns.named.items():
+        same, where = table.indices(column), place(path, line, column)
+        if not same:
+            raise BiogripError(
+                f"{where}: found no such column, allowed are {listed(table.names)}."
+                f"{nearest(column, table.names)} Say which is which by "
+                f"{columns.said_by(*columns.named)}."
+            )
+        if len(same) > 1:
+            raise BiogripError(f"{where}: found {len(same)} columns of this name, allowed is one.")
+        if same[0] in found:
+            raise BiogripError(
+                f"{where}: found {found[same[0]]} and {key} in one column, allowed are two."
+            )
+        found[same[0]] = key
+    return list(found)
+
+
+def _units(path: Path, table: Table, indices: list[int], columns: Columns) -> list[str]:
+    """Return the units of the columns to read."""
+    below = [table.units[i] if table.units else "" for i in indices]
+    said_by = columns.said_by("time_unit"), columns.said_by(columns.unit_key)
+    time = unit_of(path, columns.time, columns.time_unit, TIME_UNITS, said_by[0], below[0])
+    units, unit = [time], columns.reading_unit
+    for column, cell in zip(list(columns.named.values())[1:], below[1:], strict=True):
+        # Standard deviations are in the unit of the readings.
+        unit = unit_of(path, column, unit, columns.quantity.units, said_by[1], cell)
+        units.append(unit)
+    return units
+
+
+def _numbers(path: Path, sheet: Sheet, table: Table, indices: list[int]) -> tuple[Array, str]:
+    """Return the numbers of columns, (n_rows, n_columns), NaN for gaps, and the decimal sign."""
+    rows, width = slice(table.first, table.end), len(table.names)
+    cells, lines = sheet.cells[rows], sheet.numbers[rows]
+    for index in indices:
+        for row in np.flatnonzero(sheet.widths[rows] <= index)[:1]:
+            raise BiogripError(
+                f"{place(path, lines[row], table.names[index])}: found only "
+                f"{counted(sheet.widths[rows][row], 'cell')} in the row, allowed are the header's "
+                f"{width}."
+            )
+    # Empty cells at the end are common.
+    for row in np.flatnonzero(np.any(cells[:, width:] != "", axis=1))[:1]:
+        raise BiogripError(
+            f"{place(path, lines[row])}: found {counted(sheet.widths[rows][row], 'cell')} in the "
+            f"row, allowed are the header's {width}. A decimal comma needs semicolons or tabs as "
+            "separators."
+        )
+    decimal, values = "point", np.empty((len(cells), len(indices)))
+    for column, texts in enumerate(cells[:, indices].T):
+        if sheet.separator != "," and any("," in text for text in texts):
+            decimal, texts = "comma", [text.replace(",", ".") for text in texts]
+        values[:, column] = np.fromiter(map(number_or_inf, texts), float, len(cells))
+        for row in np.flatnonzero(np.isinf(values[:, column]))[:1]:
+            name = table.names[indices[column]]
+            raise BiogripError(
+                f"{place(path, lines[row], name)}: found '{shortened(texts[row])}', allowed is a "
+                "finite number, or nan, NA, N/A, - or nothing where there is none."
+            )
+    return values, decimal
+
+
+def _averaged(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:
+    """Average successive rows of equal times, as a rounded clock writes them.
+
+    A third column, (n_rows,), has standard deviations; that of a mean is the root of their sum of
+    squares over their number. Returns the means, the lines of the first rows, and the number of
+    rows that are averaged with others.
+    """
+    starts = np.flatnonzero(np.append(True, np.diff(values[:, 0]) != 0))
+    counts = np.diff(np.append(starts, len(values)))
+    shares = values / np.repeat(counts, counts)[:, None]
+    means = np.add.reduceat(shares, starts, axis=0)
+    means[:, 0] = values[starts, 0]
+    if values.shape[1] > 2:
+        means[:, 2] = np.hypot.reduceat(shares[:, 2], starts)
+    return means, lines[starts], int(np.sum(counts[counts > 1]))
+
+
+def _check_count(
+    path: Path, columns: Columns, found: int, without_number: int, what: str = "row"
+) -> None:
+    if found < FEWEST_SAMPLES:
+        gaps = f" ({counted(without_number, 'row')} with NaN)" if without_number else ""
+        *names, last = columns.named.values()
+        which = f"{'both ' if len(names) == 1 else ''}{', '.join(names)} and {last}"
+        raise BiogripError(
+            f"{place(path)}: found {counted(found, what)} with a number in {which}{gaps}, "
+            f"allowed are at least {FEWEST_SAMPLES}."
+        )
+
+
+def _check_positive(path: Path, column: str, sd: Array, lines: IntArray) -> None:
+    for row in np.flatnonzero(sd <= 0)[:1]:
+        raise BiogripError(
+            f"{place(path, lines[row], column)}: found {sd[row]:.15g}, allowed is a standard "
+            "deviation above 0."
+        )
+
+
+def _check_order(path: Path, columns: Columns, time: Array, lines: IntArray) -> None:
+    least = _SHORTEST_STEP * float(np.max(np.abs(time)))
+    for row in np.flatnonzero(np.diff(time) <= least)[:1]:
+        before, now = time[row : row + 2]
+        found, hint = f"{now:.15g} after {before:.15g}", ""
+        if now == before:
+            found = f"{now:.15g} repeated"
+            way = columns.said_by("average_repeated")
+            hint = f" The readings of equal times are averaged by {way}."
+        by = f", by more than {least:.1g}" if now > before else ""
+        raise BiogripError(
+            f"{place(path, lines[row + 1], columns.time)}: found {found} "
+            f"(line {lines[row]}), allowed are times that increase{by}.{hint}"
+        )

@@ -1,0 +1,323 @@
+"""Tables in a text file: its encoding and cells, and where its tables begin and end.
+
+A table is a row of names, perhaps a row of units, and rows of cells, perhaps below a preamble.
+Anton Paar's programs write lines like ``Interval:``, a row of names, perhaps an empty row, and a
+row of units in brackets. TRIOS writes ``[step]``, the name of the step, names, and bare units.
+"""
+
+import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from io import BytesIO
+from itertools import pairwise
+from math import inf, isfinite, nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biogrip.arrays import IntArray
+from biogrip.digits import counted
+from biogrip.errors import BiogripError
+from biogrip.traces.columns import (
+    TIME_UNITS,
+    Columns,
+    in_brackets,
+    listed,
+    place,
+    plain_name,
+    shortened,
+    trace_file_problem,
+    unit_in_cell,
+)
+
+SEPARATORS = ("\t", ";", ",")
+
+# Guesses among all encodings take µ for Chinese.
+_ENCODINGS = {
+    "utf_8": "UTF-8",
+    "utf_16": "UTF-16",
+    "utf_16_le": "UTF-16",
+    "utf_16_be": "UTF-16",
+    "cp1252": "Windows-1252",
+}
+_LINE_END = re.compile(r"\r\n|\r|\n")
+# Empty lines and comments; #REF!, #DIV/0! or #NAME? followed by a separator are cells.
+_LEFT_OUT = re.compile(r" *(?:$|#(?!(?:[A-Z0-9/_]+[!?]|N/A|NV)\s*[,;\t]))")
+# Begins like a row of numbers.
+_ROW = re.compile(r'[\s",;]*[-+]?[.\d][\d.,eE+-]*[\s",;]')
+_GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
+_PREAMBLE_LINES_SHOWN = 3
+_NAMES_SHOWN = 8
+_TABLES_SHOWN = 50
+# Where separator and header are looked for if no line has the columns.
+_LINES_SEARCHED = 200
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Cells of a text file, without empty lines and comments."""
+
+    encoding: str
+    """Name of the encoding."""
+    separator: str
+    """Cell separator."""
+    cells: NDArray[Any]
+    """Cells without padding, (n_lines, n_columns), empty where a line is shorter."""
+    widths: IntArray
+    """Numbers of separators and one, (n_lines,)."""
+    numbers: IntArray
+    """Line numbers in the file, from 1, (n_lines,)."""
+    headers: list[int]
+    """Places of lines that may be headers: of the first, and of those that begin with words."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table in a sheet; its places are indices of the sheet's lines."""
+
+    at: int
+    """Place of the names."""
+    names: list[str]
+    """Names of the columns."""
+    units: list[str] | None
+    """Cells of the row of units, if there is one."""
+    first: int
+    """Place of the first row."""
+    is_step: bool = False
+    """True if ``[step]`` and a name are right above the names."""
+    end: int = 0
+    """Place after the last row."""
+    title: str = ""
+    """Some words of the preamble."""
+
+    def indices(self, column: str) -> list[int]:
+        """Return which columns have a name."""
+        return [i for i, name in enumerate(self.names) if plain_name(name) == plain_name(column)]
+
+    def common(self, columns: Columns) -> int:
+        """Count the columns to read that it has."""
+        return sum(bool(self.indices(name)) for name in columns.named.values())
+
+    def has(self, columns: Columns) -> bool:
+        """Return True if it has all columns to read."""
+        return self.common(columns) == len(columns.named)
+
+
+def read_sheet(path: Path, columns: Columns) -> Sheet:
+    """Read the cells of a text file.
+
+    Raises
+    ------
+    BiogripError
+        If it is no file, or no text in UTF-8, UTF-16 or Windows-1252, or a quote has no end.
+    """
+    # Imported here: loading pandas takes long.
+    import pandas as pd
+
+    encoding, text = _read_text(path)
+    lines = _LINE_END.split(text)
+    kept = [i for i, line in enumerate(lines) if not _LEFT_OUT.match(line)]
+    if not kept:
+        raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
+    lines, numbers = [lines[i] for i in kept], np.array(kept) + 1
+    headers = [i for i, line in enumerate(lines) if i == 0 or not _ROW.match(line)]
+    separator = _separator(lines, [lines[i] for i in headers], columns)
+    widths = np.array([line.count(separator) for line in lines]) + 1
+    try:
+        frame = pd.read_csv(
+            BytesIO("\n".join(lines).encode()),
+            sep=separator,
+            header=None,
+            names=range(widths.max()),
+            index_col=False,
+            dtype=object,
+            na_filter=False,
+            skip_blank_lines=False,
+            skipinitialspace=True,
+        )
+    except ValueError:
+        # A quote is open to the end.
+        frame = pd.DataFrame()
+    if len(frame) != len(lines):
+        is_open = re.compile(rf'(?:^|{separator}) *"(?:[^"]|"")*$')
+        row = next((i for i, line in enumerate(lines) if is_open.search(line)), 0)
+        raise BiogripError(
+            f"{place(path, numbers[row])}: found a quote without its end, allowed are quoted cells "
+            "that end on their line."
+        )
+    cells = np.vectorize(str.strip, otypes=[object])(frame.to_numpy())
+    return Sheet(encoding, separator, cells, widths, numbers, headers)
+
+
+def _read_text(path: Path) -> tuple[str, str]:
+    """Return the encoding that a file seems to have, and its text."""
+    from charset_normalizer import from_bytes
+
+    if problem := trace_file_problem(path):
+        raise BiogripError(f"{place(path)}: {problem}")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise BiogripError(f"{place(path)}: cannot be read: {error.strerror}.") from error
+    matches = from_bytes(content, cp_isolation=[*_ENCODINGS])
+    # What can be UTF-8 is.
+    best = next((match for match in matches if match.encoding == "utf_8"), matches.best())
+    if best is not None:
+        return _ENCODINGS[best.encoding], str(best)
+    codec = "utf-16" if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8"
+    line, found = None, "binary data"
+    try:
+        content.decode(codec)
+    except UnicodeDecodeError as error:
+        line = len(_LINE_END.split(content[: error.start].decode(codec)))
+        found = f"the byte 0x{content[error.start]:02x}"
+    raise BiogripError(
+        f"{place(path, line)}: found {found}, allowed is text in UTF-8, UTF-16 or Windows-1252."
+    )
+
+
+def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -> str:
+    """Return the separator by which a line has most columns to read, or which most lines have."""
+
+    def merit(separator: str) -> tuple[int, int]:
+        rows = ({plain_name(cell.strip('" ')) for cell in row.split(separator)} for row in headers)
+        common = max(len(columns.plain_names & row) for row in rows)
+        return common, sum(separator in line for line in lines[:_LINES_SEARCHED])
+
+    return max(SEPARATORS, key=merit)
+
+
+def find_tables(path: Path, sheet: Sheet, columns: Columns) -> tuple[list[Table], int]:
+    """Find the tables of a file, and the index of the block to read, or the only one that can be.
+
+    Raises
+    ------
+    BiogripError
+        With a list of the tables, if there is no such block, or no block is asked for and several
+        have the columns.
+    """
+    tables = _tables(sheet, columns) or [_likely_table(sheet)]
+    common = [table.common(columns) for table in tables]
+    count = common.count(len(columns.named))
+    if columns.block is None and count <= 1:
+        return tables, common.index(max(common))
+    if columns.block is not None and columns.block <= len(tables):
+        return tables, columns.block - 1
+    found, allowed = f"no block {columns.block}", f"are 1 to {len(tables)}:"
+    if columns.block is None:
+        names = ", ".join(f"'{name}'" for name in columns.named.values())
+        found = f"{counted(count, 'block')} with the columns {names}"
+        allowed = f"is one: say which by {columns.said_by('block')}."
+    shown = [
+        f"\n  {number}: {_in_words(sheet, table, columns)}"
+        for number, table in enumerate(tables[:_TABLES_SHOWN], 1)
+    ]
+    more = [f"\n  and {len(tables)} in all"] if len(tables) > _TABLES_SHOWN else []
+    raise BiogripError(f"{place(path)}: found {found}, allowed {allowed}{''.join(shown + more)}")
+
+
+def _in_words(sheet: Sheet, table: Table, columns: Columns) -> str:
+    """Return where a table is, some of its names, and the range of its times."""
+    title = f", {table.title}" if table.title else ""
+    names = [name for name in table.names if name and not name.endswith(":")]
+    rows = counted(table.end - table.first, "row")
+    said = f"line {sheet.numbers[table.at]}{title}; {listed(names, _NAMES_SHOWN)}; {rows}"
+    for time in table.indices(columns.time)[:1]:
+        if table.end > table.first:
+            first, last = map(shortened, sheet.cells[[table.first, table.end - 1], time])
+            unit = table.units[time].strip("[]() ") if table.units else ""
+            said += f", {first} to {last} {unit}".rstrip()
+    return said
+
+
+def _tables(sheet: Sheet, columns: Columns) -> list[Table]:
+    """Return all tables in the order of the file."""
+    found = (_header(sheet, at, columns) for at in sheet.headers)
+    tables = [table for table in found if table is not None]
+    ends = [0, *(_end(sheet, *pair) for pair in pairwise(tables)), len(sheet.cells)]
+    return [
+        replace(table, end=end, title=_title(sheet, start, table))
+        for table, (start, end) in zip(tables, pairwise(ends), strict=False)
+    ]
+
+
+def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
+    """Return a table whose names are on a line, or None if the line is no header.
+
+    A header has the columns to read, or is above a row of units in brackets and rows of numbers,
+    or follows ``[step]`` and the name of a step.
+    """
+    is_step = at >= 2 and str(sheet.cells[at - 2, 0]).lower() == "[step]"
+    table = Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1, is_step)
+    names, has_columns = table.names, table.has(columns)
+    if not has_columns and (_count_numbers(names) or sum(map(bool, names)) < 2):
+        return None
+    below = [i for i in range(at + 1, min(at + 4, len(sheet.cells))) if any(sheet.cells[i])]
+    if below and not any(sheet.cells[below[0], len(names) :]):
+        units = sheet.cells[below[0], : len(names)].tolist()
+        numbers = _count_numbers(sheet.cells[below[1]]) if len(below) > 1 else 0
+        times = [units[i] for i in table.indices(columns.time) if i < len(units)]
+        if (
+            (is_step and numbers > _count_numbers(units))
+            or (all(in_brackets(unit) for unit in units if unit) and (has_columns or numbers > 0))
+            or (has_columns and any(unit_in_cell(unit, TIME_UNITS) for unit in times))
+        ):
+            return replace(table, units=units, first=below[0] + 1)
+    return table if has_columns else None
+
+
+def _likely_table(sheet: Sheet) -> Table:
+    """Return what may be the table of a file without the columns: names above numbers."""
+    numbers = [*map(_count_numbers, sheet.cells[:_LINES_SEARCHED])]
+    likely = [
+        at
+        for at, (here, below) in enumerate(pairwise(numbers))
+        if below > here == 0 and sum(map(bool, sheet.cells[at])) > 1
+    ]
+    at = likely[0] if likely else 0
+    return Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1)
+
+
+def _end(sheet: Sheet, table: Table, following: Table) -> int:
+    """Return the place after the rows of a table, where the preamble of the following begins."""
+    if following.is_step:
+        return max(following.at - 2, table.first)
+    end = following.at
+    while end > table.first and _in_preamble(sheet.cells[end - 1], len(table.names)):
+        end -= 1
+    return end
+
+
+def _in_preamble(cells: Sequence[str], width: int) -> bool:
+    """Return True if cells are no row, even a damaged one: few, or beginning like ``Test:``."""
+    filled = [i for i, cell in enumerate(cells) if cell]
+    first = cells[filled[0]] if filled else ":"
+    return first.endswith(":") or (not _is_number(first) and filled[-1] + 1 < width)
+
+
+def _title(sheet: Sheet, start: int, table: Table) -> str:
+    """Return words of a preamble: the name of a step, or the last few lines."""
+    start = table.at - 1 if table.is_step else max(start, table.at - _PREAMBLE_LINES_SHOWN)
+    words = (" ".join(filter(None, cells)) for cells in sheet.cells[start : table.at])
+    return "; ".join(shortened(each) for each in words if each)
+
+
+def _count_numbers(cells: Sequence[str]) -> int:
+    return sum(map(_is_number, cells))
+
+
+def _is_number(cell: str) -> bool:
+    """Return True if a cell is a finite number, with a decimal point or comma."""
+    return isfinite(number_or_inf(cell.replace(",", ".")))
+
+
+def number_or_inf(cell: str) -> float:
+    """Return a cell's number, NaN for a gap, and inf for anything else."""
+    try:
+        # Python reads 1_000 as a number; in a table it is damage.
+        return inf if "_" in cell else float(cell)
+    except ValueError:
+        return nan if cell.lower() in _GAPS else inf

@@ -1,0 +1,322 @@
+"""Files of traces: kept ones, with what is read of them or said of them, and any other ones."""
+
+import csv
+import re
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from biogrip.errors import BiogripError
+from biogrip.physics.instruments import COMPLIANCE, INSTRUMENTS, MODULUS, ROTATION
+from biogrip.traces.columns import TIME_UNITS, Columns, unit_of
+from biogrip.traces.reader import Recording, read_recording
+
+FILES = Path(__file__).with_name("files")
+KEPT: list[dict[str, Any]] = yaml.safe_load((FILES / "files.yaml").read_text(encoding="utf-8"))
+PLAIN = Columns("time_s", "rotation_rad")
+ROWS = tuple(f"{i},{i}e-6" for i in range(12))
+
+
+def columns_of(given: dict[str, Any]) -> Columns:
+    quantity = INSTRUMENTS[given.get("quantity", "rotation")].read
+    return Columns(**{**given, "quantity": quantity})
+
+
+def first_last_sum(values: Any) -> list[float]:
+    return [values[0], values[-1], values.sum()]
+
+
+def refusal(path: Path, columns: Columns = PLAIN) -> str:
+    with pytest.raises(BiogripError) as error:
+        read_recording(path, columns)
+    return str(error.value)
+
+
+@pytest.mark.parametrize("kept", KEPT, ids=lambda kept: f"{kept['file']} {kept['columns']}")
+def test_a_kept_file_is_read_or_refused_as_its_table_says(
+    kept: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The numbers are those of a reader by the csv module, from before pandas read the files."""
+    monkeypatch.chdir(FILES)
+    path, columns = Path(kept["file"]), columns_of(kept["columns"])
+    if "lines" in kept:
+        lines = path.read_bytes().decode("latin-1").splitlines()
+        for number, line in kept["lines"].items():
+            lines[number - 1 : number] = [line]
+        monkeypatch.chdir(tmp_path)
+        path.write_bytes("\n".join(lines).encode("latin-1"))
+    if "message" in kept:
+        assert refusal(path, columns) == kept["message"]
+        return
+    found = read_recording(path, columns)
+    assert found.recognised is not None
+    assert found.recognised.data() == kept["read_as"]
+    assert first_last_sum(found.lines) == kept["lines_read"]
+    assert first_last_sum(found.rotation_rad) == pytest.approx(kept["reading"], rel=1e-14)
+    assert found.time_s.sum() == pytest.approx(kept["time_sum_s"], rel=1e-14)
+    assert found.without_number == kept["read_as"]["gaps"]
+    if "sd" in kept:
+        assert found.sd_rad is not None
+        assert first_last_sum(found.sd_rad) == pytest.approx(kept["sd"], rel=1e-14)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    values=st.lists(st.floats(-1e300, 1e300), min_size=10, max_size=20),
+    decimal=st.sampled_from([(",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ",")]),
+    line_end=st.sampled_from(["\n", "\r\n", "\r"]),
+    encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "cp1252"]),
+    quoting=st.sampled_from([csv.QUOTE_ALL, csv.QUOTE_MINIMAL, csv.QUOTE_NONNUMERIC]),
+    gap=st.sampled_from(["", "NaN", "nan", "NA", "N/A", "-", "n/a", "#N/A", "#NV", " "]),
+    more=st.lists(st.sampled_from(["", "  ", "# 1,2", "#REF!", " #x", "##;1"]), max_size=3),
+    seed=st.integers(0, 1000),
+)
+def test_what_pandas_writes_is_read_to_the_last_bit(
+    tmp_path_factory: pytest.TempPathFactory,
+    values: list[float],
+    decimal: tuple[str, str],
+    line_end: str,
+    encoding: str,
+    quoting: int,
+    gap: str,
+    more: list[str],
+    seed: int,
+) -> None:
+    """With gaps, other columns, comments and empty lines between the rows."""
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(1e-3, 10, len(values)))
+    frame = pd.DataFrame({"angle (µrad)": values, "note, é": 'any; "thing"', "time_s": times})
+    holes = rng.choice(len(values) + 1, 2)
+    frame = pd.concat([frame[: holes[0]], frame[:0].reindex([0]), frame[holes[0] :]])
+    path = tmp_path_factory.mktemp("t") / "t.csv"
+    frame.to_csv(
+        path,
+        sep=decimal[0],
+        decimal=decimal[1],
+        index=False,
+        quoting=quoting,  # type: ignore[arg-type]
+        na_rep=gap,
+        lineterminator="\n",
+    )
+    lines = path.read_text("utf-8").splitlines()
+    for line in more:
+        lines.insert(int(rng.integers(len(lines) + 1)), line)
+    path.write_bytes("".join(line + line_end for line in lines).encode(encoding))
+    found = read_recording(path, Columns("time_s", "angle (urad)"))
+    np.testing.assert_array_equal(found.time_s, times)
+    np.testing.assert_array_equal(found.rotation_rad, np.array(values) * 1e-6)
+    assert found.without_number == 1
+    for line, time in zip(found.lines, times, strict=True):
+        assert repr(float(time)).replace(".", decimal[1]) in lines[line - 1]
+
+
+UNITS = {
+    "s": (1.0, TIME_UNITS),
+    "ms": (1e-3, TIME_UNITS),
+    "min": (60.0, TIME_UNITS),
+    "h": (3600.0, TIME_UNITS),
+    "rad": (1.0, ROTATION.units),
+    "mrad": (1e-3, ROTATION.units),
+    "urad": (1e-6, ROTATION.units),
+    "\u00b5rad": (1e-6, ROTATION.units),
+    "\u03bcrad": (1e-6, ROTATION.units),
+    "deg": (0.017453292519943295, ROTATION.units),
+    "°": (0.017453292519943295, ROTATION.units),
+    "Pa": (1.0, MODULUS.units),
+    "1/kPa": (1e-3, COMPLIANCE.units),
+    "Pa^-1": (1.0, COMPLIANCE.units),
+    "Pa**-1": (1.0, COMPLIANCE.units),
+    "Pa-1": (1.0, COMPLIANCE.units),
+    "Pa\u207b\u00b9": (1.0, COMPLIANCE.units),
+}
+
+
+def unit(column: str, given: str | None, allowed: Any, below: str = "") -> str:
+    return unit_of(Path("t.csv"), column, given, allowed, "HOW", below)
+
+
+@pytest.mark.parametrize("written", UNITS)
+def test_a_unit_is_read_off_a_name_or_a_row_of_units_or_stated(written: str) -> None:
+    size, allowed = UNITS[written]
+    names = [f"x ({written})", f"x [{written}]", f"x( {written} )", f"2 [{written}]"]
+    if written.isalpha():
+        names += [f"x_{written}", f"x_2_{written}"]
+    if written.startswith("1/"):
+        names += [f"x_per_{written[2:]}"]
+    found = {unit(name, None, allowed) for name in names}
+    found |= {unit("x", None, allowed, cell) for cell in (written, f"[{written}]", f"({written})")}
+    if "^" not in written and "-1" not in written and "\u207b" not in written:
+        found |= {unit(name, written, allowed) for name in ("x", "phi_left", *names)}
+    assert [allowed[each] for each in found] == [size]
+
+
+@pytest.mark.parametrize(
+    ("column", "given", "below", "message"),
+    [
+        *(
+            (name, None, "", "found no unit, neither stated (by HOW) nor")
+            for name in ("phi", "x_s")
+        ),
+        *((name, None, "", "found no unit") for name in ("phi_left", "phi (rad/s)", "phi_Mrad")),
+        ("phi", None, "[V]", "found no unit (but '[V]' below it)"),
+        ("phi", None, "m", "found no unit (but 'm' below it)"),
+        ("phi", "V", "", "found the unit 'V', allowed are rad, mrad, urad, deg."),
+        (
+            "phi_mrad",
+            "urad",
+            "",
+            "found the unit 'urad' where the name says 'mrad', allowed is one",
+        ),
+        ("phi", "rad", "deg", "found the unit 'rad' where the row of units says 'deg'"),
+        ("phi_mrad", None, "rad", "found the unit 'mrad' where the row of units says 'rad'"),
+    ],
+)
+def test_a_unit_is_never_guessed(column: str, given: str | None, below: str, message: str) -> None:
+    with pytest.raises(BiogripError) as error:
+        unit(column, given, ROTATION.units, below)
+    assert str(error.value).startswith(f"t.csv, column '{column}': {message}")
+
+
+@pytest.mark.parametrize("given", ["hours", "hour", "HR", "h "])
+def test_a_unit_that_is_spelled_out_is_a_unit_in_a_row_and_a_hint_elsewhere(given: str) -> None:
+    assert unit("t", None, TIME_UNITS, f"[{given}]") == "h"
+    if given.strip() != "h":
+        with pytest.raises(BiogripError, match=re.escape("Did you mean 'h'?")):
+            unit("t", given, TIME_UNITS)
+    with pytest.raises(BiogripError, match="found no unit"):
+        unit("t", None, TIME_UNITS, "[m]")
+
+
+@pytest.mark.parametrize("sd", [True, False])
+def test_readings_of_equal_times_are_averaged(tmp_path: Path, sd: bool) -> None:
+    rng = np.random.default_rng(1)
+    frame = pd.DataFrame({"time_s": np.repeat(np.arange(15), rng.integers(1, 5, 15))})
+    frame["modulus_Pa"], frame["sd"] = rng.uniform(1, 2, (2, len(frame)))
+    frame.to_csv(tmp_path / "t.csv", index=False)
+    columns = {"time": "time_s", "reading": "modulus_Pa", "quantity": "modulus"}
+    columns |= {"sd": "sd"} if sd else {}
+    found = read_recording(tmp_path / "t.csv", columns_of({**columns, "average_repeated": True}))
+    groups = frame.groupby("time_s")
+    np.testing.assert_array_equal(found.time_s, np.arange(15))
+    np.testing.assert_allclose(found.rotation_rad, groups["modulus_Pa"].mean(), rtol=1e-13)
+    first = frame.drop_duplicates("time_s").index + 2
+    np.testing.assert_array_equal(found.lines, first)
+    counts = groups.size()
+    assert found.recognised is not None
+    assert found.recognised.averaged == counts[counts > 1].sum() > 0
+    if sd:
+        of_means = groups["sd"].apply(lambda own: np.sqrt((own**2).sum())) / counts
+        assert found.sd_rad is not None
+        np.testing.assert_allclose(found.sd_rad, of_means, rtol=1e-13)
+
+
+def test_what_was_recognised_is_a_small_table_unless_it_is_usual() -> None:
+    path = FILES / "anton_paar_semicolons.cp1252.csv"
+    columns = columns_of(
+        {"time": "Time", "reading": "Relaxation Modulus", "quantity": "modulus", "block": 2}
+    )
+    form = read_recording(path, columns).recognised
+    assert form is not None
+    assert not form.is_usual(columns)
+    assert form.in_words(Path("t.tsv")).split("\n") == [
+        "t.tsv is read as",
+        "  encoding     Windows-1252",
+        "  separator    semicolons",
+        "  decimal      comma",
+        "  header_line  22",
+        "  units_line   24",
+        "  block        2",
+        "  blocks       2",
+        "  preamble     Interval: 2",
+        "  rows         12",
+        "  gaps         0",
+        "  first_s      12.5",
+        "  last_s       18.0",
+        "  time         Time, in s",
+        "  modulus      Relaxation Modulus, in kPa",
+    ]
+    plain = read_recording(FILES / "plain.csv", PLAIN).recognised
+    assert plain is not None
+    assert plain.is_usual(PLAIN)
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+def test_a_byte_that_is_no_text_is_placed_however_late_it_is(tmp_path: Path, newline: str) -> None:
+    """The byte 0x81 is no character of Windows-1252."""
+    lines = ["time_s,rotation_rad", *(f"{i},{i}" for i in range(5000)), "1,\x81"]
+    (tmp_path / "t.csv").write_bytes(newline.join(lines).encode("latin-1"))
+    assert ", line 5002: found the byte 0x81, allowed is text in UTF-8" in refusal(
+        tmp_path / "t.csv"
+    )
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "place"),
+    [
+        (f"time_s,rotation,{200_000 * 'x'}", "4,1,2", ", line 1"),
+        ("time_s,rotation_rad", f"4,{200_000 * '1'}", ", line 6"),
+        (",".join(map(str, range(5000))), "4,1", ", line 1"),
+    ],
+    ids=["name", "cell", "names"],
+)
+def test_endless_text_is_refused_in_few_words(
+    tmp_path: Path, header: str, row: str, place: str
+) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("\n".join([header, *ROWS[:4], row, *ROWS[5:]]))
+    said = refusal(path)
+    assert said.startswith(f"{path}{place}")
+    assert len(said) < 1000
+
+
+def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+    assert "found the folder" in refusal(tmp_path)
+    assert "allowed is a file that exists" in refusal(tmp_path / (300 * "x"))
+
+
+def damaged(content: bytes, rng: np.random.Generator) -> bytes:
+    """Content with a piece replaced, left out or repeated, and perhaps without its end."""
+    start = int(rng.integers(len(content)))
+    piece = content[start : start + int(rng.integers(1, 60))]
+    others = [rng.bytes(1), b"", 2 * piece, b"\n", b"[step]\n", b'"', b"9", b"Time\t"]
+    end = start + int(rng.choice([1, len(piece)]))
+    made = content[:start] + others[rng.integers(len(others))] + content[end:]
+    return made if rng.integers(2) else made[: int(rng.integers(len(made)))]
+
+
+def is_sound(recording: Recording) -> bool:
+    increase = np.all(np.diff(recording.time_s) > 0)
+    return bool(increase and np.all(np.isfinite(recording.rotation_rad)))
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        next(kept for kept in KEPT if kept["file"] == name and "read_as" in kept)
+        for name in ("plain.csv", "anton_paar.utf16.csv", "trios.txt", "volts.cp1252.csv")
+    ],
+    ids=lambda kept: kept["file"],
+)
+def test_a_damaged_file_is_refused_or_leaves_a_trace(kept: dict[str, Any], tmp_path: Path) -> None:
+    content, rng = (FILES / kept["file"]).read_bytes(), np.random.default_rng(5)
+    columns, path, read = columns_of(kept["columns"]), tmp_path / "t.csv", 0
+    for _ in range(60):
+        path.write_bytes(damaged(content, rng))
+        with suppress(BiogripError):
+            assert is_sound(read_recording(path, columns))
+            read += 1
+    assert 0 < read < 60
+
+
+def test_random_bytes_are_refused(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        (tmp_path / "t.csv").write_bytes(rng.bytes(int(rng.integers(1, 5000))))
+        refusal(tmp_path / "t.csv")
