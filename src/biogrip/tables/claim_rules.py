@@ -1,12 +1,13 @@
 """Rules by which a claim of the paper is called replicated, in part, not, or impossible to tell.
 
-Results that claims of the paper are judged by.
+Claims are functions under `@claim`, in the modules `claims_on_*`; this one has the rules that they
+share, and the results that they are given.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -52,6 +53,33 @@ class Judged:
     evidence: str
 
 
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper."""
+
+    place: str
+    """Section, table or figure."""
+    words: str
+    """The claim as the paper has it, shortened."""
+    judge: Callable[["Results"], Judged]
+
+
+CLAIMS: list[Claim] = []
+"""All claims, in the order of the paper, which is that of their functions."""
+
+_Judge = TypeVar("_Judge", bound=Callable[["Results"], Judged])
+
+
+def claim(place: str, words: str) -> Callable[[_Judge], _Judge]:
+    """Add a claim, with the decorated function as its rule, to `CLAIMS`."""
+
+    def add(judge: _Judge) -> _Judge:
+        CLAIMS.append(Claim(place, words, judge))
+        return judge
+
+    return add
+
+
 def by_share(share: float) -> str:
     """Judge something that holds for a share of seeds or settings."""
     if share >= MOST:
@@ -88,6 +116,11 @@ def altogether(verdicts: Iterable[str]) -> str:
 def plain(value: float, digits: int = 3) -> str:
     """Return a number in words of evidence: with commas, not with an exponent, if it is large."""
     return f"{float(f'{value:.{digits}g}'):,g}"
+
+
+def percent(share: float) -> str:
+    """Return a share in words of evidence."""
+    return f"{100 * share:.0f} %"
 
 
 def share_within_a_decade(values: "pd.Series[float]", target: float) -> float:
@@ -199,18 +232,14 @@ def read_results(
     sweeps: list[Path],
 ) -> Results:
     """Read results from the files of all the paper's cases, in their order, and from tables."""
-    found = {path.stem: read_frame(path, "a table", ()) for path in tables}
     runs = {}
     for (name, case), identified, history in zip(
         study.cases.items(), identifications, histories, strict=True
     ):
-        number = case.truth.published.table
+        truth, number = case.truth, case.truth.published.table
         if study.shown == "genetic" and number is not None:
-            runs[number] = _runs(name, case.truth, identified, history)
-    return Results(study, found, runs, {file.stem: file for file in sweeps})
-
-
-def _runs(name: str, truth: Truth, identified: Path, history: Path) -> Runs:
-    columns = ["best_misfit", *(p.column for p in truth.model.parameters)]
-    found = read_identifications(identified, "genetic")
-    return Runs(name, truth, found, read_histories(history, "genetic", columns))
+            columns = ["best_misfit", *(p.column for p in truth.model.parameters)]
+            found = read_identifications(identified, "genetic")
+            runs[number] = Runs(name, truth, found, read_histories(history, "genetic", columns))
+    of_study = {path.stem: read_frame(path, "a table", ()) for path in tables}
+    return Results(study, of_study, runs, {file.stem: file for file in sweeps})

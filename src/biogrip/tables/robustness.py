@@ -1,7 +1,4 @@
-"""Settings and inputs shared by the table and the heat maps of a sweep.
-
-Results of a sweep: a row per case and point.
-"""
+"""Results of a sweep: the settings that its table and heat maps share, and the table."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +11,7 @@ from biogrip.judging.fisher import headlines
 from biogrip.stages.sweeps import POINTS
 from biogrip.study.study import Study
 from biogrip.study.sweeps import AxisBlock
-from biogrip.tables.layout import Cell, Column, Table
+from biogrip.tables.layout import Column, Row, Table
 
 
 @dataclass(frozen=True)
@@ -82,7 +79,7 @@ def headlines_of(points: pd.DataFrame) -> list[str]:
     return headlines(list(pairs))
 
 
-# Name and heading of columns that exist for every method.
+# By column of points: name and heading of the columns that the table has for every method.
 _BY_METHOD = {
     "near_noise_share": ("near_noise", "Share {near_noise}"),
     "basin_share": ("basin", "Share in the true basin"),
@@ -93,34 +90,38 @@ _BY_METHOD = {
 
 def robustness(maps: HeatMaps, points: Path) -> Table:
     """Join the points of a sweep over all its cases."""
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for name in maps.cases:
         found = read_points(points, maps.name, name)
         for quantity in headlines_of(found):
             chosen = found[found["quantity"] == quantity]
             for (row, column), group in chosen.groupby(["row", "column"], sort=False):
                 by_method = group.set_index("method")
+                head = {
+                    "case": name,
+                    "row": maps.rows.values[row],
+                    "column": maps.columns.values[column],
+                    "quantity": quantity,
+                    "bound_percent": float(by_method["bound_percent"].iloc[0]),
+                }
                 rows.append(
-                    (
-                        name,
-                        maps.rows.values[row],
-                        maps.columns.values[column],
-                        quantity,
-                        *(float(by_method[c][m]) for c in _BY_METHOD for m in maps.methods),
-                        float(by_method["bound_percent"].iloc[0]),
-                    )
+                    head
+                    | {
+                        f"{ours}_{method}": float(by_method.loc[method, theirs])
+                        for theirs, (ours, _) in _BY_METHOD.items()
+                        for method in maps.methods
+                    }
                 )
     words = near_noise_words(maps.near_noise_tolerance)
-    titles = {name: method.title for name, method in maps.methods.items()}
     columns = (
         Column("case", "Case"),
         Column("row", _capital(maps.rows.title)),
         Column("column", _capital(maps.columns.title)),
         Column("quantity", "Quantity"),
         *(
-            Column(f"{name}_{m}", f"{heading.format(near_noise=words)}, {t}", 2)
+            Column(f"{name}_{m}", f"{heading.format(near_noise=words)}, {method.title}", 2)
             for name, heading in _BY_METHOD.values()
-            for m, t in titles.items()
+            for m, method in maps.methods.items()
         ),
         Column("bound_percent", "Bound, rest known %", 2),
     )
