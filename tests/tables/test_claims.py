@@ -8,9 +8,8 @@ import pytest
 
 from biogrip.physics.models import Published, Sample, Truth
 from biogrip.records.rows import read_table
-from biogrip.tables import claims_on_algorithm as algorithm
-from biogrip.tables import claims_on_instrument as instrument
-from biogrip.tables import claims_on_values as values
+from biogrip.tables import claims_on_method as method
+from biogrip.tables import claims_on_results as results
 from biogrip.tables.claim_rules import (
     IN_PART,
     NOT,
@@ -93,7 +92,7 @@ def test_orders_of_magnitude_at_generation_20_are_those_of_that_generation() -> 
         for seed in range(3 * SEEDS)
         for generation in ((0, 10) if seed % 3 == 0 else (0, 10, 19, 30))
     ]
-    judged = algorithm.judge_early_orders(runs(history_of(rows)))
+    judged = results.judge_early_orders(runs(history_of(rows)))
     assert judged.verdict == IN_PART
     assert "generation 20: k 0 %, k_p 100 %, c 33 %; at 60: k 67 %, k_p 100 %" in judged.evidence
 
@@ -122,15 +121,15 @@ def identified(table: int, **columns: Any) -> Results:
 
 def test_the_sum_of_dampers_may_be_right_where_c_is_not() -> None:
     c = np.linspace(5, 60, SEEDS)
-    judged = values.judge_key_damper(identified(6, c=c, c_p=100.0 - c))
+    judged = results.judge_key_damper(identified(6, c=c, c_p=100.0 - c))
     assert judged.verdict == IN_PART
     assert "3 %: 0 % for c, 100 % for c + c_p" in judged.evidence
-    assert values.judge_key_damper(identified(6, c=c, c_p=0 * c)).verdict == NOT
+    assert results.judge_key_damper(identified(6, c=c, c_p=0 * c)).verdict == NOT
 
 
 def test_errors_are_held_against_the_level_of_the_noise() -> None:
     k = np.where(np.arange(SEEDS) < 10, 8.7, 8.9)
-    judged = values.judge_below_noise(identified(5, k=k))
+    judged = results.judge_below_noise(identified(5, k=k))
     assert (judged.verdict, judged.evidence[:4]) == (IN_PART, "25 %")
 
 
@@ -140,7 +139,7 @@ def test_jaws_that_would_have_to_pull_hold_one_sample_in_three() -> None:
         name: seen(truth=seen(title=name, published=seen(table=table)))
         for name, table in (("a", 5), ("b", 6), ("c", 7))
     }
-    judged = instrument.judge_grip(Results(seen(cases=cases), {"mechanics": forces}, {}, {}))
+    judged = method.judge_grip(Results(seen(cases=cases), {"mechanics": forces}, {}, {}))
     assert judged.verdict == IN_PART
     assert "0.2 µN (Table 5), -0.7 µN (Table 6), -0.6 µN (Table 7)" in judged.evidence
 
@@ -164,7 +163,7 @@ def test_models_that_fit_as_well_are_held_against_the_one_that_made_the_traces()
         table = pd.DataFrame(
             [row for name, bic in zip(names, refuted, strict=True) for row in rows(name, bic)]
         )
-        judged = algorithm.judge_cell_model(Results(seen(cases=cases), {"models": table}, {}, {}))
+        judged = results.judge_cell_model(Results(seen(cases=cases), {"models": table}, {}, {}))
         assert judged.verdict == verdict
         assert "7 of 50 traces" in judged.evidence
 
@@ -172,11 +171,11 @@ def test_models_that_fit_as_well_are_held_against_the_one_that_made_the_traces()
 def test_few_seeds_and_missing_tables_tell_nothing() -> None:
     few = identified(5, k=np.full(19, 8.0))
     with pytest.raises(LackingError, match="19 seeds, and it takes 20"):
-        values.judge_below_noise(few)
+        results.judge_below_noise(few)
     with pytest.raises(LackingError, match="no table models"):
-        algorithm.judge_cell_model(few)
+        results.judge_cell_model(few)
     with pytest.raises(LackingError, match="Table 7"):
-        values.judge_good_identification(few)
+        results.judge_good_identification(few)
 
 
 def test_every_claim_of_the_published_study_has_a_verdict_and_evidence() -> None:

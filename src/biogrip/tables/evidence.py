@@ -191,7 +191,9 @@ _SAMPLING_COLUMNS = (
 
 def sampling_evidence(study: Study) -> Table:
     """Compare errors of the paper with bounds at several sampling rates."""
-    found = [cells for name, case in study.cases.items() for cells in _errors_and_bounds(case)]
+    found = [
+        (name, *cells) for name, case in study.cases.items() for cells in _errors_and_bounds(case)
+    ]
     if found:
         table = np.array([cells[2:] for cells in found], dtype=float)
         ratios = np.sqrt(np.mean((table[:, :1] / table[:, 1:]) ** 2, axis=0))
