@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from biogrip.figures.robustness import draw
+from biogrip.figures.robustness import draw_robustness
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.stages.sweeps import judge
@@ -17,4 +17,4 @@ with logged(snakemake):
     maps = heat_maps(study, sweep)
     write(robustness(maps, points), Path(snakemake.output.table[0]))
     with styled():
-        save(draw(maps, points), Path(snakemake.output.figure[0]))
+        save(draw_robustness(maps, points), Path(snakemake.output.figure[0]))

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,11 +13,7 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.figures.style import PAGE_IN, figure, panel
-from biogrip.tables.robustness import (
-    HeatMaps,
-    headlines_of,
-    read_points,
-)
+from biogrip.tables.robustness import HeatMaps, headlines_of, read_points
 
 _MOST_CASES = 3
 _CELL_IN = 0.24
@@ -29,7 +26,7 @@ _RATIO_TICKS = (0.5, 1, 2, 5, 10, 20, 50, 100)
 _WITHOUT_BOUND = "#dddddd"
 
 
-def draw(maps: HeatMaps, points: Path) -> Figure:
+def draw_robustness(maps: HeatMaps, points: Path) -> Figure:
     """Draw shares in the true basin, and errors of the best and the worst determined quantity.
 
     Numbers in cells are for the first method; brackets hold the share of the second method, and
@@ -50,13 +47,8 @@ def draw(maps: HeatMaps, points: Path) -> Figure:
             _errors(axes, maps, found[found["quantity"] == quantity], height / rows)
         for axes in grid[1 + len(chosen) :, index]:
             axes.set_axis_off()
-            axes.text(
-                0.5,
-                0.5,
-                "nothing else is determined\nat half of the points",
-                ha="center",
-                transform=axes.transAxes,
-            )
+            words = "nothing else is determined\nat half of the points"
+            axes.text(0.5, 0.5, words, ha="center", transform=axes.transAxes)
     drawn.supylabel(maps.rows.title, fontsize=8)
     drawn.supxlabel(maps.columns.title, fontsize=8)
     first, *others = (method.title for method in maps.methods.values())
@@ -119,16 +111,14 @@ def _write(axes: Axes, numbers: list[Array], colour: Array, colours: str, height
         light = share < 0.5 if dark else share > 0.5
         texts = [_short(float(grid[row, column])) for grid in numbers]
         lines = [texts[0], *(f"({text})" for text in texts[1:] if text)]
-        axes.text(
-            column + 0.5,
-            row + 0.5,
-            "\n".join(lines),
-            color="white" if light and np.isfinite(share) else "black",
-            fontsize=5.5,
-            linespacing=0.95,
-            ha="center",
-            va="center",
-        )
+        style: dict[str, Any] = {
+            "fontsize": 5.5,
+            "linespacing": 0.95,
+            "ha": "center",
+            "va": "center",
+        }
+        color = "white" if light and np.isfinite(share) else "black"
+        axes.text(column + 0.5, row + 0.5, "\n".join(lines), color=color, **style)
 
 
 def _short(number: float) -> str:
