@@ -111,14 +111,10 @@ def _write(axes: Axes, numbers: list[Array], colour: Array, colours: str, height
         light = share < 0.5 if dark else share > 0.5
         texts = [_short(float(grid[row, column])) for grid in numbers]
         lines = [texts[0], *(f"({text})" for text in texts[1:] if text)]
-        style: dict[str, Any] = {
-            "fontsize": 5.5,
-            "linespacing": 0.95,
-            "ha": "center",
-            "va": "center",
-        }
         color = "white" if light and np.isfinite(share) else "black"
-        axes.text(column + 0.5, row + 0.5, "\n".join(lines), color=color, **style)
+        style: dict[str, Any] = {"color": color, "fontsize": 5.5, "linespacing": 0.95}
+        place = column + 0.5, row + 0.5
+        axes.text(*place, "\n".join(lines), ha="center", va="center", **style)
 
 
 def _short(number: float) -> str:
