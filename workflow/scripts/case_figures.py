@@ -4,7 +4,7 @@ from pathlib import Path
 
 from biogrip.figures import course, fit, force, likelihood, scatter
 from biogrip.figures.style import save, styled
-from biogrip.page.summary import write
+from biogrip.page.page import write_summary
 from biogrip.stages.job import job_case, logged, paths
 
 with logged(snakemake):
@@ -31,4 +31,4 @@ with logged(snakemake):
                 save(drawings[name](), file)
             drawn[name] = file
     shown = [drawn[name] for name in ("judged_fit", "profiles", "valley") if name in drawn]
-    write(case, verdicts, shown, Path(snakemake.output[-1]))
+    write_summary(case, verdicts, shown, Path(snakemake.output[-1]))
