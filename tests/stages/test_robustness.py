@@ -19,7 +19,7 @@ from biogrip.records.identifications import columns
 from biogrip.records.rows import write_rows
 from biogrip.stages import sweeps as stage
 from biogrip.study.study import Study
-from biogrip.tables.robustness import HeatMaps, heat_maps, robustness
+from biogrip.tables.robustness import robustness
 from tests.helpers.default import study_of
 
 CASE = "endothelial_cell"
@@ -46,11 +46,6 @@ K = 35 * np.array([0.7, 0.8, 0.9, 1.0, 0.3])
 @pytest.fixture
 def study() -> Study:
     return study_of(SWEEPS)
-
-
-@pytest.fixture
-def maps(study: Study) -> HeatMaps:
-    return heat_maps(study, "both")
 
 
 @pytest.fixture
@@ -146,8 +141,8 @@ def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
     assert np.isinf(found["c_p"])
 
 
-def test_the_table_has_the_best_and_the_worst_determined(maps: HeatMaps, judged: Path) -> None:
-    table = robustness(maps, judged)
+def test_the_table_has_the_best_and_the_worst_determined(study: Study, judged: Path) -> None:
+    table = robustness(study, "both", judged)
     rows = table.rows
     assert [(row["quantity"], row["row"], row["column"]) for row in rows] == [
         (quantity, level, kind)
@@ -179,7 +174,7 @@ def test_the_table_says_what_of_the_gripper_the_config_calls_reconstructed(
     marked: str, said: str | None, judged: Path
 ) -> None:
     study = study_of(f"{SWEEPS}\nreconstructed: {marked}\n")
-    caption = robustness(heat_maps(study, "both"), judged).caption
+    caption = robustness(study, "both", judged).caption
     assert ("econstructed" in caption) == (said is not None)
     assert said is None or caption.endswith(f": {said}.")
 
@@ -199,9 +194,9 @@ def test_headlines_follow_from_the_bounds() -> None:
     assert headlines(_bounds(k=[400.0])) == []
 
 
-def test_heat_maps_show_the_numbers_they_are_given(maps: HeatMaps, judged: Path) -> None:
+def test_heat_maps_show_the_numbers_they_are_given(study: Study, judged: Path) -> None:
     with styled():
-        drawn = draw_robustness(maps, judged)
+        drawn = draw_robustness(study, "both", judged)
     shares, best, worst = drawn.axes[:3]
     texts = [[text.get_text() for text in axes.texts] for axes in (shares, best, worst)]
     assert texts[0] == ["a", *["80\n(80)"] * 4]
@@ -227,7 +222,7 @@ def test_the_basin_of_the_truth_is_as_wide_as_noise_makes_it(
     assert stage.in_basin(values, 10.0, bound).tolist() == inside
 
 
-def test_a_damaged_sweep_is_named(maps: HeatMaps, tmp_path: Path) -> None:
+def test_a_damaged_sweep_is_named(study: Study, tmp_path: Path) -> None:
     (tmp_path / f"{CASE}.csv").write_text("a,b\n1,2\n")
     with pytest.raises(BiogripError, match=r"endothelial_cell.csv, line 1: wanted the columns"):
-        robustness(maps, tmp_path / f"{CASE}.csv")
+        robustness(study, "both", tmp_path / f"{CASE}.csv")

@@ -140,31 +140,15 @@ class Runs:
     case: str
     truth: Truth
     found: pd.DataFrame
-    """Identifications, a row per seed."""
+    """Identifications, a row per seed; parameters by name."""
     history: pd.DataFrame
-    """Best individual, a row per seed and generation."""
-
-    def identified(self, name: str) -> "pd.Series[float]":
-        """Return the identified values of a parameter, one a seed."""
-        return self.found[self.column(name)]
-
-    def at_generation(self, generation: int, name: str) -> "pd.Series[float]":
-        """Return a parameter of the best individual of each seed in a generation.
-
-        Of a run that has stopped before it is that of the last generation.
-        """
-        until = self.history[self.history["generation"] <= generation]
-        return until.groupby("seed")[self.column(name)].last()
+    """Best individual, a row per seed and generation; parameters by name."""
 
     @property
     def last_improvement(self) -> "pd.Series[float]":
         """Generation in which the best misfit fell for the last time, by seed."""
         falls = self.history.groupby("seed")["best_misfit"].diff() < 0
         return self.history["generation"].where(falls, 0).groupby(self.history["seed"]).max()
-
-    def column(self, name: str) -> str:
-        """Return the column of a parameter."""
-        return next(p.column for p in self.truth.model.parameters if p.name == name)
 
 
 @dataclass(frozen=True)
@@ -181,13 +165,7 @@ class Results:
     """Published tables of sweeps by name."""
 
     def table(self, name: str) -> pd.DataFrame:
-        """Return a table.
-
-        Raises
-        ------
-        LackingError
-            If the study does not have it.
-        """
+        """Return a table; raise `LackingError` if the study does not have it."""
         if name not in self.tables:
             raise LackingError(f"the study has no table {name}")
         return self.tables[name]
@@ -199,10 +177,7 @@ class Results:
     def runs_of(self, number: int) -> Runs:
         """Return the runs on the sample of a table of the paper.
 
-        Raises
-        ------
-        LackingError
-            If the study has none, or too few to tell a share or a range.
+        Raise `LackingError` if the study has none, or too few to tell a share or a range.
         """
         if number not in self.runs:
             raise LackingError(f"the study has no runs of the algorithm for Table {number}")
@@ -211,13 +186,7 @@ class Results:
         return self.runs[number]
 
     def case_of(self, number: int) -> str:
-        """Return the name of the case of a table of the paper.
-
-        Raises
-        ------
-        LackingError
-            If the study has none.
-        """
+        """Return the name of the case of a table of the paper, else raise `LackingError`."""
         for name, case in self.study.cases.items():
             if case.truth.published.table == number:
                 return str(name)
@@ -238,8 +207,9 @@ def read_results(
     ):
         truth, number = case.truth, case.truth.published.table
         if study.shown == "genetic" and number is not None:
-            columns = ["best_misfit", *(p.column for p in truth.model.parameters)]
-            found = read_identifications(identified, "genetic")
-            runs[number] = Runs(name, truth, found, read_histories(history, "genetic", columns))
+            names = {p.column: p.name for p in truth.model.parameters}
+            found = read_identifications(identified, "genetic").rename(columns=names)
+            best = read_histories(history, "genetic", ["best_misfit", *names])
+            runs[number] = Runs(name, truth, found, best.rename(columns=names))
     of_study = {path.stem: read_frame(path, "a table", ()) for path in tables}
     return Results(study, of_study, runs, {file.stem: file for file in sweeps})

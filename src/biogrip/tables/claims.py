@@ -1,12 +1,8 @@
 """Every claim of the paper that results can speak to, with a verdict and the evidence."""
 
-from pathlib import Path
-
-from biogrip.study.study import Study
-
 # They are imported for the claims that they add to `CLAIMS`, in the order of the paper.
 from biogrip.tables import claims_on_method, claims_on_results  # noqa: F401
-from biogrip.tables.claim_rules import CLAIMS, RULES, UNDECIDED, Judged, LackingError, read_results
+from biogrip.tables.claim_rules import CLAIMS, RULES, UNDECIDED, Judged, LackingError, Results
 from biogrip.tables.layout import Column, Table
 
 _COLUMNS = (
@@ -17,15 +13,8 @@ _COLUMNS = (
 )
 
 
-def claims(
-    study: Study,
-    identifications: list[Path],
-    histories: list[Path],
-    tables: list[Path],
-    sweeps: list[Path],
-) -> Table:
-    """Judge every claim; the files are those of `read_results`."""
-    results = read_results(study, identifications, histories, tables, sweeps)
+def claims(results: Results) -> Table:
+    """Judge every claim by the study's results."""
     rows = []
     for claim in CLAIMS:
         try:

@@ -91,15 +91,16 @@ def judge_orders(results: Results, names: dict[int, tuple[str, ...]]) -> Judged:
     verdicts: list[str] = []
     for number, each in names.items():
         runs = results.runs_of(number)
-        shares = [
-            share_within_a_decade(runs.identified(name), runs.truth.parameters[name])
-            for name in each
-        ]
+        shares = _shares_within_a_decade(runs, each, runs.found)
         verdicts += map(by_share, shares)
         said.append(f"Table {number}: {_listed(each, shares)}")
     return Judged(
         altogether(verdicts), f"Seeds within half a decade of the target: {'; '.join(said)}."
     )
+
+
+def _shares_within_a_decade(runs: Runs, names: Iterable[str], values: pd.DataFrame) -> list[float]:
+    return [share_within_a_decade(values[name], runs.truth.parameters[name]) for name in names]
 
 
 def _listed(names: Iterable[str], shares: Iterable[float]) -> str:
@@ -108,7 +109,7 @@ def _listed(names: Iterable[str], shares: Iterable[float]) -> str:
 
 def _errors_percent(runs: Runs, *names: str) -> Array:
     """Return absolute errors of a parameter or a sum, one a seed."""
-    values = np.sum([runs.identified(name) for name in names], axis=0)
+    values = runs.found[list(names)].sum(axis=1).to_numpy(float)
     target = sum(runs.truth.parameters[name] for name in names)
     return np.asarray(100 * np.abs(values / target - 1))
 
@@ -189,10 +190,10 @@ def judge_early_orders(results: Results) -> Judged:
     runs = results.runs_of(5)
     names = [name for name in runs.truth.model.names if name != "c_p"]
     early, later = (
-        [
-            share_within_a_decade(runs.at_generation(at, name), runs.truth.parameters[name])
-            for name in names
-        ]
+        # Of a run that has stopped before, the last generation.
+        _shares_within_a_decade(
+            runs, names, runs.history[runs.history["generation"] <= at].groupby("seed").last()
+        )
         for at in (_EARLY, _CONVERGED)
     )
     return Judged(
@@ -243,11 +244,11 @@ def judge_low_damper(results: Results) -> Judged:
     runs = results.runs_of(5)
     limits = results.table(f"verdicts_{runs.case}").set_index("quantity")
     most = float(limits.loc["c_p", "expected_high"])
-    share = float(np.mean(runs.identified("c_p") <= most))
+    share = float(np.mean(runs.found["c_p"] <= most))
     return Judged(
         by_share(share),
         f"{percent(share)} of the seeds identify c_p below {most:.2g} N s/m, the largest that a "
-        f"trace allows; the median is {runs.identified('c_p').median():.3g} N s/m.",
+        f"trace allows; the median is {runs.found['c_p'].median():.3g} N s/m.",
     )
 
 
