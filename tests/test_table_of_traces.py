@@ -357,5 +357,5 @@ def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met(here: Path) -> N
     for name in ("k_p", "c_p"):
         assert unsized[name] / sized[name] == pytest.approx(ratio, rel=1e-3)
     smallest = contacts(STUDY).rows[0]
-    assert smallest[0] == pytest.approx(30)
-    assert smallest[3] == pytest.approx(100 * (ratio - 1))
+    assert smallest["size_um"] == pytest.approx(30)
+    assert smallest["off_percent"] == pytest.approx(100 * (ratio - 1))

@@ -13,10 +13,9 @@ import pytest
 from PIL import Image
 from scipy.spatial import KDTree
 
-from biogrip.figures import robustness as heat_map
+from biogrip.figures.robustness import draw_robustness
 from biogrip.figures.style import COLORS, save_png, styled
 from biogrip.stages.sweeps import POINTS
-from biogrip.tables.robustness import heat_maps
 from tests.helpers.default import study_of
 
 PINNED = Path(__file__).with_name("pinned")
@@ -72,7 +71,7 @@ def pictures(tiny: Path, judged: Path) -> dict[str, Image.Image]:
     files = sorted((tiny / "results" / "figures").glob("*.png"))
     drawn = BytesIO()
     with styled():
-        save_png(heat_map.draw(heat_maps(study_of(SWEEP), "level"), judged), drawn)
+        save_png(draw_robustness(study_of(SWEEP), "level", judged), drawn)
     found = {path.stem: path for path in files if not path.stem.endswith(RECORDED)}
     return {name: Image.open(file).convert("RGB") for name, file in found.items()} | {
         HEAT_MAPS: Image.open(drawn).convert("RGB")

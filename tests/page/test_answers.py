@@ -43,6 +43,7 @@ VERDICTS = [
 
 
 def test_a_value_is_replicated_in_full_in_part_or_not() -> None:
+    """Or cannot be compared: what the paper has not, and too few seeds for a middle 90 %."""
     errors = [
         error("cell", "k", "2.5"),
         error("cell", "c", "2.5", typical="2.2"),
@@ -55,10 +56,6 @@ def test_a_value_is_replicated_in_full_in_part_or_not() -> None:
     assert said.startswith("Of 5 values of the paper, sums included, 2 are replicated (")
     assert "): k of Table 5, c of Table 6; 2 are replicated in part (" in said
     assert said.endswith("): c of Table 5, k of Table 6; 1 is not replicated: c + c_p of Table 5.")
-
-
-def test_what_cannot_be_compared_is_not() -> None:
-    """Samples that the paper has not, and too few seeds for a middle 90 %."""
     assert compare_with_paper([error("cell", "k", "")], VERDICTS, NAMES) == ""
     few = compare_with_paper([error("cell", "k", "2", seeds="4")], VERDICTS, NAMES)
     assert "takes 20 seeds" in few
@@ -118,8 +115,7 @@ def test_quantities_that_no_trace_determines_are_left_out() -> None:
 
 
 def test_the_published_study_is_counted_as_pandas_counts_it() -> None:
-    errors = pd.read_csv(TABLES / "errors.csv")
-    files = sorted(TABLES.glob("verdicts_*.csv"))
+    errors, files = pd.read_csv(TABLES / "errors.csv"), sorted(TABLES.glob("verdicts_*.csv"))
     verdicts = pd.concat(map(pd.read_csv, files)).rename(columns={"quantity": "parameter"})
     both = errors.merge(verdicts, on=["case", "parameter"])
     assert len(both) == len(errors) > 10

@@ -65,7 +65,7 @@ def test_a_reading_that_changes_nothing_finds_what_the_study_finds(folder: Path)
 
 def test_the_table_has_a_row_for_each_case_and_reading(study: Study, folder: Path) -> None:
     made = interpretations(study, [folder / f"{CASE}.csv"])
-    assert [row[1] for row in made.rows] == [
+    assert [row["interpretation"] for row in made.rows] == [
         "as printed",
         "patient",
         "three digits",

@@ -8,10 +8,10 @@ import pytest
 
 from biogrip.physics.models import Published, Sample, Truth
 from biogrip.records.rows import read_table
-from biogrip.tables import claims_on_algorithm as algorithm
-from biogrip.tables import claims_on_instrument as instrument
-from biogrip.tables import claims_on_values as values
+from biogrip.tables import claims_on_method as method
+from biogrip.tables import claims_on_results as results
 from biogrip.tables.claim_rules import (
+    CLAIMS,
     IN_PART,
     NOT,
     REPLICATED,
@@ -27,7 +27,6 @@ from biogrip.tables.claim_rules import (
     plain,
     share_within_a_decade,
 )
-from biogrip.tables.claims import CLAIMS
 from tests.helpers.default import seen
 from tests.helpers.places import ROOT
 
@@ -61,25 +60,15 @@ def test_large_numbers_have_commas() -> None:
     assert [plain(value) for value in (3364.0, 0.0632, 1.1e-5)] == ["3,360", "0.0632", "1.1e-05"]
 
 
-def runs(
-    history: pd.DataFrame, found: pd.DataFrame | None = None, table: int = 5, **printed: float
-) -> Results:
-    """Results with the runs on one sample, and nothing else."""
+def runs(rows: list[dict[str, float]], table: int = 5, **printed: float) -> Results:
+    """Results with the runs on one sample, a row a seed and generation, and nothing else."""
     published = Published(table=table, generation=70, identified=printed, error_percent={})
     truth = Truth("A sample", Sample("generalized_maxwell"), TRUE, published)
-    if found is None:
-        found = history.groupby("seed").last().reset_index()
+    history = pd.DataFrame(rows)
+    found = history.groupby("seed").last().reset_index()
     cases = {"mine": seen(truth=truth, noise=seen(level=0.1))}
     study = seen(cases=cases, near_noise_tolerance=0.02)
     return Results(study, {}, {table: Runs("mine", truth, found, history)}, {})
-
-
-def history_of(rows: list[dict[str, float]]) -> pd.DataFrame:
-    columns = {name: f"{name}_{unit}" for name, unit in zip(TRUE, UNITS, strict=True)}
-    return pd.DataFrame(rows).rename(columns=columns)
-
-
-UNITS = ("N_per_m", "N_per_m", "Ns_per_m", "Ns_per_m")
 
 
 def test_orders_of_magnitude_at_generation_20_are_those_of_that_generation() -> None:
@@ -93,7 +82,7 @@ def test_orders_of_magnitude_at_generation_20_are_those_of_that_generation() -> 
         for seed in range(3 * SEEDS)
         for generation in ((0, 10) if seed % 3 == 0 else (0, 10, 19, 30))
     ]
-    judged = algorithm.judge_early_orders(runs(history_of(rows)))
+    judged = results.judge_early_orders(runs(rows))
     assert judged.verdict == IN_PART
     assert "generation 20: k 0 %, k_p 100 %, c 33 %; at 60: k 67 %, k_p 100 %" in judged.evidence
 
@@ -105,32 +94,30 @@ def test_the_last_improvement_is_the_last_fall_of_the_best_misfit() -> None:
         for seed, each in misfits.items()
         for generation, misfit in enumerate(each)
     ]
-    found = runs(history_of(rows)).runs[5]
+    found = runs(rows).runs[5]
     assert found.last_improvement.tolist() == [3, 0, 1]
 
 
 def identified(table: int, **columns: Any) -> Results:
-    count = len(next(iter(columns.values())))
+    """Of runs of one generation, at the truth but for what is given for each seed."""
     rows = [
-        {"seed": seed, "generation": 1, "best_misfit": 1.0}
-        | TRUE
-        | {name: each[seed] for name, each in columns.items()}
-        for seed in range(count)
+        {"seed": seed, "generation": 1, "best_misfit": 1.0, **TRUE, **own}
+        for seed, own in enumerate(pd.DataFrame(columns).to_dict("records"))
     ]
-    return runs(history_of(rows), table=table, k=7.0, k_p=2.0, c=97.0, c_p=3.0)
+    return runs(rows, table=table, k=7.0, k_p=2.0, c=97.0, c_p=3.0)
 
 
 def test_the_sum_of_dampers_may_be_right_where_c_is_not() -> None:
     c = np.linspace(5, 60, SEEDS)
-    judged = values.judge_key_damper(identified(6, c=c, c_p=100.0 - c))
+    judged = results.judge_key_damper(identified(6, c=c, c_p=100.0 - c))
     assert judged.verdict == IN_PART
     assert "3 %: 0 % for c, 100 % for c + c_p" in judged.evidence
-    assert values.judge_key_damper(identified(6, c=c, c_p=0 * c)).verdict == NOT
+    assert results.judge_key_damper(identified(6, c=c, c_p=0 * c)).verdict == NOT
 
 
 def test_errors_are_held_against_the_level_of_the_noise() -> None:
     k = np.where(np.arange(SEEDS) < 10, 8.7, 8.9)
-    judged = values.judge_below_noise(identified(5, k=k))
+    judged = results.judge_below_noise(identified(5, k=k))
     assert (judged.verdict, judged.evidence[:4]) == (IN_PART, "25 %")
 
 
@@ -140,7 +127,7 @@ def test_jaws_that_would_have_to_pull_hold_one_sample_in_three() -> None:
         name: seen(truth=seen(title=name, published=seen(table=table)))
         for name, table in (("a", 5), ("b", 6), ("c", 7))
     }
-    judged = instrument.judge_grip(Results(seen(cases=cases), {"mechanics": forces}, {}, {}))
+    judged = method.judge_grip(Results(seen(cases=cases), {"mechanics": forces}, {}, {}))
     assert judged.verdict == IN_PART
     assert "0.2 µN (Table 5), -0.7 µN (Table 6), -0.6 µN (Table 7)" in judged.evidence
 
@@ -164,7 +151,7 @@ def test_models_that_fit_as_well_are_held_against_the_one_that_made_the_traces()
         table = pd.DataFrame(
             [row for name, bic in zip(names, refuted, strict=True) for row in rows(name, bic)]
         )
-        judged = algorithm.judge_cell_model(Results(seen(cases=cases), {"models": table}, {}, {}))
+        judged = results.judge_cell_model(Results(seen(cases=cases), {"models": table}, {}, {}))
         assert judged.verdict == verdict
         assert "7 of 50 traces" in judged.evidence
 
@@ -172,11 +159,11 @@ def test_models_that_fit_as_well_are_held_against_the_one_that_made_the_traces()
 def test_few_seeds_and_missing_tables_tell_nothing() -> None:
     few = identified(5, k=np.full(19, 8.0))
     with pytest.raises(LackingError, match="19 seeds, and it takes 20"):
-        values.judge_below_noise(few)
+        results.judge_below_noise(few)
     with pytest.raises(LackingError, match="no table models"):
-        algorithm.judge_cell_model(few)
+        results.judge_cell_model(few)
     with pytest.raises(LackingError, match="Table 7"):
-        values.judge_good_identification(few)
+        results.judge_good_identification(few)
 
 
 def test_every_claim_of_the_published_study_has_a_verdict_and_evidence() -> None:

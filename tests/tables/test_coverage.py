@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import f
 
-from biogrip.physics.simulation import simulated_rotation
 from biogrip.records.identifications import INTERVALS
-from biogrip.records.traces import write_target
 from biogrip.stages import intervals as stage
+from biogrip.stages import targets
 from biogrip.tables.coverage import coverage
 from biogrip.tables.verdicts import verdict_counts
 from tests.helpers.default import study_of
@@ -24,17 +23,8 @@ cases: {endothelial_cell: null, liquid_drop_1: null}
 
 @pytest.fixture
 def target(tmp_path: Path) -> Path:
-    case = study_of(OVERLAY).cases[CASE]
-    problem = case.problem
-    time_s = case.sampling.over(problem.torque.end_s)
-    network = problem.model.network(np.array([list(case.parameters.values())]))
-    rotation = simulated_rotation(
-        problem.gripper, network, problem.torque, time_s, nonlinear=False
-    )[0]
-    path = tmp_path / "target.csv"
-    nothing = np.zeros_like(time_s)
-    write_target(path, time_s, nothing, rotation, nothing)
-    return path
+    targets.simulate(study_of(OVERLAY).cases[CASE], tmp_path / "target.csv")
+    return tmp_path / "target.csv"
 
 
 def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> None:
@@ -53,8 +43,7 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
     ]
     INTERVALS.write(tmp_path / "i.csv", rows)
     made = coverage(study_of(OVERLAY), [target], [tmp_path / "i.csv"], [])
-    names = [column.name for column in made.columns]
-    found = {row[1]: dict(zip(names, row, strict=True)) for row in made.rows}
+    found = {row["quantity"]: row for row in made.rows}
     assert list(found) == ["k", "k_p", "c_p"]
     assert (found["k_p"]["target"], found["k_p"]["shown_one_sided_true"]) == (1e-4, 1)
     k, c_p = found["k"], found["c_p"]
@@ -65,7 +54,7 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
     shown += ["shown_one_sided", "shown_one_sided_true"]
     assert [k[name] for name in shown] == [2, 1, 0, 1, 1]
     assert [c_p[name] for name in shown] == [2, 0, 0, 2, 1]
-    assert c_p["bound_percent"] is None
+    assert "bound_percent" not in c_p
     assert "95" not in made.caption
 
 
@@ -84,13 +73,12 @@ def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
     ]
     INTERVALS.write(tmp_path / "i.csv", rows)
     made = verdict_counts(study_of(OVERLAY), [tmp_path / "i.csv"])
-    names = [column.name for column in made.columns]
-    found = {row[4]: dict(zip(names, row, strict=True)) for row in made.rows}
+    found = {row["verdict"]: row for row in made.rows}
     assert list(found) == ["bounded above", "determined", "not determined"]
     assert [row["reached"] for row in found.values()] == [1, 3, 1]
     assert {row["seeds"] for row in found.values()} == {5}
-    assert [row["true"] for row in found.values()] == [0, 2, None]
-    assert [row["narrow"] for row in found.values()] == [None, 2, None]
+    assert [row.get("true") for row in found.values()] == [0, 2, None]
+    assert [row.get("narrow") for row in found.values()] == [None, 2, None]
     determined = found["determined"]
     for count, tried, name in ((3, 5, "reached"), (2, 3, "true")):
         more = tried - count + 1
@@ -101,36 +89,28 @@ def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
     assert "at 90 %" in made.caption
 
 
-@pytest.mark.parametrize(("every", "judged"), [(1, [9, 10, 11]), (10, [10])])
+@pytest.mark.parametrize(
+    ("every", "seeds", "judged"), [(1, (9, 11), [9, 10]), (10, (9, 11), [10]), (25, (24, 27), [25])]
+)
 def test_some_seeds_are_judged_in_full(
-    tmp_path: Path, target: Path, every: int, judged: list[int]
+    tmp_path: Path, target: Path, every: int, seeds: tuple[int, int], judged: list[int]
 ) -> None:
-    overlay = OVERLAY.replace("0.9}", f"0.9, verdicts_every: {every}}}")
-    expected = tmp_path / "expected.json"
-    expected.write_text('{"quantities": [], "trades": [], "notes": [], "fit": "ok"}')
-    case = study_of(overlay).case(CASE)
-    stage.estimate(case, range(9, 12), target, expected, [], tmp_path / "i.csv")
-    found = INTERVALS.read(tmp_path / "i.csv")
-    assert found["seed"].drop_duplicates().tolist() == judged
-    assert found["verdict"].notna().all()
-
-
-def test_one_in_25_seeds_is_judged_in_full(tmp_path: Path, target: Path) -> None:
-    """Whatever the batch, and with the limits that whole profiles have."""
-    study = study_of(OVERLAY)
+    """One in 25 by default, whatever the batch, and with the limits that whole profiles have."""
+    overlay = OVERLAY if every == 25 else OVERLAY.replace("0.9}", f"0.9, verdicts_every: {every}}}")
     expected = tmp_path / "expected.json"
     expected.write_text(
         '{"quantities": [{"quantity": "k", "verdict": "determined"}], "trades": [], "notes": [], '
         '"fit": "ok"}'
     )
-    stage.estimate(study.case(CASE), range(24, 27), target, expected, [], tmp_path / "i.csv")
+    case = study_of(overlay).case(CASE)
+    stage.estimate(case, range(*seeds), target, expected, [], tmp_path / "i.csv")
     found = INTERVALS.read(tmp_path / "i.csv")
-    judged = found[found["verdict"].notna()]
-    assert judged["seed"].tolist() == [25] * 5
-    assert judged["quantity"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"]
-    assert found["seed"].tolist() == [24, *[25] * 5, 26]
-    assert judged["low"].notna().tolist() == [True, False, False, False, False]
-    k = judged.iloc[0]
+    assert set(found["seed"]) == set(range(*seeds))
+    whole = found[found["verdict"].notna()]
+    assert whole["seed"].tolist() == list(np.repeat(judged, 5))
+    assert whole["quantity"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"] * len(judged)
+    assert whole["low"].notna().tolist() == [True, False, False, False, False] * len(judged)
+    k = whole.iloc[0]
     # There is but one basin.
     assert k["shown_low"] == pytest.approx(k["low"], rel=1e-3)
     assert k["shown_high"] == pytest.approx(k["high"], rel=1e-3)

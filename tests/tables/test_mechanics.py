@@ -1,17 +1,15 @@
-from typing import Any
+"""Tables of what the gripper does to a sample, beside statics and what is written down by hand."""
+
+import math
+from pathlib import Path
 
 import pytest
 
-from biogrip.study.study import Study
-from biogrip.tables.mechanics import mechanics
-from tests.helpers.default import STUDY, study_of
+from biogrip.physics.models import Sample
+from biogrip.records.identifications import DIFFERENCES
+from biogrip.tables.mechanics import left_out, linearisation, mechanics
+from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import ROOT
-
-
-def rows_of(study: Study = STUDY) -> list[dict[str, Any]]:
-    found = mechanics(study)
-    names = [column.name for column in found.columns]
-    return [dict(zip(names, row, strict=True)) for row in found.rows]
 
 
 def test_springs_alone_tell_what_statics_says() -> None:
@@ -27,7 +25,7 @@ def test_springs_alone_tell_what_statics_says() -> None:
           sized: {{sample: {{model: kelvin_voigt, k_p: 0.05, c_p: 0, size_m: 90e-6}}}}
         """
     )
-    small, large, sized = rows_of(study)
+    small, large, sized = mechanics(study).rows
     force = 0.5 * 1.6e-9 / STUDY.gripper.lever_m
     assert small["largest_force_uN"] == pytest.approx(1e6 * force)
     assert small["shortening_um"] == pytest.approx(1e6 * force / own)
@@ -40,7 +38,7 @@ def test_springs_alone_tell_what_statics_says() -> None:
 
 def test_the_papers_samples() -> None:
     """Drops of 30 to 120 um shorten by 8 to 30 %, and the jaws would have to pull them."""
-    cell, _, drop, drop_large, *_ = rows_of()
+    cell, _, drop, drop_large, *_ = mechanics(STUDY).rows
     assert drop["strain_percent"] == pytest.approx(30, abs=1)
     assert drop_large["strain_percent"] == pytest.approx(8, abs=0.5)
     assert drop["lowest_force_uN"] == pytest.approx(-0.74, abs=0.01)
@@ -54,10 +52,10 @@ def test_soft_samples_are_as_soft_as_cells_and_softer_than_the_gripper() -> None
     study = study_of((ROOT / "config" / "soft.yaml").read_text(encoding="utf-8"))
     soft, stiff = study.case("soft_cell").parameters, STUDY.case("endothelial_cell").parameters
     assert {n: 1e3 * v for n, v in soft.items()} == pytest.approx(stiff)
-    for row in rows_of(study):
+    for row in mechanics(study).rows:
         assert 0.1 < row["stiffness_over_gripper"] < 1
         assert row["lowest_force_uN"] < 0
-    cell = rows_of(study)[0]
+    cell = mechanics(study).rows[0]
     assert 0.5 < cell["apparent_modulus_kPa"] < 2
     # The formula in the config: E sqrt(D s)/(3 (1 - nu^2)).
     length = 1e-6 * (cell["size_um"] * cell["shortening_um"]) ** 0.5
@@ -69,4 +67,26 @@ def test_soft_samples_are_as_soft_as_cells_and_softer_than_the_gripper() -> None
 def test_the_nonlinear_model_differs_little() -> None:
     nonlinear = mechanics(study_of("models: {target: nonlinear}"))
     for one, other in zip(mechanics(STUDY).rows, nonlinear.rows, strict=True):
-        assert one[2:6] == pytest.approx(other[2:6], rel=5e-3)
+        for name in ("shortening_um", "strain_percent", "largest_force_uN", "lowest_force_uN"):
+            assert one[name] == pytest.approx(other[name], rel=5e-3)
+            assert one[name] != other[name]
+
+
+def test_the_linearisation_is_held_against_one_percent(tmp_path: Path) -> None:
+    """Differences that go with the square of the torque, from a half to four times it."""
+    rows = [("cell", 75.0, factor, 0.002 * factor**2) for factor in (0.5, 2.0, 4.0)]
+    DIFFERENCES.write(tmp_path / "d.csv", rows)
+    (found,) = linearisation(STUDY, tmp_path / "d.csv").rows
+    assert found["difference_percent"] == pytest.approx(0.2)
+    assert found["factor_for_1_percent"] == pytest.approx(math.sqrt(5))
+
+
+def test_a_damper_between_both_jaws_damps_a_rotation_twice() -> None:
+    """Both arms close by b phi, so the damper by 2 b phi, and each arm's lever is b."""
+    drop = seen(sample=Sample("kelvin_voigt"), parameters={"k_p": 0.5, "c_p": 11.0})
+    device = {name: getattr(STUDY, name) for name in ("gripper", "actuator", "phases")}
+    rows = left_out(seen(**device, gripped=["drop"], cases={"drop": drop})).rows
+    (found,) = (row for row in rows if row["beside"].startswith("the sample's"))
+    b = 1.5e-3 * math.sin(math.radians(75))
+    assert found["beside_size"] == pytest.approx(b * 11.0 * 2 * b)
+    assert found["share_percent"] == pytest.approx(100 * found["size"] / found["beside_size"])

@@ -2,19 +2,9 @@
 
 from pathlib import Path
 
-from biogrip.figures import (
-    convergence,
-    evolution,
-    fit,
-    force,
-    judged_fit,
-    profiles,
-    scatter,
-    valley,
-    waterfall,
-)
+from biogrip.figures import course, fit, force, likelihood, scatter
 from biogrip.figures.style import save, styled
-from biogrip.page.summary import write
+from biogrip.page.page import write_summary
 from biogrip.stages.job import job_case, logged, paths
 
 with logged(snakemake):
@@ -23,15 +13,15 @@ with logged(snakemake):
     measured, calibrated = paths(files.measurements), paths(files.calibrated)
     target, expected = paths(files.target), paths(files.expected)
     drawings = {
-        "convergence": lambda: convergence.draw(case, found, history),
-        "evolution": lambda: evolution.draw(case, found, history),
-        "fit": lambda: fit.draw(case, found, measured, calibrated),
-        "judged_fit": lambda: judged_fit.draw(case, verdicts, measured[0], calibrated),
-        "profiles": lambda: profiles.draw(case, verdicts, expected),
-        "force": lambda: force.draw(case, *target),
-        "scatter": lambda: scatter.draw(case, found, *target, *expected, calibrated),
-        "waterfall": lambda: waterfall.draw(case, found),
-        "valley": lambda: valley.draw(case, verdicts, found),
+        "convergence": lambda: course.draw_convergence(case, found, history),
+        "evolution": lambda: course.draw_evolution(case, found, history),
+        "waterfall": lambda: course.draw_waterfall(case, found),
+        "fit": lambda: fit.draw_typical_fit(case, found, measured, calibrated),
+        "judged_fit": lambda: fit.draw_judged_fit(case, verdicts, measured[0], calibrated),
+        "profiles": lambda: likelihood.draw_profiles(case, verdicts, expected),
+        "valley": lambda: likelihood.draw_valley(case, verdicts, found),
+        "force": lambda: force.draw_force(case, *target),
+        "scatter": lambda: scatter.draw_scatter(case, found, *target, *expected, calibrated),
     }
     drawn = {}
     for file in map(Path, snakemake.output):
@@ -41,4 +31,4 @@ with logged(snakemake):
                 save(drawings[name](), file)
             drawn[name] = file
     shown = [drawn[name] for name in ("judged_fit", "profiles", "valley") if name in drawn]
-    write(case, verdicts, shown, Path(snakemake.output[-1]))
+    write_summary(case, verdicts, shown, Path(snakemake.output[-1]))

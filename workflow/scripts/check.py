@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from biogrip.stages.job import logged, paths
-from biogrip.tables.comparison import compare
+from biogrip.tables.layout import compare
 
 with logged(snakemake):
     print(compare(Path(snakemake.params.published), paths(snakemake.input.made)))

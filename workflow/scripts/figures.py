@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from biogrip.figures import comb, linearisation, linkage, moduli, overview, torque
+from biogrip.figures import actuator, linearisation, linkage, moduli, overview
 from biogrip.figures.overview import shown_cases
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
@@ -17,12 +17,12 @@ with logged(snakemake):
         return [file for file in given[name] if file.stem in shown.cases]
 
     drawings = {
-        "comb": lambda: comb.draw(study),
-        "linkage": lambda: linkage.draw(gripped),
-        "torque": lambda: torque.draw(study),
-        "linearisation": lambda: linearisation.draw(gripped, *given["differences"]),
-        "moduli": lambda: moduli.draw(shown, of("identifications"), of("targets")),
-        "overview": lambda: overview.draw(
+        "comb": lambda: actuator.draw_comb(study),
+        "torque": lambda: actuator.draw_torque(study),
+        "linkage": lambda: linkage.draw_linkage(gripped),
+        "linearisation": lambda: linearisation.draw_linearisation(gripped, *given["differences"]),
+        "moduli": lambda: moduli.draw_moduli(shown, of("identifications"), of("targets")),
+        "overview": lambda: overview.draw_overview(
             shown,
             of("identifications"),
             of("expected"),

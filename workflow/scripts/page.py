@@ -4,14 +4,11 @@ from pathlib import Path
 
 import yaml
 
-from biogrip.page.page import write
+from biogrip.page.page import write_report
 from biogrip.stages.job import job_study, logged, paths
 
 with logged(snakemake):
     study = job_study(snakemake)
-    write(
-        study,
-        yaml.safe_dump(study.plain, allow_unicode=True),
-        *(paths(files) for _, files in snakemake.input.items()),
-        Path(snakemake.output.page),
-    )
+    config = yaml.safe_dump(study.plain, allow_unicode=True)
+    files = {name: paths(each) for name, each in snakemake.input.items()}
+    write_report(study, config, files, Path(snakemake.output.page))

@@ -2,19 +2,18 @@
 
 from pathlib import Path
 
-from biogrip.figures.robustness import draw
+from biogrip.figures.robustness import draw_robustness
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.stages.sweeps import judge
 from biogrip.tables.layout import write
-from biogrip.tables.robustness import heat_maps, robustness
+from biogrip.tables.robustness import robustness
 
 with logged(snakemake):
     study, sweep = job_study(snakemake), snakemake.wildcards.sweep
     identifications = paths(snakemake.input.identifications)
     points = Path(snakemake.output.points)
     judge(study, sweep, identifications, paths(snakemake.input.calibrated), points)
-    maps = heat_maps(study, sweep)
-    write(robustness(maps, points), Path(snakemake.output.table[0]))
+    write(robustness(study, sweep, points), Path(snakemake.output.table[0]))
     with styled():
-        save(draw(maps, points), Path(snakemake.output.figure[0]))
+        save(draw_robustness(study, sweep, points), Path(snakemake.output.figure[0]))

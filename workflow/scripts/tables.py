@@ -3,15 +3,7 @@
 from pathlib import Path
 
 from biogrip.stages.job import job_study, logged, paths
-from biogrip.tables import coverage, errors_of_case, evidence, inputs, mechanics, methods
-from biogrip.tables import evidence as printed_values
-from biogrip.tables import evidence as sampling_evidence
-from biogrip.tables import mechanics as contact
-from biogrip.tables import mechanics as left_out
-from biogrip.tables import mechanics as linearisation
-from biogrip.tables import methods as models
-from biogrip.tables import methods as timings
-from biogrip.tables import verdicts as verdict_counts
+from biogrip.tables import coverage, errors_of_case, evidence, inputs, mechanics, methods, verdicts
 from biogrip.tables.layout import write
 
 with logged(snakemake):
@@ -19,8 +11,7 @@ with logged(snakemake):
     given = {name: paths(files) for name, files in snakemake.input.items()}
     gripped, simulated = study.of(study.gripped), study.of(study.simulated)
     published, covered = study.of(study.published), study.of(study.covered)
-    every = [name for name in study.covered if study.case(name).verdicts_every == 1]
-    counted = study.of(every)
+    counted = study.of(n for n in study.covered if study.case(n).verdicts_every == 1)
     axes = [name for name in study.published if study.cases[name].published.axis_rad]
 
     def of(study, name):
@@ -30,29 +21,29 @@ with logged(snakemake):
         "errors": lambda: errors_of_case.errors(study, given["errors"]),
         "gene_ranges": lambda: inputs.gene_ranges(study),
         "parameter_ranges": lambda: inputs.parameter_ranges(study),
-        "timings": lambda: timings.timings(study, given["times"]),
+        "timings": lambda: methods.timings(study, given["times"]),
         "gripper": lambda: inputs.gripper(study),
         "actuator": lambda: inputs.actuator(study),
-        "contact": lambda: contact.contacts(study),
-        "left_out": lambda: left_out.left_out(study),
-        "linearisation": lambda: linearisation.linearisation(gripped, *given["differences"]),
+        "contact": lambda: mechanics.contacts(study),
+        "left_out": lambda: mechanics.left_out(study),
+        "linearisation": lambda: mechanics.linearisation(gripped, *given["differences"]),
         "mechanics": lambda: mechanics.mechanics(gripped),
         "methods": lambda: methods.methods(simulated, of(simulated, "identifications")),
         "coverage": lambda: coverage.coverage(
             covered, of(covered, "targets"), given["intervals"], of(covered, "calibrated")
         ),
-        "verdict_counts": lambda: verdict_counts.verdict_counts(
+        "verdict_counts": lambda: verdicts.verdict_counts(
             counted, [file for file in given["intervals"] if file.parent.name in counted.cases]
         ),
-        "models": lambda: models.models(study, given["fits"]),
+        "models": lambda: methods.models(study, given["fits"]),
         "evidence": lambda: evidence.evidence(
             published,
             of(published, "identifications"),
             [file for file in given["measurements"] if file.parent.name in axes],
             of(published, "targets"),
         ),
-        "printed_values": lambda: printed_values.printed_values(published),
-        "sampling_evidence": lambda: sampling_evidence.sampling_evidence(published),
+        "printed_values": lambda: evidence.printed_values(published),
+        "sampling_evidence": lambda: evidence.sampling_evidence(published),
     }
     for file in map(Path, snakemake.output):
         if file.suffix == ".csv":

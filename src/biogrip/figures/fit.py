@@ -1,4 +1,4 @@
-"""Figures 9, 11 and 12: target, noisy measurement, a typical fit and its residuals."""
+"""Figures 9, 11 and 12: target, noisy trace, its typical or best fit, and the residuals."""
 
 from pathlib import Path
 from typing import Any
@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.digits import with_unit
-from biogrip.figures.results import Fit, typical_fit
+from biogrip.figures.results import Fit, fit_of, typical_fit
 from biogrip.figures.style import (
     COLUMN_IN,
     FITTED,
@@ -18,21 +18,37 @@ from biogrip.figures.style import (
     is_over_decades,
     scale_of_fit,
 )
+from biogrip.records.traces import read_measurements
+from biogrip.records.verdicts import read_verdicts
+from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case
 
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
 
 
-def draw(
+def draw_typical_fit(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> Figure:
     """Draw the fit of a case's typical seed."""
-    problem = case.problem.calibrated(calibrated)
-    fit = typical_fit(problem, case.study.shown_method.name, identifications, measurements)
-    ended = f"{case.study.shown_method.step} {fit.generations}"
+    problem, method = case.problem.calibrated(calibrated), case.study.shown_method
+    fit = typical_fit(problem, method.name, identifications, measurements)
+    ended = f"{method.step} {fit.generations}"
     recorded = fit.target_rad is None
     label = f"fit ({ended})" if recorded else f"typical fit (seed {fit.seed}, {ended})"
     return draw_fit(fit, label, case.title, case.published.axis_rad)
+
+
+def draw_judged_fit(
+    case: Case, verdicts: Path, measurements: Path, calibrated: list[Path]
+) -> Figure:
+    """Draw the judged trace of a case and its best fit."""
+    problem = case.problem.calibrated(calibrated)
+    found = {item["quantity"]: item["value"] for item in read_verdicts(verdicts)["quantities"]}
+    values = {name: found[name] for name in problem.searched.names}
+    recorded = read_measurements(measurements, [TRACE])
+    fit = fit_of(problem, {**problem.fixed, **values}, recorded, TRACE)
+    trace = "recorded trace" if case.recorded else f"seed {TRACE}"
+    return draw_fit(fit, f"best fit ({trace})", case.title, case.published.axis_rad)
 
 
 def draw_traces(axes: Axes, fit: Fit, label: str) -> tuple[float, str]:

@@ -15,7 +15,7 @@ from biogrip.records.traces import read_target
 from biogrip.study.study import Case
 
 
-def draw(case: Case, target: Path) -> Figure:
+def draw_force(case: Case, target: Path) -> Figure:
     """Draw the jaw force under bilateral contact, and the rotation with and without adhesion."""
     time_s, _, rotation = read_target(target)
     torque = torque_history(case.phases)

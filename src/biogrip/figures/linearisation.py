@@ -20,7 +20,7 @@ _SHOWN_FACTOR = 20.0
 _MOST_CASES = 3
 
 
-def draw(study: Study, differences: Path) -> Figure:
+def draw_linearisation(study: Study, differences: Path) -> Figure:
     """Draw the difference for the last case at twenty times the torque, and maps of a few."""
     comparison = DIFFERENCES.read(differences)
     cases = dict(list(study.cases.items())[:_MOST_CASES])
@@ -36,23 +36,14 @@ def draw(study: Study, differences: Path) -> Figure:
         )
         shares = 100 * grid.to_numpy(float)
         axes = maps[index]
-        mesh = axes.pcolormesh(
-            grid.columns,
-            grid.index,
-            shares,
-            norm=LogNorm(1e-5, 30),
-            cmap="cividis_r",
-            shading="nearest",
-        )
+        values, style = (grid.columns, grid.index, shares), {"cmap": "cividis_r"}
+        mesh = axes.pcolormesh(*values, norm=LogNorm(1e-5, 30), shading="nearest", **style)
         if np.nanmax(shares) > LIMIT_PERCENT:
-            lines = axes.contour(
-                grid.columns, grid.index, shares, [LIMIT_PERCENT], colors="black", linewidths=1.2
-            )
+            lines = axes.contour(*values, [LIMIT_PERCENT], colors="black", linewidths=1.2)
             axes.clabel(lines, fmt=f"{LIMIT_PERCENT:g} %%", fontsize=7)
         axes.set_yscale("log")
-        axes.set_yticks(
-            [0.3, 1, 3, 10, 30], ["0.3", "1", "3", "10", "30"] if index == 0 else [""] * 5
-        )
+        ticks = [0.3, 1, 3, 10, 30]
+        axes.set_yticks(ticks, ["" if index else f"{tick:g}" for tick in ticks])
         axes.minorticks_off()
         axes.set_xlabel(r"$\hat\theta_2$ (deg)")
         if index == 0:

@@ -1,15 +1,14 @@
-"""Figures 4 to 6: the gripper as a linkage, to scale, and the sample's two networks."""
+"""Figures 4 to 6: the gripper as a linkage, its angles, and the sample's two networks."""
 
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
-from biogrip.figures.elements import damper, spring
-from biogrip.figures.nomenclature import nomenclature
-from biogrip.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, figure, panel
+from biogrip.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, SKY, figure, panel
 from biogrip.physics.contact import LARGEST_M
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import torque_history
@@ -17,69 +16,73 @@ from biogrip.physics.simulation import simulated_rotation
 from biogrip.stages.model_difference import network_of
 from biogrip.study.study import Study
 
-_ARROW = {"arrowstyle": "->", "lw": 1, "color": BLACK, "shrinkA": 0, "shrinkB": 0}
-
+Place = tuple[float, float]
 
 # Rotation that is visible in the drawing while arms still look like arms.
 _VISIBLE_RAD = 0.012
+# Of the drawing of names, exaggerated for legibility: degrees, arm lengths.
+_HAT_DEG, _CLOSING_DEG, _GAP, _NODE = 72.0, 16.0, 2.3, 0.2
 
 
-def draw(study: Study) -> Figure:
-    """Draw linkage, tips, nomenclature and networks."""
+def draw_linkage(study: Study) -> Figure:
+    """Draw linkage, tips, names of angles and displacements, and networks."""
     gripper = study.gripper
     drawn = figure(PAGE_IN, 4.8)
     (whole, tips), (names, networks) = drawn.subplots(2, 2, width_ratios=[1.15, 1])
-    _linkage(whole, gripper)
+    _whole(whole, gripper)
     panel(whole, "a", "linkage A-B-C-D, to scale")
     _tips(tips, gripper, _largest_rotation_rad(study))
     panel(tips, "b", "tips B and C")
-    nomenclature(names)
+    _names(names)
     panel(names, "c", "angles and displacements, not to scale", most_letters=40)
     _networks(networks)
     panel(networks, "d", "the sample BC")
+    for axes in (whole, tips, names):
+        axes.set_aspect("equal", anchor="N")
+    for axes in (whole, tips, names, networks):
+        axes.set_axis_off()
     return drawn
 
 
-def _joints(gripper: Gripper, closing_rad: float = 0.0) -> dict[str, tuple[float, float]]:
-    """Return positions of the four joints in millimetres, with both arms closed by an angle."""
-    length, angle = (
-        1e3 * gripper.arm_length_m,
-        math.radians(gripper.reference_angle_deg),
-    )
+def _joints(gripper: Gripper, closing_rad: float, factor: float) -> dict[str, Place]:
+    """Return positions of the four joints times a factor, with both arms closed by an angle."""
+    length, angle = 1e3 * gripper.arm_length_m, math.radians(gripper.reference_angle_deg)
     base = 0.5e3 * LARGEST_M + length * math.cos(angle)
-    tip_x = -base + length * math.cos(angle - closing_rad)
-    tip_y = length * math.sin(angle - closing_rad)
-    return {"A": (-base, 0), "B": (tip_x, tip_y), "C": (-tip_x, tip_y), "D": (base, 0)}
+    x = factor * (-base + length * math.cos(angle - closing_rad))
+    y = factor * length * math.sin(angle - closing_rad)
+    return {"A": (-factor * base, 0), "B": (x, y), "C": (-x, y), "D": (factor * base, 0)}
 
 
-def _linkage(axes: Axes, gripper: Gripper) -> None:
-    joints = _joints(gripper)
-    axes.plot(*zip(joints["A"], joints["B"], strict=True), color=BLUE, linewidth=2.5)
-    axes.plot(*zip(joints["D"], joints["C"], strict=True), color=BLUE, linewidth=2.5)
-    axes.plot(*zip(joints["A"], joints["D"], strict=True), color=GREY, linewidth=1)
-    middle = joints["B"][1]
-    axes.add_patch(Circle((0, middle), 0.5e3 * LARGEST_M, color=ORANGE))
-    for name, (x, y) in joints.items():
-        axes.plot(x, y, "o", color="white", markeredgecolor=BLACK, markersize=4)
-        side = -1 if x < 0 else 1
-        axes.annotate(name, (x, y), xytext=(8 * side, -2), textcoords="offset points", ha="center")
-    a, d = joints["A"], joints["D"]
+def _line(axes: Axes, start: Place, end: Place, color: str, width: float, style: str = "-") -> None:
+    axes.plot(*zip(start, end, strict=True), style, color=color, linewidth=width)
+
+
+def _joint(axes: Axes, name: str, at: Place, label_at: Place, **options: Any) -> None:
+    axes.plot(*at, "o", color="white", markeredgecolor=BLACK, markersize=4, zorder=4)
+    axes.annotate(name, at, xytext=label_at, ha="center", **options)
+
+
+def _arrow(axes: Axes, start: Place, end: Place, width: float = 1.0) -> None:
+    style = {"arrowstyle": "->", "lw": width, "color": BLACK, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", end, start, arrowprops=style)
+
+
+def _whole(axes: Axes, gripper: Gripper) -> None:
+    joints = _joints(gripper, 0.0, 1.0)
+    a, b, c, d = joints.values()
+    for start, end, color, width in ((a, b, BLUE, 2.5), (d, c, BLUE, 2.5), (a, d, GREY, 1)):
+        _line(axes, start, end, color, width)
+    axes.add_patch(Circle((0, b[1]), 0.5e3 * LARGEST_M, color=ORANGE))
+    for name, at in joints.items():
+        _joint(axes, name, at, (-8 if at[0] < 0 else 8, -2), textcoords="offset points")
     angle = gripper.reference_angle_deg
-    axes.add_patch(Arc(a, 0.5, 0.5, theta1=0, theta2=angle, linewidth=0.8))
-    axes.add_patch(Arc(d, 0.5, 0.5, theta1=0, theta2=180 - angle, linewidth=0.8))
-    axes.annotate(r"$\hat\theta_2$", (a[0] + 0.27, 0.1), fontsize=8)
-    axes.annotate(r"$\hat\theta_4$", (d[0] + 0.27, 0.1), fontsize=8)
-    label = rf"$l$ = {1e3 * gripper.arm_length_m:g} mm"
-    axes.annotate(
-        label,
-        (0.5 * (a[0] + joints["B"][0]) - 0.08, 0.5 * middle),
-        ha="right",
-        fontsize=7,
-    )
+    for foot, ends, label in ((a, angle, r"$\hat\theta_2$"), (d, 180 - angle, r"$\hat\theta_4$")):
+        axes.add_patch(Arc(foot, 0.5, 0.5, theta1=0, theta2=ends, linewidth=0.8))
+        axes.annotate(label, (foot[0] + 0.27, 0.1), fontsize=8)
+    label, place = rf"$l$ = {1e3 * gripper.arm_length_m:g} mm", (0.5 * (a[0] + b[0]) - 0.08)
+    axes.annotate(label, (place, 0.5 * b[1]), ha="right", fontsize=7)
     axes.annotate(rf"$\hat\theta_2$ = {angle:g}°", (0, -0.18), ha="center", fontsize=7)
-    axes.set(xlim=(a[0] - 0.75, d[0] + 0.75), ylim=(-0.25, middle + 0.2))
-    axes.set_aspect("equal", anchor="N")
-    axes.set_axis_off()
+    axes.set(xlim=(a[0] - 0.75, d[0] + 0.75), ylim=(-0.25, b[1] + 0.2))
 
 
 def _largest_rotation_rad(study: Study) -> float:
@@ -88,65 +91,101 @@ def _largest_rotation_rad(study: Study) -> float:
     for case in study.cases.values():
         torque = torque_history(case.phases)
         time_s = np.linspace(0.0, torque.end_s, 401)
-        rotation = simulated_rotation(
-            case.gripper, network_of(case), torque, time_s, nonlinear=False
-        )
+        network = network_of(case)
+        rotation = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)
         peaks.append(float(rotation.max()))
     return max(peaks) or _VISIBLE_RAD
 
 
 def _tips(axes: Axes, gripper: Gripper, rotation_rad: float) -> None:
-    """Draw the tips at the reference and at the largest rotation, which is enlarged."""
+    """Draw the tips at the reference and at the largest rotation, which is enlarged; in um."""
     times = max(1, round(_VISIBLE_RAD / rotation_rad))
     enlarged = f" (drawn {times} times)" if times > 1 else ""
-    reference, moved = (
-        {name: (1e3 * x, 1e3 * y) for name, (x, y) in _joints(gripper, turned).items()}
-        for turned in (0.0, times * rotation_rad)
-    )
-    for joints, colour, label in (
+    reference, moved = (_joints(gripper, turn, 1e3) for turn in (0.0, times * rotation_rad))
+    for joints, color, label in (
         (reference, GREY, "reference"),
         (moved, BLUE, f"closed by {1e3 * rotation_rad:.2g} mrad{enlarged}"),
     ):
         for foot, tip in (("A", "B"), ("D", "C")):
-            axes.plot(*zip(joints[foot], joints[tip], strict=True), color=colour, linewidth=2)
-        axes.plot([], [], color=colour, linewidth=2, label=label)
-    (b_x, b_y), (c_x, _) = moved["B"], moved["C"]
-    height = 1e6 * LARGEST_M
-    axes.add_patch(Circle((0, reference["B"][1]), height / 2, fill=False, color=GREY))
+            _line(axes, joints[foot], joints[tip], color, 2)
+        axes.plot([], [], color=color, linewidth=2, label=label)
+    (b_x, y), (c_x, _) = moved["B"], moved["C"]
+    radius = 0.5e6 * LARGEST_M
+    axes.add_patch(Circle((0, reference["B"][1]), radius, fill=False, color=GREY))
     theta = np.linspace(0, 2 * np.pi, 200)
-    axes.fill(
-        c_x * np.cos(theta),
-        b_y + height**2 / 4 / c_x * np.sin(theta),
-        color=ORANGE,
-        alpha=0.6,
-    )
-    for side, name, wrist in ((-1, r"$\phi_2$", b_x), (1, r"$\phi_4$", c_x)):
-        axes.annotate(
-            "",
-            (wrist + side * 5, b_y - 95),
-            (wrist + side * 65, b_y - 80),
-            arrowprops=_ARROW,
-        )
-        axes.annotate(name, (wrist + side * 78, b_y - 80), ha="center", va="center")
-    # Displacements of the tips along x, counted from the reference.
-    level = reference["B"][1] + height / 2 + 16
-    for text, at_rest, at_end, shift in (
-        ("$u_B$", reference["B"][0], b_x, -9),
-        ("$u_C$", reference["C"][0], c_x, 9),
-    ):
-        axes.plot([at_rest, at_rest], [level - 10, level + 8], color=BLACK, linewidth=0.6)
-        axes.annotate("", (at_end, level), (at_rest, level), arrowprops=_ARROW)
-        label_at = (at_rest + shift, level)
-        axes.annotate(text, label_at, ha="left" if shift > 0 else "right", va="center", fontsize=7)
-    start = (-155, b_y + 30)
-    axes.annotate("", (start[0] + 45, start[1]), start, arrowprops=_ARROW)
-    axes.annotate("$x$", (start[0] + 50, start[1]), va="center", fontsize=7)
-    axes.plot([-30, 70], [b_y - 150, b_y - 150], color=BLACK, linewidth=1.5)
-    axes.annotate("100 µm", (20, b_y - 158), ha="center", va="top", fontsize=7)
-    axes.set(xlim=(-160, 160), ylim=(b_y - 185, b_y + 165))
-    axes.set_aspect("equal", anchor="N")
-    axes.set_axis_off()
+    height = radius**2 / c_x
+    axes.fill(c_x * np.cos(theta), y + height * np.sin(theta), color=ORANGE, alpha=0.6)
+    # Displacements of the tips along x are counted from the reference.
+    level = reference["B"][1] + radius + 16
+    for side, joint, x, angle in ((-1, "B", b_x, r"$\phi_2$"), (1, "C", c_x, r"$\phi_4$")):
+        _arrow(axes, (x + side * 65, y - 80), (x + side * 5, y - 95))
+        axes.annotate(angle, (x + side * 78, y - 80), ha="center", va="center")
+        at_rest = reference[joint][0]
+        _line(axes, (at_rest, level - 10), (at_rest, level + 8), BLACK, 0.6)
+        _arrow(axes, (at_rest, level), (x, level))
+        text, place = f"$u_{joint}$", (at_rest + 9 * side, level)
+        axes.annotate(text, place, ha="left" if side > 0 else "right", va="center", fontsize=7)
+    _arrow(axes, (-155, y + 30), (-110, y + 30))
+    axes.annotate("$x$", (-105, y + 30), va="center", fontsize=7)
+    _line(axes, (-30, y - 150), (70, y - 150), BLACK, 1.5)
+    axes.annotate("100 µm", (20, y - 158), ha="center", va="top", fontsize=7)
+    axes.set(xlim=(-160, 160), ylim=(y - 185, y + 165))
     axes.legend(loc="upper center", ncols=1)
+
+
+def _names(axes: Axes) -> None:
+    """Draw the linkage at the reference and deformed, with symbols for what changes."""
+    hat, tilde = (math.radians(angle) for angle in (_HAT_DEG, _HAT_DEG - _CLOSING_DEG))
+    base = math.cos(hat) + _GAP / 2
+    b_hat, b = ((-base + math.cos(angle), math.sin(angle)) for angle in (hat, tilde))
+    c_hat, c = ((-x, y) for x, y in (b_hat, b))
+    for left, right, color, width in ((b_hat, c_hat, GREY, 1.2), (b, c, BLUE, 2.2)):
+        _line(axes, (-base, 0), left, color, width)
+        _line(axes, (base, 0), right, color, width)
+    _line(axes, (-base, 0), (base, 0), GREY, 1)
+    _line(axes, b_hat, c_hat, GREY, 0.8)
+    # A Maxwell branch; x is the displacement of its inner node.
+    y, size = b[1], (c[0] - b[0]) / 2.5
+    _spring(axes, b[0], _NODE, y, "$k$", size)
+    _damper(axes, _NODE, c[0], y, "$c$", size)
+    axes.plot(_NODE, y, "o", color=ORANGE, markersize=4, zorder=4)
+    for name, at in (("A", (-base, 0)), ("B", b), ("C", c), ("D", (base, 0))):
+        _joint(axes, name, at, (at[0], at[1] - 0.19))
+    _angles(axes, -base, 2, _HAT_DEG, _HAT_DEG - _CLOSING_DEG)
+    _angles(axes, base, 4, 180 - _HAT_DEG, 180 - _HAT_DEG + _CLOSING_DEG)
+    top = b_hat[1] + 0.14
+    for start, end, name in (
+        (b_hat[0], b[0], "$u_B$"),
+        (c_hat[0], c[0], "$u_C$"),
+        (0, _NODE, "$x$"),
+    ):
+        _arrow(axes, (start, top), (end, top), 0.9)
+        place = (0.5 * (start + end), top + 0.04)
+        axes.annotate(name, place, ha="center", va="bottom", fontsize=7.5)
+    _line(axes, (0, y - 0.06), (0, top + 0.05), BLACK, 0.8, ":")
+    _line(axes, (_NODE, y), (_NODE, top), BLACK, 0.8, ":")
+    words = (
+        r"$\theta_2=\tilde\theta_2-\hat\theta_2=-\phi_2$",
+        r"$\theta_4=\tilde\theta_4-\hat\theta_4=\phi_4$",
+    )
+    axes.annotate("\n".join(words), (0, 0.33), ha="center", va="center", fontsize=7.5)
+    axes.set(xlim=(-base - 0.25, base + 0.75), ylim=(-0.2, top + 0.25))
+
+
+def _angles(axes: Axes, foot: float, index: int, hat: float, tilde: float) -> None:
+    """Draw arcs of both angles in degrees, and the rotation between them."""
+
+    def at(radius: float, angle_deg: float) -> Place:
+        angle = math.radians(angle_deg)
+        return foot + radius * math.cos(angle), radius * math.sin(angle)
+
+    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 7.5}
+    for angle, size, color, symbol in ((hat, 0.36, GREY, "hat"), (tilde, 0.68, BLUE, "tilde")):
+        axes.add_patch(Arc((foot, 0), size, size, theta1=0, theta2=angle, color=color, lw=0.9))
+        place = at(size / 2 + 0.1, 0.35 * angle)
+        axes.annotate(rf"$\{symbol}\theta_{index}$", place, color=color, **style)
+    _arrow(axes, at(0.62, hat), at(0.62, tilde), 0.9)
+    axes.annotate(rf"$\phi_{index}$", at(0.73, 0.5 * (hat + tilde)), **style)
 
 
 def _networks(axes: Axes) -> None:
@@ -158,25 +197,36 @@ def _networks(axes: Axes) -> None:
         heights = [top - 0.75 * i for i in range(len(rows))]
         axes.annotate(title, (2.5, top + 0.5), ha="center", fontsize=7)
         for x, name, offset in ((0.2, "B", -0.18), (4.8, "C", 0.18)):
-            axes.plot([x, x], [heights[0], heights[-1]], color=BLACK, linewidth=1)
-            mid = 0.5 * (heights[0] + heights[-1])
-            axes.plot(
-                x,
-                mid,
-                "o",
-                color="white",
-                markeredgecolor=BLACK,
-                markersize=4,
-                zorder=3,
-            )
-            axes.annotate(name, (x + offset, mid), ha="center", va="center")
+            _line(axes, (x, heights[0]), (x, heights[-1]), BLACK, 1)
+            middle = 0.5 * (heights[0] + heights[-1])
+            _joint(axes, name, (x, middle), (x + offset, middle), va="center")
         for y, row in zip(heights, rows, strict=True):
             if row == "kc":
-                spring(axes, 0.2, 2.5, y, "$k$")
-                damper(axes, 2.5, 4.8, y, "$c$")
+                _spring(axes, 0.2, 2.5, y, "$k$")
+                _damper(axes, 2.5, 4.8, y, "$c$")
             elif row == "k_p":
-                spring(axes, 0.2, 4.8, y, "$k_p$")
+                _spring(axes, 0.2, 4.8, y, "$k_p$")
             else:
-                damper(axes, 0.2, 4.8, y, "$c_p$")
+                _damper(axes, 0.2, 4.8, y, "$c_p$")
     axes.set(xlim=(-0.2, 5.2), ylim=(-0.5, 5.2))
-    axes.set_axis_off()
+
+
+def _spring(axes: Axes, x0: float, x1: float, y: float, label: str, size: float = 1.0) -> None:
+    """Draw a spring from x0 to x1 at a height."""
+    middle = 0.5 * (x0 + x1)
+    x = np.linspace(middle - 0.5 * size, middle + 0.5 * size, 9)
+    zigzag = y + 0.14 * size * np.array([0, 1, -1, 1, -1, 1, -1, 1, 0])
+    axes.plot([x0, *x, x1], [y, *zigzag, y], color=BLUE, linewidth=1)
+    axes.annotate(label, (middle, y + 0.18 * size), ha="center", va="bottom", fontsize=7)
+
+
+def _damper(axes: Axes, x0: float, x1: float, y: float, label: str, size: float = 1.0) -> None:
+    """Draw a damper from x0 to x1 at a height."""
+    middle, half, height = 0.5 * (x0 + x1), 0.3 * size, 0.15 * size
+    left, right = middle - half, middle + half
+    _line(axes, (x0, y), (middle, y), SKY, 1)
+    _line(axes, (middle, y - 0.1 * size), (middle, y + 0.1 * size), SKY, 1.5)
+    cup = [y + height, y + height, y - height, y - height]
+    axes.plot([left, right, right, left], cup, color=SKY, linewidth=1)
+    _line(axes, (right, y), (x1, y), SKY, 1)
+    axes.annotate(label, (middle, y + 0.18 * size), ha="center", va="bottom", fontsize=7)

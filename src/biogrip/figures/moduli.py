@@ -41,7 +41,7 @@ _STYLES: tuple[dict[str, Any], ...] = (
 )
 
 
-def draw(study: Study, identifications: list[Path], targets: list[Path]) -> Figure:
+def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) -> Figure:
     """Draw moduli over frequency, and sensitivities over time."""
     drawn = figure(PAGE_IN, 4.4)
     axes = drawn.subplots(2, len(study.cases), squeeze=False, height_ratios=[1.35, 1])
@@ -67,13 +67,8 @@ def draw(study: Study, identifications: list[Path], targets: list[Path]) -> Figu
     return drawn
 
 
-def _moduli(
-    axes: Axes,
-    study: Study,
-    case: Case,
-    identified: Path,
-    time_s: Array,
-) -> None:
+def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Array) -> None:
+    """Draw G' and G'' of all fits and of the truth, and shade where the fits agree."""
     between = np.diff(time_s)
     slowest, fastest = 1 / (time_s[-1] - time_s[0]), 1 / float(np.min(between))
     omega = np.geomspace(slowest / 30, 30 * fastest, _POINTS)

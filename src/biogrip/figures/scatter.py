@@ -19,6 +19,7 @@ from biogrip.figures.style import (
     TARGET,
     line_of,
     panel,
+    points_within,
     row_of_panels,
 )
 from biogrip.judging.fisher import bound
@@ -34,14 +35,15 @@ from biogrip.study.study import Case
 _LOOSE = 0.25
 _WIDTHS = 8.0
 _DECADES = 1e4
+# Points at the edge would make the layout leave them room.
+_DOTS: dict[str, Any] = {
+    "linestyle": "", "marker": "o", "markersize": 2, "markeredgewidth": 0, "alpha": 0.55,
+    "clip_on": False, "in_layout": False,
+}  # fmt: skip
 
 
-def draw(
-    case: Case,
-    identifications: Path,
-    target: Path,
-    expected: Path,
-    calibrated: list[Path],
+def draw_scatter(
+    case: Case, identifications: Path, target: Path, expected: Path, calibrated: list[Path]
 ) -> Figure:
     """Draw identified over target for every quantity and method."""
     items = read_verdicts(expected)["quantities"]
@@ -88,20 +90,9 @@ def _quantity(
         shown = mine[:SHOWN_SEEDS]
         # A fixed sideways scatter keeps points apart.
         x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
-        inside = (shown > bottom) & (shown < top)
-        dots: dict[str, Any] = {
-            "color": line_of(case.study.identifiers[name])["color"],
-            "linestyle": "",
-            "markeredgewidth": 0,
-            "alpha": 0.55,
-        }
-        axes.plot(x[inside], shown[inside], marker="o", markersize=2, **dots)
-        for outside, marker, edge in ((shown >= top, "^", top), (shown <= bottom, "v", bottom)):
-            height = np.full(int(outside.sum()), edge)
-            (line,) = axes.plot(
-                x[outside], height, marker=marker, markersize=3, clip_on=False, **dots
-            )
-            line.set_in_layout(False)
+        style = _DOTS | {"color": line_of(case.study.identifiers[name])["color"]}
+        points, ends = np.column_stack([x, shown]), ((-np.inf, bottom), (np.inf, top))
+        points_within(axes, points, *ends, style, edge_size=3)
         low, middle, high = np.clip(np.percentile(mine, [25, 50, 75]), bottom, top)
         axes.plot([place, place], [low, high], color=TARGET, linewidth=1.0)
         axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
@@ -134,21 +125,15 @@ def _title(quantity: Quantity, limit: float, verdict: str) -> str:
 
 
 def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
+    axes, truth = drawn.axes[0], case.truth
+    marks = [(case.study.identifiers[name].title, "o", name) for name in methods]
     handles: list[Any] = []
-    axes = drawn.axes[0]
-    for name in methods:
-        method = case.study.identifiers[name]
-        color = line_of(method)["color"]
-        handles += axes.plot(
-            [], [], "o", color=color, markersize=4, label=method.title, markeredgewidth=0
-        )
-    handles += axes.plot(
-        [], [], "^", color=TARGET, markersize=4, label="beyond the axis", markeredgewidth=0
-    )
-    percent = f"{100 * case.confidence:g} %"
-    label = f"{percent} by the Cramér-Rao bound (named above), rest known"
+    for label, marker, name in [*marks, ("beyond the axis", "^", "")]:
+        color = line_of(case.study.identifiers[name])["color"] if name else TARGET
+        style: dict[str, Any] = {"color": color, "markersize": 4, "markeredgewidth": 0}
+        handles += axes.plot([], [], marker, label=label, **style)
+    label = f"{100 * case.confidence:g} % by the Cramér-Rao bound (named above), rest known"
     handles.append(axes.fill([], [], color=SHADE, label=label)[0])
-    truth = case.truth
     if truth.published.identified:
         handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
     drawn.legend(handles=handles, loc="outside lower left", ncols=3)

@@ -1,13 +1,13 @@
-"""Ticks of logarithmic axes in plain text; math text would take a tenth of a figure's time.
+"""Common style of all figures: legible at column width, safe for colour-blind readers.
 
-Common style of all figures: legible at column width, safe for colour-blind readers.
-
-Scales and limits of axes, for figures and for pages that draw in a browser.
+Colours and sizes; empty figures and their files; ticks, scales and limits of axes, for figures and
+for pages that draw in a browser. Ticks of logarithmic axes are plain text, as math text would take
+a tenth of a figure's time.
 """
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -24,52 +24,7 @@ from biogrip.figures.results import Fit, scale_of
 from biogrip.files import atomic_write
 from biogrip.fit.methods import Method
 
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_POWER = re.compile(r"\^\{(.*?)\}")
-
-
-def power_of_ten(exponent: int) -> str:
-    """Return a power of ten with a superscript exponent."""
-    return "10" + str(exponent).translate(_SUPERSCRIPTS)
-
-
-def decade_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
-    """Return at most three ticks of a logarithmic axis whose labels do not overlap."""
-    first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
-    decades = list(range(first, last + 1))
-    if len(decades) >= 2:
-        step = -(-(len(decades) - 1) // 2)
-        chosen = decades[::step]
-        return [10.0**d for d in chosen], [power_of_ten(d) for d in chosen]
-    steps = [m * 10.0**d for d in range(first - 1, last + 2) for m in (1, 2, 5)]
-    found = [value for value in steps if low <= value <= high]
-    # Labels of these values are wide, so keep two.
-    inside = [found[0], found[-1]] if len(found) > 2 else found
-    return inside, [f"{value:g}" for value in inside]
-
-
-class _Plain(LogFormatterSciNotation):
-    """Log formatter that writes plain text instead of math text."""
-
-    def __call__(self, x: float, pos: Any = None) -> str:
-        text: str = super().__call__(x, pos)
-        plain = _POWER.sub(lambda power: power[1].translate(_SUPERSCRIPTS), text)
-        return re.sub(r"\$\\mathdefault\{(.*)\}\$", r"\1", plain).replace(r"\times", "×")
-
-
-def label_plainly(drawn: Figure) -> None:
-    """Replace default formatters of logarithmic axes by plain-text ones."""
-    for axes in drawn.axes:
-        for axis in (axes.xaxis, axes.yaxis):
-            for kind in ("major", "minor"):
-                usual = getattr(axis, f"get_{kind}_formatter")()
-                if type(usual) is LogFormatterSciNotation:
-                    plain = _Plain(labelOnlyBase=usual.labelOnlyBase)
-                    getattr(axis, f"set_{kind}_formatter")(plain)
-
-
-COLUMN_IN = 3.5
-PAGE_IN = 7.2
+COLUMN_IN, PAGE_IN = 3.5, 7.2
 
 # Okabe and Ito's palette.
 BLACK, GREY = "#000000", "#999999"
@@ -93,7 +48,6 @@ COLORS = {
 
 # Most panels that are legible in one row.
 _MOST_SIDE_BY_SIDE, _LEGEND_IN = 5, 0.4
-
 _PANEL_SIZE = 7.5
 
 _STYLE: dict[Any, Any] = {
@@ -140,13 +94,44 @@ def row_of_panels(
     """Return a page-wide figure with panels in one or more rows."""
     rows = -(-count // _MOST_SIDE_BY_SIDE)
     columns = -(-count // rows)
-    drawn = figure(
-        PAGE_IN, height_in if rows == 1 else rows * (height_in - _LEGEND_IN) + _LEGEND_IN
-    )
+    drawn = figure(PAGE_IN, rows * (height_in - _LEGEND_IN) + _LEGEND_IN)
     grid = list(drawn.subplots(rows, columns, sharey=sharey, squeeze=False).ravel())
     for axes in grid[count:]:
         axes.set_axis_off()
     return drawn, grid[:count]
+
+
+def panel(axes: Axes, letter: str, title: str, most_letters: int = 34) -> None:
+    """Label a panel, cutting a title that is too long."""
+    short = title if len(title) <= most_letters else f"{title[: most_letters - 1]}…"
+    place = axes.set_title(f"     {short}", fontsize=_PANEL_SIZE).get_transform()
+    axes.text(0, 1, letter, transform=place, fontsize=_PANEL_SIZE, fontweight="bold")
+
+
+def points_within(
+    axes: Axes,
+    points: Array,
+    low: Sequence[float] | Array,
+    high: Sequence[float] | Array,
+    style: dict[str, Any],
+    *,
+    edge_size: float,
+    labels: tuple[str, str] = ("", ""),
+) -> None:
+    """Draw points, (n, 2), and at the edge triangles for those not between low and high.
+
+    The labels are those of points within and of points beyond.
+    """
+    beyond = (points > high) | (points < low)
+    inside = ~beyond.any(axis=1)
+    axes.plot(*points[inside].T, **style, label=labels[0] or None)
+    right = points[:, 0] > high[0]
+    above, below = (points[:, 1] > high[1]) & ~right, (points[:, 1] < low[1]) & ~right
+    for marker, outside in ((">", right), ("^", above), ("v", below)):
+        if np.any(outside):
+            at_edge = np.clip(points[outside], low, high).T
+            edge = style | {"marker": marker, "markersize": edge_size}
+            axes.plot(*at_edge, **edge, label=labels[1] or None)
 
 
 def save(drawn: Figure, output: Path) -> None:
@@ -168,7 +153,11 @@ def lay_out(drawn: Figure, dots_per_inch: float) -> None:
 
     Otherwise each `savefig` would draw twice, and a second layout would differ.
     """
-    label_plainly(drawn)
+    for axis in (axis for axes in drawn.axes for axis in (axes.xaxis, axes.yaxis)):
+        if type(usual := axis.get_major_formatter()) is LogFormatterSciNotation:
+            axis.set_major_formatter(_Plain(labelOnlyBase=usual.labelOnlyBase))
+        if type(usual := axis.get_minor_formatter()) is LogFormatterSciNotation:
+            axis.set_minor_formatter(_Plain(labelOnlyBase=usual.labelOnlyBase))
     drawn.set_dpi(dots_per_inch)
     if (engine := drawn.get_layout_engine()) is not None:
         engine.execute(drawn)
@@ -196,11 +185,32 @@ def _glyphs_alone() -> Iterator[None]:
         subset.load_font = before
 
 
-def panel(axes: Axes, letter: str, title: str, most_letters: int = 34) -> None:
-    """Label a panel, cutting a title that is too long."""
-    short = title if len(title) <= most_letters else f"{title[: most_letters - 1]}…"
-    place = axes.set_title(f"     {short}", fontsize=_PANEL_SIZE).get_transform()
-    axes.text(0, 1, letter, transform=place, fontsize=_PANEL_SIZE, fontweight="bold")
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_POWER = re.compile(r"\^\{(.*?)\}")
+
+
+class _Plain(LogFormatterSciNotation):
+    """Log formatter that writes plain text instead of math text."""
+
+    def __call__(self, x: float, pos: Any = None) -> str:
+        text: str = super().__call__(x, pos)
+        plain = _POWER.sub(lambda power: power[1].translate(_SUPERSCRIPTS), text)
+        return re.sub(r"\$\\mathdefault\{(.*)\}\$", r"\1", plain).replace(r"\times", "×")
+
+
+def decade_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
+    """Return at most three ticks of a logarithmic axis whose labels do not overlap."""
+    first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
+    decades = list(range(first, last + 1))
+    if len(decades) >= 2:
+        step = -(-(len(decades) - 1) // 2)
+        chosen = decades[::step]
+        return [10.0**d for d in chosen], [f"10{str(d).translate(_SUPERSCRIPTS)}" for d in chosen]
+    steps = [m * 10.0**d for d in range(first - 1, last + 2) for m in (1, 2, 5)]
+    found = [value for value in steps if low <= value <= high]
+    # Labels of these values are wide, so keep two.
+    inside = [found[0], found[-1]] if len(found) > 2 else found
+    return inside, [f"{value:g}" for value in inside]
 
 
 HIGHEST_INCREASE = 12.0

@@ -31,6 +31,9 @@ _LAYOUT: dict[str, Any] = {
     "yaxis": {"automargin": True, "exponentformat": "power"},
 }
 
+Fits = Sequence[tuple[Method, Fit]]
+"""A trace with the fit of each method."""
+
 
 def fits_of(
     case: Case,
@@ -38,7 +41,7 @@ def fits_of(
     identifications: Path,
     measurements: Path,
     calibrated: Sequence[Path],
-) -> list[tuple[Method, Fit]]:
+) -> Fits:
     """Return the judged trace of a case with the fit of each method, from files of the case."""
     problem = case.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
@@ -50,7 +53,7 @@ def fits_of(
     return fits
 
 
-def explorer(cases: Sequence[tuple[str, Sequence[tuple[Method, Fit]]]]) -> str:
+def explorer(cases: Sequence[tuple[str, Fits]]) -> str:
     """Return an interactive figure of traces, targets and fits, with a menu of the cases.
 
     Parameters
@@ -64,28 +67,26 @@ def explorer(cases: Sequence[tuple[str, Sequence[tuple[Method, Fit]]]]) -> str:
         HTML element that holds Plotly's library and needs no network.
     """
     lines = [_lines(fits) for _, fits in cases]
-    drawn = Figure([line for own in lines for line in own], _LAYOUT)
+    axes = [_axes(fits[0][1]) for _, fits in cases]
     buttons = []
-    for (title, fits), own in zip(cases, lines, strict=True):
-        visible = [each is own for each in lines for _ in each]
-        change = [{"visible": visible}, _axes(fits[0][1])]
+    for (title, _), own, of_case in zip(cases, lines, axes, strict=True):
+        change = [{"visible": [each is own for each in lines for _ in each]}, of_case]
         buttons.append({"label": escape(title), "method": "update", "args": change})
+    drawn = Figure([line for own in lines for line in own], _LAYOUT)
     for line in drawn.data[len(lines[0]) :]:
         line.visible = False
-    for key, value in _axes(cases[0][1][0][1]).items():
-        drawn.layout[key] = value
     menu = {"buttons": buttons, "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
-    drawn.update_layout(updatemenus=[menu])
+    drawn.update_layout({**axes[0], "updatemenus": [menu]})
     config = {"displayModeBar": False, "responsive": True}
     return str(drawn.to_html(config, full_html=False, div_id="explorer"))
 
 
-def _lines(fits: Sequence[tuple[Method, Fit]]) -> list[Scatter]:
+def _lines(fits: Fits) -> list[Scatter]:
     trace = fits[0][1]
     factor, _ = scale_of_fit(trace)
     stride = -(-len(trace.time_s) // _MOST_READINGS)
 
-    def drawn(values: Array, name: str, **style: Any) -> Scatter:
+    def line(values: Array, name: str, **style: Any) -> Scatter:
         x, y = (
             significant(each[::stride], _DIGITS).astype("f4")
             for each in (trace.time_s, factor * values)
@@ -93,13 +94,13 @@ def _lines(fits: Sequence[tuple[Method, Fit]]) -> list[Scatter]:
         return Scatter(x=x, y=y, name=name, **style)
 
     kind = "recorded trace" if trace.target_rad is None else "noisy trace"
-    dots = {"mode": "markers", "marker": {"size": 3, "color": MEASURED}}
-    lines = [drawn(trace.measured_rad, kind, **dots)]
+    dots = {"size": 3, "color": MEASURED}
+    lines = [line(trace.measured_rad, kind, mode="markers", marker=dots)]
     if trace.target_rad is not None:
-        lines.append(drawn(trace.target_rad, "target", mode="lines", line_color=TARGET))
+        lines.append(line(trace.target_rad, "target", mode="lines", line_color=TARGET))
     for method, fit in fits:
-        line = {"color": COLORS[method.color], "dash": _DASHES[method.dashes]}
-        lines.append(drawn(fit.fitted_rad, method.title, mode="lines", line=line))
+        style = {"color": COLORS[method.color], "dash": _DASHES[method.dashes]}
+        lines.append(line(fit.fitted_rad, method.title, mode="lines", line=style))
     return lines
 
 

@@ -1,12 +1,13 @@
 """Rules by which a claim of the paper is called replicated, in part, not, or impossible to tell.
 
-Results that claims of the paper are judged by.
+Claims are functions under `@claim`, in the modules `claims_on_*`; this one has the rules that they
+share, and the results that they are given.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -52,6 +53,33 @@ class Judged:
     evidence: str
 
 
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper."""
+
+    place: str
+    """Section, table or figure."""
+    words: str
+    """The claim as the paper has it, shortened."""
+    judge: Callable[["Results"], Judged]
+
+
+CLAIMS: list[Claim] = []
+"""All claims, in the order of the paper, which is that of their functions."""
+
+_Judge = TypeVar("_Judge", bound=Callable[["Results"], Judged])
+
+
+def claim(place: str, words: str) -> Callable[[_Judge], _Judge]:
+    """Add a claim, with the decorated function as its rule, to `CLAIMS`."""
+
+    def add(judge: _Judge) -> _Judge:
+        CLAIMS.append(Claim(place, words, judge))
+        return judge
+
+    return add
+
+
 def by_share(share: float) -> str:
     """Judge something that holds for a share of seeds or settings."""
     if share >= MOST:
@@ -90,6 +118,11 @@ def plain(value: float, digits: int = 3) -> str:
     return f"{float(f'{value:.{digits}g}'):,g}"
 
 
+def percent(share: float) -> str:
+    """Return a share in words of evidence."""
+    return f"{100 * share:.0f} %"
+
+
 def share_within_a_decade(values: "pd.Series[float]", target: float) -> float:
     """Return the share of values of the same order of magnitude as the target."""
     apart: Array = np.abs(np.log10(values.to_numpy(float) / target))
@@ -107,31 +140,15 @@ class Runs:
     case: str
     truth: Truth
     found: pd.DataFrame
-    """Identifications, a row per seed."""
+    """Identifications, a row per seed; parameters by name."""
     history: pd.DataFrame
-    """Best individual, a row per seed and generation."""
-
-    def identified(self, name: str) -> "pd.Series[float]":
-        """Return the identified values of a parameter, one a seed."""
-        return self.found[self.column(name)]
-
-    def at_generation(self, generation: int, name: str) -> "pd.Series[float]":
-        """Return a parameter of the best individual of each seed in a generation.
-
-        Of a run that has stopped before it is that of the last generation.
-        """
-        until = self.history[self.history["generation"] <= generation]
-        return until.groupby("seed")[self.column(name)].last()
+    """Best individual, a row per seed and generation; parameters by name."""
 
     @property
     def last_improvement(self) -> "pd.Series[float]":
         """Generation in which the best misfit fell for the last time, by seed."""
         falls = self.history.groupby("seed")["best_misfit"].diff() < 0
         return self.history["generation"].where(falls, 0).groupby(self.history["seed"]).max()
-
-    def column(self, name: str) -> str:
-        """Return the column of a parameter."""
-        return next(p.column for p in self.truth.model.parameters if p.name == name)
 
 
 @dataclass(frozen=True)
@@ -148,13 +165,7 @@ class Results:
     """Published tables of sweeps by name."""
 
     def table(self, name: str) -> pd.DataFrame:
-        """Return a table.
-
-        Raises
-        ------
-        LackingError
-            If the study does not have it.
-        """
+        """Return a table; raise `LackingError` if the study does not have it."""
         if name not in self.tables:
             raise LackingError(f"the study has no table {name}")
         return self.tables[name]
@@ -166,10 +177,7 @@ class Results:
     def runs_of(self, number: int) -> Runs:
         """Return the runs on the sample of a table of the paper.
 
-        Raises
-        ------
-        LackingError
-            If the study has none, or too few to tell a share or a range.
+        Raise `LackingError` if the study has none, or too few to tell a share or a range.
         """
         if number not in self.runs:
             raise LackingError(f"the study has no runs of the algorithm for Table {number}")
@@ -178,13 +186,7 @@ class Results:
         return self.runs[number]
 
     def case_of(self, number: int) -> str:
-        """Return the name of the case of a table of the paper.
-
-        Raises
-        ------
-        LackingError
-            If the study has none.
-        """
+        """Return the name of the case of a table of the paper, else raise `LackingError`."""
         for name, case in self.study.cases.items():
             if case.truth.published.table == number:
                 return str(name)
@@ -199,18 +201,15 @@ def read_results(
     sweeps: list[Path],
 ) -> Results:
     """Read results from the files of all the paper's cases, in their order, and from tables."""
-    found = {path.stem: read_frame(path, "a table", ()) for path in tables}
     runs = {}
     for (name, case), identified, history in zip(
         study.cases.items(), identifications, histories, strict=True
     ):
-        number = case.truth.published.table
+        truth, number = case.truth, case.truth.published.table
         if study.shown == "genetic" and number is not None:
-            runs[number] = _runs(name, case.truth, identified, history)
-    return Results(study, found, runs, {file.stem: file for file in sweeps})
-
-
-def _runs(name: str, truth: Truth, identified: Path, history: Path) -> Runs:
-    columns = ["best_misfit", *(p.column for p in truth.model.parameters)]
-    found = read_identifications(identified, "genetic")
-    return Runs(name, truth, found, read_histories(history, "genetic", columns))
+            names = {p.column: p.name for p in truth.model.parameters}
+            found = read_identifications(identified, "genetic").rename(columns=names)
+            best = read_histories(history, "genetic", ["best_misfit", *names])
+            runs[number] = Runs(name, truth, found, best.rename(columns=names))
+    of_study = {path.stem: read_frame(path, "a table", ()) for path in tables}
+    return Results(study, of_study, runs, {file.stem: file for file in sweeps})

@@ -6,7 +6,6 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.fit.least_squares import identify_many
-from biogrip.fit.problem import Identification
 from biogrip.physics.jaw_force import compute_grip
 from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.protocol import torque_history
@@ -14,10 +13,11 @@ from biogrip.physics.simulation import simulated_rotation
 from biogrip.physics.unilateral import unilateral_response
 from biogrip.records.traces import as_written
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Cell, Column, Table
+from biogrip.tables.layout import Column, Row, Table
 
 _MOST_SEEDS = 20
-_MEANS_LITTLE = 1000.0
+# Error in percent beyond which a number means little.
+_LARGEST_PERCENT = 1000.0
 _COLUMNS = (
     Column("case", "Case"),
     Column("lost_at_s", "Contact lost at (s)"),
@@ -41,10 +41,6 @@ def linear_cases(study: Study) -> list[str]:
     ]
 
 
-def _few(case: Case) -> int:
-    return min(case.seeds, _MOST_SEEDS)
-
-
 def contact_loss(study: Study) -> Table:
     """Identify traces simulated with bilateral and with unilateral contact, and compare errors."""
     rows = [
@@ -56,12 +52,13 @@ def contact_loss(study: Study) -> Table:
         "the force reaches zero, and in the readings of the latter before the loss. "
         f"Medians over the same noise of at most {_MOST_SEEDS} seeds; the misfit is over the RMS "
         "of the noise. Errors are (target - identified)/target; empty beyond "
-        f"{_MEANS_LITTLE:g} %."
+        f"{_LARGEST_PERCENT:g} %."
     )
     return Table(caption, _COLUMNS, rows)
 
 
-def _rows(study_seed: int, name: str, case: Case) -> list[tuple[Cell, ...]]:
+def _rows(study_seed: int, name: str, case: Case) -> list[Row]:
+    """Return a row for every quantity and the misfit; none if the jaws keep contact."""
     torque, model = torque_history(case.phases), case.sample.model
     network = model.sample(case.parameters)
     if compute_grip(case.gripper, network, torque, nonlinear=False).pulls_from_s is None:
@@ -74,44 +71,53 @@ def _rows(study_seed: int, name: str, case: Case) -> list[tuple[Cell, ...]]:
         return []
     noise = [
         add_noise(held, case.noise, stream(study_seed, name, seed, "noise"), time_s) - held
-        for seed in range(_few(case))
+        for seed in range(min(case.seeds, _MOST_SEEDS))
     ]
     lost = free.parted_s[0]
     whole, until = np.ones(len(time_s), dtype=bool), time_s < lost
-    traces = ((held, whole), (let_go, whole), (let_go, until))
-    found = [
-        _medians(study_seed, name, case, time_s[kept], [(rotation + n)[kept] for n in noise])
-        for rotation, kept in traces
-    ]
-    rms = [float(np.sqrt(np.mean(np.square([n[kept] for n in noise])))) for _, kept in traces]
-    rows: list[tuple[Cell, ...]] = []
+    medians, misfits = {}, {}
+    for column, rotation, kept in (
+        ("held", held, whole),
+        ("let_go", let_go, whole),
+        ("until_lost", let_go, until),
+    ):
+        traces = [(rotation + n)[kept] for n in noise]
+        medians[column] = _medians(study_seed, name, case, time_s[kept], traces)
+        rms = float(np.sqrt(np.mean(np.square([n[kept] for n in noise]))))
+        found = medians[column]
+        misfits[column] = found[-1] / rms if found and rms else None
+    rows: list[Row] = []
     for index, quantity in enumerate(model.quantities):
-        label = " + ".join(parameter.name for parameter in quantity)
-        target = sum(case.parameters[parameter.name] for parameter in quantity)
-        given, wrong, cut = (None if values is None else values[index] for values in found)
-        errors = [_error(target, value) for value in (wrong, cut)]
-        unit = quantity[0].unit
-        rows.append((name, lost, label, unit, target, given, wrong, errors[0], cut, errors[1]))
-    misfits = [
-        None if values is None or not level else values[-1] / level
-        for values, level in zip(found, rms, strict=True)
-    ]
-    rows.append((name, lost, "misfit", "noise", 1.0, *misfits[:2], None, misfits[2], None))
-    return rows
+        names = [parameter.name for parameter in quantity]
+        target = sum(case.parameters[each] for each in names)
+        row: Row = {"case": name, "lost_at_s": lost, "quantity": " + ".join(names)}
+        row |= {"unit": quantity[0].unit, "target": target}
+        row |= {column: found[index] for column, found in medians.items() if found}
+        row["error_percent"] = _error_percent(target, row.get("let_go"))
+        row["until_lost_error_percent"] = _error_percent(target, row.get("until_lost"))
+        rows.append(row)
+    head: Row = {
+        "case": name,
+        "lost_at_s": lost,
+        "quantity": "misfit",
+        "unit": "noise",
+        "target": 1.0,
+    }
+    return [*rows, head | misfits]
 
 
 def _medians(
     study_seed: int, name: str, case: Case, time_s: Array, traces: Sequence[Array]
-) -> list[float] | None:
-    """Return the median of every quantity and of the misfit in rad; None for too few samples."""
+) -> list[float]:
+    """Return the median of every quantity and of the misfit in rad; none of too few readings."""
     problem = case.problem.to_identify()
     searched, model = problem.searched, problem.model
     nuisance = problem.offset + problem.drift
     if len(time_s) <= len(searched.names) + nuisance + 1:
-        return None
+        return []
     problems = [problem.of(time_s, trace) for trace in traces]
     rngs = [stream(study_seed, name, seed, "contact_loss") for seed in range(len(traces))]
-    found: list[Identification] = identify_many(problems, case.least_squares, rngs)
+    found = identify_many(problems, case.least_squares, rngs)
     values = [
         {**problem.fixed, **dict(zip(searched.names, one.parameters, strict=True))} for one in found
     ]
@@ -122,6 +128,6 @@ def _medians(
     return [*medians, float(np.median([one.misfit_rad for one in found]))]
 
 
-def _error(target: float, value: float | None) -> float | None:
+def _error_percent(target: float, value: float | None) -> float | None:
     error = 100 * (target - value) / target if target and value is not None else None
-    return None if error is None or abs(error) > _MEANS_LITTLE else error
+    return None if error is None or abs(error) > _LARGEST_PERCENT else error

@@ -1,6 +1,5 @@
 """Coverage of confidence intervals, and spread of estimates over the Cramér-Rao bound."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,17 +8,12 @@ import pandas as pd
 from biogrip.arrays import Array
 from biogrip.judging.fisher import bound
 from biogrip.judging.quantities import parameters_and_sum
-from biogrip.judging.verdicts import (
-    BOUNDED_ABOVE,
-    BOUNDED_BELOW,
-    DETERMINED,
-    NOT_DETERMINED,
-)
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.noise import standard_deviation
 from biogrip.records.identifications import INTERVALS
 from biogrip.records.traces import read_target
 from biogrip.study.study import Study
-from biogrip.tables.layout import Cell, Column, Table
+from biogrip.tables.layout import Column, Row, Table
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -40,17 +34,20 @@ _COLUMNS = (
     Column("shown_one_sided", "Bounded on one side"),
     Column("shown_one_sided_true", "Bounded and true"),
 )
+# Verdicts that are counted together.
+_COUNTED = {"determined": (DETERMINED,), "one_sided": (BOUNDED_BELOW, BOUNDED_ABOVE)}
 
 
 def coverage(
-    study: Study,
-    targets: list[Path],
-    intervals: list[Path],
-    calibrated: list[Path],
+    study: Study, targets: list[Path], intervals: list[Path], calibrated: list[Path]
 ) -> Table:
-    """Compare estimates and intervals of many seeds with the true values and the bound."""
+    """Compare estimates and intervals of many seeds with the true values and the bound.
+
+    Targets are files of all cases, in their order; calibrated grippers those of the cases that have
+    one.
+    """
     calibrations = iter(calibrated)
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     estimated = pd.concat([INTERVALS.read(file) for file in intervals])
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
         case_problem = case.problem.calibrated([next(calibrations)] if case.is_calibrated else [])
@@ -61,16 +58,17 @@ def coverage(
         noise_rad = standard_deviation(rotation, case.noise)
         for quantity in parameters_and_sum(case_problem.searched):
             mine = found[found["quantity"] == quantity.label]
+            fitted = mine[mine["estimate_rest_known"].notna()]
+            shown = mine[mine["verdict"].notna()]
+            if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
+                continue
             # The config's value: `log_truth` is clipped to the search range.
             names = [case_problem.searched.names[index] for index in quantity.members]
             truth = sum(case.parameters[member] for member in names)
-            head = (name, quantity.label, quantity.unit, truth)
+            head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
             limit = 100 * bound(sensitivity, noise_rad, log_truth, quantity)
-            fitted = mine[mine["estimate_rest_known"].notna()]
-            shown = mine[mine["verdict"].notna()]
-            if len(fitted) or np.any(shown["verdict"] != NOT_DETERMINED):
-                numbers = _spreads(fitted, truth, limit, case.confidence)
-                rows.append((*head, *numbers, len(shown), *_shown(shown, truth)))
+            numbers = _spreads(fitted, truth, limit, case.confidence) | _shown(shown, truth)
+            rows.append({**head, "target": truth, **numbers})
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
         "standard deviation of the estimates' logarithms beside the Cramér-Rao bound, and how "
@@ -93,35 +91,35 @@ def _judged_seeds(study: Study) -> str:
     return "every seed" if 1 in every else f"every {every.pop()}th seed"
 
 
-def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float) -> list[Cell]:
-    """Return bound, spread and coverage of a determined quantity, else empty cells."""
+def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float) -> Row:
+    """Return bound, spread and coverage of a quantity; nothing of one without intervals."""
     if found.empty:
-        return [None] * 8
-    spread = _spread(found["estimate"])
-    return [
-        bound,
-        spread,
-        spread / bound,
-        _spread(found["estimate_rest_known"]) / bound,
-        float(np.mean(100 * np.log(found["estimate"].to_numpy(float) / truth))),
-        100 * confidence,
-        100 * float(np.mean(holds(found, truth))),
-        len(found),
-    ]
+        return {}
+    spread, rest_known = (
+        100 * float(np.std(np.log(found[name].to_numpy(float)), ddof=1))
+        for name in ("estimate", "estimate_rest_known")
+    )
+    return {
+        "bound_percent": bound,
+        "spread_percent": spread,
+        "spread_over_bound": spread / bound,
+        "rest_known_over_bound": rest_known / bound,
+        "bias_percent": np.mean(100 * np.log(found["estimate"].to_numpy(float) / truth)),
+        "confidence_percent": 100 * confidence,
+        "coverage_percent": 100 * np.mean(holds(found, truth)),
+        "seeds": len(found),
+    }
 
 
-def _shown(found: pd.DataFrame, truth: float) -> Iterator[int]:
-    """Yield counts of determined verdicts and true ones among them, then of one-sided verdicts."""
+def _shown(found: pd.DataFrame, truth: float) -> Row:
+    """Count verdicts from whole profiles, and the true ones among them."""
+    counts: Row = {"shown_seeds": len(found)}
     held = holds(found, truth, "shown_")
-    for verdicts in ((DETERMINED,), (BOUNDED_BELOW, BOUNDED_ABOVE)):
+    for name, verdicts in _COUNTED.items():
         chosen = found["verdict"].isin(verdicts).to_numpy()
-        yield int(np.sum(chosen))
-        yield int(np.sum(held[chosen]))
-
-
-def _spread(estimates: "pd.Series[float]") -> float:
-    """Return the standard deviation of the logarithm in percent."""
-    return 100 * float(np.std(np.log(estimates.to_numpy(float)), ddof=1))
+        counts[f"shown_{name}"] = int(np.sum(chosen))
+        counts[f"shown_{name}_true"] = int(np.sum(held[chosen]))
+    return counts
 
 
 def holds(found: pd.DataFrame, truth: float, which: str = "") -> Array:

@@ -1,6 +1,7 @@
 """Tables 5 to 7: target, the paper's identification and this study's; and all of them joined."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -8,11 +9,10 @@ from biogrip.arrays import Array
 from biogrip.digits import counted
 from biogrip.fit.methods import near_noise, near_noise_words, typical
 from biogrip.physics.models import Truth
-from biogrip.physics.sample_model import Parameter
 from biogrip.records.identifications import read_identifications
 from biogrip.records.rows import read_rows
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Cell, Column, Table
+from biogrip.tables.layout import Column, Row, Table
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -30,62 +30,56 @@ _COLUMNS = (
     Column("median_absolute_error_percent", "Median abs. error %", 2),
     Column("seeds", "Seeds"),
 )
-TYPICAL = (
+_TYPICAL = (
     "Typical is the seed of median excess of the misfit over the noise in its trace; the lowest "
-    "misfit would be that of the quietest trace."
+    "misfit would be that of the quietest trace. Error = (target - identified) / target."
 )
 
-_WHOLE_NUMBERS = {"typical_seed", "seeds"}
 
-
-def table_columns(near_noise_tolerance: float) -> tuple[Column, ...]:
-    """Return the columns of an error table."""
+def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:
     share = f"Share {near_noise_words(near_noise_tolerance)}"
     return (*_COLUMNS, Column("near_noise_share", share, 2))
 
 
 def errors_of_case(case: Case, identifications: Path) -> Table:
     """Compare target and identified values of one case, given its identifications, CSV."""
-    truth = case.truth
+    truth, tolerance = case.truth, case.study.near_noise_tolerance
     found = read_identifications(identifications, case.study.shown)
     shown = found.index.get_loc(typical(found).name)
-    known = bool(found["noise_rms"].notna().all())
-    reached = near_noise(found, case.study.near_noise_tolerance)
-    share = float(np.mean(reached)) if known else None
+    known = found["noise_rms"].notna().all()
+    of_case = {
+        "case": case.name,
+        "typical_seed": found["seed"].iloc[shown],
+        "seeds": len(found),
+        "near_noise_share": np.mean(near_noise(found, tolerance)) if known else None,
+    }
     rows = []
-    for names in truth.model.quantities:
-        label = " + ".join(parameter.name for parameter in names)
-        target = truth.target(names)
-        values = found[[parameter.column for parameter in names]].sum(axis=1).to_numpy(float)
+    for quantity in truth.model.quantities:
+        names = [parameter.name for parameter in quantity]
+        target = truth.target(quantity)
+        values = found[[parameter.column for parameter in quantity]].sum(axis=1).to_numpy(float)
         error = error_percent(target, values)
         low, median, high = np.percentile(values, [5, 50, 95])
-        rows.append(
-            (
-                case.name,
-                label,
-                names[0].unit,
-                target,
-                *_paper(truth, names, target),
-                int(found["seed"].iloc[shown]),
-                float(values[shown]),
-                float(error[shown]),
-                float(median),
-                float(low),
-                float(high),
-                float(np.median(np.abs(error))),
-                len(found),
-                share,
-            )
-        )
+        of_quantity = {
+            "parameter": " + ".join(names),
+            "unit": quantity[0].unit,
+            "target": target,
+            "typical_identified": values[shown],
+            "typical_error_percent": error[shown],
+            "median_identified": median,
+            "p05_identified": low,
+            "p95_identified": high,
+            "median_absolute_error_percent": np.median(np.abs(error)),
+        }
+        rows.append(of_case | of_quantity | _of_paper(truth, names, target))
     number = f"Table {truth.published.table}. " if truth.published.table is not None else ""
-    seeds = counted(len(found), "seed")
     caption = (
-        f"{number}{truth.title}: target and identified parameters over {seeds}. "
-        f"{TYPICAL} Error = (target - identified) / target."
+        f"{number}{truth.title}: target and identified parameters over "
+        f"{counted(len(found), 'seed')}. {_TYPICAL}"
         if truth.parameters
         else f"{truth.title}: parameters identified in the recorded trace."
     )
-    return Table(caption, table_columns(case.study.near_noise_tolerance), rows)
+    return Table(caption, _columns(tolerance), rows)
 
 
 def error_percent(target: float | None, identified: Array) -> Array:
@@ -95,47 +89,35 @@ def error_percent(target: float | None, identified: Array) -> Array:
     return 100 * (target - identified) / target
 
 
+def _of_paper(truth: Truth, names: list[str], target: float | None) -> Row:
+    """Return the paper's value and error; the error of a sum is computed from its values."""
+    identified = truth.published.identified
+    if not all(name in identified for name in names):
+        return {}
+    value = float(sum(identified[name] for name in names))
+    error: Any = truth.published.error_percent.get(names[0])
+    if len(names) > 1:
+        error = error_percent(target, np.array([value]))[0]
+    return {"paper_identified": value, "paper_error_percent": error}
+
+
 def errors(study: Study, tables: list[Path]) -> Table:
     """Join the error tables of all cases, CSV."""
-    columns = table_columns(study.near_noise_tolerance)
+    columns = _columns(study.near_noise_tolerance)
     names = [column.name for column in columns]
-    rows: list[tuple[Cell, ...]] = [
-        tuple(_cell(name, text) for name, text in zip(names, row, strict=True))
+    rows = [
+        {name: _cell(name, text) for name, text in zip(names, row, strict=True)}
         for path in tables
         for row in read_rows(path, names)[1:]
     ]
-    caption = (
-        f"Identification errors of all cases. {TYPICAL} Error = (target - identified) / target."
-    )
-    return Table(caption, columns, rows)
+    return Table(f"Identification errors of all cases. {_TYPICAL}", columns, rows)
 
 
-def _cell(name: str, text: str) -> Cell:
-    if name in _WHOLE_NUMBERS:
+def _cell(name: str, text: str) -> str | float:
+    if name in ("typical_seed", "seeds"):
         return int(text)
     try:
         return float(text)
     except ValueError:
-        return text or None
-
-
-def _paper(
-    truth: Truth, quantity: list[Parameter], target: float | None
-) -> tuple[float | None, str | float | None]:
-    """Return the paper's value and error; the error of a sum is computed from its values."""
-    identified, names = truth.published.identified, [p.name for p in quantity]
-    if not all(name in identified for name in names):
-        return None, None
-    value = float(sum(identified[name] for name in names))
-    if len(names) == 1:
-        return value, truth.published.error_percent.get(names[0])
-    return value, float(error_percent(target, np.array([value]))[0])
-
-
-_CAPTION = (
-    "Target values, the values and errors that the paper prints, and those of this study: the seed "
-    "of median excess of the misfit over the noise in its trace, median and 5 to 95 % over seeds, "
-    "the median absolute error, and the share of seeds whose misfit is within the study's "
-    "tolerance of the noise. Errors are (target - identified) / target. Where c and c_p trade "
-    "against each other, only the row c + c_p is determined."
-)
+        # As ">100", which the paper prints for an error.
+        return text

@@ -1,12 +1,13 @@
-"""Check of the values in Tables 5 to 7 against the paper's own encoding and error formula.
+"""Evidence for the reconstructed values, and contradictions within the paper.
 
-Sampling rate at which the paper's errors agree with Cramér-Rao bounds.
-
-Evidence for the reconstructed values, and contradictions within the paper.
+Three tables: statements of the paper beside results; the values in its Tables 5 to 7 against its
+own encoding and error formula; and the sampling rate at which its errors agree with Cramér-Rao
+bounds.
 """
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,13 +20,117 @@ from biogrip.physics.models import Truth
 from biogrip.physics.protocol import sample_times
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.records.identifications import read_identifications
-from biogrip.records.traces import (
-    each_trace,
-    read_jaw_force,
-)
+from biogrip.records.traces import each_trace, read_jaw_force
 from biogrip.study.study import Case, Study
 from biogrip.tables.errors_of_case import error_percent
-from biogrip.tables.layout import Cell, Column, Table
+from biogrip.tables.layout import Column, Row, Table
+
+_COLUMNS = (
+    Column("quantity", "Quantity"),
+    Column("unit", "Unit"),
+    Column("paper", "Paper"),
+    Column("this_study", "This study", 3),
+    Column("remark", "Remark"),
+)
+# Section 3: torque in N m, voltage in V as the paper rounds it, and a remark.
+_PRINTED_VOLTAGES = (
+    (1.6e-9, "about 17", "eq. (9) with Table 2"),
+    (0.32e-9, "about 7", "eq. (9) with Table 2"),
+    (1.6e-6, "about 17", "section 3 prints 1.6 uN m without the factor 1e-3"),
+)
+_PRINTED_GENE_VALUES = "9 or 12"
+
+
+def evidence(
+    study: Study, identifications: list[Path], measurements: list[Path], targets: list[Path]
+) -> Table:
+    """Compare statements of the paper with results of the study."""
+    rows = _device_rows(study)
+    for name, case in study.cases.items():
+        truth = case.truth
+        rows += [row for path in targets if path.stem == name for row in _grip_rows(truth, path)]
+        rows += _axis_rows(truth, [path for path in measurements if path.parent.name == name])
+        if study.shown == "genetic":
+            identified = [path for path in identifications if path.stem == name]
+            rows += _generation_rows(truth, identified)
+    return Table("Statements of the paper beside what the study computes.", _COLUMNS, rows)
+
+
+def _row(quantity: str, unit: str, paper: str | None, this_study: float, remark: str) -> Row:
+    cells = quantity, unit, paper, this_study, remark
+    return {column.name: cell for column, cell in zip(_COLUMNS, cells, strict=True)}
+
+
+def _device_rows(study: Study) -> list[Row]:
+    """Return what the paper says of actuator, gripper and genes."""
+    comb, gripper, arm = study.actuator, study.gripper, study.gripper.left
+    rows = [
+        _row(f"voltage for {torque:g} N m", "V", printed, _volts(study, torque), remark)
+        for torque, printed, remark in _PRINTED_VOLTAGES
+    ]
+    remark = "has to be less than the arm length"
+    rows.append(_row("outer radius of the comb", "mm", None, 1e3 * comb.outer_radius_m, remark))
+    stroke_Nm = arm.stiffness_Nm_per_rad * math.radians(comb.stroke_deg)
+    for quantity, unit, value, source in (
+        ("arm length", "mm", 1e3 * gripper.arm_length_m, "config"),
+        ("natural frequency of the free arm", "Hz", arm.natural_frequency_Hz, "config"),
+        ("quality factor of the free arm", "", arm.quality_factor, "config"),
+        ("voltage for the full stroke, no sample", "V", _volts(study, stroke_Nm), "config's k_2"),
+    ):
+        rows.append(_row(quantity, unit, None, value, f"from the {source}"))
+    remark = "from the config, made after Table 4"
+    for name in (parameter.name for parameter in SINGLE_BRANCH):
+        low, high = study.ranges[name].exponent
+        quantity = f"values of the exponent gene of {name}"
+        rows.append(_row(quantity, "", _PRINTED_GENE_VALUES, high - low + 1, remark))
+    return rows
+
+
+def _volts(study: Study, torque_Nm: float) -> float:
+    return float(actuator.voltage(study.actuator, torque_Nm))
+
+
+def _grip_rows(case: Truth, target: Path) -> list[Row]:
+    """Return the jaw force at the lower torque, which the paper says maintains the grip."""
+    time_s, torque, force = read_jaw_force(target)
+    # The first such sample may coincide with the step, so skip it.
+    reduced = np.flatnonzero(torque < torque.max())[1:]
+    if not len(reduced):
+        return []
+    lowest = reduced[np.argmin(force[reduced])]
+    remark = (
+        f"lowest of the samples, at {time_s[lowest]:.4g} s; negative: the jaws would have to pull"
+    )
+    quantity = f"{case.title}: jaw force at the lower torque"
+    return [_row(quantity, "uN", "maintains the grip", 1e6 * float(force[lowest]), remark)]
+
+
+def _axis_rows(case: Truth, traces: list[Path]) -> list[Row]:
+    """Return the ends of an axis that the paper shows, and of our traces."""
+    axis = case.published.axis_rad
+    if not axis or not traces:
+        return []
+    # Keep only extremes: traces of many seeds exceed the memory.
+    extremes = [(trace.min(), trace.max()) for path in traces for trace in each_trace(path)]
+    remark = (
+        f"median of {counted(len(extremes), 'noisy trace')}; the paper's is the end of its axis"
+    )
+    ends = zip(("smallest", "largest"), axis, np.median(extremes, axis=0), strict=True)
+    return [
+        _row(f"{case.title}: {end} sample", "mrad", f"{1e3 * printed:g}", 1e3 * ours, remark)
+        for end, printed, ours in ends
+    ]
+
+
+def _generation_rows(case: Truth, identified: list[Path]) -> list[Row]:
+    generation = case.published.generation
+    if not generation or not identified:
+        return []
+    found = read_identifications(identified[0], "genetic")
+    median = float(np.median(found["generations"]))
+    quantity = f"{case.title}: generation of the fit"
+    return [_row(quantity, "", str(generation), median, "median generation at which ours stops")]
+
 
 _PRINTED_COLUMNS = (
     Column("case", "Case"),
@@ -42,28 +147,30 @@ _PRINTED_COLUMNS = (
 
 def printed_values(study: Study) -> Table:
     """Compare published values with encoding, range and error formula."""
-    ranges = study.ranges
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for case, reported in study.cases.items():
-        truth = reported.truth
-        printed = truth.published
+        truth, printed = reported.truth, reported.truth.published
         for name in truth.model.names:
-            target = truth.parameters[name]
+            target, genes = truth.parameters[name], study.ranges[name]
             identified = printed.identified.get(name)
             for quantity, value in (("target", target), ("identified", identified)):
                 if value is None or value <= 0:
                     continue
-                genes = ranges[name]
                 nearest = nearest_encodable(value, genes)
-                errors: tuple[Cell, Cell] = (None, None)
+                row: Row = {
+                    "case": case,
+                    "parameter": name,
+                    "quantity": quantity,
+                    "printed": value,
+                    "nearest_encodable": nearest,
+                    "distance_percent": 100 * (value - nearest) / value,
+                    "within_range": "yes" if genes.low <= value <= genes.high else "no",
+                }
                 if quantity == "identified" and target:
-                    printed_percent = printed.error_percent.get(name)
-                    errors = (printed_percent, float(error_percent(target, np.array([value]))[0]))
-                distance = 100 * (value - nearest) / value
-                within = "yes" if genes.low <= value <= genes.high else "no"
-                rows.append(
-                    (case, name, quantity, value, nearest, distance, within, *errors),
-                )
+                    row["printed_error_percent"] = printed.error_percent.get(name)
+                    error = error_percent(target, np.array([value]))[0]
+                    row["recomputed_error_percent"] = error
+                rows.append(row)
     caption = (
         "Printed values of Tables 5 to 7 against the two-digit encoding of eq. (10), the ranges "
         "of Table 4, and the printed errors against (target - identified) / target."
@@ -74,180 +181,64 @@ def printed_values(study: Study) -> Table:
 _RATES_HZ = (0.1, 1.0, 10.0, 100.0)
 # Factor of a parameter's bound over that of the sum above which the two count as exchangeable.
 _TRADING = 2.0
-
 _SAMPLING_COLUMNS = (
     Column("case", "Case"),
     Column("parameter", "Parameter"),
     Column("paper_error_percent", "Paper's error %", 2),
     *(Column(f"bound_percent_{rate:g}_Hz", f"Bound % at {rate:g} Hz", 2) for rate in _RATES_HZ),
 )
-_CAPTION = (
-    "The paper's errors beside the standard deviations that the study's noise leaves at least "
-    "(Cramer-Rao bounds at the true parameters), at several sampling rates. Of c and c_p the sum "
-    "stands where they trade against each other at the paper's answer. Last row: the paper's "
-    "error over the bound, root mean square over the rows above; about 1 is to be expected of an "
-    "identification that is as good as noise allows."
-)
 
 
 def sampling_evidence(study: Study) -> Table:
     """Compare errors of the paper with bounds at several sampling rates."""
-    rows: list[tuple[Cell, ...]] = []
-    for name, case in study.cases.items():
-        rows += _case_rows(name, case)
-    if rows:
-        table = np.array([row[2:] for row in rows], dtype=float)
+    found = [
+        (name, *cells) for name, case in study.cases.items() for cells in _errors_and_bounds(case)
+    ]
+    if found:
+        table = np.array([cells[2:] for cells in found], dtype=float)
         ratios = np.sqrt(np.mean((table[:, :1] / table[:, 1:]) ** 2, axis=0))
-        rows.append(("all", "error / bound", None, *(float(ratio) for ratio in ratios)))
-    return Table(_CAPTION, _SAMPLING_COLUMNS, rows)
+        found.append(("all", "error / bound", None, *ratios))
+    caption = (
+        "The paper's errors beside the standard deviations that the study's noise leaves at least "
+        "(Cramer-Rao bounds at the true parameters), at several sampling rates. Of c and c_p the "
+        "sum stands where they trade against each other at the paper's answer. Last row: the "
+        "paper's error over the bound, root mean square over the rows above; about 1 is to be "
+        "expected of an identification that is as good as noise allows."
+    )
+    names = [column.name for column in _SAMPLING_COLUMNS]
+    rows = [dict(zip(names, cells, strict=True)) for cells in found]
+    return Table(caption, _SAMPLING_COLUMNS, rows)
 
 
-def _case_rows(name: str, case: Case) -> list[tuple[Cell, ...]]:
-    """Return a row per quantity that is determined at some rate and that the paper reports."""
+def _errors_and_bounds(case: Case) -> list[tuple[Any, ...]]:
+    """Return a row of each quantity that is determined at some rate and that the paper reports."""
     truth, identified = case.truth.parameters, case.truth.published.identified
     problem, noise = case.problem, case.noise
     names = list(problem.searched.names)
-    end_s = problem.torque.end_s
-    times = [sample_times(end_s, rate) for rate in _RATES_HZ]
+    times = [sample_times(problem.torque.end_s, rate) for rate in _RATES_HZ]
     at_truth = [bounds_percent(problem, noise, truth, time_s) for time_s in times]
-    shown = [q for q, _ in at_truth[0]]
+    shown = [quantity for quantity, _ in at_truth[0]]
     if set(names) <= set(identified):
         shown = _drop_redundant(bounds_percent(problem, noise, identified, times[-1]))
-    rows: list[tuple[Cell, ...]] = []
-    for index, (q, _) in enumerate(at_truth[0]):
-        bounds = [found[index][1] for found in at_truth]
-        members = [names[member] for member in q.members]
+    found: list[tuple[Any, ...]] = []
+    for index, (quantity, _) in enumerate(at_truth[0]):
+        bounds = [at_rate[index][1] for at_rate in at_truth]
+        members = [names[member] for member in quantity.members]
         known = all(member in identified for member in members)
-        if q in shown and known and min(bounds) < DETERMINED_PERCENT:
-            target, found = (sum(of[m] for m in members) for of in (truth, identified))
-            error = float(error_percent(target, np.array([found]))[0])
-            rows.append((name, q.label, error, *bounds))
-    return rows
+        if quantity in shown and known and min(bounds) < DETERMINED_PERCENT:
+            target, value = (sum(of[m] for m in members) for of in (truth, identified))
+            error = error_percent(target, np.array([value]))[0]
+            found.append((quantity.label, error, *bounds))
+    return found
 
 
 def _drop_redundant(bounds: list[tuple[Quantity, float]]) -> list[Quantity]:
     """Leave out sums whose members are determined, and members that only the sum determines."""
-    sums = [(q, percent) for q, percent in bounds if q.form == "sum"]
     left_out = []
-    for total, percent in sums:
+    for total, percent in [(q, percent) for q, percent in bounds if q.form == "sum"]:
         members = [(q, alone) for q, alone in bounds if set(q.members) < set(total.members)]
         if min(alone for _, alone in members) > _TRADING * percent:
             left_out += [q for q, _ in members]
         else:
             left_out.append(total)
     return [q for q, _ in bounds if q not in left_out]
-
-
-_COLUMNS = (
-    Column("quantity", "Quantity"),
-    Column("unit", "Unit"),
-    Column("paper", "Paper"),
-    Column("this_study", "This study", 3),
-    Column("remark", "Remark"),
-)
-
-# Section 3: torque in N m, voltage in V as the paper rounds it, and a remark.
-_PRINTED_VOLTAGES = (
-    (1.6e-9, "about 17", "eq. (9) with Table 2"),
-    (0.32e-9, "about 7", "eq. (9) with Table 2"),
-    (1.6e-6, "about 17", "section 3 prints 1.6 uN m without the factor 1e-3"),
-)
-_PRINTED_GENE_VALUES = "9 or 12"
-
-
-def evidence(
-    study: Study,
-    identifications: list[Path],
-    measurements: list[Path],
-    targets: list[Path],
-) -> Table:
-    """Compare statements of the paper with results of the study."""
-    rows = [*_actuator_rows(study), *_gripper_rows(study), *_gene_rows(study)]
-    for name, case in study.cases.items():
-        truth = case.truth
-        rows += [row for path in targets if path.stem == name for row in _grip_rows(truth, path)]
-        traces = [path for path in measurements if path.parent.name == name]
-        identified = [path for path in identifications if path.stem == name]
-        rows += _axis_rows(truth, traces)
-        if study.shown == "genetic":
-            rows += _generation_rows(truth, identified)
-    return Table("Statements of the paper beside what the study computes.", _COLUMNS, rows)
-
-
-def _actuator_rows(study: Study) -> list[tuple[Cell, ...]]:
-    comb = study.actuator
-    rows: list[tuple[Cell, ...]] = []
-    for torque, printed, remark in _PRINTED_VOLTAGES:
-        volts = float(actuator.voltage(comb, torque))
-        rows.append((f"voltage for {torque:g} N m", "V", printed, volts, remark))
-    remark = "has to be less than the arm length"
-    rows.append(("outer radius of the comb", "mm", None, 1e3 * comb.outer_radius_m, remark))
-    return rows
-
-
-def _gripper_rows(study: Study) -> list[tuple[Cell, ...]]:
-    gripper = study.gripper
-    comb = study.actuator
-    stroke = gripper.left.stiffness_Nm_per_rad * math.radians(comb.stroke_deg)
-    volts = float(actuator.voltage(comb, stroke))
-    arm = gripper.left
-    rows = (
-        ("arm length", "mm", 1e3 * gripper.arm_length_m, "config"),
-        ("natural frequency of the free arm", "Hz", arm.natural_frequency_Hz, "config"),
-        ("quality factor of the free arm", "", arm.quality_factor, "config"),
-        ("voltage for the full stroke, no sample", "V", volts, "config's k_2"),
-    )
-    return [(name, unit, None, value, f"from the {source}") for name, unit, value, source in rows]
-
-
-def _gene_rows(study: Study) -> list[tuple[Cell, ...]]:
-    ranges = study.ranges
-    rows: list[tuple[Cell, ...]] = []
-    for parameter in SINGLE_BRANCH:
-        low, high = ranges[parameter.name].exponent
-        remark = "from the config, made after Table 4"
-        quantity = f"values of the exponent gene of {parameter.name}"
-        rows.append((quantity, "", _PRINTED_GENE_VALUES, high - low + 1, remark))
-    return rows
-
-
-def _grip_rows(case: Truth, target: Path) -> list[tuple[Cell, ...]]:
-    """Return the jaw force at the lower torque, which the paper says maintains the grip."""
-    time_s, torque, force = read_jaw_force(target)
-    # The first such sample may coincide with the step, so skip it.
-    reduced = np.flatnonzero(torque < torque.max())[1:]
-    if not len(reduced):
-        return []
-    lowest = reduced[np.argmin(force[reduced])]
-    remark = (
-        f"lowest of the samples, at {time_s[lowest]:.4g} s; negative: the jaws would have to pull"
-    )
-    quantity = f"{case.title}: jaw force at the lower torque"
-    return [(quantity, "uN", "maintains the grip", 1e6 * float(force[lowest]), remark)]
-
-
-def _axis_rows(case: Truth, traces: list[Path]) -> list[tuple[Cell, ...]]:
-    axis = case.published.axis_rad
-    if not axis or not traces:
-        return []
-    # Keep only extremes: traces of many seeds exceed the memory.
-    extremes = [(trace.min(), trace.max()) for path in traces for trace in each_trace(path)]
-    low, high = (1e3 * float(value) for value in np.median(extremes, axis=0))
-    remark = (
-        f"median of {counted(len(extremes), 'noisy trace')}; the paper's is the end of its axis"
-    )
-    ends = zip(("smallest", "largest"), axis, (low, high), strict=True)
-    return [
-        (f"{case.title}: {end} sample", "mrad", f"{1e3 * printed:g}", ours, remark)
-        for end, printed, ours in ends
-    ]
-
-
-def _generation_rows(case: Truth, identified: list[Path]) -> list[tuple[Cell, ...]]:
-    generation = case.published.generation
-    if not generation or not identified:
-        return []
-    found = read_identifications(identified[0], "genetic")
-    median = float(np.median(found["generations"]))
-    quantity = f"{case.title}: generation of the fit"
-    return [(quantity, "", str(generation), median, "median generation at which ours stops")]

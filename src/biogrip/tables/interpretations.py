@@ -1,11 +1,10 @@
-"""How close seeds come to the truth, beside the paper, in all parameters of a table at once.
+"""The genetic algorithm under every interpretation of the paper's section 4.
 
-Comparison of interpretations of section 4: success rate, errors and last improvement.
-
-How probable the paper's tables are together, under every interpretation of section 4.
+Two tables: success rate, errors and last improvement of each interpretation; and how probable the
+paper's tables are together, all parameters of a table at once.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import reduce
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from biogrip.physics.models import Truth
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.records.identifications import INTERPRETATIONS
 from biogrip.study.study import Study
-from biogrip.tables.layout import Cell, Column, Table
+from biogrip.tables.layout import Column, Row, Table
 
 COMPARED = ("k", "k_p", "c")
 """Parameters compared with the paper's at once; of c_p it says only that it errs by over 100 %."""
@@ -48,13 +47,16 @@ def relative_errors(truth: Truth, found: pd.DataFrame) -> Array:
 
 def as_small(truth: Truth, found: pd.DataFrame) -> BoolArray:
     """Return True for each seed whose errors are all as small as the paper's."""
-    allowed = _printed_errors(truth) + ROUNDING
-    return np.all(relative_errors(truth, found) <= allowed[:, None], axis=0)
+    return _all_below(_printed_errors(truth) + ROUNDING, truth, found)
 
 
 def of_same_order(truth: Truth, found: pd.DataFrame) -> BoolArray:
     """Return True for each seed with all errors at most half a decade above the paper's."""
     allowed = _HALF_A_DECADE * np.maximum(_printed_errors(truth), _RESOLVED)
+    return _all_below(allowed, truth, found)
+
+
+def _all_below(allowed: Array, truth: Truth, found: pd.DataFrame) -> BoolArray:
     return np.all(relative_errors(truth, found) <= allowed[:, None], axis=0)
 
 
@@ -67,11 +69,25 @@ def _printed_errors(truth: Truth) -> Array:
 
 def interpretations(study: Study, found: list[Path]) -> Table:
     """Compare the interpretations from the rows of each case, CSV."""
-    rows = [
-        row
-        for path, (name, case) in zip(found, study.cases.items(), strict=True)
-        for row in _rows(study, name, case.truth, INTERPRETATIONS.read(path))
-    ]
+    rows: list[Row] = []
+    for path, (case, made) in zip(found, study.cases.items(), strict=True):
+        truth, of_case = made.truth, INTERPRETATIONS.read(path)
+        for name, title in study.interpretation_titles.items():
+            mine = of_case[of_case["interpretation"] == name]
+            row = {
+                "case": case,
+                "interpretation": title,
+                "seeds": len(mine),
+                "near_noise_share": near_noise(mine, study.near_noise_tolerance).mean(),
+                "last_improvement": mine["last_improvement"].median(),
+            }
+            if compared_parameters(truth):
+                row["as_close_share"] = as_small(truth, mine).mean()
+            for p in SINGLE_BRANCH:
+                if target := truth.parameters.get(p.name):
+                    error = 100 * np.abs(mine[p.column].to_numpy(float) / target - 1)
+                    row[f"error_percent {p.name}"] = np.median(error)
+            rows.append(row)
     words = near_noise_words(study.near_noise_tolerance)
     columns = (
         Column("case", "Case"),
@@ -91,47 +107,9 @@ def interpretations(study: Study, found: list[Path]) -> Table:
     return Table(caption, columns, rows)
 
 
-def _rows(study: Study, case: str, truth: Truth, found: pd.DataFrame) -> list[tuple[Cell, ...]]:
-    rows: list[tuple[Cell, ...]] = []
-    for name, title in study.interpretation_titles.items():
-        mine = found[found["interpretation"] == name]
-        errors = {
-            p.name: 100 * np.abs(mine[p.column].to_numpy(float) / truth.parameters[p.name] - 1)
-            for p in SINGLE_BRANCH
-            if truth.parameters.get(p.name)
-        }
-        compared = compared_parameters(truth)
-        rows.append(
-            (
-                case,
-                title,
-                len(mine),
-                float(near_noise(mine, study.near_noise_tolerance).mean()),
-                float(as_small(truth, mine).mean()) if compared else None,
-                *(_median(errors.get(p.name)) for p in SINGLE_BRANCH),
-                float(mine["last_improvement"].median()),
-            )
-        )
-    return rows
-
-
-def _median(errors: "np.ndarray | None") -> float | None:
-    return None if errors is None else float(np.median(errors))
-
-
-ALL = "all"
-"""In the column of the paper's table: all of them."""
-AS_SMALL, SAME_ORDER = "as small", "of the same order"
-_CRITERIA: dict[str, Callable[[Truth, pd.DataFrame], BoolArray]] = {
-    AS_SMALL: as_small,
-    SAME_ORDER: of_same_order,
-}
-_TAILS = 0.025, 0.975
-_LOG2_DRAWS = 14
-_ROUNDING = 1e-9
-"""Products of shares that differ by less are equal."""
-
-_COLUMNS = (
+_AS_SMALL = "as small"
+_CRITERIA = {_AS_SMALL: as_small, "of the same order": of_same_order}
+_JOINT_COLUMNS = (
     Column("interpretation", "Interpretation"),
     Column("errors", "Errors beside the printed ones"),
     Column("table", "Table of the paper"),
@@ -144,6 +122,10 @@ _COLUMNS = (
     Column("as_improbable_low", "from", 2),
     Column("as_improbable_high", "to", 2),
 )
+_TAILS = 0.025, 0.975
+_LOG2_DRAWS = 14
+_ROUNDING = 1e-9
+"""Products of shares that differ by less are equal."""
 
 
 def interpretations_jointly(study: Study, found: list[Path]) -> Table:
@@ -163,28 +145,33 @@ def interpretations_jointly(study: Study, found: list[Path]) -> Table:
         if compared_parameters(case.truth)
     ]
     rows = [
-        row
+        {"interpretation": title, **row}
         for name, title in study.interpretation_titles.items()
         for row in _joint_rows(
-            title, [(truth, rows[rows["interpretation"] == name]) for truth, rows in cases]
+            [(truth, rows[rows["interpretation"] == name]) for truth, rows in cases]
         )
     ]
-    return Table(caption, _COLUMNS, rows)
+    return Table(caption, _JOINT_COLUMNS, rows)
 
 
-def _joint_rows(title: str, cases: list[tuple[Truth, pd.DataFrame]]) -> Iterator[tuple[Cell, ...]]:
+def _joint_rows(cases: list[tuple[Truth, pd.DataFrame]]) -> Iterator[Row]:
+    """Yield by each criterion a row for every table of the paper, and one for all of them."""
     own = [own_shares(relative_errors(truth, found)) for truth, found in cases]
     for criterion, is_close in _CRITERIA.items():
         counts = [(int(is_close(truth, found).sum()), len(found)) for truth, found in cases]
         for (truth, _), (count, seeds) in zip(cases, counts, strict=True):
-            number = truth.published.table
             low, high = limits([(count, seeds)])
-            yield (title, criterion, number, seeds, count, count / seeds, low, high, *3 * (None,))
+            row: Row = {"errors": criterion, "table": truth.published.table, "seeds": seeds}
+            row |= {"as_close": count, "probability": count / seeds, "low": low, "high": high}
+            yield row
         product = float(np.prod([count / seeds for count, seeds in counts]))
-        ends = limits(counts)
-        improbable = [share_not_larger(own, value) for value in (product, *ends)]
-        rarity = improbable if criterion == AS_SMALL else 3 * [None]
-        yield (title, criterion, ALL, None, None, product, *ends, *rarity)
+        low, high = limits(counts)
+        row = {"errors": criterion, "table": "all"}
+        row |= {"probability": product, "low": low, "high": high}
+        if criterion == _AS_SMALL:
+            ends = {"": product, "_low": low, "_high": high}
+            row |= {f"as_improbable{end}": share_not_larger(own, p) for end, p in ends.items()}
+        yield row
 
 
 def limits(counts: list[tuple[int, int]]) -> tuple[float, float]:

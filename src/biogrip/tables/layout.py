@@ -1,25 +1,41 @@
-"""Tables as CSV for computing, and as Markdown, LaTeX and HTML for reading."""
+"""Tables: written as CSV for computing, as Markdown, LaTeX and HTML for reading; and compared.
 
-import math
-from collections.abc import Sequence
+CSV has six significant digits, print as many as a column says, of the number in the CSV.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from difflib import unified_diff
 from html import escape
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
+from biogrip.digits import counted
+from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.records.rows import write_rows
 
-Cell = str | float | int | None
+Row = dict[str, Any]
+"""Text or numbers by the name of their column; None, NaN or no cell is an empty one."""
+
+_STYLE = (
+    "body{font-family:sans-serif;margin:1.5em}table{border-collapse:collapse}"
+    "th,td{padding:.3em .7em;border-bottom:1px solid #ccc;text-align:left}"
+    "th{border-bottom:2px solid #333}p{max-width:60em}"
+)
+_MOST_LINES = 40
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table: its names in CSV and print."""
+    """A column of a table."""
 
     name: str
-    """Name in the CSV."""
+    """Name in the CSV, and in rows."""
     heading: str
     """Heading in print."""
     digits: int = 3
@@ -33,21 +49,22 @@ class Table:
     caption: str
     """Description of the table in a sentence or two."""
     columns: tuple[Column, ...]
-    rows: Sequence[tuple[Cell, ...]]
-    """None is an empty cell."""
+    rows: Sequence[Mapping[str, Any]]
+    """See `Row`."""
+
+    def __post_init__(self) -> None:
+        """Raise `ValueError` if a row has a cell of no column."""
+        names = {column.name for column in self.columns}
+        if extra := {name for row in self.rows for name in row} - names:
+            raise ValueError(f"cells of no column: {', '.join(sorted(extra))}")
 
 
 def write(table: Table, output: Path) -> None:
-    """Write a table as CSV with six significant digits, and as .md, .tex and .html.
-
-    The latter omit empty columns.
-    """
+    """Write a table as CSV, and without empty columns as .md, .tex and .html beside it."""
+    columns = table.columns
     shown = pd.DataFrame(
-        [
-            [_text(cell, column.digits) for cell, column in zip(row, table.columns, strict=True)]
-            for row in table.rows
-        ],
-        columns=[column.heading for column in table.columns],
+        [[_text(row.get(c.name), c.digits) for c in columns] for row in table.rows],
+        columns=[c.heading for c in columns],
     )
     if len(shown):
         shown = shown.loc[:, (shown != "").any()]
@@ -60,20 +77,25 @@ def write(table: Table, output: Path) -> None:
         label=f"tab:{output.stem}",
         column_format="l" * shown.shape[1],
     )
-    names = [column.name for column in table.columns]
-    write_rows(output, names, ([_text(cell, 6) for cell in row] for row in table.rows))
+    html = (
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><style>{_STYLE}</style>'
+        f"</head><body>\n<p>{escape(table.caption)}</p>\n{shown.to_html(index=False, border=0)}\n"
+        "</body></html>\n"
+    )
+    cells = ([_text(row.get(c.name), 6) for c in columns] for row in table.rows)
+    write_rows(output, [c.name for c in columns], cells)
     write_text(output.with_suffix(".md"), f"{table.caption}\n\n{markdown}\n")
     write_text(output.with_suffix(".tex"), latex)
-    write_text(output.with_suffix(".html"), _page(table.caption, shown))
+    write_text(output.with_suffix(".html"), html)
 
 
-def _text(cell: Cell, digits: int) -> str:
-    if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+def _text(cell: Any, digits: int) -> str:
+    if cell is None:
         return ""
-    if isinstance(cell, float):
+    if isinstance(cell, float | np.floating):
         # Round the CSV's number, so that print and CSV agree; adding zero turns -0 into 0.
         shown = float(f"{cell:.6g}")
-        return f"{float(f'{shown:.{digits}g}') + 0.0:.{digits}g}"
+        return "" if np.isnan(cell) else f"{float(f'{shown:.{digits}g}') + 0.0:.{digits}g}"
     return str(cell)
 
 
@@ -82,14 +104,26 @@ def _without_bars(text: str) -> str:
     return text.replace("|", r"\|").replace("\n", " ")
 
 
-def _page(caption: str, shown: pd.DataFrame) -> str:
-    style = (
-        "body{font-family:sans-serif;margin:1.5em}table{border-collapse:collapse}"
-        "th,td{padding:.3em .7em;border-bottom:1px solid #ccc;text-align:left}"
-        "th{border-bottom:2px solid #333}p{max-width:60em}"
-    )
-    body = shown.to_html(index=False, border=0)
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><style>{style}</style>'
-        f"</head><body>\n<p>{escape(caption)}</p>\n{body}\n</body></html>\n"
-    )
+def compare(published: Path, made: Sequence[Path]) -> str:
+    """Compare tables with published files of the same names, and say how many agree.
+
+    Raises
+    ------
+    BiogripError
+        If there is none to compare; or with the lines that differ, if a table is not published, or
+        has other bytes.
+    """
+    if not made:
+        raise BiogripError(f"{published}: holds no tables to compare with.")
+    differing: list[str] = []
+    for now in made:
+        before = published / now.name
+        if not before.exists():
+            differing.append(f"{now.name}: is not published.")
+        elif before.read_bytes() != now.read_bytes():
+            old, new = (file.read_text(encoding="utf-8").splitlines() for file in (before, now))
+            differing += unified_diff(old, new, str(before), str(now), n=0, lineterm="")
+    if differing:
+        shown = "\n".join(islice(differing, _MOST_LINES))
+        raise BiogripError(f"the regenerated tables differ from {published}.\n{shown}")
+    return f"{counted(len(made), 'file')} of tables compared with {published}: the same bytes."

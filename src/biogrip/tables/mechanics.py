@@ -1,16 +1,15 @@
-"""Table of rotation, torque and voltage at contact with samples of several sizes.
+"""What the gripper does to a sample, and what its model leaves out.
 
-Size of the physical effects that the model leaves out.
-
-Strain, force, stiffness and apparent modulus of every sample.
-
-Domain in which the paper's linearisation is accurate.
+Four tables: the closed gripper at contact with samples of several sizes; strain, force, stiffness
+and apparent modulus of every sample; effects that the model leaves out, estimated; and the torque
+up to which the paper's linearisation is accurate.
 """
 
 from pathlib import Path
 
 import numpy as np
 
+from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics import actuator
 from biogrip.physics.contact import (
@@ -24,13 +23,12 @@ from biogrip.physics.contact import (
     mass_of_sample,
     rolling_of_contact,
 )
-from biogrip.physics.gripper import Gripper
 from biogrip.physics.jaw_force import compute_grip, jaw_force
 from biogrip.physics.protocol import largest_load, torque_history
 from biogrip.physics.simulation import simulated_shortening
 from biogrip.records.identifications import DIFFERENCES
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Cell, Column, Table
+from biogrip.tables.layout import Column, Row, Table
 
 _CONTACT_COLUMNS = (
     Column("size_um", "Sample (um)"),
@@ -47,22 +45,28 @@ _CONTACT_COLUMNS = (
 def contacts(study: Study) -> Table:
     """Return the state of the gripper closed onto samples from the smallest to the largest."""
     grip_Nm = largest_load(study.phases)
-    rows: list[tuple[Cell, ...]] = []
+    neutral_deg = study.gripper.reference_angle_deg
+    rows: list[Row] = []
     for size_um in np.arange(1e6 * SMALLEST_M, 1e6 * LARGEST_M + 1, 15.0):
         try:
             found = contact(study.gripper, study.jaw_gap_m, study.actuator, 1e-6 * size_um)
         except BiogripError as error:
-            rows.append((float(size_um), *6 * (None,), str(error)))
+            rows.append({"size_um": size_um, "remark": str(error)})
             continue
-        numbers = (
-            1e3 * found.closing_rad,
-            found.reference_angle_deg,
-            _off_percent(study.gripper, found.reference_angle_deg),
-            1e9 * found.torque_Nm,
-            found.voltage_V,
-            float(actuator.voltage(study.actuator, found.torque_Nm + grip_Nm)),
+        sines = np.sin(np.radians([found.reference_angle_deg, neutral_deg]))
+        rows.append(
+            {
+                "size_um": size_um,
+                "closing_mrad": 1e3 * found.closing_rad,
+                "reference_angle_deg": found.reference_angle_deg,
+                "off_percent": 100 * ((sines[0] / sines[1]) ** 2 - 1),
+                "torque_nNm": 1e9 * found.torque_Nm,
+                "voltage_V": found.voltage_V,
+                "gripping_voltage_V": float(
+                    actuator.voltage(study.actuator, found.torque_Nm + grip_Nm)
+                ),
+            }
         )
-        rows.append((float(size_um), *(float(number) for number in numbers), ""))
     caption = (
         "Closing the jaws from the neutral configuration onto a sample: rotation of each arm, its "
         "angle at contact, by how much stiffnesses and dampings of the linear model are off if the "
@@ -73,78 +77,7 @@ def contacts(study: Study) -> Table:
     return Table(caption, _CONTACT_COLUMNS, rows)
 
 
-def _off_percent(neutral: Gripper, angle_deg: float) -> float:
-    """Return the error of values that are found with the neutral angle, and not this one."""
-    sines = np.sin(np.radians([angle_deg, neutral.reference_angle_deg]))
-    return float(100 * ((sines[0] / sines[1]) ** 2 - 1))
-
-
-_LEFT_OUT_COLUMNS = (
-    Column("effect", "Left out"),
-    Column("size", "Size", 2),
-    Column("unit", "Unit"),
-    Column("beside", "Beside"),
-    Column("beside_size", "which is", 2),
-    Column("share_percent", "Share (%)", 2),
-    Column("remark", "Remark"),
-)
-
-
-def _damping(case: Case) -> float:
-    model = case.sample.model
-    if model.power_law:
-        return 0.0
-    network = model.sample(case.parameters)
-    return float(network.c_p[0] + network.c[0].sum())
-
-
-def left_out(study: Study) -> Table:
-    """Estimate effects that the model leaves out, for the largest sample."""
-    gripper, comb = study.gripper, study.actuator
-    dampings = [damping for name in study.gripped if (damping := _damping(study.cases[name])) > 0]
-    least = min(dampings, default=None)
-    b, arm = gripper.lever_m, gripper.left
-    turn = largest_load(study.phases) / arm.stiffness_Nm_per_rad
-    rows: list[tuple[Cell, ...]] = []
-    if least is not None:
-        drag = drag_of_sample(LARGEST_M)
-        remark = "the sample in water, Stokes; of the case with the least damping"
-        rows.append(_row("drag on the sample", drag, "N s/m", "its dampers", least, remark))
-    drag = drag_of_arm(gripper, comb.thickness_m)
-    remark = "all of an arm in water; the paper keeps the device out of it"
-    beside = "the hinge's damping"
-    damping = arm.damping_Nms_per_rad
-    rows.append(_row("drag on an arm", drag, "N m s/rad", beside, damping, remark))
-    if least is not None:
-        remark = "the same, beside what a rotation trace is made of"
-        beside, share = "the sample's, 2 b^2 c", 2 * b * b * least
-        rows.append(_row("drag on an arm", drag, "N m s/rad", beside, share, remark))
-    length = 1e3 * gripper.arm_length_m
-    moved = length * rolling_of_contact(gripper, LARGEST_M, turn)
-    remark = "a sphere that rolls on the jaw, at the free arm's rotation under the largest torque"
-    rows.append(_row("contact point along the jaw", moved, "mm", "the arm length", length, remark))
-    remark = "at most: fingers shield each other; the voltage for a torque is less by half of it"
-    fringing = fringing_of_comb(comb)
-    rows.append(_row("fringing of the comb", fringing, "", "its capacitance", 1.0, remark))
-    remark = "felt for milliseconds after a step, as the arms' own"
-    beside, mass = "an arm's at the jaw, I/b^2", arm.inertia_kgm2 / b**2
-    rows.append(
-        _row("inertia of the sample", mass_of_sample(LARGEST_M), "kg", beside, mass, remark)
-    )
-    caption = (
-        f"What the model leaves out, estimated for a sample of {1e6 * LARGEST_M:g} um: its size, "
-        "and its share of what it would add to."
-    )
-    return Table(caption, _LEFT_OUT_COLUMNS, rows)
-
-
-def _row(
-    effect: str, size: float, unit: str, beside: str, whole: float, remark: str
-) -> tuple[Cell, ...]:
-    return effect, size, unit, beside, whole, 100 * size / whole, remark
-
-
-_COLUMNS = (
+_MECHANICS_COLUMNS = (
     Column("case", "Case"),
     Column("size_um", "Size (um)"),
     Column("shortening_um", "Shortening (um)"),
@@ -172,47 +105,105 @@ def mechanics(study: Study) -> Table:
         "method of measurement. A case that gives no size has a row for the smallest and the "
         "largest sample that the gripper takes."
     )
-    return Table(caption, _COLUMNS, [row for case in study.cases.values() for row in _rows(case)])
+    rows = [row for case in study.cases.values() for row in _mechanics_of(case)]
+    return Table(caption, _MECHANICS_COLUMNS, rows)
 
 
-def _rows(case: Case) -> list[tuple[Cell, ...]]:
-    torque = torque_history(case.phases)
+def _mechanics_of(case: Case) -> list[Row]:
+    """Return a row for every size of a case's sample."""
     network = case.sample.model.sample(case.parameters)
+    given = case.gripper, network, torque_history(case.phases)
     # Immediately before the first change of torque.
     end = np.array([np.nextafter(case.phases[0].duration_s, 0)])
-    given = case.gripper, network, torque
     shortening = float(simulated_shortening(*given, end, nonlinear=case.nonlinear_target)[0, 0])
     force = float(jaw_force(*given, end, nonlinear=case.nonlinear_target)[0, 0])
     grip = compute_grip(*given, nonlinear=case.nonlinear_target)
-    # A springpot has neither instantaneous nor long-term stiffness.
-    power_law = case.sample.model.power_law
-    in_the_end = None if power_law else float(network.k_p[0])
-    at_once = None if power_law else float(network.k_p[0] + network.k[0].sum())
     own = case.gripper.jaw_stiffness_N_per_m
-    rows: list[tuple[Cell, ...]] = []
+    of_all_sizes: Row = {
+        "case": case.title,
+        "shortening_um": 1e6 * shortening,
+        "largest_force_uN": 1e6 * grip.largest_N,
+        "lowest_force_uN": 1e6 * grip.lowest_N,
+        "lowest_at_s": grip.lowest_at_s,
+        "gripper_stiffness_N_per_m": own,
+    }
+    # A springpot has neither instantaneous nor long-term stiffness.
+    if not case.sample.model.power_law:
+        at_once = float(network.k_p[0] + network.k[0].sum())
+        of_all_sizes |= {
+            "stiffness_at_once_N_per_m": at_once,
+            "stiffness_in_the_end_N_per_m": float(network.k_p[0]),
+            "stiffness_over_gripper": at_once / own,
+        }
+    rows: list[Row] = []
     for size in (SMALLEST_M, LARGEST_M) if case.size_m is None else (case.size_m,):
-        modulus = apparent_modulus(force, shortening, size) if shortening > 0 else None
-        rows.append(
-            (
-                case.title,
-                1e6 * size,
-                1e6 * shortening,
-                100 * shortening / size,
-                1e6 * grip.largest_N,
-                1e6 * grip.lowest_N,
-                grip.lowest_at_s,
-                at_once,
-                in_the_end,
-                own,
-                None if at_once is None else at_once / own,
-                None if modulus is None else 1e-3 * modulus,
-            )
-        )
+        modulus = 1e-3 * apparent_modulus(force, shortening, size) if shortening > 0 else None
+        of_size = {"size_um": 1e6 * size, "strain_percent": 100 * shortening / size}
+        rows.append(of_all_sizes | of_size | {"apparent_modulus_kPa": modulus})
     return rows
 
 
+_LEFT_OUT_COLUMNS = (
+    Column("effect", "Left out"),
+    Column("size", "Size", 2),
+    Column("unit", "Unit"),
+    Column("beside", "Beside"),
+    Column("beside_size", "which is", 2),
+    Column("share_percent", "Share (%)", 2),
+    Column("remark", "Remark"),
+)
+
+
+def left_out(study: Study) -> Table:
+    """Estimate effects that the model leaves out, for the largest sample."""
+    gripper, arm = study.gripper, study.gripper.left
+    b, length_mm = gripper.lever_m, 1e3 * gripper.arm_length_m
+    turn = largest_load(study.phases) / arm.stiffness_Nm_per_rad
+    arm_drag = drag_of_arm(gripper, study.actuator.thickness_m)
+    rows: list[Row] = []
+
+    def add(effect: str, size: float, unit: str, beside: str, whole: float, remark: str) -> None:
+        of_whole = {"beside": beside, "beside_size": whole, "share_percent": 100 * size / whole}
+        rows.append({"effect": effect, "size": size, "unit": unit, **of_whole, "remark": remark})
+
+    dampings = [damping for name in study.gripped if (damping := _damping(study.cases[name])) > 0]
+    if dampings:
+        remark = "the sample in water, Stokes; of the case with the least damping"
+        drag = drag_of_sample(LARGEST_M)
+        add("drag on the sample", drag, "N s/m", "its dampers", min(dampings), remark)
+    remark = "all of an arm in water; the paper keeps the device out of it"
+    hinge = arm.damping_Nms_per_rad
+    add("drag on an arm", arm_drag, "N m s/rad", "the hinge's damping", hinge, remark)
+    if dampings:
+        remark = "the same, beside what a rotation trace is made of"
+        own = 2 * b * b * min(dampings)
+        add("drag on an arm", arm_drag, "N m s/rad", "the sample's, 2 b^2 c", own, remark)
+    remark = "a sphere that rolls on the jaw, at the free arm's rotation under the largest torque"
+    moved = length_mm * rolling_of_contact(gripper, LARGEST_M, turn)
+    add("contact point along the jaw", moved, "mm", "the arm length", length_mm, remark)
+    remark = "at most: fingers shield each other; the voltage for a torque is less by half of it"
+    fringing = fringing_of_comb(study.actuator)
+    add("fringing of the comb", fringing, "", "its capacitance", 1.0, remark)
+    remark = "felt for milliseconds after a step, as the arms' own"
+    mass, of_arm = mass_of_sample(LARGEST_M), arm.inertia_kgm2 / b**2
+    add("inertia of the sample", mass, "kg", "an arm's at the jaw, I/b^2", of_arm, remark)
+    caption = (
+        f"What the model leaves out, estimated for a sample of {1e6 * LARGEST_M:g} um: its size, "
+        "and its share of what it would add to."
+    )
+    return Table(caption, _LEFT_OUT_COLUMNS, rows)
+
+
+def _damping(case: Case) -> float:
+    """Return the damping of all dampers of a case's sample in N s/m."""
+    if case.sample.model.power_law:
+        return 0.0
+    network = case.sample.model.sample(case.parameters)
+    return float(network.c_p[0] + network.c[0].sum())
+
+
 LIMIT_PERCENT = 1.0
-"""Difference up to which it counts as accurate, as a share of the peak."""
+"""Difference up to which the linear model counts as accurate, as a share of the peak."""
 
 _LINEARISATION_COLUMNS = (
     Column("case", "Case"),
@@ -224,7 +215,7 @@ _LINEARISATION_COLUMNS = (
 
 def linearisation(_: Study, differences: Path) -> Table:
     """Return, for every case and angle, the torque factor that reaches `LIMIT_PERCENT`."""
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for (case, angle), group in DIFFERENCES.read(differences).groupby(
         ["case", "reference_angle_deg"], sort=False
     ):
@@ -232,7 +223,8 @@ def linearisation(_: Study, differences: Path) -> Table:
         share = group["difference_over_peak"].to_numpy(float)
         known = np.isfinite(share)
         at_one = np.exp(np.interp(0.0, np.log(factor[known]), np.log(share[known])))
-        rows.append((case, float(angle), 100 * float(at_one), _crossing(factor, share)))
+        cells = case, float(angle), 100 * at_one, _crossing(factor, share)
+        rows.append({c.name: x for c, x in zip(_LINEARISATION_COLUMNS, cells, strict=True)})
     caption = (
         "Largest difference of the linear from the nonlinear model, as a share of the peak, at the "
         "torque of the case's protocol, and the multiple of that torque at which it reaches "
@@ -241,11 +233,11 @@ def linearisation(_: Study, differences: Path) -> Table:
     return Table(caption, _LINEARISATION_COLUMNS, rows)
 
 
-def _crossing(factor: np.ndarray, share: np.ndarray) -> float | None:
+def _crossing(factor: Array, share: Array) -> float | None:
+    """Return the factor at which a share first reaches the limit, interpolated in logarithms."""
     limit = LIMIT_PERCENT / 100
     above = np.flatnonzero(share >= limit)
     if not len(above) or above[0] == 0:
-        return None if not len(above) else float(factor[0])
-    last = above[0]
-    pair = slice(last - 1, last + 1)
+        return float(factor[0]) if len(above) else None
+    pair = slice(above[0] - 1, above[0] + 1)
     return float(np.exp(np.interp(np.log(limit), np.log(share[pair]), np.log(factor[pair]))))

@@ -1,9 +1,4 @@
-"""Comparison of identification methods on the same traces.
-
-Model selection by AIC and BIC, counted over seeds.
-
-Processor time of the methods on the machine that ran them.
-"""
+"""The identification methods on the same traces, the models that fit them, and processor time."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,14 +8,12 @@ import pandas as pd
 
 from biogrip.fit.methods import chi_square_increase, near_noise, near_noise_words
 from biogrip.fit.nested_fits import aic_and_bic
-from biogrip.physics.models import Truth
-from biogrip.physics.sample_model import Parameter
 from biogrip.records.identifications import MODEL_FITS, TIMINGS, read_identifications
 from biogrip.study.study import Study
 from biogrip.tables.errors_of_case import error_percent
-from biogrip.tables.layout import Cell, Column, Table
+from biogrip.tables.layout import Column, Row, Table
 
-_LEADING = (
+_METHOD_COLUMNS = (
     Column("case", "Case"),
     Column("method", "Method"),
     Column("seeds", "Seeds"),
@@ -33,34 +26,32 @@ _LEADING = (
 
 def methods(study: Study, identifications: list[Path]) -> Table:
     """Compare success rate, errors and cost of each method."""
-    labels = dict.fromkeys(
-        _label(quantity)
-        for case in study.cases.values()
-        for quantity in case.truth.model.quantities
-    )
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
+    labels = {}
     for (name, case), path in zip(study.cases.items(), identifications, strict=True):
         found = read_identifications(path)
-        increase = chi_square_increase(found, case.samples)
-        for method in found["method"].unique():
-            mine = found["method"] == method
-            reached = near_noise(found[mine], study.near_noise_tolerance)
-            rows.append(
-                (
-                    name,
-                    study.identifiers[method].title,
-                    int(mine.sum()),
-                    float(np.mean(increase[mine] <= study.optimum_tolerance)),
-                    float(np.mean(reached)),
-                    float(np.median(increase[mine])),
-                    float(found.loc[mine, "evaluations"].median()),
-                    *_errors(found[mine], case.truth, list(labels)),
-                )
-            )
+        found["increase"] = chi_square_increase(found, case.samples)
+        for method, mine in found.groupby("method", sort=False):
+            row: Row = {
+                "case": name,
+                "method": study.identifiers[method].title,
+                "seeds": len(mine),
+                "optimum_share": np.mean(mine["increase"] <= study.optimum_tolerance),
+                "near_noise_share": np.mean(near_noise(mine, study.near_noise_tolerance)),
+                "median_rise": np.median(mine["increase"]),
+                "median_evaluations": float(mine["evaluations"].median()),
+            }
+            for quantity in case.truth.model.quantities:
+                label = " + ".join(p.name for p in quantity)
+                values = mine[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
+                error = np.abs(error_percent(case.truth.target(quantity), values))
+                row[f"error_percent {label}"] = np.median(error)
+                labels[f"error_percent {label}"] = f"Error {label} %"
+            rows.append(row)
     words = near_noise_words(study.near_noise_tolerance)
     columns = (
-        *(replace(c, heading=c.heading.format(near_noise=words)) for c in _LEADING),
-        *(Column(f"error_percent {label}", f"Error {label} %", 2) for label in labels),
+        *(replace(c, heading=c.heading.format(near_noise=words)) for c in _METHOD_COLUMNS),
+        *(Column(name, heading, 2) for name, heading in labels.items()),
     )
     caption = (
         "Methods on the same traces. At the global optimum: chi-squared at most "
@@ -71,20 +62,7 @@ def methods(study: Study, identifications: list[Path]) -> Table:
     return Table(caption, columns, rows)
 
 
-def _errors(found: pd.DataFrame, truth: Truth, labels: list[str]) -> list[Cell]:
-    errors: dict[str, float] = {}
-    for quantity in truth.model.quantities:
-        target = truth.target(quantity)
-        values = found[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
-        errors[_label(quantity)] = float(np.median(np.abs(error_percent(target, values))))
-    return [errors.get(label) for label in labels]
-
-
-def _label(quantity: list[Parameter]) -> str:
-    return " + ".join(parameter.name for parameter in quantity)
-
-
-_COLUMNS = (
+_MODEL_COLUMNS = (
     Column("case", "Case"),
     Column("model", "Model"),
     Column("parameters", "Parameters"),
@@ -100,27 +78,27 @@ def models(study: Study, fits: list[Path]) -> Table:
     """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
     found = pd.concat([MODEL_FITS.read(path) for path in fits])
     found["aic"], found["bic"] = aic_and_bic(found["misfit"], found["samples"], found["parameters"])
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for case, made in study.cases.items():
         maker = None if made.recorded else made.sample.candidate
         of_case = found[found["case"] == case]
-        delta = {}
-        for criterion in ("aic", "bic"):
-            wide = of_case.pivot(index="seed", columns="model", values=criterion)
-            # In the configured order, since idxmin takes the first of equals.
-            wide = wide[list(of_case["model"].unique())]
-            delta[criterion] = wide.sub(wide.min(axis=1), axis=0)
-        for name in of_case["model"].unique():
-            medians = [float(table[name].median()) for table in delta.values()]
-            chosen = [int((table.idxmin(axis=1) == name).sum()) for table in delta.values()]
+        # In the configured order, since idxmin takes the first of equals.
+        tried = list(of_case["model"].unique())
+        values = {c: of_case.pivot(index="seed", columns="model", values=c) for c in ("aic", "bic")}
+        delta = {c: wide[tried].sub(wide.min(axis=1), axis=0) for c, wide in values.items()}
+        for name in tried:
             model = made.models[name].model
-            title = model.title + (" (made the traces)" if name == maker else "")
-            rows.append((case, title, len(model.names), *medians, *chosen, len(delta["aic"])))
+            row: Row = {"case": case, "model": model.title + " (made the traces)" * (name == maker)}
+            row |= {"parameters": len(model.names), "seeds": len(delta["aic"])}
+            for criterion, each in delta.items():
+                row[f"median_delta_{criterion}"] = each[name].median()
+                row[f"chosen_by_{criterion}"] = (each.idxmin(axis=1) == name).sum()
+            rows.append(row)
     caption = (
         "Simplest adequate model: by how much each model's AIC and BIC exceed the lowest, and in "
         "how many seeds it has the lowest."
     )
-    return Table(caption, _COLUMNS, rows)
+    return Table(caption, _MODEL_COLUMNS, rows)
 
 
 _TIMING_COLUMNS = (
@@ -135,17 +113,9 @@ _TIMING_COLUMNS = (
 def timings(study: Study, times: list[Path]) -> Table:
     """Summarise processor time per identification by case and method, from CSV."""
     spent = pd.concat([TIMINGS.read(path) for path in times])
-    rows: list[tuple[Cell, ...]] = [
-        (
-            case,
-            study.identifiers[method].title,
-            len(mine),
-            float(mine["cpu_s"].median()),
-            float(mine["cpu_s"].sum()),
-        )
+    rows = [
+        {"case": case, "method": study.identifiers[method].title, "seeds": len(mine)}
+        | {"median_cpu_s": mine["cpu_s"].median(), "total_cpu_s": mine["cpu_s"].sum()}
         for (case, method), mine in spent.groupby(["case", "method"], sort=False)
     ]
     return Table("Processor time of the identifications on this machine.", _TIMING_COLUMNS, rows)
-
-
-# Not in tables/, since times are not reproducible.

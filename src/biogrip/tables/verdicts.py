@@ -1,7 +1,4 @@
-"""Verdicts on one trace of a case, quantity by quantity.
-
-Counts of the verdicts of whole profiles on each quantity, and of the true ones.
-"""
+"""Verdicts on one trace of a case, quantity by quantity; and counts of verdicts over seeds."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -9,14 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.stats import binomtest
 
-from biogrip.judging.quantities import Quantity, parameters_and_sum
+from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, NOT_DETERMINED, WIDE
 from biogrip.records.identifications import INTERVALS
 from biogrip.records.verdicts import read_verdicts
 from biogrip.study.study import Case, Study
 from biogrip.tables.coverage import holds
-from biogrip.tables.layout import Cell, Column, Table
+from biogrip.tables.layout import Column, Row, Table
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -36,29 +34,23 @@ _COLUMNS = (
 
 
 def verdicts(case: Case, measured: Path, expected: list[Path]) -> Table:
-    """List the verdicts on all quantities of a case."""
+    """List the verdicts on all quantities of a case, and those expected, where there are any."""
     found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
     foreseen_of = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for item in found["quantities"]:
-        name = item["quantity"]
-        foreseen = foreseen_of.get(name, {})
+        foreseen = foreseen_of.get(item["quantity"], {})
+        gaps = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in item["excluded"])
         rows.append(
-            (
-                case.name,
-                name,
-                item["unit"],
-                target_of(name, case.parameters),
-                found["fit"],
-                item["verdict"],
-                item["value"] if item["verdict"] == DETERMINED else None,
-                item["low"],
-                item["high"],
-                " and ".join(f"{start:.3g} to {end:.3g}" for start, end in item["excluded"]),
-                foreseen.get("verdict"),
-                foreseen.get("low"),
-                foreseen.get("high"),
-            )
+            {name: item[name] for name in ("quantity", "unit", "verdict", "low", "high")}
+            | {f"expected_{name}": foreseen.get(name) for name in ("verdict", "low", "high")}
+            | {
+                "case": case.name,
+                "target": target_of(item["quantity"], case.parameters),
+                "fit": found["fit"],
+                "value": item["value"] if item["verdict"] == DETERMINED else None,
+                "excluded": gaps,
+            }
         )
     trades = "".join(
         f" {' and '.join(trade['members'])} trade against each other: determined is "
@@ -100,14 +92,15 @@ _COUNT_COLUMNS = (
 
 def verdict_counts(study: Study, intervals: list[Path]) -> Table:
     """Count verdicts of whole profiles, and those whose limits hold the true value."""
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     estimated = pd.concat([INTERVALS.read(file) for file in intervals])
     for name, case in study.cases.items():
         found = estimated[estimated["case"] == name]
         for quantity in parameters_and_sum(case.problem.searched):
             mine = found[(found["quantity"] == quantity.label) & found["verdict"].notna()]
-            truth = target_of(quantity.label, case.parameters)
-            rows += [(name, *row) for row in _rows(quantity, mine, truth)]
+            target = target_of(quantity.label, case.parameters)
+            head: Row = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
+            rows += [head | row for row in _counts(mine, target)]
     percents = " or ".join(sorted({f"{100 * case.confidence:g}" for case in study.cases.values()}))
     caption = (
         f"Verdicts from whole profiles at {percents} %, as users are shown them, in every seed: "
@@ -117,25 +110,22 @@ def verdict_counts(study: Study, intervals: list[Path]) -> Table:
     return Table(caption, _COUNT_COLUMNS, rows)
 
 
-def _rows(
-    quantity: Quantity, found: pd.DataFrame, truth: float | None
-) -> Iterator[tuple[Cell, ...]]:
+def _counts(found: pd.DataFrame, target: float | None) -> Iterator[Row]:
+    """Yield a row for every verdict on a quantity."""
     for verdict, mine in found.groupby("verdict"):
         count = len(mine)
-        head = (quantity.label, quantity.unit, truth, str(verdict), len(found), count)
-        narrow: int | None = None
+        row: Row = {"target": target, "verdict": verdict, "seeds": len(found), "reached": count}
+        row |= _interval("reached", count, len(found))
         if verdict == DETERMINED:
-            narrow = int(np.sum(mine["shown_high"] <= WIDE**2 * mine["shown_low"]))
-        true: tuple[Cell, ...] = (None,) * 4
-        if verdict != NOT_DETERMINED and truth is not None:
-            held = int(np.sum(holds(mine, truth, "shown_")))
-            true = held, 100 * held / count, *_interval_percent(held, count)
-        yield *head, *_interval_percent(count, len(found)), narrow, *true
+            row["narrow"] = np.sum(mine["shown_high"] <= WIDE**2 * mine["shown_low"])
+        if verdict != NOT_DETERMINED and target is not None:
+            true = int(np.sum(holds(mine, target, "shown_")))
+            row |= {"true": true, "true_percent": 100 * true / count}
+            row |= _interval("true", true, count)
+        yield row
 
 
-def _interval_percent(count: int, tried: int) -> tuple[float, float]:
+def _interval(name: str, count: int, tried: int) -> Row:
     """Return the 95 % interval of Clopper and Pearson for a share, in percent."""
-    from scipy.stats import binomtest
-
     low, high = binomtest(count, tried).proportion_ci(0.95, method="exact")
-    return 100 * low, 100 * high
+    return {f"{name}_from_percent": 100 * low, f"{name}_to_percent": 100 * high}

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pytest
 from matplotlib.patches import Rectangle
 
-from biogrip.figures import overview, profiles, valley
-from biogrip.figures.style import decade_ticks, figure, lay_out, styled
+from biogrip.figures.likelihood import draw_profiles, draw_valley
+from biogrip.figures.style import lay_out, styled
 from biogrip.fit.methods import METHODS
 from tests.helpers.default import seen
 
@@ -26,20 +25,18 @@ def item(**changes: Any) -> dict[str, Any]:
     return {**words, **limits, "profile": profile, **changes}
 
 
-def written(path: Path, *items: dict[str, Any]) -> Path:
-    content = {"quantities": list(items), "trades": [], "notes": []}
+def drawn(folder: Path, **changes: Any) -> Any:
+    """Axes of a profile."""
+    content = {"quantities": [item(**changes)], "trades": [], "notes": []}
     levels = {"confidence": 0.9, "threshold": 2.71, "certainty": 10.83}
-    path.write_text(json.dumps({**content, **levels}))
-    return path
-
-
-def drawn(path: Path) -> Any:
+    (folder / "v.json").write_text(json.dumps({**content, **levels}))
     with styled():
-        return profiles.draw(seen(title="A drop", parameters={"k": 2.2}), path, [])
+        case = seen(title="A drop", parameters={"k": 2.2})
+        return draw_profiles(case, folder / "v.json", []).axes[0]
 
 
 def test_a_profile_is_a_curve_and_crosses_its_threshold_at_its_limits(tmp_path: Path) -> None:
-    axes = drawn(written(tmp_path / "v.json", item())).axes[0]
+    axes = drawn(tmp_path)
     (curve,) = (line for line in axes.lines if line.get_label() == "this trace")
     values, increases = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
     assert len(values) > 40
@@ -54,25 +51,10 @@ def test_a_profile_is_a_curve_and_crosses_its_threshold_at_its_limits(tmp_path: 
 
 
 def test_a_set_in_two_parts_is_shaded_in_two_parts(tmp_path: Path) -> None:
-    made = drawn(written(tmp_path / "v.json", item(excluded=[[1.9, 2.1]])))
-    spans = [patch for patch in made.axes[0].patches if isinstance(patch, Rectangle)]
+    axes = drawn(tmp_path, excluded=[[1.9, 2.1]])
+    spans = [patch for patch in axes.patches if isinstance(patch, Rectangle)]
     edges = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in spans]
     assert [round(end, 3) for pair in edges for end in pair] == [1.225, 1.9, 2.1, 3.265]
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "labels"),
-    [
-        (1e-3, 1e7, ["10⁻³", "10²", "10⁷"]),
-        (0.5, 50, ["10⁰", "10¹"]),
-        (1.5e-4, 1.2e-3, ["0.0002", "0.001"]),
-        (2.1, 4.9, []),
-    ],
-)
-def test_ticks_do_not_collide(low: float, high: float, labels: list[str]) -> None:
-    ticks, found = decade_ticks(low, high)
-    assert found == labels
-    assert all(low <= tick <= high for tick in ticks)
 
 
 def drawn_valley(
@@ -92,16 +74,14 @@ def drawn_valley(
     path = folder / "v.json"
     path.write_text(json.dumps({"quantities": [], "trades": [], "notes": [], "valley": found}))
     rows = {f"{name}_Ns_per_m": values for name, values in fits.items()}
-    frame = pd.DataFrame(rows).assign(case="x", method="least_squares")
-    frame["seed"] = range(len(frame))
-    for column in ("misfit", "noise_rms", "generations", "evaluations", "stop_reason"):
-        frame[column] = 1
+    frame = pd.DataFrame(rows).assign(case="x", method="least_squares", misfit=1, noise_rms=1)
+    frame = frame.assign(seed=range(len(frame)), generations=1, evaluations=1, stop_reason=1)
     frame.to_csv(folder / "found.csv", index=False)
     paper = seen(identified=known.get("paper", {}))
     study = seen(fitting_method=METHODS["least_squares"])
     case = seen(title="A drop", study=study, parameters=known.get("truth", {}), published=paper)
     with styled():
-        return valley.draw(case, path, folder / "found.csv").axes[0]
+        return draw_valley(case, path, folder / "found.csv").axes[0]
 
 
 DEEP = [[50.0] * 5, [0.0] * 5, [60.0] * 5]
@@ -158,15 +138,3 @@ def test_where_truth_and_paper_coincide_both_are_seen(tmp_path: Path) -> None:
     marks = {line.get_label(): line for line in axes.lines}
     assert marks["truth"].get_zorder() > marks["paper"].get_zorder()
     assert marks["paper"].get_markerfacecolor() == "none"
-
-
-def test_the_overview_marks_what_is_off_its_axis() -> None:
-    with styled():
-        page = figure(3, 3)
-        axes = page.subplots()
-        places, ratios = np.arange(4.0), np.array([1e-5, 0.5, 2.0, 1e7])
-        overview._points(axes, places, ratios, "red", "a fit")
-    drawn_at = {line.get_marker(): np.asarray(line.get_xydata()) for line in axes.lines}
-    np.testing.assert_allclose(drawn_at["v"], [[0, 1e-3]])
-    np.testing.assert_allclose(drawn_at["^"], [[3, 1e3]])
-    assert len(drawn_at["o"]) == 2

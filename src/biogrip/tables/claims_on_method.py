@@ -1,4 +1,4 @@
-"""Claims of the paper's sections 2 and 3: actuator, grip, equations of motion."""
+"""Claims of the paper's sections 2 to 4: actuator, grip, equations of motion, genetic encoding."""
 
 import numpy as np
 import pandas as pd
@@ -14,49 +14,34 @@ from biogrip.tables.claim_rules import (
     REPLICATED,
     UNDECIDED,
     Judged,
-    LackingError,
     Results,
     altogether,
     by_number,
     by_share,
+    claim,
+    percent,
     plain,
 )
 from biogrip.tables.mechanics import LIMIT_PERCENT
 
 _FELT = 1.1
 """Ratio of bounds from which the gripper's stiffness is said to matter."""
-_SCATTER_OF_CELLS = 30.0
-"""Factor by which measured moduli of cells differ from 1 kPa, by the method of measurement."""
 
 
+@claim("section 2", "1.6e-3 µNm … corresponds to … about 17 V")
 def judge_voltage(results: Results) -> Judged:
     """Judge the voltage of the first torque."""
     row = results.table("evidence").set_index("quantity").loc["voltage for 1.6e-09 N m"]
-    return Judged(
-        by_number(_printed(row), float(row["this_study"])),
-        f"Eqs. (7) to (9) with Table 2 give {row['this_study']:.3g} V.",
-    )
+    volts = f"{row['this_study']:.3g} V"
+    return Judged(_as_printed(row), f"Eqs. (7) to (9) with Table 2 give {volts}.")
 
 
-def judge_voltages(results: Results) -> Judged:
-    """Judge both voltages for torques as section 3 prints them."""
-    rows = results.table("evidence").set_index("quantity")
-    misprinted = rows.loc["voltage for 1.6e-06 N m"]
-    meant = [rows.loc[f"voltage for {torque} N m"] for torque in ("1.6e-09", "3.2e-10")]
-    as_printed = by_number(_printed(misprinted), float(misprinted["this_study"]))
-    corrected = altogether(by_number(_printed(row), float(row["this_study"])) for row in meant)
-    ours = " and ".join(f"{row['this_study']:.3g}" for row in meant)
-    return Judged(
-        as_printed if as_printed == corrected else IN_PART,
-        f"1.6 µN m would take {misprinted['this_study']:.3g} V; a thousandth of both torques, "
-        f"as in section 2, takes {ours} V.",
-    )
+def _as_printed(row: "pd.Series") -> str:
+    printed = float(str(row["paper"]).removeprefix("about "))
+    return by_number(printed, float(row["this_study"]))
 
 
-def _printed(row: "pd.Series") -> float:
-    return float(str(row["paper"]).removeprefix("about "))
-
-
+@claim("section 2", "in order to maintain the grip with the sample")
 def judge_grip(results: Results) -> Judged:
     """Judge whether the jaws press throughout."""
     lowest = results.table("mechanics").groupby("case", sort=False)["lowest_force_uN"].min()
@@ -69,14 +54,14 @@ def judge_grip(results: Results) -> Judged:
     )
 
 
+@claim("section 2", "samples … belonging to the range [30, 120] µm")
 def judge_sizes(results: Results) -> Judged:
     """Judge whether the stroke suffices to close onto samples of all sizes."""
     found = results.table("contact")
     stroke = results.study.actuator.stroke_deg
     needed = np.degrees(1e-3 * found["closing_mrad"].to_numpy(float))
-    within = float(np.mean(needed <= stroke))
     return Judged(
-        by_share(within),
+        by_share(float(np.mean(needed <= stroke))),
         f"Closing onto samples of {found['size_um'].min():g} to {found['size_um'].max():g} µm "
         f"takes {np.nanmin(needed):.2g} to {np.nanmax(needed):.2g} degrees of the stroke of "
         f"{stroke:g}, with the reconstructed arm, and {found['voltage_V'].min():.3g} to "
@@ -84,13 +69,13 @@ def judge_sizes(results: Results) -> Judged:
     )
 
 
+@claim("section 2", "[distance of the jaws] can be easily set-up … without affecting the results")
 def judge_jaw_gap(results: Results) -> Judged:
     """Judge whether the gap matters: in the linear model only by the angle at contact."""
     angles = np.radians(results.table("contact")["reference_angle_deg"].to_numpy(float))
     scale = np.sin(angles) ** 2
     change = 100 * float(scale.max() / scale.min() - 1)
-    bounds = results.table("coverage").dropna(subset="bound_percent")
-    smallest = float(bounds["bound_percent"].min())
+    smallest = float(results.table("coverage")["bound_percent"].min())
     return Judged(
         REPLICATED if change <= smallest else IN_PART,
         "The gap sets the angle at which the jaws meet a sample. From the smallest sample to the "
@@ -99,13 +84,17 @@ def judge_jaw_gap(results: Results) -> Judged:
     )
 
 
+@claim(
+    "section 2",
+    "capability … depends on the elastic properties of the device and on the implemented algorithm",
+)
 def judge_capability(results: Results) -> Judged:
     """Judge whether the gripper's stiffness and the algorithm decide what is found."""
     points = results.of_sweep("robustness_gripper")
     found = points.groupby(["case", "quantity"], sort=False)["bound_percent"]
     ratio = (found.max() / found.min()).groupby("case", sort=False).max()
-    methods = results.table("methods")
-    by_method = methods.groupby("method", sort=False)["optimum_share"].agg(["min", "max"])
+    methods = results.table("methods").groupby("method", sort=False)
+    by_method = methods["optimum_share"].agg(["min", "max"])
     shares = "; ".join(
         f"{name} {_percents(row['min'], row['max'])}" for name, row in by_method.iterrows()
     )
@@ -119,17 +108,17 @@ def judge_capability(results: Results) -> Judged:
 
 
 def _percents(low: float, high: float) -> str:
-    first, last = f"{100 * low:.0f}", f"{100 * high:.0f}"
-    return f"{last} %" if first == last else f"{first} to {last} %"
+    first, last = percent(low), percent(high)
+    return last if first == last else f"{first.removesuffix(' %')} to {last}"
 
 
+@claim("section 2", "determined considering a standard impulse or a step response")
 def judge_free_arm(results: Results) -> Judged:
     """Judge whether a step and an impulse on a free arm give its properties."""
     case = next(iter(results.study.cases.values()))
-    test = case.calibration
+    test, arm = case.calibration, case.gripper.left
     time_s = sample_times(test.duration_s, test.rate_Hz)
     causes = test.step_torque_Nm, test.impulse_Nms
-    arm = case.gripper.left
     motion = free_motion(arm, time_s, *causes)
     noise = Noise("gaussian", test.noise_level, "peak")
     rng = stream(results.study.study_seed, "claims", 0, "calibration")
@@ -146,6 +135,7 @@ def judge_free_arm(results: Results) -> Judged:
     )
 
 
+@claim("section 3, (1)-(6)", "can be described by means of the following equations")
 def judge_equations(results: Results) -> Judged:
     """Judge the printed balance of the massless node, which grows where it should decay."""
     case = results.study.cases[results.case_of(5)]
@@ -160,8 +150,9 @@ def judge_equations(results: Results) -> Judged:
     )
 
 
+@claim("section 3, (4)-(6)", "an approximate linear set of equations can be obtained")
 def judge_linear_model(results: Results) -> Judged:
-    """Judge the linearised equations."""
+    """Judge the linearised equations at the angle that is nearest to the gripper's."""
     table = results.table("linearisation")
     angle = results.study.gripper.reference_angle_deg
     used = table.iloc[(table["reference_angle_deg"] - angle).abs().argsort(kind="stable")]
@@ -174,28 +165,50 @@ def judge_linear_model(results: Results) -> Judged:
     )
 
 
-def judge_rotation(results: Results) -> Judged:
-    """Tell why the level of the rotation proves nothing."""
-    rows = results.table("evidence").dropna(subset="unit")
-    rows = rows[rows["unit"] == "mrad"]
-    if not len(rows):
-        raise LackingError("the study has no trace of Table 7")
-    low, high = (float(value) for value in rows["this_study"])
+@claim("section 3", "1.6 µNm is about 17 V, whereas … 0.32 µNm is about 7 V")
+def judge_voltages(results: Results) -> Judged:
+    """Judge both voltages for torques as section 3 prints them, and as it means them."""
+    rows = results.table("evidence").set_index("quantity")
+    misprinted = rows.loc["voltage for 1.6e-06 N m"]
+    meant = [rows.loc[f"voltage for {torque} N m"] for torque in ("1.6e-09", "3.2e-10")]
+    as_printed, corrected = _as_printed(misprinted), altogether(map(_as_printed, meant))
+    ours = " and ".join(f"{row['this_study']:.3g}" for row in meant)
     return Judged(
-        UNDECIDED,
-        f"Ours span {low:.2g} to {high:.2g} mrad; the arms' stiffness, which the copy lacks, was "
-        "reconstructed from this axis.",
+        as_printed if as_printed == corrected else IN_PART,
+        f"1.6 µN m would take {misprinted['this_study']:.3g} V; a thousandth of both torques, "
+        f"as in section 2, takes {ours} V.",
     )
 
 
-def judge_endothelial(results: Results) -> Judged:
-    """Judge whether Table 5's sample is as stiff as a cell."""
-    table = results.table("mechanics")
-    title = results.study.cases[results.case_of(5)].truth.title
-    modulus = table.loc[table["case"] == title, "apparent_modulus_kPa"].to_numpy(float)
-    is_like = modulus.min() >= 1 / _SCATTER_OF_CELLS and modulus.max() <= _SCATTER_OF_CELLS
+@claim("section 4", "three independent genes allows a faster convergence")
+def judge_splitting(results: Results) -> Judged:
+    """Tell what is known of the encoding in three genes."""
+    table = results.table("methods").groupby("method", sort=False)["median_evaluations"].max()
+    said = "; ".join(f"{name} {plain(count)}" for name, count in table.items())
     return Judged(
-        REPLICATED if is_like else NOT,
-        f"Its apparent modulus is {plain(modulus.min(), 2)} to {plain(modulus.max(), 2)} kPa by "
-        f"its size; cells have about 1 kPa, give or take a factor of {_SCATTER_OF_CELLS:g}.",
+        UNDECIDED,
+        f"The paper shows no other encoding. Simulated responses, medians, at most: {said}.",
+    )
+
+
+@claim("section 4", "each one … few possible values (either 9 or 12)")
+def judge_genes(results: Results) -> Judged:
+    """Judge the numbers of values that a gene takes."""
+    counts = sorted(set(results.table("gene_ranges")["values"].astype(int)))
+    return Judged(
+        altogether(REPLICATED if count in (9, 12) else NOT for count in counts),
+        f"Ranges that give Table 4 have {', '.join(map(str, counts))} values a gene.",
+    )
+
+
+@claim("section 4, Table 4", "range as reported in Table 4, with two significant digits")
+def judge_digits(results: Results) -> Judged:
+    """Judge whether the printed results can be encoded."""
+    table = results.table("printed_values")
+    found = table[table["quantity"] == "identified"]
+    fits = (found["distance_percent"].abs() < 1e-9) & (found["within_range"] == "yes")
+    return Judged(
+        by_share(float(fits.mean())),
+        f"{fits.sum()} of the {len(fits)} values that Tables 5 to 7 call identified have two "
+        "digits within the ranges of Table 4.",
     )

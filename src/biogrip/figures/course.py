@@ -1,0 +1,186 @@
+"""The course of the methods: Figures 8 and 10 over generations, and where all runs end."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+
+from biogrip.digits import with_unit
+from biogrip.figures.results import read_history, seeds_in_words, typical_in_words
+from biogrip.figures.style import (
+    ALL_SEEDS,
+    COLUMN_IN,
+    FITTED,
+    PAGE_IN,
+    PAPER,
+    TARGET,
+    figure,
+    line_of,
+)
+from biogrip.fit.methods import chi_square_increase, near_noise, near_noise_words, typical
+from biogrip.records.identifications import read_identifications
+from biogrip.study.study import Case
+
+_TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
+# Of increases of chi-squared, smaller ones being drawn there.
+_LOWEST = 1e-3
+
+
+def _line_of_seed(*, typical: bool, alpha: float) -> dict[str, Any]:
+    if typical:
+        return {"color": FITTED, "linewidth": 1.5, "zorder": 3}
+    return {"color": ALL_SEEDS, "linewidth": 0.4, "alpha": alpha}
+
+
+def _name_seeds(axes: Axes, found: pd.DataFrame) -> None:
+    """Add to the legend what the lines of seeds are."""
+    if len(found) > 1:
+        axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=seeds_in_words(len(found)))
+    axes.plot([], [], color=FITTED, label=typical_in_words(found))
+
+
+def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figure:
+    """Draw each seed's excess of the misfit over its noise, highlighting the typical seed."""
+    method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
+    found = read_identifications(identifications, method.name)
+    noise = found.set_index("seed")["noise_rms"]
+    noisy = bool((noise > 0).all())
+    unit = noise if noisy else pd.Series(found["misfit"].min(), index=noise.index)
+    shown = int(typical(found)["seed"])
+    history = read_history(histories, method.name, shown)
+    drawn = figure(COLUMN_IN, 2.5)
+    axes = drawn.subplots()
+    for seed, rows in history.groupby("seed"):
+        excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
+        axes.plot(rows["generation"], excess, **_line_of_seed(typical=seed == shown, alpha=0.7))
+    _name_seeds(axes, found)
+    label = "noise in the trace" if noisy else "lowest misfit"
+    axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
+    last = int(history["generation"].max())
+    if case.mutation_start is not None and case.mutation_start <= last:
+        _mark_mutation(axes, case.mutation_start, last)
+    axes.set_yscale("symlog", linthresh=1, linscale=0.5)
+    axes.set_ylim(bottom=-0.8)
+    ticks = [tick for tick in _TICKS if tick < axes.get_ylim()[1]]
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.set(xlim=(0, last), xlabel=method.step, title=case.title)
+    axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
+    if noisy:
+        words, near = near_noise_words(tolerance), 100 * tolerance
+        axes.axhline(near, color=TARGET, linestyle="-.", linewidth=0.8, label=words)
+        reached = near_noise(found, tolerance).sum()
+        axes.set_title(f"{case.title}: {reached} of {len(found)} {words}")
+    axes.legend(loc="upper right")
+    return drawn
+
+
+def _mark_mutation(axes: Axes, start: int, last: int) -> None:
+    """Mark the generation in which mutation starts, with a label below the curves."""
+    axes.axvline(start, color=TARGET, linestyle=":", linewidth=0.8)
+    before = start > last / 2
+    axes.annotate(
+        "mutation starts",
+        (start, 0.03),
+        xycoords=("data", "axes fraction"),
+        xytext=(-3 if before else 3, 0),
+        textcoords="offset points",
+        ha="right" if before else "left",
+        fontsize=7,
+        path_effects=[withStroke(linewidth=2, foreground="white")],
+    )
+
+
+def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure:
+    """Draw every parameter over generations for all seeds, highlighting the typical seed."""
+    truth, method = case.truth, case.study.shown_method
+    found = read_identifications(identifications, method.name)
+    shown = int(typical(found)["seed"])
+    parameters, identified = truth.model.parameters, truth.published.identified
+    columns = [parameter.column for parameter in parameters]
+    history = read_history(histories, method.name, shown, columns)
+    drawn = figure(PAGE_IN, 3.9)
+    grid = drawn.subplots(2, -(-len(parameters) // 2), sharex=True).ravel()
+    for axes, parameter in zip(grid, parameters, strict=False):
+        for seed, rows in history.groupby("seed"):
+            style = _line_of_seed(typical=seed == shown, alpha=0.6)
+            axes.step(rows["generation"], rows[parameter.column], where="post", **style)
+        target = truth.parameters.get(parameter.name, 0)
+        if target > 0:
+            axes.axhline(target, color=TARGET, linestyle="--")
+            last = history.loc[history["seed"] == shown, parameter.column].iloc[-1]
+            axes.set_title(f"seed {shown} ends {_beside(last / target)}", loc="right", fontsize=7)
+        if parameter.name in identified:
+            axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
+        if np.any(history[parameter.column] > 0):
+            axes.set_yscale("log")
+        axes.set_ylabel(with_unit(parameter.symbol, parameter.unit))
+        axes.set_xlim(0, history["generation"].max())
+    for axes in grid[len(parameters) :]:
+        axes.set_axis_off()
+    half = len(grid) // 2
+    for axes, below in zip(grid[:half], grid[half:], strict=True):
+        lowest = below if below.axison else axes
+        lowest.set_xlabel(method.step)
+        lowest.tick_params(labelbottom=True)
+    _name_seeds(grid[0], found)
+    if truth.parameters:
+        grid[0].plot([], [], color=TARGET, linestyle="--", label="target")
+    if identified:
+        grid[0].plot([], [], color=PAPER, linestyle=":", label="identified in the paper")
+    handles, labels = grid[0].get_legend_handles_labels()
+    drawn.legend(handles, labels, loc="outside upper center", ncols=4)
+    drawn.suptitle(truth.title, x=0.01, ha="left", fontsize=8)
+    return drawn
+
+
+def _beside(ratio: float) -> str:
+    """Return the distance to the target in words, as a few percent are invisible on the axis."""
+    if not 0.5 < ratio < 2:
+        return f"at {ratio:.2g} times the target"
+    percent = 100 * (ratio - 1)
+    if abs(percent) < 0.05:
+        return "at the target"
+    return f"{abs(percent):.2g} % {'above' if percent > 0 else 'below'} the target"
+
+
+def draw_waterfall(case: Case, identifications: Path) -> Figure:
+    """Draw the sorted increases of chi-squared over the lowest known, for every method."""
+    found = read_identifications(identifications)
+    increase = np.maximum(chi_square_increase(found, case.samples), _LOWEST)
+    tolerance = case.study.optimum_tolerance
+    drawn = figure(COLUMN_IN, 3.15)
+    axes = drawn.subplots()
+    methods = found["method"].unique()
+    curves = []
+    # Where curves coincide each is seen beside the thinner ones on top of it.
+    for name, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
+        method = case.study.identifiers[name]
+        mine = np.sort(increase[found["method"] == name])
+        share = 100 * np.mean(mine <= tolerance)
+        place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
+        label = f"{method.title}: {share:.0f} %"
+        curves += axes.plot(place, mine, label=label, linewidth=width, **line_of(method))
+    near = case.samples * ((1 + case.study.near_noise_tolerance) ** 2 - 1)
+    # Limits are named in the legend, since a curve may cover any place along them.
+    words = near_noise_words(case.study.near_noise_tolerance)
+    line: dict[str, Any] = {"color": TARGET, "linewidth": 0.8}
+    limits = [
+        axes.axhline(tolerance, linestyle="--", label="global optimum", **line),
+        axes.axhline(near, linestyle=":", label=words, **line),
+    ]
+    axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * max(near, float(increase.max()))))
+    ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]
+    axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
+    axes.minorticks_off()
+    axes.set(xlim=(0, 100), xlabel="seeds, sorted (%)", ylabel="Δχ² over the lowest known")
+    axes.set_title(f"{case.title}: share at the global optimum")
+    # Each legend column ends with a limit; a third column would be too wide.
+    half = -(-len(curves) // 2)
+    handles = [*curves[:half], limits[0], *curves[half:], limits[1]]
+    drawn.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.0)
+    return drawn

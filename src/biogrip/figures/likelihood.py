@@ -1,0 +1,175 @@
+"""Profile likelihoods of every quantity, and chi-squared over two that trade: a valley."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from scipy.interpolate import PchipInterpolator
+
+from biogrip.arrays import Array
+from biogrip.digits import with_unit
+from biogrip.figures.results import first_seeds, seeds_in_words
+from biogrip.figures.style import (
+    BLUE,
+    COLUMN_IN,
+    FITTED,
+    GREY,
+    HIGHEST_INCREASE,
+    PAPER,
+    SHADE,
+    TARGET,
+    decade_ticks,
+    figure,
+    is_wide,
+    panel,
+    points_within,
+    profile_limits,
+    row_of_panels,
+)
+from biogrip.judging.likelihood import CERTAIN
+from biogrip.records.identifications import read_identifications
+from biogrip.records.verdicts import read_verdicts
+from biogrip.study.study import Case
+from biogrip.tables.verdicts import target_of
+
+
+def draw_profiles(case: Case, measured: Path, expected: list[Path]) -> Figure:
+    """Draw the profile of every quantity of a case, with confidence limits."""
+    found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
+    foreseen = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
+    quantities = found["quantities"]
+    drawn, grid = row_of_panels(len(quantities), 2.5, sharey=True)
+    for index, (axes, item) in enumerate(zip(grid, quantities, strict=True)):
+        if item["quantity"] in foreseen:
+            curve = _curve(foreseen[item["quantity"]]["profile"])
+            axes.plot(*curve, color=GREY, label="expected without noise")
+        axes.plot(*_curve(item["profile"]), color=FITTED, label="this trace")
+        for increase, style, label in (
+            (found["threshold"], "--", f"{100 * found['confidence']:g} %"),
+            (found["certainty"], ":", f"{100 * CERTAIN:g} %, to close a side"),
+        ):
+            axes.axhline(increase, color=TARGET, linestyle=style, linewidth=0.7, label=label)
+        _limits(axes, item)
+        truth = target_of(item["quantity"], case.parameters)
+        if truth is not None:
+            axes.axvline(truth, color=TARGET, linewidth=0.7, label="truth")
+        low, high = profile_limits(item)
+        if is_wide(low, high):
+            axes.set_xscale("log")
+            axes.set_xticks(*decade_ticks(low, high))
+            axes.minorticks_off()
+        else:
+            axes.xaxis.set_major_locator(MaxNLocator(2, steps=[1, 2, 5, 10]))
+        axes.set(xlim=(low, high), ylim=(0, HIGHEST_INCREASE))
+        axes.set_xlabel(with_unit(item["symbol"], item["unit"]))
+        panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], item["verdict"], 40)
+    grid[0].set_ylabel("rise of χ²")
+    handles, labels = grid[0].get_legend_handles_labels()
+    drawn.legend(handles, labels, loc="outside lower right", ncols=5)
+    drawn.suptitle(case.title, x=0.01, ha="left", fontsize=8)
+    return drawn
+
+
+def _curve(profile: dict[str, Any]) -> tuple[Array, Array]:
+    """Return a smooth curve: the root of the increase, interpolated by monotone cubics (PCHIP).
+
+    They do not overshoot (Fritsch & Carlson 1980); the root turns a parabola into straight lines.
+    """
+    # Rounding may have made neighbours equal.
+    values, places = np.unique(np.array(profile["values"]), return_index=True)
+    roots = np.sqrt(np.clip(np.array(profile["increases"])[places], 0.0, 4 * HIGHEST_INCREASE))
+    dense = np.unique(np.concatenate([np.linspace(*pair, 6) for pair in pairwise(np.log(values))]))
+    return np.exp(dense), PchipInterpolator(np.log(values), roots)(dense) ** 2
+
+
+def _limits(axes: Axes, item: dict[str, Any]) -> None:
+    low, high = item["low"], item["high"]
+    values = item["profile"]["values"]
+    if low is not None or high is not None:
+        ends = [low or values[0], *(end for gap in item["excluded"] for end in gap)]
+        ends.append(high or values[-1])
+        for start, end in zip(ends[::2], ends[1::2], strict=True):
+            axes.axvspan(start, end, color=SHADE, zorder=0, linewidth=0)
+    for limit in (low, high):
+        if limit is not None:
+            axes.axvline(limit, color=BLUE, linewidth=0.7)
+
+
+_LEVELS = [0.0, 1.0, 3.84, 10.83, 30.0, 100.0, 300.0, 1000.0]
+# Increase of chi^2 up to which axes show the valley; margin as a share of what they show; largest
+# end and least length of an axis as multiples of the sum c + c_p.
+_DEEP, _AROUND, _FARTHEST, _LEAST = 10.83, 0.12, 1.15, 0.02
+
+# Not in layout: it would reserve room for labels of points.
+_POINTS: dict[str, Any] = {"linestyle": "", "clip_on": False, "in_layout": False}
+_FITS = _POINTS | {
+    "color": FITTED, "marker": "o", "markersize": 2.5, "markeredgewidth": 0, "alpha": 0.8
+}  # fmt: skip
+# Open markers below the truth, since both may coincide.
+_THE_PAPERS = _POINTS | {
+    "color": PAPER, "marker": "D", "markersize": 6, "markerfacecolor": "none",
+    "markeredgewidth": 1.4, "zorder": 4,
+}  # fmt: skip
+_TRUE = _POINTS | {
+    "color": TARGET, "marker": "*", "markersize": 7, "markeredgecolor": "white",
+    "markeredgewidth": 0.6, "zorder": 5,
+}  # fmt: skip
+
+
+def draw_valley(case: Case, measured: Path, identifications: Path) -> Figure:
+    """Draw the increase of chi-squared over the two exchangeable dampers of a case."""
+    found = read_verdicts(measured)
+    valley = found["valley"]
+    x, y = valley["x"], valley["y"]
+    identified = read_identifications(identifications, case.study.fitting_method.name)
+    drawn = figure(COLUMN_IN, 3.1)
+    axes = drawn.subplots()
+    colours = colormaps["cividis_r"](np.linspace(0, 0.95, len(_LEVELS)))
+    shown = []
+    for grid in valley["grids"]:
+        # The root of the increase is nearly linear, so interpolate that.
+        roots = np.sqrt(np.maximum(np.array(grid["increases"], dtype=float), 0.0))
+        values, levels = (grid["x_values"], grid["y_values"]), np.sqrt(_LEVELS)
+        filled = axes.contourf(*values, roots, levels, colors=colours, extend="max")
+        shown += [path.vertices for path in filled.get_paths()[: _LEVELS.index(_DEEP)]]
+    total = sum(valley["best"])
+    label = f"{x['symbol']} + {y['symbol']} = {total:.3g} {x['unit']}"
+    axes.plot([0, total], [total, 0], color=TARGET, linewidth=0.8, linestyle="--", label=label)
+    columns = [f"{item['name']}_Ns_per_m" for item in (x, y)]
+    label = f"{case.study.fitting_method.title}, {seeds_in_words(len(identified))}"
+    marked = [(first_seeds(identified)[columns].to_numpy(float), _FITS, label)]
+    marked += [
+        (np.array([[place[x["name"]], place[y["name"]]]]), style, name)
+        for place, style, name in (
+            (case.published.identified, _THE_PAPERS, "paper"),
+            (case.parameters, _TRUE, "truth"),
+        )
+        if {x["name"], y["name"]} <= set(place)
+    ]
+    places = [np.array([valley["best"]]), *(points for points, *_ in marked)]
+    low, high = _window(np.concatenate([*shown, *places]), total)
+    for points, style, name in marked:
+        labels = (name, "beyond the axis")
+        points_within(axes, points, (0, 0), high, style, edge_size=4.5, labels=labels)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=case.title)
+    axes.set_xlabel(with_unit(x["symbol"], x["unit"]))
+    axes.set_ylabel(with_unit(y["symbol"], y["unit"]))
+    axes.set_box_aspect(1)
+    drawn.legend(loc="outside lower center", ncols=2)
+    bar = drawn.colorbar(filled, ax=axes, ticks=list(np.sqrt(_LEVELS)))
+    bar.ax.set_yticklabels([f"{level:g}" for level in _LEVELS])
+    bar.set_label("rise of χ²")
+    return drawn
+
+
+def _window(places: Array, total: float) -> tuple[Array, Array]:
+    """Return lower and upper ends of both axes around places, (n, 2), within bounds."""
+    places = np.minimum(places, _FARTHEST * total)
+    low, high = places.min(axis=0), places.max(axis=0)
+    around = np.maximum(_AROUND * (high - low), (_LEAST * total - (high - low)) / 2)
+    return np.maximum(low - around, 0.0), np.minimum(high + around, _FARTHEST * total)

@@ -1,0 +1,397 @@
+"""Claims of the paper's sections 5 and 6: convergence, and the values of Tables 5 to 7."""
+
+from collections.abc import Iterable
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from biogrip.arrays import Array
+from biogrip.tables.claim_rules import (
+    IN_PART,
+    NOT,
+    REPLICATED,
+    UNDECIDED,
+    Judged,
+    LackingError,
+    Results,
+    Runs,
+    altogether,
+    by_range,
+    by_share,
+    by_value,
+    claim,
+    percent,
+    plain,
+    share_within_a_decade,
+)
+
+_TABLES = (5, 6, 7)
+_EARLY, _CONVERGED = 20, 60
+_ROUNDING_PERCENT = 0.5
+"""Errors of the paper are compared after rounding."""
+_SCATTER_OF_CELLS = 30.0
+"""Factor by which measured moduli of cells differ from 1 kPa, by the method of measurement."""
+_OF_MEDIAN = 0.6745
+"""Median error of an estimator at the bound, in standard deviations."""
+_NEAR_BOUND = 2.0
+"""Factor of that up to which a method's error counts as that which noise allows."""
+_APART = 10.0
+"""Difference of BIC that is decisive."""
+
+
+def judge_values(results: Results, number: int) -> Judged:
+    """Judge the identified values of a table."""
+    runs = results.runs_of(number)
+    errors = results.table("errors")
+    errors = errors[errors["case"] == runs.case].set_index("parameter")
+    limits = results.table(f"verdicts_{runs.case}").set_index("quantity")
+    said, verdicts = [], []
+    for name, printed in runs.truth.published.identified.items():
+        row, expected = errors.loc[name], limits.loc[name]
+        low, high = float(row["p05_identified"]), float(row["p95_identified"])
+        ends = float(expected["expected_low"]), float(expected["expected_high"])
+        is_close = bool(ends[0] <= float(row["typical_identified"]) <= ends[1])
+        verdicts.append(by_value(low, printed, high, is_close=is_close))
+        said.append(f"{name} = {printed:g} {verdicts[-1]} ({plain(low)} to {plain(high)})")
+    return Judged(altogether(verdicts), f"With the middle 90 % of the seeds: {'; '.join(said)}.")
+
+
+def judge_fits_response(results: Results, number: int) -> Judged:
+    """Judge whether runs fit the response to within the noise."""
+    share = _near_noise_share(results, number)
+    near = 100 * results.study.near_noise_tolerance
+    said = f"{percent(share)} of the seeds fit to within {near:g} % of the noise."
+    return Judged(by_share(share), said)
+
+
+def _near_noise_share(results: Results, number: int) -> float:
+    case, errors = results.runs_of(number).case, results.table("errors")
+    return float(errors.loc[errors["case"] == case, "near_noise_share"].iloc[0])
+
+
+def judge_generation_of_the_fit(results: Results, number: int) -> Judged:
+    """Judge the generation at which the paper shows a fit."""
+    runs = results.runs_of(number)
+    printed = runs.truth.published.generation
+    if printed is None:
+        raise LackingError("the config has no generation of the fit")
+    stop, last = runs.found["generations"], runs.last_improvement
+    low, high = np.percentile(stop, [5, 95])
+    return Judged(
+        by_range(printed, stop),
+        f"Ours stop at generation {stop.median():.0f} ({low:.0f} to {high:.0f}), and last improve "
+        f"at {last.median():.0f}.",
+    )
+
+
+def judge_orders(results: Results, names: dict[int, tuple[str, ...]]) -> Judged:
+    """Judge whether orders of magnitude of parameters of some tables are found in the end."""
+    said: list[str] = []
+    verdicts: list[str] = []
+    for number, each in names.items():
+        runs = results.runs_of(number)
+        shares = _shares_within_a_decade(runs, each, runs.found)
+        verdicts += map(by_share, shares)
+        said.append(f"Table {number}: {_listed(each, shares)}")
+    return Judged(
+        altogether(verdicts), f"Seeds within half a decade of the target: {'; '.join(said)}."
+    )
+
+
+def _shares_within_a_decade(runs: Runs, names: Iterable[str], values: pd.DataFrame) -> list[float]:
+    return [share_within_a_decade(values[name], runs.truth.parameters[name]) for name in names]
+
+
+def _listed(names: Iterable[str], shares: Iterable[float]) -> str:
+    return ", ".join(f"{name} {percent(s)}" for name, s in zip(names, shares, strict=True))
+
+
+def _errors_percent(runs: Runs, *names: str) -> Array:
+    """Return absolute errors of a parameter or a sum, one a seed."""
+    values = runs.found[list(names)].sum(axis=1).to_numpy(float)
+    target = sum(runs.truth.parameters[name] for name in names)
+    return np.asarray(100 * np.abs(values / target - 1))
+
+
+claim("sections 4, 6", "does not require to assume a priori the order of magnitude")(
+    partial(judge_orders, names={5: ("k", "k_p", "c"), 6: ("k", "c"), 7: ("k", "c")})
+)
+
+
+@claim("section 5", "reaching a stationary value")
+def judge_stationary(results: Results) -> Judged:
+    """Judge whether runs come to rest before the last generation allowed."""
+    runs = [results.runs_of(n) for n in _TABLES]
+    share = float(np.mean(pd.concat([each.found["stop_reason"] == "stalled" for each in runs])))
+    changes = [each.history.groupby("seed")["best_misfit"].diff().fillna(0) for each in runs]
+    never_worse = bool((pd.concat(changes) <= 0).all())
+    return Judged(
+        by_share(share) if never_worse else NOT,
+        f"{percent(share)} of the runs end without improvement for 20 generations; the best "
+        f"misfit {'never rises' if never_worse else 'rises at times'}.",
+    )
+
+
+@claim("section 5, Figure 8", "Generally, convergence is reached around the 60th generation")
+def judge_convergence(results: Results) -> Judged:
+    """Judge the generation of convergence by that of the last improvement."""
+    last = {n: results.runs_of(n).last_improvement for n in _TABLES}
+    said = ", ".join(f"{np.median(each):.0f} (Table {n})" for n, each in last.items())
+    return Judged(
+        altogether(by_range(_CONVERGED, each) for each in last.values()),
+        f"Median generation of the last improvement: {said}.",
+    )
+
+
+@claim(
+    "section 5, Figure 8",
+    "20 generations … verify if mutation can move the optimum from a local minimum",
+)
+def judge_further_generations(results: Results) -> Judged:
+    """Judge whether twenty further generations lead out of local minima."""
+    shares = {n: _near_noise_share(results, n) for n in _TABLES}
+    points = results.of_sweep("interpretations")
+    patient = points[points["interpretation"].isin(["as printed", "patience of 60 generations"])]
+    printed, longer = patient.loc[
+        patient["case"] == results.case_of(5), "near_noise_share"
+    ].to_numpy(float)
+    said = ", ".join(f"{percent(share)} (Table {n})" for n, share in shares.items())
+    return Judged(
+        altogether(map(by_share, shares.values())),
+        f"Runs that come near the noise: {said}. With 60 further generations they are "
+        f"{100 * longer:.1f} instead of {100 * printed:.1f} % for Table 5 (sweep interpretations).",
+    )
+
+
+@claim("section 5", "for the case of endothelial cells")
+def judge_endothelial(results: Results) -> Judged:
+    """Judge whether Table 5's sample is as stiff as a cell."""
+    table = results.table("mechanics")
+    title = results.study.cases[results.case_of(5)].truth.title
+    modulus = table.loc[table["case"] == title, "apparent_modulus_kPa"].to_numpy(float)
+    is_like = modulus.min() >= 1 / _SCATTER_OF_CELLS and modulus.max() <= _SCATTER_OF_CELLS
+    return Judged(
+        REPLICATED if is_like else NOT,
+        f"Its apparent modulus is {plain(modulus.min(), 2)} to {plain(modulus.max(), 2)} kPa by "
+        f"its size; cells have about 1 kPa, give or take a factor of {_SCATTER_OF_CELLS:g}.",
+    )
+
+
+claim("Figure 9", "the best fit solution, obtained at the 70th generation")(
+    partial(judge_generation_of_the_fit, number=5)
+)
+claim("Figure 9", "target response … and the best fit")(partial(judge_fits_response, number=5))
+
+
+@claim("Figure 10", "except c_p, the order of magnitude … is obtained around the 20th generation")
+def judge_early_orders(results: Results) -> Judged:
+    """Judge whether orders of magnitude are there at the twentieth generation."""
+    runs = results.runs_of(5)
+    names = [name for name in runs.truth.model.names if name != "c_p"]
+    early, later = (
+        # Of a run that has stopped before, the last generation.
+        _shares_within_a_decade(
+            runs, names, runs.history[runs.history["generation"] <= at].groupby("seed").last()
+        )
+        for at in (_EARLY, _CONVERGED)
+    )
+    return Judged(
+        altogether(map(by_share, early)),
+        f"Seeds within half a decade of the target at generation {_EARLY}: "
+        f"{_listed(names, early)}; at {_CONVERGED}: {_listed(names, later)}.",
+    )
+
+
+claim("Table 5", "identified values")(partial(judge_values, number=5))
+
+
+@claim("Table 5", "k_p and c have a negligible error")
+def judge_negligible(results: Results) -> Judged:
+    """Judge whether errors of k_p and c are as small as printed in Table 5."""
+    runs, said, verdicts = results.runs_of(5), [], []
+    for name in ("k_p", "c"):
+        printed = runs.truth.published.identified[name] / runs.truth.parameters[name] - 1
+        errors = _errors_percent(runs, name)
+        share = float(np.mean(errors <= 100 * abs(printed) + _ROUNDING_PERCENT))
+        verdicts.append(by_share(share))
+        said.append(f"{name} {percent(share)} (median error {np.median(errors):.2g} %)")
+    methods = results.table("methods")
+    is_best = (methods["method"] == "multi-start least squares") & (methods["case"] == runs.case)
+    polished = ""
+    if is_best.any():
+        best = methods[is_best].iloc[0]
+        others = f"{best['error_percent k_p']:.2g} and {best['error_percent c']:.2g}"
+        polished = f" By least squares median errors are {others} %."
+    return Judged(
+        altogether(verdicts), f"Seeds as close as the paper: {', '.join(said)}.{polished}"
+    )
+
+
+@claim("Table 5", "the error on k is lower than the noise level")
+def judge_below_noise(results: Results) -> Judged:
+    """Judge whether the error of k is below the level of the noise in Table 5."""
+    runs = results.runs_of(5)
+    errors = _errors_percent(runs, "k")
+    share = float(np.mean(errors < 100 * results.study.cases[runs.case].noise.level))
+    said = f"{percent(share)} of the seeds; the median error of k is {np.median(errors):.2g} %."
+    return Judged(by_share(share), said)
+
+
+@claim("Table 5", "c_p … has a very low value that does not affect the response")
+def judge_low_damper(results: Results) -> Judged:
+    """Judge whether runs show that c_p of Table 5 is low."""
+    runs = results.runs_of(5)
+    limits = results.table(f"verdicts_{runs.case}").set_index("quantity")
+    most = float(limits.loc["c_p", "expected_high"])
+    share = float(np.mean(runs.found["c_p"] <= most))
+    return Judged(
+        by_share(share),
+        f"{percent(share)} of the seeds identify c_p below {most:.2g} N s/m, the largest that a "
+        f"trace allows; the median is {runs.found['c_p'].median():.3g} N s/m.",
+    )
+
+
+claim("section 5", "generally able … also in case of simpler models")(
+    partial(judge_orders, names={6: ("k", "c"), 7: ("k", "c")})
+)
+claim("Table 6", "identified values")(partial(judge_values, number=6))
+
+
+@claim("Table 6", "response … is dominated basically by the damping value")
+def judge_damper_dominates(results: Results) -> Judged:
+    """Judge whether a bare damper says as much of Table 6's traces."""
+    table = results.table("models")
+    rows = table[(table["case"] == results.case_of(6)) & (table["model"] == "bare damper")]
+    if rows.empty:
+        raise LackingError("the study does not compare a bare damper")
+    chosen, seeds = int(rows["chosen_by_bic"].iloc[0]), int(rows["seeds"].iloc[0])
+    return Judged(
+        by_share(chosen / seeds), f"BIC prefers a bare damper for {chosen} of {seeds} traces."
+    )
+
+
+claim("Figure 11", "fits correctly the response")(partial(judge_fits_response, number=6))
+
+
+@claim("Table 6", "identify with small error the key parameter c")
+def judge_key_damper(results: Results) -> Judged:
+    """Judge whether c of Table 6 is found; the sum may be where c is not."""
+    runs = results.runs_of(6)
+    printed = abs(runs.truth.published.identified["c"] / runs.truth.parameters["c"] - 1)
+    alone, total = (
+        float(np.mean(_errors_percent(runs, *names) <= 100 * printed + _ROUNDING_PERCENT))
+        for names in (("c",), ("c", "c_p"))
+    )
+    verdict = by_share(alone)
+    return Judged(
+        IN_PART if verdict == NOT and by_share(total) != NOT else verdict,
+        f"Seeds with an error up to {100 * printed:.2g} %: {percent(alone)} for c, "
+        f"{percent(total)} for c + c_p, which alone is determined.",
+    )
+
+
+claim("Table 6", "catch k_p and k orders of magnitude")(
+    partial(judge_orders, names={6: ("k", "k_p")})
+)
+claim("Table 7", "identified values")(partial(judge_values, number=7))
+
+
+@claim("Table 7", "becomes affected by the k value, thus the identification improves")
+def judge_spring_shows(results: Results) -> Judged:
+    """Judge whether k is determined in Table 7's sample, and not in Table 6's."""
+    determined = {}
+    for number in (6, 7):
+        table = results.table(f"verdicts_{results.case_of(number)}").set_index("quantity")
+        determined[number] = str(table.loc["k", "expected_verdict"])
+    right = [determined[6] != "determined", determined[7] == "determined"]
+    return Judged(
+        altogether(REPLICATED if each else IN_PART for each in right),
+        f"Without noise k is {determined[6]} in Table 6's sample, {determined[7]} in Table 7's.",
+    )
+
+
+@claim("Table 7", "good identification for k and c (error below 3%)")
+def judge_good_identification(results: Results) -> Judged:
+    """Judge whether k and c of Table 7 are found to within 3 %."""
+    runs = results.runs_of(7)
+    k, c = (_errors_percent(runs, name) <= 3 + _ROUNDING_PERCENT for name in ("k", "c"))
+    both = float(np.mean(k & c))
+    return Judged(
+        by_share(both),
+        f"Seeds with errors below 3 %, rounded: k {percent(float(k.mean()))}, "
+        f"c {percent(float(c.mean()))}, both {percent(both)}.",
+    )
+
+
+@claim("Figure 12", "axis from -0.6 to 4.2 mrad")
+def judge_rotation(results: Results) -> Judged:
+    """Tell why the level of the rotation proves nothing."""
+    rows = results.table("evidence")
+    rows = rows[rows["unit"] == "mrad"]
+    if rows.empty:
+        raise LackingError("the study has no trace of Table 7")
+    low, high = (float(value) for value in rows["this_study"])
+    return Judged(
+        UNDECIDED,
+        f"Ours span {low:.2g} to {high:.2g} mrad; the arms' stiffness, which the copy lacks, was "
+        "reconstructed from this axis.",
+    )
+
+
+claim("Figure 12", "fit at generation 61")(partial(judge_generation_of_the_fit, number=7))
+
+
+@claim("section 6", "confirm the feasibility of the approach")
+def judge_feasible(results: Results) -> Judged:
+    """Judge feasibility by what a trace determines."""
+    said, verdicts = [], []
+    for number in _TABLES:
+        table = results.table(f"verdicts_{results.case_of(number)}")
+        own = table[~table["quantity"].str.contains("+", regex=False)]
+        is_determined = own["verdict"] == "determined"
+        verdicts += [REPLICATED if each else NOT for each in is_determined]
+        said.append(f"Table {number}: {', '.join(own['quantity'][is_determined]) or 'none'}")
+    return Judged(altogether(verdicts), f"Parameters that a trace determines: {'; '.join(said)}.")
+
+
+@claim("section 6", "highly robust with respect to measurement noise")
+def judge_robust(results: Results) -> Judged:
+    """Judge robustness by errors over a sweep of noise beside those that noise allows."""
+    points = results.of_sweep("robustness_noise")
+    points = points[(points["row"] > 0) & np.isfinite(points["bound_percent"])]
+    fine = points["error_genetic"] <= _NEAR_BOUND * _OF_MEDIAN * points["bound_percent"]
+    shares = fine.groupby([points["case"], points["quantity"]], sort=False).mean()
+    names = {results.case_of(number): number for number in _TABLES}
+    said = ", ".join(
+        f"{percent(share)} ({quantity}, Table {names[case]})"
+        for (case, quantity), share in shares.items()
+    )
+    return Judged(
+        altogether(map(by_share, shares)),
+        f"Levels and kinds of noise at which the median error is at most {_NEAR_BOUND:g} times "
+        f"that which noise allows: {said} (sweep robustness_noise).",
+    )
+
+
+@claim("section 6", "nor the specific cell model")
+def judge_cell_model(results: Results) -> Judged:
+    """Judge whether any simpler model would do, and whether a trace tells which was right."""
+    table = results.table("models")
+    verdicts, said = [], []
+    for number in _TABLES:
+        mine = table[table["case"] == results.case_of(number)]
+        (maker,) = mine[mine["model"].str.endswith("(made the traces)")].to_dict("records")
+        simpler = mine[mine["parameters"] < maker["parameters"]]
+        if simpler.empty:
+            raise LackingError("the study compares no simpler sample models")
+        fail = int((simpler["median_delta_bic"] > _APART).sum())
+        verdicts.append(NOT if fail else REPLICATED)
+        chosen = f"{maker['chosen_by_bic']} of {maker['seeds']} traces"
+        said.append(f"Table {number}: {fail} of {len(simpler)}, {chosen}")
+    return Judged(
+        altogether(verdicts),
+        "The paper fits only the model that made its traces. Simpler models that a trace refutes "
+        f"(BIC higher by over {_APART:g}), and traces whose BIC prefers the one that made them: "
+        f"{'; '.join(said)}.",
+    )

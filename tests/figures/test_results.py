@@ -1,0 +1,258 @@
+"""Which run a figure shows, and what is drawn of fits, bounds and forces; nothing misleading."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from matplotlib.patches import Rectangle
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.figures.course import draw_convergence, draw_evolution
+from biogrip.figures.fit import draw_fit, draw_judged_fit, draw_typical_fit
+from biogrip.figures.force import draw_force
+from biogrip.figures.overview import draw_ratios
+from biogrip.figures.results import SHOWN_SEEDS, Fit, read_history
+from biogrip.figures.scatter import draw_scatter
+from biogrip.figures.style import ALL_SEEDS, FITTED, figure, styled
+from biogrip.fit.methods import METHODS
+from biogrip.physics.instruments import MODULUS
+from biogrip.physics.models import MODELS
+from biogrip.physics.simulation import simulated_rotation
+from biogrip.records.identifications import columns
+from biogrip.records.traces import Measurements, table_of, write_measurements
+from biogrip.stages import targets
+from tests.helpers.default import STUDY, seen, study_of
+
+CASE = "liquid_drop_2"
+TRUTH = [1.0, 1e-4, 10.0, 1e-3]
+TIME_S = np.arange(0.0, 400.5, 1.0)
+COLUMNS = ["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"]
+
+
+def response(values: list[float]) -> Array:
+    problem = STUDY.cases[CASE].problem
+    network = problem.model.network(np.array([values]))
+    device = problem.gripper, network, problem.torque
+    found: Array = simulated_rotation(*device, TIME_S, nonlinear=False)[0]
+    return found
+
+
+@pytest.fixture
+def identifications(tmp_path: Path) -> Path:
+    """Of seed 1 the excess over the noise is the middle one, of seed 2 the misfit is lowest."""
+    rows = [
+        [CASE, "genetic", seed, k, *TRUTH[1:], misfit, noise, 7, 100, "stalled"]
+        for seed, k, misfit, noise in (
+            (0, 9.0, 1.3e-4, 1e-4),
+            (1, 0.7, 6e-5, 5e-5),
+            (2, 1e-6, 3e-5, 3e-5),
+        )
+    ]
+    frame = pd.DataFrame(rows, columns=columns(MODELS["generalized_maxwell"]))
+    frame.to_csv(tmp_path / f"{CASE}.csv", index=False)
+    return tmp_path / f"{CASE}.csv"
+
+
+@pytest.fixture
+def measurements(tmp_path: Path) -> Path:
+    """Three traces whose noise falls from seed to seed."""
+    target, rng = response(TRUTH), np.random.default_rng(0)
+    traces = {
+        seed: target + 1e-4 / (1 + seed) * rng.standard_normal(len(TIME_S)) for seed in range(3)
+    }
+    write_measurements(tmp_path / "seeds_0-2.parquet", Measurements(TIME_S, target, traces))
+    return tmp_path / "seeds_0-2.parquet"
+
+
+def curve(found: Any, label: str) -> Array:
+    (line,) = (line for line in found.axes[0].lines if label in str(line.get_label()))
+    return np.asarray(line.get_ydata(), dtype=float)
+
+
+def test_the_typical_run_is_drawn(identifications: Path, measurements: Path) -> None:
+    with styled():
+        drawn = draw_typical_fit(STUDY.cases[CASE], identifications, [measurements], [])
+    expected = 1e3 * response([0.7, *TRUTH[1:]])
+    np.testing.assert_allclose(curve(drawn, "typical fit (seed 1"), expected, rtol=1e-9)
+    # The paper's axis is on it, and all that was measured.
+    low, high = drawn.axes[0].get_ylim()
+    assert low <= -0.6
+    assert high >= 4.2
+
+
+def test_the_page_of_a_trace_shows_the_fit_that_it_judges(
+    tmp_path: Path, measurements: Path
+) -> None:
+    names = STUDY.cases[CASE].problem.model.names
+    items = [{"quantity": n, "value": v} for n, v in zip(names, [0.9, *TRUTH[1:]], strict=True)]
+    verdicts = tmp_path / "verdicts.json"
+    verdicts.write_text(json.dumps({"quantities": items, "trades": [], "notes": []}))
+    with styled():
+        drawn = draw_judged_fit(STUDY.cases[CASE], verdicts, measurements, [])
+    expected = 1e3 * response([0.9, *TRUTH[1:]])
+    np.testing.assert_allclose(curve(drawn, "best fit (seed 0)"), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("time_s", "sd", "scale", "residual"),
+    [
+        (np.geomspace(0.01, 1000.0, 200), None, "log", "residual (Pa)"),
+        (np.linspace(0.0, 10.0, 200), None, "linear", "residual (Pa)"),
+        (np.linspace(0.0, 10.0, 200), 0.5, "linear", "residual / sd"),
+    ],
+)
+def test_axes_suit_the_sampling_and_residuals_are_in_the_unit_that_was_minimised(
+    time_s: Array, sd: float | None, scale: str, residual: str
+) -> None:
+    modulus = 100 / (1 + time_s)
+    sds = None if sd is None else np.full(len(time_s), sd)
+    fit = Fit(time_s, None, 1.01 * modulus, modulus, sds, MODULUS)
+    traces, residuals = draw_fit(fit, "fit", "").axes
+    assert (traces.get_xscale(), traces.get_yscale()) == (scale, scale)
+    assert traces.get_ylabel() == "modulus (Pa)"
+    assert (residuals.get_yscale(), residuals.get_ylabel()) == ("linear", residual)
+    points = np.asarray(residuals.lines[0].get_ydata(), dtype=float)
+    np.testing.assert_allclose(points, 0.01 * modulus / (sd or 1))
+
+
+def test_histories_of_the_seeds_that_are_drawn_are_read(tmp_path: Path) -> None:
+    """By one method, wherever in the file they are; Arrow's own filter is the independent one."""
+    path = tmp_path / "histories.parquet"
+    seeds = np.repeat([0, 1, SHOWN_SEEDS, SHOWN_SEEDS + 1], 3)
+    tables = [
+        table_of({"method": method, "seed": seeds, "generation": seeds, "k": seeds * 0.5}, 12)
+        for method in ("genetic", "least_squares")
+    ]
+    with pq.ParquetWriter(path, tables[0].schema) as writer:
+        for table in tables:
+            for start in range(0, 12, 4):
+                writer.write_table(table.slice(start, 4))
+    found = read_history(path, "least_squares", SHOWN_SEEDS + 1, ["k"])
+    kept = [("method", "==", "least_squares"), ("seed", "!=", SHOWN_SEEDS)]
+    names = ["seed", "generation", "k"]
+    pd.testing.assert_frame_equal(found, pd.read_parquet(path, columns=names, filters=kept))
+    with pytest.raises(BiogripError, match=r"histories.parquet: cannot be read as histories"):
+        read_history(path, "genetic", 0, ["no such column"])
+
+
+@pytest.mark.parametrize(
+    ("seeds", "shown", "others", "label"),
+    [
+        (50, 7, 49, "all 50 seeds"),
+        (1500, 7, 99, "first 100 of 1500 seeds"),
+        (1500, 1400, 100, "first 100 of 1500 seeds"),
+    ],
+)
+def test_no_more_seeds_are_drawn_than_can_be_seen(
+    tmp_path: Path, seeds: int, shown: int, others: int, label: str
+) -> None:
+    numbers = np.arange(seeds)
+    lower = np.flatnonzero(numbers != shown)[: (seeds - 1) // 2]
+    misfit = np.where(np.isin(numbers, lower), 1.0, 1.5)
+    misfit[shown] = 1.2
+    found = pd.DataFrame({"seed": numbers, "misfit": misfit, "noise_rms": 1.0})
+    found = found.assign(case=1, generations=1, evaluations=1, stop_reason=1, method="genetic")
+    found.to_csv(tmp_path / "found.csv", index=False)
+    history = {"seed": np.repeat(numbers, 2), "generation": np.tile([0, 1], seeds)}
+    history["best_misfit"] = np.repeat(misfit, 2)
+    pd.DataFrame(history).assign(method="genetic").to_parquet(tmp_path / "history.parquet")
+    study = seen(shown_method=METHODS["genetic"], near_noise_tolerance=0.02)
+    case = seen(title="A cell", mutation_start=20, study=study)
+    files = tmp_path / "found.csv", tmp_path / "history.parquet"
+    (axes,) = draw_convergence(case, *files).axes
+    colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]
+    assert (colors.count(ALL_SEEDS), colors.count(FITTED)) == (others, 1)
+    legend = axes.get_legend()
+    assert legend
+    assert legend.get_texts()[0].get_text() == label
+    # Generations end before mutation starts.
+    assert not axes.texts
+
+
+def test_how_far_from_its_target_a_run_ends_is_named(identifications: Path, tmp_path: Path) -> None:
+    history = pd.DataFrame({"seed": [0, 0, 1, 1, 2, 2], "generation": [0, 1] * 3})
+    for column, value in zip(COLUMNS, TRUTH, strict=True):
+        history[column] = [value, value * 0.9, value, value * 1.024, value, value]
+    history.assign(method="genetic").to_parquet(tmp_path / "history.parquet")
+    with styled():
+        drawn = draw_evolution(STUDY.cases[CASE], identifications, tmp_path / "history.parquet")
+    titles = [axes.get_title(loc="right") for axes in drawn.axes]
+    assert titles == ["seed 1 ends 2.4 % above the target"] * 4
+
+
+def scattered(overlay: str, identifications: Path) -> Any:
+    """Of a case of which the sum alone is determined."""
+    folder, case = identifications.parent, study_of(overlay).cases[CASE]
+    targets.simulate(case, folder / "target.csv")
+    verdicts = dict.fromkeys(["k", "k_p", "c", "c_p"], "not determined")
+    verdicts["c + c_p"] = "determined"
+    items = [{"quantity": name, "verdict": verdict} for name, verdict in verdicts.items()]
+    content = {"quantities": items, "trades": [], "notes": []}
+    (folder / "expected.json").write_text(json.dumps(content))
+    with styled():
+        return draw_scatter(
+            case, identifications, folder / "target.csv", folder / "expected.json", []
+        )
+
+
+def test_a_band_of_the_study_s_confidence_is_drawn_of_what_is_determined_alone(
+    identifications: Path,
+) -> None:
+    drawn = scattered("", identifications)
+    shaded = [any(isinstance(p, Rectangle) for p in axes.patches) for axes in drawn.axes]
+    assert shaded == [False] * 4 + [True]
+    titles = [axes.get_title("left") for axes in drawn.axes]
+    assert "not determined" in titles[2]
+    assert titles[4].endswith("%")
+    assert drawn.axes[2].get_yscale() == "log"
+    texts = [text.get_text() for text in drawn.legends[0].get_texts()]
+    assert "beyond the axis" in texts
+    assert "95 % by the Cramér-Rao bound (named above), rest known" in texts
+    # 1e-6 of 1 is below four decades: one triangle on the edge.
+    triangles = [line for line in drawn.axes[0].lines if line.get_marker() == "v"]
+    assert [len(np.asarray(line.get_xdata())) for line in triangles] == [1]
+    narrow = scattered("identifiability: {confidence: 0.6827}", identifications)
+    wide, small = (float(f.axes[4].patches[0].get_extents().height) for f in (drawn, narrow))
+    assert wide / small == pytest.approx(1.96, rel=1e-3)
+
+
+def test_the_overview_marks_what_is_off_its_axis() -> None:
+    axes = figure(3, 3).subplots()
+    draw_ratios(axes, np.column_stack([np.arange(4.0), [1e-5, 0.5, 2.0, 1e7]]), "red", "a fit")
+    drawn_at = {line.get_marker(): np.asarray(line.get_xydata()) for line in axes.lines}
+    np.testing.assert_allclose(drawn_at["v"], [[0, 1e-3]])
+    np.testing.assert_allclose(drawn_at["^"], [[3, 1e3]])
+    assert len(drawn_at["o"]) == 2
+
+
+PULLED = """
+measurement: {rate_Hz: 1.0}
+cases:
+  left: {contact: unilateral, sample: {model: kelvin_voigt, k_p: 0.05, c_p: 5.0}}
+  bent: {sample: {model: liquid_drop, k: 1.0, k_p: 1.0e-3, c: 10.0}, models: {target: nonlinear}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "pulls", "free"),
+    [
+        ("endothelial_cell", False, False),
+        ("liquid_drop_1", True, True),
+        ("left", True, True),
+        ("bent", True, False),
+    ],
+)
+def test_a_pull_is_marked(tmp_path: Path, name: str, pulls: bool, free: bool) -> None:
+    case = study_of(PULLED).cases[name]
+    targets.simulate(case, tmp_path / "target.csv")
+    with styled():
+        legends = [axes.get_legend() for axes in draw_force(case, tmp_path / "target.csv").axes]
+    forces, rotations = ([t.get_text() for t in each.get_texts()] for each in legends if each)
+    assert ("the jaws would have to pull" in forces) == pulls
+    assert ("jaws that let go" in forces) == free
+    assert ("jaws that let go" in rotations) == (free and name != "left")

@@ -1,0 +1,104 @@
+"""Files of figures, ticks, prefixes, colours, and what is beyond an axis."""
+
+import re
+import zlib
+from contextlib import suppress
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fontTools import subset
+from fontTools.ttLib import TTFont
+from matplotlib.lines import Line2D
+
+from biogrip.figures.actuator import draw_torque
+from biogrip.figures.results import scale_of
+from biogrip.figures.style import (
+    COLORS,
+    decade_ticks,
+    figure,
+    line_of,
+    points_within,
+    save,
+    styled,
+)
+from biogrip.fit.methods import METHODS
+from tests.helpers.default import STUDY
+
+
+def test_saved_figures_are_the_same_every_time(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        with styled():
+            save(draw_torque(STUDY), tmp_path / f"{name}.png")
+    for suffix in (".png", ".pdf"):
+        assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+def test_a_pdf_has_the_glyphs_that_are_drawn_and_no_table_that_lays_text_out(
+    tmp_path: Path,
+) -> None:
+    load_font = subset.load_font
+    with styled():
+        empty = figure(2, 2)
+        empty.subplots().set_title("Wxyz")
+        save(empty, tmp_path / "drawn.png")
+    assert subset.load_font is load_font
+    content = (tmp_path / "drawn.pdf").read_bytes()
+    streams = map(decompressed, re.findall(rb"stream\r?\n(.*?)\r?\nendstream", content, re.DOTALL))
+    (font,) = (TTFont(BytesIO(text)) for text in streams if text.startswith(b"\x00\x01\x00\x00"))
+    assert not {"GDEF", "GPOS", "GSUB", "kern"} & set(font.keys())
+    with_outlines = sum(font["glyf"][name].numberOfContours != 0 for name in font.getGlyphOrder())
+    # Of the title, and of 0.0, 0.2 ... 1.0 at the ticks: seven digits and the point.
+    assert with_outlines >= len("Wxyz") + len("01.2468") - 1
+
+
+def decompressed(stream: bytes) -> bytes:
+    """What is in a stream of a PDF; nothing if it is not compressed."""
+    with suppress(zlib.error):
+        return zlib.decompress(stream)
+    return b""
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(2.0, (1.0, "rad")), (3e-3, (1e3, "mrad")), (3e-5, (1e6, "µrad")), (3e-8, (1e9, "nrad"))],
+)
+def test_prefixes(value: float, expected: tuple[float, str]) -> None:
+    assert scale_of(np.array([-value, 0.0]), "rad") == expected
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "labels"),
+    [
+        (1e-3, 1e7, ["10⁻³", "10²", "10⁷"]),
+        (0.5, 50, ["10⁰", "10¹"]),
+        (1.5e-4, 1.2e-3, ["0.0002", "0.001"]),
+        (2.1, 4.9, []),
+    ],
+)
+def test_ticks_do_not_collide(low: float, high: float, labels: list[str]) -> None:
+    ticks, found = decade_ticks(low, high)
+    assert found == labels
+    assert all(low <= tick <= high for tick in ticks)
+
+
+def test_every_method_is_drawn_as_no_other_and_in_colours_for_all_eyes() -> None:
+    lines = [tuple(line_of(method).values()) for method in METHODS.values()]
+    assert len(set(lines)) == len(lines)
+    for method in METHODS.values():
+        Line2D([], [], **line_of(method))
+    # Okabe and Ito's, but for their yellow, which is not seen on white; and a grey.
+    assert set(COLORS.values()) == {
+        *("#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00", "#CC79A7", "#999999"),
+    }
+
+
+def test_points_beyond_an_axis_are_triangles_at_its_edge() -> None:
+    axes = figure(3, 3).subplots()
+    points = np.array([[1.0, 0.5], [2.0, 2.0], [3.0, -7.0], [4.0, 7.0], [99.0, 2.0]])
+    points_within(axes, points, (0, 0), (9, 5), {"marker": "o"}, edge_size=3)
+    drawn_at = {line.get_marker(): np.asarray(line.get_xydata()) for line in axes.lines}
+    np.testing.assert_array_equal(drawn_at["o"], points[:2])
+    edges = {"v": [[3, 0]], "^": [[4, 5]], ">": [[9, 2]]}
+    assert {marker: at.tolist() for marker, at in drawn_at.items() if marker != "o"} == edges

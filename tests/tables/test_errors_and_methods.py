@@ -1,0 +1,200 @@
+"""Tables of errors, methods, models and verdicts, recomputed by hand."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from biogrip.errors import BiogripError
+from biogrip.fit.methods import METHODS
+from biogrip.physics.models import MODELS, UNPUBLISHED, Published, Sample, Truth
+from biogrip.records.identifications import MODEL_FITS, columns
+from biogrip.tables.errors_of_case import errors, errors_of_case
+from biogrip.tables.layout import write
+from biogrip.tables.methods import methods, models, timings
+from biogrip.tables.verdicts import verdicts
+from tests.helpers.default import seen, study_of
+
+PAPER = Published(
+    table=9,
+    identified={"k": 9.0, "k_p": 1.0, "c": 3.0, "c_p": 2.0},
+    error_percent={"k": "10", "k_p": "-", "c": "25", "c_p": ">100"},
+)
+TRUE = {"k": 8.0, "k_p": 0.0, "c": 4.0, "c_p": 1.0}
+
+
+def identified(path: Path, rows: list[list[Any]]) -> Path:
+    """Write identifications of a drop: method, seed, parameters, misfit, noise, evaluations."""
+    rows = [["drop", *row[:-1], 60, row[-1], "stalled"] for row in rows]
+    pd.DataFrame(rows, columns=columns(MODELS["generalized_maxwell"])).to_csv(path, index=False)
+    return path
+
+
+@pytest.fixture
+def eleven_seeds(tmp_path: Path) -> Path:
+    """Of k = 5, 6, ... 15; c + c_p = 5 always; the trace of seed 3 is the quietest."""
+    rows = []
+    for seed in range(11):
+        noise = 0.5 if seed == 3 else 1.0
+        values = [5 + seed, 0.1, 5 - 0.1 * seed, 0.1 * seed]
+        rows.append(["genetic", seed, *values, noise * (1.001 + 0.0036 * seed), noise, 15500])
+    return identified(tmp_path / "drop.csv", rows)
+
+
+def case_of(near_noise_tolerance: float = 0.02) -> Any:
+    truth = Truth("A drop", Sample("generalized_maxwell"), TRUE, PAPER)
+    study = seen(shown="genetic", near_noise_tolerance=near_noise_tolerance)
+    return seen(name="drop", truth=truth, study=study)
+
+
+def test_error_table_is_the_arithmetic_it_says(eleven_seeds: Path) -> None:
+    made = errors_of_case(case_of(), eleven_seeds)
+    rows = {row["parameter"]: row for row in made.rows}
+    assert list(rows) == ["k", "k_p", "c", "c_p", "c + c_p"]
+    k, total = rows["k"], rows["c + c_p"]
+    # Not the seed of lowest misfit: excesses rise with the seed, and 5 is the middle one of 11.
+    typical = k["typical_seed"], k["typical_identified"], k["typical_error_percent"]
+    # (8 - 10) / 8, as the paper has it: too stiff is negative.
+    assert typical == (5, 10.0, -25.0)
+    assert (k["median_identified"], k["p05_identified"], k["p95_identified"]) == (10.0, 5.5, 14.5)
+    # |8 - k| over k = 5 .. 15: 0 once, 1, 2 and 3 twice, 4, 5, 6 and 7.
+    assert k["median_absolute_error_percent"] == pytest.approx(37.5)
+    # 1.001 + 0.0036 seed is at most 1.02 up to seed 5.
+    assert k["near_noise_share"] == pytest.approx(6 / 11)
+    assert made.columns[-1].heading == "Share within 2 % of the noise"
+    assert (k["paper_identified"], k["paper_error_percent"]) == (9.0, "10")
+    assert (total["target"], total["paper_identified"], total["paper_error_percent"]) == (5, 5, 0)
+    assert total["median_absolute_error_percent"] == pytest.approx(0.0, abs=1e-12)
+    assert np.isnan(rows["k_p"]["typical_error_percent"])
+
+
+def test_joined_errors_are_within_the_tolerance_that_their_heading_names(
+    eleven_seeds: Path, tmp_path: Path
+) -> None:
+    case = case_of(0.005)
+    made = errors_of_case(case, eleven_seeds)
+    assert made.columns[-1].heading == "Share within 0.5 % of the noise"
+    # 1.001 and 1.0046.
+    assert made.rows[0]["near_noise_share"] == pytest.approx(2 / 11)
+    write(made, tmp_path / "t.csv")
+    joined = errors(case.study, [tmp_path / "t.csv"])
+    assert joined.columns == made.columns
+    assert joined.rows[0]["typical_seed"] == 5
+    assert joined.rows[3]["paper_error_percent"] == ">100"
+
+
+def test_files_that_are_no_identifications_are_named(tmp_path: Path) -> None:
+    with pytest.raises(BiogripError, match=r"gone.csv: cannot be read as identifications"):
+        errors_of_case(case_of(), tmp_path / "gone.csv")
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(BiogripError, match=r"other.csv, line 1: wanted the columns case"):
+        errors_of_case(case_of(), tmp_path / "other.csv")
+
+
+def study(parameters: dict[str, float], samples: int) -> Any:
+    """Of one case, a drop."""
+    truth = Truth("A drop", Sample("generalized_maxwell"), parameters, UNPUBLISHED)
+    cases = {"drop": seen(truth=truth, samples=samples)}
+    return seen(cases=cases, identifiers=METHODS, optimum_tolerance=1.0, near_noise_tolerance=0.02)
+
+
+def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
+    rows = []
+    for seed, genetic, polished in ((0, 1.2, 1.0), (1, 1.0004, 1.0), (2, 1.05, 0.9)):
+        for method, misfit, n in (("genetic", genetic, 9), ("least_squares", polished, 10 + seed)):
+            rows.append([method, seed, 8.0, 1.0, 3.0, 2.0, misfit, 1.02, n])
+    path = identified(tmp_path / "drop.csv", rows)
+    parameters = {"k": 10.0, "k_p": 1.0, "c": 4.0, "c_p": 1.0}
+    first, second = methods(study(parameters, 1000), [path]).rows
+    # 1000 (1.0004^2 - 1) = 0.80: at the optimum; the others are far above.
+    assert (first["seeds"], first["optimum_share"]) == (3, pytest.approx(1 / 3))
+    assert second["optimum_share"] == 1.0
+    assert first["near_noise_share"] == pytest.approx(1 / 3)
+    assert second["median_evaluations"] == 11
+    assert first["error_percent k"] == pytest.approx(20.0)
+    assert first["error_percent c + c_p"] == pytest.approx(0.0)
+
+
+def test_the_lowest_known_may_be_the_truth(tmp_path: Path) -> None:
+    path = identified(tmp_path / "d.csv", [["genetic", 0, 8.0, 1.0, 3.0, 2.0, 1.1, 1.0, 100]])
+    parameters = dict.fromkeys(["k", "k_p", "c", "c_p"], 1.0)
+    (made,) = methods(study(parameters, 100), [path]).rows
+    assert made["median_rise"] == pytest.approx(100 * (1.1**2 - 1))
+
+
+def test_models_are_chosen_by_their_criteria(tmp_path: Path) -> None:
+    n, rows = 1000, []
+    # Half the chi^2 gained by the second model: 1, 4 and 20 over three seeds.
+    for seed, gain in enumerate((1.0, 4.0, 20.0)):
+        rows.append(("drop", "damper", seed, 1, n, 1.0))
+        rows.append(("drop", "maxwell", seed, 2, n, float(np.exp(-gain / (2 * n)))))
+    MODEL_FITS.write(tmp_path / "fits.csv", rows)
+    tried = {name: Sample(name) for name in ("damper", "maxwell")}
+    drop = seen(recorded=False, sample=Sample("maxwell"), models=tried)
+    damper, maxwell = models(seen(cases={"drop": drop}), [tmp_path / "fits.csv"]).rows
+    # A parameter costs 2 by AIC, ln 1000 = 6.9 by BIC.
+    assert (damper["chosen_by_aic"], maxwell["chosen_by_aic"]) == (1, 2)
+    assert (damper["chosen_by_bic"], maxwell["chosen_by_bic"]) == (2, 1)
+    assert damper["median_delta_aic"] == pytest.approx(4.0 - 2.0)
+    assert maxwell["median_delta_bic"] == pytest.approx(np.log(n) - 4.0)
+    assert maxwell["model"] == "Maxwell liquid (made the traces)"
+
+
+def test_what_made_the_traces_is_tried_and_marked(tmp_path: Path) -> None:
+    two = study_of("""
+model_selection: {models: [damper, generalized_maxwell]}
+cases:
+  two: {sample: {model: generalized_maxwell, branches: 2,
+                 k_1: 30, k_2: 10, k_p: 12.3, c_1: 150, c_2: 600, c_p: 0}}
+""").cases["two"]
+    assert tuple(two.models) == ("damper", "generalized_maxwell", "generalized_maxwell_2")
+    fits = [("two", name, 0, 4, 1000, 1.0) for name in two.models]
+    MODEL_FITS.write(tmp_path / "fits.csv", fits)
+    found = models(seen(cases={"two": two}), [tmp_path / "fits.csv"]).rows
+    marked = [row["model"] for row in found if "made the traces" in row["model"]]
+    assert marked == ["generalized Maxwell-Wiechert model, 2 branches (made the traces)"]
+    assert [row["parameters"] for row in found] == [1, 4, 6]
+
+
+def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
+    item = {"unit": "N/m", "value": 2.0, "low": 1.0, "high": 3.0, "excluded": [[1.5, 1.8]]}
+    measured: dict[str, Any] = {
+        "fit": "ok",
+        "confidence": 0.9,
+        "quantities": [
+            {**item, "quantity": "k", "verdict": "determined"},
+            {**item, "quantity": "c + c_p", "verdict": "bounded above", "low": None},
+        ],
+        "trades": [{"members": ["c", "c_p"], "quantity": "c + c_p"}],
+        "notes": [],
+    }
+    expected = {**measured, "quantities": [{**measured["quantities"][0], "high": 4.0}]}
+    files = [tmp_path / "a.json", tmp_path / "b.json"]
+    for file, content in zip(files, (measured, expected), strict=True):
+        file.write_text(json.dumps(content))
+    known = seen(name="x", title="X", parameters={"k": 2.5, "c": 1.0, "c_p": 0.5})
+    table = verdicts(known, files[0], files[1:])
+    k, total = table.rows
+    assert k["excluded"] == "1.5 to 1.8"
+    headings = {column.name: column.heading for column in table.columns}
+    assert (headings["low"], headings["high"]) == ("90 % from", "90 % to")
+    assert "One-sided limits hold with 95 % confidence." in table.caption
+    assert (k["target"], k["value"], k["low"], k["expected_high"]) == (2.5, 2.0, 1.0, 4.0)
+    assert (total["target"], total["value"], total["high"]) == (1.5, None, 3.0)
+    assert total["expected_verdict"] is None
+    assert "c and c_p trade against each other: determined is c + c_p." in table.caption
+    recorded = seen(**vars(known) | {"parameters": {}})
+    assert verdicts(recorded, files[0], []).rows[0]["target"] is None
+    files[0].write_text("{}")
+    with pytest.raises(BiogripError, match=r"a\.json: holds no verdicts"):
+        verdicts(known, files[0], files[1:])
+
+
+def test_timings_are_summed(tmp_path: Path) -> None:
+    path = tmp_path / "times.csv"
+    path.write_text("case,method,seed,cpu_s\nx,genetic,0,0.1\nx,genetic,1,0.3\nx,genetic,2,0.2\n")
+    (row,) = timings(seen(identifiers=METHODS), [path]).rows
+    assert (row["median_cpu_s"], row["total_cpu_s"]) == (pytest.approx(0.2), pytest.approx(0.6))

@@ -1,0 +1,77 @@
+"""Tables as files, in four formats, and regenerated ones beside the published."""
+
+import csv
+import re
+from pathlib import Path
+
+import pytest
+
+from biogrip.errors import BiogripError
+from biogrip.records.rows import escape_formula, read_rows
+from biogrip.tables.layout import Column, Table, compare, write
+from tests.helpers.places import ROOT
+
+
+def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
+    columns = Column("case", "Case"), Column("value", "Value", 3), Column("none", "None")
+    rows = [{"case": "a_b", "value": 1234.5678}, {"case": "c & d", "value": -0.0, "none": None}]
+    write(Table("Fifty % of a_b.", columns, [*rows, {"none": float("nan")}]), tmp_path / "t.csv")
+    found = read_rows(tmp_path / "t.csv", ["case", "value", "none"])[1:]
+    assert found == [["a_b", "1234.57", ""], ["c & d", "0", ""], ["", "", ""]]
+    markdown, latex, page = ((tmp_path / f"t.{end}").read_text() for end in ("md", "tex", "html"))
+    assert "1.23e+03" in markdown
+    assert "None" not in markdown + latex + page
+    assert r"Fifty \% of a\_b." in latex
+    assert r"c \& d" in latex
+    assert "c &amp; d" in page
+
+
+def test_a_cell_of_no_column_is_refused() -> None:
+    with pytest.raises(ValueError, match="no column: vlaue"):
+        Table("", (Column("value", "Value"),), [{"vlaue": 1.0}])
+
+
+def test_markup_in_a_cell_is_text_in_every_format(tmp_path: Path) -> None:
+    cells = {"a": "a|b\nc", "b": "<script>x</script>", "c": "50 % & 3_4 $x$ #1 {y} ~^\\"}
+    columns = tuple(Column(name, f"{name}|<b>") for name in "abc")
+    write(Table("A table.", columns, [cells, cells]), tmp_path / "t.csv")
+    rows = (tmp_path / "t.md").read_text().splitlines()[2:]
+    assert [len(re.findall(r"(?<!\\)\|", row)) for row in rows] == [4, 4, 4, 4]
+    assert r"a\|b c" in rows[2]
+    page = (tmp_path / "t.html").read_text()
+    assert "<script>" not in page
+    assert "<b>" not in page
+    assert r"50 \% \& 3\_4 \$x\$ \#1 \{y\}" in (tmp_path / "t.tex").read_text()
+
+
+def test_the_published_tables_hold_nothing_that_is_escaped() -> None:
+    files = sorted((ROOT / "results" / "published" / "tables").glob("*.csv"))
+    assert len(files) > 10
+    for file in files:
+        with file.open(newline="") as stream:
+            cells = [cell for row in csv.reader(stream) for cell in row]
+        assert [cell for cell in cells if escape_formula(cell) != cell or "|" in cell] == []
+
+
+def test_regenerated_tables_are_the_same_bytes_or_their_lines_are_shown(tmp_path: Path) -> None:
+    published, made = tmp_path / "published", tmp_path / "made"
+    for folder in (published, made):
+        folder.mkdir()
+        (folder / "a.csv").write_text("k,c\n1,2\n3,4\n")
+        (folder / "b.md").write_text("text\n")
+    files = [made / "a.csv", made / "b.md"]
+    assert compare(published, files).startswith("2 files of tables compared with ")
+    (made / "a.csv").write_text("k,c\n1,2\n3,5\n")
+    (made / "c.csv").write_text("new\n")
+    with pytest.raises(BiogripError) as error:
+        compare(published, [*files, made / "c.csv"])
+    said = str(error.value).splitlines()
+    assert said[0] == f"the regenerated tables differ from {published}."
+    assert said[-3:] == ["-3,4", "+3,5", "c.csv: is not published."]
+    assert "text" not in str(error.value)
+    (made / "a.csv").write_text("".join(f"{n}\n" for n in range(1000)))
+    with pytest.raises(BiogripError) as error:
+        compare(published, [made / "a.csv"])
+    assert len(str(error.value).splitlines()) == 41
+    with pytest.raises(BiogripError, match="holds no tables to compare with"):
+        compare(published, [])
