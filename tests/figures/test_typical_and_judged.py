@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -14,7 +15,7 @@ from biogrip.figures import evolution, fit, judged_fit
 from biogrip.figures.results import SHOWN_SEEDS, read_history
 from biogrip.figures.style import styled
 from biogrip.physics.simulation import simulated_rotation
-from biogrip.records.traces import Measurements, table_of, write_measurements
+from biogrip.records.traces import Measurements, write_measurements
 from tests.helpers.default import STUDY
 
 CASE = "liquid_drop_2"
@@ -36,7 +37,7 @@ def test_histories_of_the_seeds_that_are_drawn_are_read(tmp_path: Path) -> None:
     path = tmp_path / "histories.parquet"
     seeds = np.repeat([0, 1, SHOWN_SEEDS, SHOWN_SEEDS + 1], 3)
     tables = [
-        table_of({"method": method, "seed": seeds, "generation": seeds, "k": seeds * 0.5}, 12)
+        pa.table({"method": [method] * 12, "seed": seeds, "generation": seeds, "k": seeds * 0.5})
         for method in ("genetic", "least_squares")
     ]
     with pq.ParquetWriter(path, tables[0].schema) as writer:
@@ -47,7 +48,7 @@ def test_histories_of_the_seeds_that_are_drawn_are_read(tmp_path: Path) -> None:
     kept = [("method", "==", "least_squares"), ("seed", "!=", SHOWN_SEEDS)]
     columns = ["seed", "generation", "k"]
     pd.testing.assert_frame_equal(found, pd.read_parquet(path, columns=columns, filters=kept))
-    with pytest.raises(BiogripError, match=r"histories.parquet: cannot be read as histories"):
+    with pytest.raises(BiogripError, match=r"histories.parquet: cannot be read: No match"):
         read_history(path, "genetic", 0, ["no such column"])
 
 

@@ -15,7 +15,7 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import hold, torque_history
-from biogrip.records.verdicts import diagnosis_data
+from biogrip.records.identifications import diagnosis_data
 from biogrip.stages import judgement
 
 SAMPLES, MEANS_OF = 200_000, 50

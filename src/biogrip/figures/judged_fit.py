@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 
 from biogrip.figures.fit import draw_fit
 from biogrip.figures.results import fit_of
+from biogrip.records.identifications import read_verdicts
 from biogrip.records.traces import read_measurements
-from biogrip.records.verdicts import read_verdicts
 from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case
 

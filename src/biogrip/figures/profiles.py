@@ -26,7 +26,7 @@ from biogrip.figures.style import (
     row_of_panels,
 )
 from biogrip.judging.likelihood import CERTAIN
-from biogrip.records.verdicts import read_verdicts
+from biogrip.records.identifications import read_verdicts
 from biogrip.study.study import Case
 
 

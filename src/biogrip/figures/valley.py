@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from biogrip.arrays import Array
 from biogrip.figures.results import first_seeds, seeds_in_words
 from biogrip.figures.style import COLUMN_IN, FITTED, PAPER, TARGET, figure
-from biogrip.records.identifications import read_identifications
-from biogrip.records.verdicts import read_verdicts
+from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.study.study import Case
 
 _LEVELS = [0.0, 1.0, 3.84, 10.83, 30.0, 100.0, 300.0, 1000.0]

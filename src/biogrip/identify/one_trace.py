@@ -37,8 +37,8 @@ from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES, Sample
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.progress import Progress
+from biogrip.records.identifications import exact_data
 from biogrip.records.traces import Measurements
-from biogrip.records.verdicts import exact_data
 from biogrip.stages import recording
 from biogrip.stages.judgement import fits_judged, notes_on_fit
 from biogrip.study.experiment_blocks import fixed_problems

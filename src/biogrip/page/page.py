@@ -23,8 +23,8 @@ from biogrip.page.answers import (
 )
 from biogrip.page.explorer import explorer, fits_of
 from biogrip.page.png_address import png_address
+from biogrip.records.identifications import read_verdicts
 from biogrip.records.rows import read_table
-from biogrip.records.verdicts import read_verdicts
 from biogrip.study.study import Case, Study
 from biogrip.tables.verdicts import target_of
 

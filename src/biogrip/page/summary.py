@@ -7,7 +7,7 @@ import jinja2
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.page.png_address import png_address
-from biogrip.records.verdicts import read_verdicts
+from biogrip.records.identifications import read_verdicts
 from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case
 

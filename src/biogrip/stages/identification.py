@@ -12,12 +12,10 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-import pyarrow.compute as pc
-import pyarrow.parquet as pq
+import pandas as pd
 
 from biogrip.arrays import parts
 from biogrip.errors import BiogripError
-from biogrip.files import atomic_write
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.methods import identifier
 from biogrip.fit.nested_fits import fit_models
@@ -31,7 +29,7 @@ from biogrip.records.identifications import (
     write_identifications,
     write_timings,
 )
-from biogrip.records.rows import read_rows, write_rows
+from biogrip.records.rows import read_parquet, read_rows, write_parquet, write_rows
 from biogrip.records.traces import Measurements, read_measurements
 from biogrip.study.study import Case
 
@@ -104,14 +102,8 @@ def join(
             f"{', '.join(case.study.methods)}. Delete them and run again."
         )
     write_rows(parameters, header, rows)
-    with atomic_write(history) as scratch:
-        schema = pq.read_schema(history_batches[0])
-        with pq.ParquetWriter(scratch, schema) as joined:
-            for batch in history_batches:
-                # The data set API would import pandas.
-                with pq.ParquetFile(batch) as file:
-                    table = file.read()
-                joined.write_table(table.filter(pc.less(table["seed"], case.seeds)))
+    histories = pd.concat([read_parquet(batch) for batch in history_batches])
+    write_parquet(history, histories[histories["seed"] < case.seeds])
 
 
 def _problem(case: Case) -> CaseProblem:

@@ -25,9 +25,8 @@ from biogrip.judging.verdicts import DETERMINED, Finding
 from biogrip.physics.noise import add_noise, standard_deviation, stream
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.progress import Progress
-from biogrip.records.identifications import INTERVALS
+from biogrip.records.identifications import INTERVALS, read_verdicts
 from biogrip.records.traces import read_target
-from biogrip.records.verdicts import read_verdicts
 from biogrip.stages.identification import groups
 from biogrip.study.study import Case
 

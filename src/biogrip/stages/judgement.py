@@ -18,8 +18,8 @@ from biogrip.judging.likelihood import MISSED
 from biogrip.judging.onset_profiles import profile_over_onset
 from biogrip.judging.valley import compute_valley
 from biogrip.physics.noise import rms, standard_deviation, stream
+from biogrip.records.identifications import diagnosis_data
 from biogrip.records.traces import read_measurements, read_target
-from biogrip.records.verdicts import diagnosis_data
 from biogrip.study.study import Case
 from biogrip.traces.late_onset import note_late_onset
 

@@ -21,12 +21,11 @@ from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.physics.unilateral import unilateral_response
 from biogrip.progress import warn
+from biogrip.records.rows import write_parquet
 from biogrip.records.traces import (
     Measurements,
     read_target,
-    table_of,
     write_measurements,
-    write_tables,
     write_target,
     write_target_without_jaws,
 )
@@ -50,7 +49,7 @@ def run(case: Case, gripper: Path, records: Path) -> None:
         )
         columns |= {f"{name}_step_rad": record.step_rad, f"{name}_impulse_rad": record.impulse_rad}
         found[name] = calibrate(record, *causes)
-    write_tables(records, [table_of(columns, len(time_s))], dictionary=False)
+    write_parquet(records, columns)
     write_text(gripper, calibration_yaml(found["left"], found["right"]))
 
 

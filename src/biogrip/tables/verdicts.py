@@ -12,8 +12,7 @@ import pandas as pd
 
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, NOT_DETERMINED, WIDE
-from biogrip.records.identifications import INTERVALS
-from biogrip.records.verdicts import read_verdicts
+from biogrip.records.identifications import INTERVALS, read_verdicts
 from biogrip.study.study import Case, Study
 from biogrip.tables.coverage import holds
 from biogrip.tables.layout import Cell, Column, Table
