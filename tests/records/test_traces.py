@@ -1,4 +1,6 @@
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,11 +62,11 @@ def test_a_damaged_target_is_explained(tmp_path: Path, line: int, text: str, mes
 
 
 @pytest.mark.parametrize("known", [{}, {"target_rad": TIMES - 1}, {"sd_rad": TIMES + 0.1}])
-def test_measurements_are_read_back(tmp_path: Path, known: dict[str, np.ndarray]) -> None:
+def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> None:
     """All of them or some, with what is known, bit for bit."""
     path = tmp_path / "seeds_3-7.parquet"
     traces = {seed: np.random.default_rng(seed).random(5) for seed in (3, 4, 5, 6, 7)}
-    given = Measurements(TIMES, **{"target_rad": None, "rotation_rad": traces, **known})
+    given = replace(Measurements(TIMES, None, traces), **known)
     write_measurements(path, given)
     for seeds in (None, [6, 4]):
         read = read_measurements(path, seeds)

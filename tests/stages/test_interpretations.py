@@ -8,7 +8,7 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.records.identifications import INTERPRETATIONS, read_identifications
 from biogrip.stages.identification import identify
-from biogrip.stages.sweeps import read
+from biogrip.stages.sweeps import identify_interpreted
 from biogrip.stages.targets import measure, simulate
 from biogrip.study.study import Study
 from biogrip.tables.interpretations import interpretations
@@ -47,7 +47,7 @@ def folder(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     measure(case, range(3), target, measured)
     outputs = [made / name for name in ("ours.csv", "h.parquet", "times.csv")]
     identify(case, "genetic", range(3), measured, [], *outputs)
-    read(case, target, made / f"{CASE}.csv")
+    identify_interpreted(case, target, made / f"{CASE}.csv")
     return made
 
 

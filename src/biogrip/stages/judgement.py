@@ -1,4 +1,8 @@
-"""Stage 4: confidence limits of one trace of a case, and expected ones without noise."""
+"""Verdicts on one trace of a case, and those to expect of any, from its trace without noise.
+
+The trace is fitted by least squares, with the noise model of the case. Profile likelihoods of the
+fit give limits and verdicts of every quantity.
+"""
 
 import json
 from collections.abc import Sequence
@@ -26,21 +30,6 @@ from biogrip.traces.late_onset import note_late_onset
 TRACE = 0
 """Seed of the trace that is judged."""
 
-"""The measurements with that trace."""
-
-
-def fit_judged(
-    case: Case,
-    case_problem: CaseProblem,
-    time_s: Array,
-    rotation_rad: Array,
-    seed: int,
-    progress: Progress = silent,
-) -> TraceFit:
-    """Return the least-squares fit of a trace that its judgement is based on."""
-    (fit,) = fits_judged([case], [case_problem], [(time_s, rotation_rad)], seed, progress)
-    return fit
-
 
 def fits_judged(
     cases: Sequence[Case],
@@ -49,14 +38,16 @@ def fits_judged(
     seed: int,
     progress: Progress = silent,
 ) -> list[TraceFit]:
-    """Return these fits of several traces, times and rotations, of cases with the same budget."""
+    """Return the least-squares fits of traces that their judgements are based on.
+
+    Traces are pairs of times and rotations, (n_samples,) each, one of each case; the cases have
+    the same budget of least squares.
+    """
     least_squares = identifier("least_squares", cases[0].least_squares)
 
     def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
-        chosen = [cases[index] for index in which]
-        rngs = [
-            stream(case.study.study_seed, case.name, seed, "identifiability") for case in chosen
-        ]
+        names = [(cases[index].study.study_seed, cases[index].name) for index in which]
+        rngs = [stream(study_seed, name, seed, "identifiability") for study_seed, name in names]
         return least_squares(problems, rngs, progress)
 
     return fit_traces(case_problems, traces, find)
@@ -66,13 +57,14 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
     """Fit the trace of seed 0 by least squares, and write verdicts, profiles and valley."""
     recorded = read_measurements(measurements, [TRACE])
     case_problem = case.problem.calibrated(calibrated).weighted(recorded.sd_rad)
-    fit = fit_judged(case, case_problem, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
+    trace = recorded.rotation_rad[TRACE]
+    (fit,) = fits_judged([case], [case_problem], [(recorded.time_s, trace)], TRACE)
     diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
     if case_problem.fit_start:
         diagnosis = profile_over_onset(diagnosis, recorded.time_s)
     notes = notes_on_fit(fit)
     if case.may_start_late:
-        trace, near = recorded.rotation_rad[TRACE], diagnosis.likelihood.best
+        near = diagnosis.likelihood.best
         notes += note_late_onset(case_problem, recorded.time_s, trace, near)
     said = diagnosis_data(diagnosis, notes)
     _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": valley})
@@ -83,9 +75,8 @@ def notes_on_fit(fit: TraceFit) -> list[Note]:
     notes = [Note(HARMLESS, text) for text in fit.notes()]
     if fit.noise_model is None:
         return notes
-    misfit = find_slow_misfit(
-        fit.noise_model, fit.problem.residuals.duration_s, fit.problem.residuals.instrument
-    )
+    residuals = fit.problem.residuals
+    misfit = find_slow_misfit(fit.noise_model, residuals.duration_s, residuals.instrument)
     return [misfit, *notes] if misfit else notes
 
 
