@@ -15,11 +15,10 @@ from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.problem import Identification, silent
 from biogrip.judging.diagnosis import Diagnosis, diagnose
-from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
-from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
+from biogrip.physics.gripper import NO_ARMS, Gripper
+from biogrip.physics.instruments import GRIPPER, Instrument
 from biogrip.physics.models import Sample
-from biogrip.physics.noise import Noise, add_noise
-from biogrip.physics.protocol import Phase, hold
+from biogrip.physics.protocol import Phase
 from biogrip.physics.simulation import simulated_rotation
 
 if TYPE_CHECKING:
@@ -92,14 +91,9 @@ def simulate(experiment: CaseProblem, parameters: Mapping[str, float], time_s: A
     (n_samples,)
         In SI units; of a rotation, rad.
     """
-    rotation: Array = simulated_rotation(
-        experiment.gripper,
-        experiment.model.sample(parameters),
-        experiment.torque,
-        time_s,
-        nonlinear=experiment.nonlinear,
-    )[0]
-    return rotation
+    network, torque = experiment.model.sample(parameters), experiment.torque
+    nonlinear = experiment.nonlinear
+    return simulated_rotation(experiment.gripper, network, torque, time_s, nonlinear=nonlinear)[0]
 
 
 def identify_sample(
@@ -160,21 +154,7 @@ def plot(
 
 
 __all__ = [
-    "INSTRUMENTS",
-    "Arm",
-    "CaseProblem",
-    "Diagnosis",
-    "GeneRange",
-    "Gripper",
-    "Identification",
-    "Noise",
-    "Phase",
-    "Sample",
-    "add_noise",
-    "hold",
-    "identify_sample",
-    "judge",
-    "plot",
-    "set_up",
-    "simulate",
+    *("INSTRUMENTS", "Arm", "CaseProblem", "Diagnosis", "GeneRange", "Gripper", "Identification"),
+    *("Noise", "Phase", "Sample", "add_noise", "hold", "identify_sample", "judge", "plot"),
+    *("set_up", "simulate"),
 ]
