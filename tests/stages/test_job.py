@@ -100,14 +100,19 @@ def test_a_script_reads_what_its_rule_gives() -> None:
     assert paths(["a", "b"]) == [Path("a"), Path("b")]
 
 
-def test_an_error_of_ours_ends_a_job_with_its_message_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_log_has_what_a_user_can_correct_alone_and_else_a_traceback(tmp_path: Path) -> None:
     log = tmp_path / "job.log"
-    with pytest.raises(SystemExit) as ended, logged(SimpleNamespace(log=[str(log)])):
+    job = SimpleNamespace(log=[str(log)])
+    with pytest.raises(SystemExit) as ended, logged(job):
         raise BiogripError("a.csv: cannot be read.")
     assert ended.value.code == 1
     assert log.read_text() == "biogrip: a.csv: cannot be read.\n"
+    with pytest.raises(ZeroDivisionError), logged(job):
+        print(1 // 0)
+    said = log.read_text()
+    assert said.startswith("Traceback (most recent call last):")
+    assert "print(1 // 0)" in said
+    assert said.endswith("ZeroDivisionError: integer division or modulo by zero\n")
 
 
 def test_a_default_of_a_case_goes_before_what_the_study_has() -> None:

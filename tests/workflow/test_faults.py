@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from tests.helpers.places import ROOT
-from tests.helpers.planned import results_of
-from tests.helpers.runs import TINY, snakemake
+from tests.helpers.runs import TINY, results_of, snakemake
+
+pytestmark = pytest.mark.nightly
 
 # What is asked for, and what is removed so that there is something to do.
 ERRORS = "results/tables/errors_liquid_drop_2.csv"
@@ -94,7 +95,6 @@ def run_beside(process: "subprocess.Popen[bytes]", folder: Path) -> None:
     assert process.wait(120) == 0
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize("fault", [kill_snakemake, kill_a_job, interrupt, run_beside])
 def test_the_same_command_ends_with_the_undisturbed_bytes(
     tiny: Path, tiny_copy: Path, fault: Callable[["subprocess.Popen[bytes]", Path], None]
@@ -107,7 +107,6 @@ def test_the_same_command_ends_with_the_undisturbed_bytes(
     assert [name for name in ours if ours[name] != theirs[name]] == []
 
 
-@pytest.mark.nightly
 def test_a_full_disk_is_said_and_the_run_goes_on(tiny: Path, tmp_path: Path) -> None:
     """Results on a file system of their own, with no room for the page."""
     study = tmp_path / "study"
@@ -137,15 +136,3 @@ def test_a_full_disk_is_said_and_the_run_goes_on(tiny: Path, tmp_path: Path) -> 
     assert not left
     assert run.status == 0, run.output
     assert results == results_of(tiny)
-
-
-def test_a_trace_edited_after_a_run_is_read_again(tiny_copy: Path) -> None:
-    trace = tiny_copy / "mine.csv"
-    header, *rows = trace.read_text().splitlines()
-    readings = [(time_s, float(reading)) for time_s, reading in (row.split(",") for row in rows)]
-    lower = [f"{time_s},{0.9 * reading:.6e}" for time_s, reading in readings]
-    trace.write_text("\n".join([header, *lower, ""]))
-    before = (tiny_copy / "results/identifications/mine.csv").read_bytes()
-    run = snakemake(tiny_copy, "--", "results/identifications/mine.csv", config=TINY)
-    assert run.status == 0, run.output
-    assert (tiny_copy / "results/identifications/mine.csv").read_bytes() != before
