@@ -15,10 +15,11 @@ from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.problem import Identification, silent
 from biogrip.judging.diagnosis import Diagnosis, diagnose
-from biogrip.physics.gripper import NO_ARMS, Gripper
-from biogrip.physics.instruments import GRIPPER, Instrument
+from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
+from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import Sample
-from biogrip.physics.protocol import Phase
+from biogrip.physics.noise import Noise, add_noise
+from biogrip.physics.protocol import Phase, hold
 from biogrip.physics.simulation import simulated_rotation
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def set_up(
         Gripper, or one of `INSTRUMENTS`: ``INSTRUMENTS["strain"]`` is creep whose strain is read,
         ``INSTRUMENTS["modulus"]`` relaxation whose modulus is.
     protocol
-        Phases of the torque, or of what else is held.
+        Phases of the torque, or of what else is controlled.
     sample
         Constitutive model of the sample.
     ranges
@@ -154,7 +155,21 @@ def plot(
 
 
 __all__ = [
-    *("INSTRUMENTS", "Arm", "CaseProblem", "Diagnosis", "GeneRange", "Gripper", "Identification"),
-    *("Noise", "Phase", "Sample", "add_noise", "hold", "identify_sample", "judge", "plot"),
-    *("set_up", "simulate"),
+    "INSTRUMENTS",
+    "Arm",
+    "CaseProblem",
+    "Diagnosis",
+    "GeneRange",
+    "Gripper",
+    "Identification",
+    "Noise",
+    "Phase",
+    "Sample",
+    "add_noise",
+    "hold",
+    "identify_sample",
+    "judge",
+    "plot",
+    "set_up",
+    "simulate",
 ]
