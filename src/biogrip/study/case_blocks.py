@@ -1,4 +1,9 @@
-"""Config blocks of a case, and those that a study sets for all cases."""
+"""Config blocks of a case, and those that a study sets for all cases.
+
+A case has all blocks of the study, merged with its own. Beside the bounds of single keys, its
+blocks must fit each other: protocol and readings to the instrument, true values to what is
+searched, sampling to the protocol.
+"""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -185,8 +190,8 @@ class CaseBlock(Shared):
             arms = self.gripper.left, self.gripper.right
             yield from below(("calibration",), self.calibration.problems_of(arms))
         elif isinstance(self.assumed_gripper, str):
-            text = f"found '{self.assumed_gripper}', allowed is '{CALIBRATED}' or keys of a "
-            yield ("assumed_gripper",), f"{text}gripper block."
+            text = f"found '{self.assumed_gripper}', allowed is '{CALIBRATED}'"
+            yield ("assumed_gripper",), f"{text} or keys of a gripper block."
         elif self.assumed_gripper is not None:
             believed = overlaid(plain(self.gripper.neutral), self.assumed_gripper)
             yield from below(("assumed_gripper",), checked(Gripper, believed)[1])
@@ -245,11 +250,10 @@ class CaseBlock(Shared):
             low = 10.0 ** math.floor(math.log10(genes.low))
             high = 10.0 ** math.ceil(math.log10(genes.high))
             vanishes = value == 0 and parameter.may_vanish
-            if value is None or vanishes or low <= value <= high:
-                continue
-            text = f"found {value:g}, which is not searched for; allowed is {low:g} to {high:g} "
-            text = f"{text}{parameter.unit}".rstrip()
-            yield ("sample", parameter.name), f"{text}, or another search_range."
+            if value is not None and not vanishes and not low <= value <= high:
+                limits = f"{low:g} to {high:g} {parameter.unit}".rstrip()
+                text = f"found {value:g}, which is not searched for; allowed is {limits}"
+                yield ("sample", parameter.name), f"{text}, or another search_range."
 
     def _band_problems(self) -> Iterator[Problem]:
         """Find times outside the validity of power laws."""
@@ -271,17 +275,17 @@ class CaseBlock(Shared):
         coloured = measured.coloured and key == "rate_Hz"
         most = MOST_SAMPLES if coloured else _MOST_SAMPLES
         if not needed <= samples <= most:
-            text = f"found {measured.rate_Hz:g}, which gives " if key == "rate_Hz" else "found "
-            text += f"{counted(f'{samples:.6g}', 'sample')} over the protocol; allowed are {needed}"
+            rate = f"{measured.rate_Hz:g}, which gives " if key == "rate_Hz" else ""
+            found = f"found {rate}{counted(f'{samples:.6g}', 'sample')} over the protocol"
             how = " with a coloured noise model" if coloured else ""
-            yield (key,), f"{text} to {most}{how}."
+            yield (key,), f"{found}; allowed are {needed} to {most}{how}."
             return
         spans = [(it.from_s, it.from_s + (it.samples - 1) / it.rate_Hz) for it in measured.bursts]
         last = -1.0
         for index, (first, ends) in enumerate(spans or [(time, time) for time in measured.times_s]):
             if not last < first <= ends <= end:
-                text = f"found {first:g}" if first == ends else f"found {first:g} to {ends:g}"
-                text += f", allowed is later than {max(last, 0):g} and at most {end:g} s."
-                yield (key, index), text
+                found = f"{first:g}" if first == ends else f"{first:g} to {ends:g}"
+                allowed = f"later than {max(last, 0):g} and at most {end:g} s"
+                yield (key, index), f"found {found}, allowed is {allowed}."
                 return
             last = ends
