@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from biogrip import progress
+from biogrip import terminal
 from biogrip.cli import main
 from biogrip.terminal import aligned, visible, visible_lines
 from tests.helpers.places import EXAMPLE
@@ -105,11 +105,11 @@ def test_names_of_traces_are_shown_wherever_they_are_said(
 def test_progress_and_warnings_are_shown(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(progress, "_EVERY_S", 0.0)
-    with progress.Progress(HOSTILE, 1) as told:
+    monkeypatch.setattr(terminal, "_EVERY_S", 0.0)
+    with terminal.Progress(HOSTILE, 1) as told:
         told.doing(f"cell {HOSTILE}")
         told.done()
-    progress.warn(f"{HOSTILE}: a note")
+    terminal.warn(f"{HOSTILE}: a note")
     for text in capsys.readouterr():
         assert visible(HOSTILE) in text or not text
         assert not OBEYED.search(text)

@@ -207,8 +207,8 @@ def make_plausible(cases: Sequence[Case], block: DesignBlock) -> Iterator[Plausi
     A `BiogripError` says which case cannot be judged, and why.
     """
     for case in cases:
-        if problem := _problem(case, cases[0]):
-            raise BiogripError(f"design: {case.name}: {problem}")
+        if wrong := _problem(case, cases[0]):
+            raise BiogripError(f"design: {case.name}: {wrong}")
         names = case.searched.names
         own = np.log([case.parameters[name] for name in names])
         logs = own[None]
@@ -485,16 +485,15 @@ def as_config(
         for key in set(_TIMES) & set(block.get("measurement") or {}):
             del block["measurement"][key]
     for one, experiment in zip(samples, after, strict=True):
-        base = one.case.instrument.controlled.column
+        column, sampling = one.case.instrument.controlled.column, experiment.sampling
         phases = [
-            {"duration_s": phase.duration_s, base: phase.left.value_Nm}
+            {"duration_s": phase.duration_s, column: phase.left.value_Nm}
             for phase in experiment.phases
         ]
-        measured: dict[str, Any] = {"noise": {"level_rad": one.noise}}
-        if experiment.sampling.bursts:
-            measured["bursts"] = [vars(each) for each in experiment.sampling.bursts]
-        else:
-            measured["rate_Hz"] = experiment.sampling.rate_Hz
+        times: dict[str, Any] = {"rate_Hz": sampling.rate_Hz}
+        if sampling.bursts:
+            times = {"bursts": [vars(each) for each in sampling.bursts]}
+        measured = {"noise": {"level_rad": one.noise}, **times}
         own = {"protocol": {"phases": phases}, "measurement": measured}
         cases[one.case.name] = overlaid(cases.get(one.case.name) or {}, own)
     text = yaml.safe_dump(found, sort_keys=False, default_flow_style=None, width=100)
@@ -511,26 +510,27 @@ def _said(
     rows: list[tuple[str, ...]] = []
     notes = []
     for one, within, *both in zip(samples, reached, before, after, strict=True):
-        name, held, read = one.case.name, one.case.instrument.controlled, one.case.instrument.read
+        name, instrument = one.case.name, one.case.instrument
+        controlled, read, n = instrument.controlled, instrument.read, len(one.parameters)
         for index, parameter in enumerate(one.case.searched.names):
             bounds = [each.bounds[:, index] for each in both]
             rows.append((name, f"{parameter}: bound (%)", *(_percent(b[0]) for b in bounds)))
-            if (n := len(one.parameters)) > 1:
+            if n > 1:
                 worst = (_percent(b.max()) for b in bounds)
                 rows.append((name, f"{parameter}: worst of {n} samples (%)", *worst))
             if one.required[index] and not np.all(within[:, index]):
                 notes.append(f"No train that was tried tells {parameter} of {name}.")
-        for label, values in {
-            f"noise of the {read.name} ({read.unit})": (one.noise, one.noise),
-            f"largest {held.name} ({held.unit})": [largest_load(each.phases) for each in both],
+        values = {
+            f"noise of the {read.name} ({read.unit})": [one.noise, one.noise],
+            f"largest {controlled.name} ({controlled.unit})": [
+                largest_load(each.phases) for each in both
+            ],
             "highest rate (Hz)": [1 / np.diff(each.times_s).min() for each in both],
             "readings": [len(each.times_s) for each in both],
-            "least force of the jaws (N)": [
-                each.force_N for each in both if each.force_N is not None
-            ],
-        }.items():
-            if values:
-                rows.append((name, label, *(f"{value:.4g}" for value in values)))
+        }
+        if instrument.has_jaws:
+            values["least force of the jaws (N)"] = [each.force_N for each in both]
+        rows += [(name, what, *(f"{it:.4g}" for it in pair)) for what, pair in values.items()]
     yield aligned(rows, ("sample", "", "config's protocol", "designed"))
     yield from notes
     yield (

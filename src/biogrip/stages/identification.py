@@ -18,7 +18,6 @@ from biogrip.errors import BiogripError
 from biogrip.fit.methods import identifier
 from biogrip.fit.nested_fits import fit_models
 from biogrip.physics.noise import rms, stream
-from biogrip.progress import Progress
 from biogrip.records.identifications import (
     MODEL_FITS,
     Record,
@@ -30,6 +29,7 @@ from biogrip.records.identifications import (
 from biogrip.records.rows import read_parquet, read_rows, write_parquet, write_rows
 from biogrip.records.traces import read_measurements
 from biogrip.study.study import Case
+from biogrip.terminal import Progress
 
 _JOINT = 63
 

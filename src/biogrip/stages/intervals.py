@@ -26,11 +26,11 @@ from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding
 from biogrip.physics.noise import add_noise, standard_deviation, stream
 from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.progress import Progress
 from biogrip.records.identifications import INTERVALS, read_verdicts
 from biogrip.records.traces import read_target
 from biogrip.stages.identification import groups
 from biogrip.study.study import Case
+from biogrip.terminal import Progress
 
 _MOST_RESTARTS = 3
 # Significant digits, and those of values known to within a relative `_NARROW`.

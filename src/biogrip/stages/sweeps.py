@@ -21,13 +21,13 @@ from biogrip.judging.quantities import Quantity
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import simulated_rotation
-from biogrip.progress import Progress
 from biogrip.records.identifications import INTERPRETATIONS, read_identifications
 from biogrip.records.rows import RowFile
 from biogrip.records.traces import read_target
 from biogrip.stages.identification import groups
 from biogrip.study.study import Case, Study
 from biogrip.study.sweeps import Point
+from biogrip.terminal import Progress
 
 POINTS = RowFile(
     "a sweep",

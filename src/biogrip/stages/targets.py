@@ -20,7 +20,6 @@ from biogrip.physics.protocol import TorqueHistory, sample_times, torque_at, tor
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.physics.unilateral import unilateral_response
-from biogrip.progress import warn
 from biogrip.records.rows import write_parquet
 from biogrip.records.traces import (
     Measurements,
@@ -30,6 +29,7 @@ from biogrip.records.traces import (
     write_target_without_jaws,
 )
 from biogrip.study.study import Case
+from biogrip.terminal import warn
 
 
 def simulate(case: Case, target: Path) -> None:
