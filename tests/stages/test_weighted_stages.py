@@ -7,27 +7,17 @@ import pandas as pd
 import pytest
 
 from biogrip.stages import identification, judgement, recording
-from biogrip.study.load import load_study
-from biogrip.study.source import overlaid, read_config
-from tests.helpers.places import CONFIG, EXAMPLE
-
-WEIGHTED = f"""
-methods: [least_squares]
-only: [mine]
-cases:
-  mine:
-    sample: {{model: liquid_drop}}
-    measurement: {{file: {EXAMPLE}, time: time_s, rotation: rotation_rad, noise_share: 0.1}}
-"""
+from tests.helpers.default import study_of
+from tests.helpers.places import EXAMPLE
 
 
 def test_all_stages_weight_the_readings(tmp_path: Path) -> None:
     """They find the same optimum, with the noise that is known."""
-    config, traces, verdicts = (tmp_path / name for name in ("c.yaml", "t.parquet", "v.json"))
-    config.write_text(WEIGHTED)
-    case = load_study(overlaid(read_config(CONFIG), read_config(config)), [CONFIG, config]).cases[
-        "mine"
-    ]
+    file = f"{{file: {EXAMPLE}, time: time_s, rotation: rotation_rad, noise_share: 0.1}}"
+    case = study_of(
+        f"cases: {{mine: {{sample: {{model: liquid_drop}}, measurement: {file}}}}}"
+    ).cases["mine"]
+    traces, verdicts = tmp_path / "t.parquet", tmp_path / "v.json"
     recording.record(case, EXAMPLE, traces)
     judgement.judge(case, traces, [], verdicts)
     judged = json.loads(verdicts.read_text())
