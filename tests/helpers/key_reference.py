@@ -134,8 +134,7 @@ def _listed(choices: list[str]) -> str:
 
 def _shown(value: Any) -> str:
     if isinstance(value, list) and value and isinstance(value[0], str):
-        listed = ", ".join(value)
-        return f"`[{listed}]`" if len(value) <= _MOST_LISTED else f"{len(value)} keys"
-    if isinstance(value, bool):
-        return f"`{value}`".lower()
-    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+        shown = f"`[{', '.join(value)}]`"
+        return shown if len(value) <= _MOST_LISTED else f"{len(value)} keys"
+    shown = f"{value:g}" if isinstance(value, float) else str(value)
+    return f"`{shown.lower() if isinstance(value, bool) else shown}`"
