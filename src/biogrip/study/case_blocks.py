@@ -7,15 +7,19 @@ searched, sampling to the protocol.
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, dataclass, field, fields, make_dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, Tag
 
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
+from biogrip.fit.differential_evolution import DifferentialEvolutionSettings
+from biogrip.fit.genetic import GeneticSettings
+from biogrip.fit.genetic_refined import Polishing
 from biogrip.fit.genome import GeneRange, SearchRange
-from biogrip.fit.methods import METHODS, block_class
+from biogrip.fit.least_squares import LeastSquaresSettings
+from biogrip.fit.methods import METHODS
 from biogrip.keys import BY_KIND, Block, OneOf, Printed, Problem, below, plain
 from biogrip.physics.actuator import CombDrive
 from biogrip.physics.calibration import CalibrationTest
@@ -35,9 +39,6 @@ from biogrip.study.experiment_blocks import (
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.messages import checked
 from biogrip.study.source import overlaid
-
-METHOD_BLOCKS = tuple(dict.fromkeys(name for it in METHODS.values() for name in it.blocks))
-"""Config blocks of the methods."""
 
 CALIBRATED = "calibrated"
 
@@ -73,7 +74,7 @@ class Identifiability(Block):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Given(Block):
+class Shared(Block):
     """Blocks that a study sets for all cases, and that a case may change for itself."""
 
     # With descriptions, for docstrings below fields are not inherited.
@@ -106,6 +107,11 @@ class _Given(Block):
             "an element out."
         ),
     ] = field(default_factory=dict)
+    # Of the methods, as `METHODS` names them.
+    genetic_algorithm: GeneticSettings
+    genetic_refined: Polishing
+    least_squares: LeastSquaresSettings
+    differential_evolution: DifferentialEvolutionSettings
 
     def method(self, name: str) -> object:
         """Return the settings object of a method."""
@@ -113,20 +119,6 @@ class _Given(Block):
         found = [getattr(self, block) for block in method.blocks]
         return method.named(method.settings)(*found) if method.settings else found[0]
 
-
-def _of_method(name: str) -> tuple[str, type, Any]:
-    """Return the field of a method's block, which may be left out if all of its keys may be."""
-    kind = block_class(name)
-    needed = any(it.default is it.default_factory is MISSING for it in fields(kind))
-    return name, kind, field() if needed else field(default_factory=kind)
-
-
-if TYPE_CHECKING:
-    Shared = _Given
-else:
-    Shared = make_dataclass(
-        "Shared", map(_of_method, METHOD_BLOCKS), bases=(_Given,), frozen=True, kw_only=True
-    )
 
 OVERRIDABLE = tuple(each.name for each in fields(Shared))
 """Blocks that a study sets for all cases, those of methods among them, and that a case may change
@@ -183,9 +175,7 @@ class CaseBlock(Shared):
         # A chromosome has the digits and the exponent of every parameter.
         ranges = [getattr(self.search_range, p.range_name) for p in self.searched]
         genes = sum(each.digits + 1 for each in ranges)
-        for name in METHOD_BLOCKS:
-            if hasattr(settings := getattr(self, name), "problems_of"):
-                yield from below((name,), settings.problems_of(genes))
+        yield from below(("genetic_algorithm",), self.genetic_algorithm.problems_of(genes))
         if self.assumed_gripper == CALIBRATED:
             arms = self.gripper.left, self.gripper.right
             yield from below(("calibration",), self.calibration.problems_of(arms))
