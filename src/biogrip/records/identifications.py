@@ -272,7 +272,6 @@ def bounded_on_a_side(verdicts: dict[str, Any]) -> set[str]:
 
 def _finding(finding: "Finding", *, rejected: bool) -> dict[str, Any]:
     profile = finding.profile
-    words = f"fit rejected: the best fit, {finding.best_in_words}, is not to be used"
     return {
         "quantity": finding.quantity.label,
         "symbol": finding.quantity.symbol,
@@ -284,7 +283,9 @@ def _finding(finding: "Finding", *, rejected: bool) -> dict[str, Any]:
         "excluded": [] if rejected else [[start, end] for start, end in finding.gaps],
         "deviation": finding.deviation,
         "provided": finding.quantity.provided,
-        "in_words": words if rejected else finding.words(),
+        "in_words": f"fit rejected: the best fit, {finding.best_in_words}, is not to be used"
+        if rejected
+        else finding.words(),
         "profile": {
             "values": [float(value) for value in np.exp(profile.log_values)],
             "increases": [round_increase(float(increase)) for increase in profile.increases],

@@ -90,8 +90,7 @@ def _diagnosed(
     if missed is not None:
         again = found.at(fit_from([problem], missed))
         if diagnosis.likelihood.increase(again.misfit_rad) < -MISSED:
-            found = again
-            diagnosis = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+            diagnosis = diagnose(problem, model, again, confidence=confidence, noise_rad=noise_rad)
             valley, _ = compute_valley(diagnosis.likelihood, model)
     return diagnosis, valley
 
