@@ -21,14 +21,10 @@ from biogrip.page.answers import compared_rows, say_what_traces_tell
 from biogrip.records import identifications, traces
 from biogrip.records.rows import RowFile, read_table
 from tests.helpers.key_reference import file_schema, reference
-from tests.helpers.places import EXAMPLE
+from tests.helpers.places import EXAMPLE, ROOT
 from tests.published_numbers import renewed_numbers
 
-ROOT = Path(__file__).parents[1]
 PUBLISHED = ROOT / "results" / "published"
-ERRORS = PUBLISHED / "tables" / "errors.csv"
-VERDICTS = PUBLISHED / "tables"
-ROBUSTNESS = PUBLISHED / "robustness" / "tables" / "robustness_noise.csv"
 MEASURED = PUBLISHED / "measured"
 
 _CASES = {
@@ -59,11 +55,15 @@ def config_keys() -> str:
 
 def paper_against_study() -> str:
     """The table "paper | this study", from the published error table."""
-    return _table(iter(compared_rows(read_table(ERRORS), _verdicts())))
+    return _table(iter(compared_rows(read_table(PUBLISHED / "tables" / "errors.csv"), _verdicts())))
 
 
 def _verdicts() -> list[dict[str, str]]:
-    return [row for file in sorted(VERDICTS.glob("verdicts_*.csv")) for row in read_table(file)]
+    return [
+        row
+        for file in sorted((PUBLISHED / "tables").glob("verdicts_*.csv"))
+        for row in read_table(file)
+    ]
 
 
 def answer() -> str:
@@ -76,34 +76,24 @@ def answer() -> str:
 
 def measured() -> str:
     """Published values of measured traces beside ours."""
+    models = pd.read_csv(MEASURED / "tables" / "models.csv").sort_values("median_delta_bic")
     rows = []
     for sample, published in _MEASURED.items():
-        found = {
-            row["quantity"]: row
-            for row in read_table(MEASURED / "tables" / f"verdicts_{sample}.csv")
-        }
-        best = min(
-            (
-                row
-                for row in read_table(MEASURED / "tables" / "models.csv")
-                if row["case"] == sample
-            ),
-            key=lambda row: float(row["median_delta_bic"]),
-        )
+        verdicts = read_table(MEASURED / "tables" / f"verdicts_{sample}.csv")
+        found = {row["quantity"]: row for row in verdicts}
+        best = models[models["case"] == sample]["model"].iloc[0]
         for number, (quantity, value) in enumerate(published.items()):
             own = found[quantity]
-            once = (
-                (sample.replace("_", " "), own["fit"], best["model"]) if number == 0 else [""] * 3
-            )
+            row = {
+                "sample": sample.replace("_", " "),
+                "fit": own["fit"],
+                "quantity": with_unit(quantity, own["unit"]),
+                "published": f"{value:.5g}",
+                "ours, 95 % limits": _limits_of(own),
+                "lowest BIC": best,
+            }
             rows.append(
-                {
-                    "sample": once[0],
-                    "fit": once[1],
-                    "quantity": with_unit(quantity, own["unit"]),
-                    "published": f"{value:.5g}",
-                    "ours, 95 % limits": _limits_of(own),
-                    "lowest BIC": once[2],
-                }
+                row | (dict.fromkeys(("sample", "fit", "lowest BIC"), "") if number else {})
             )
     return _table(iter(rows))
 
@@ -132,31 +122,25 @@ def claims() -> str:
 
 def errors_by_noise() -> str:
     """What the genetic algorithm errs by, and the bound, at several levels of noise."""
-    table = pd.read_csv(ROBUSTNESS)
+    table = pd.read_csv(PUBLISHED / "robustness" / "tables" / "robustness_noise.csv")
     rows = []
     for cases, quantity in _JUDGED_IN_NOISE:
         ours = table[table["case"].isin(cases) & (table["quantity"] == quantity)]
-        levels = [(level, ours[ours["row"] == level]) for level in (2, 10, 40)]
-        name = _CASES[cases[0]] if len(cases) == 1 else "both drops"
-        rows.append(
-            {"quantity": f"{quantity} of {name}"}
-            | {
-                f"{level:g} % noise": f"{_range(of['error_genetic'], '.2g', ' %')} "
-                f"({_range(of['bound_percent'], '.2g', ' %')})"
-                for level, of in levels
-            }
-            | {
-                "runs near a noise of 2 %": _range(
-                    100 * levels[0][1]["near_noise_genetic"], ".0f", " %"
-                )
-            }
-        )
+        row = {"quantity": f"{quantity} of {_CASES[cases[0]] if len(cases) == 1 else 'both drops'}"}
+        for level in (2, 10, 40):
+            of = ours[ours["row"] == level]
+            error, bound = (
+                _range(of[it], ".2g", " %") for it in ("error_genetic", "bound_percent")
+            )
+            row[f"{level} % noise"] = f"{error} ({bound})"
+        near = 100 * ours[ours["row"] == 2]["near_noise_genetic"]
+        rows.append(row | {"runs near a noise of 2 %": _range(near, ".0f", " %")})
     return _table(iter(rows))
 
 
 def methods_compared() -> str:
     """How often each method reaches the optimum, and with how many responses."""
-    table = pd.read_csv(VERDICTS / "methods.csv")
+    table = pd.read_csv(PUBLISHED / "tables" / "methods.csv")
     return _table(
         {"method": method}
         | {

@@ -8,13 +8,21 @@ import pytest
 import yaml
 
 from biogrip.cli import main
-from biogrip.design import NO_BOUND, decode, make_limits, make_plausible, rated, search
+from biogrip.design import (
+    NO_BOUND,
+    Limits,
+    Plausible,
+    decode,
+    make_limits,
+    make_plausible,
+    rated,
+    search,
+)
 from biogrip.fit.multi_start import fit_from
 from biogrip.library import simulate
 from biogrip.physics.jaw_force import compute_grip
 from biogrip.physics.protocol import Sampling
-from biogrip.study.load import load_study, read_configs
-from biogrip.study.source import default_config
+from tests.helpers.default import study_of
 
 GRIPPER = """
 only: [endothelial_cell]
@@ -32,18 +40,14 @@ design: {steps: 3}
 """
 
 
-def designed(folder: Path, text: str = GRIPPER) -> tuple[Path, Path]:
-    config = folder / "my.yaml"
-    config.write_text(text)
-    assert main(["design", str(config)]) == 0
-    return config, folder / "my_designed.yaml"
+def designed(folder: Path, text: str = GRIPPER) -> Path:
+    (folder / "my.yaml").write_text(text)
+    assert main(["design", str(folder / "my.yaml")]) == 0
+    return folder / "my_designed.yaml"
 
 
-def set_up(folder: Path, text: str = GRIPPER):  # type: ignore[no-untyped-def]
-    config = folder / "my.yaml"
-    config.write_text(text)
-    files = [default_config(), config]
-    study = load_study(read_configs(files), files)
+def set_up(text: str = GRIPPER) -> tuple[list[Plausible], Limits]:
+    study = study_of(text)
     samples = list(make_plausible(list(study.cases.values()), study.config.design))
     return samples, make_limits(samples, study.config.design)
 
@@ -52,7 +56,7 @@ def set_up(folder: Path, text: str = GRIPPER):  # type: ignore[no-untyped-def]
 def test_a_design_is_better_keeps_its_limits_and_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    config, output = designed(tmp_path)
+    output = designed(tmp_path)
     said = capsys.readouterr().out
     rows = [line for line in said.splitlines() if "worst of 9 samples" in line]
     worst = np.array([[float(number) for number in row.split()[-2:]] for row in rows])
@@ -61,8 +65,7 @@ def test_a_design_is_better_keeps_its_limits_and_runs(
     # Noise, torque, rate and force stand beside the bounds.
     for label in ("noise of the rotation (rad)", "largest torque (N m)", "highest rate (Hz)"):
         assert label in said
-    files = [default_config(), output]
-    (case,) = load_study(read_configs(files), files).cases.values()
+    (case,) = study_of(output.read_text()).cases.values()
     levels = [phase.left.value_Nm for phase in case.phases]
     assert max(levels) <= 1.6e-9 * (1 + 1e-12)
     assert min(levels) > 0
@@ -72,13 +75,12 @@ def test_a_design_is_better_keeps_its_limits_and_runs(
     assert np.diff(times_s).min() >= 0.01 * (1 - 1e-9)
     # The same command gives the same bytes.
     before = output.read_bytes()
-    assert main(["design", str(config)]) == 0
-    assert output.read_bytes() == before
+    assert designed(tmp_path).read_bytes() == before
 
 
-def test_the_jaws_press_every_plausible_sample(tmp_path: Path) -> None:
+def test_the_jaws_press_every_plausible_sample() -> None:
     """By the force of the jaws over the whole protocol, which the search does not compute so."""
-    samples, limits = set_up(tmp_path)
+    samples, limits = set_up()
     unknowns = np.random.default_rng(0).random((20, 3 * limits.steps))
     for each in unknowns:
         phases = decode(each[None], samples, limits).phases
@@ -89,9 +91,9 @@ def test_the_jaws_press_every_plausible_sample(tmp_path: Path) -> None:
             assert compute_grip(case.gripper, network, torque, nonlinear=False).lowest_N > 0
 
 
-def test_bounds_are_those_of_the_inverse_information(tmp_path: Path) -> None:
+def test_bounds_are_those_of_the_inverse_information() -> None:
     """By central differences of simulated readings; the truncation of 1e-4 is some 1e-8."""
-    samples, limits = set_up(tmp_path)
+    samples, limits = set_up()
     (one,) = samples
     train, _ = search(samples, limits, 5)
     found = rated(one, train.phases, Sampling(bursts=train.bursts))
@@ -109,10 +111,10 @@ def test_bounds_are_those_of_the_inverse_information(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rate_Hz", [0.7, 10.0, 1000.0])
-def test_trains_keep_their_limits(tmp_path: Path, rate_Hz: float) -> None:
+def test_trains_keep_their_limits(rate_Hz: float) -> None:
     """Where steps are as many as have room, too: at 0.7 Hz, 12 of five readings and more in 70."""
     block = f"steps: 12, largest: 1.0e-9, duration_s: 100.0, rate_Hz: {rate_Hz}"
-    samples, limits = set_up(tmp_path, GRIPPER.split("design:")[0] + f"design: {{{block}}}")
+    samples, limits = set_up(GRIPPER.split("design:")[0] + f"design: {{{block}}}")
     unknowns = np.random.default_rng(1).random((20, 36 if limits.shares_readings else 24))
     for each in unknowns:
         train = decode(each[None], samples, limits)
@@ -126,19 +128,19 @@ def test_trains_keep_their_limits(tmp_path: Path, rate_Hz: float) -> None:
         assert times_s[-1] <= end_s
 
 
-def test_parameters_that_trade_have_no_bound(tmp_path: Path) -> None:
+def test_parameters_that_trade_have_no_bound() -> None:
     """All four of the paper's drop under its own protocol: c and c_p show as their sum alone."""
     text = "only: [liquid_drop_2]\nmeasurement: {noise: {level_rad: 3.0e-6}}"
-    (one,), _ = set_up(tmp_path, text)
+    (one,), _ = set_up(text)
     found = rated(one, one.case.phases, one.case.sampling)
     by_name = dict(zip(one.case.searched.names, found.bounds[0], strict=True))
     assert by_name["c"] == by_name["c_p"] == NO_BOUND
     assert by_name["k_p"] < 0.1
 
 
-def test_simulated_fits_scatter_as_the_bounds_say(tmp_path: Path) -> None:
+def test_simulated_fits_scatter_as_the_bounds_say() -> None:
     """200 fits: a standard deviation is then known to 5 %, and four of these are allowed."""
-    samples, limits = set_up(tmp_path)
+    samples, limits = set_up()
     (one,) = samples
     train, _ = search(samples, limits, 40)
     found = rated(one, train.phases, Sampling(bursts=train.bursts))
@@ -160,7 +162,7 @@ def test_creep_and_relaxation_are_designed(
     tmp_path: Path, instrument: str, held: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = CREEP.replace("HELD", held).replace("creep", instrument)
-    _, output = designed(tmp_path, text)
+    output = designed(tmp_path, text)
     said = capsys.readouterr().out
     assert "jaws" not in said
     assert f"largest {held.removesuffix('_Pa')}" in said

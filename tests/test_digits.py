@@ -3,18 +3,11 @@
 import numpy as np
 import pytest
 
-from biogrip.digits import counted, rounded
+from biogrip.digits import rounded
 from biogrip.judging.doubts import doubts_about_noise
 from biogrip.physics.instruments import GRIPPER
 from biogrip.records.traces import Measurements
 from biogrip.stages.recording import notes_on_recording
-
-
-@pytest.mark.parametrize(
-    ("count", "said"), [(0, "0 rows"), (1, "1 row"), (2, "2 rows"), ("1.5", "1.5 rows")]
-)
-def test_one_is_no_plural(count: object, said: str) -> None:
-    assert counted(count, "row") == said
 
 
 def test_notes_on_one_of_something_are_sentences() -> None:

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from biogrip.cli import main
-from biogrip.progress import QUIET
+from biogrip.terminal import QUIET
 
 FEW = {
     "least_squares": {"candidates": 100, "starts": 4},

@@ -209,7 +209,7 @@ def test_an_option_that_cannot_be_used_is_named(
 def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: str) -> None:
     reader, writer = os.pipe()
     os.close(reader)
-    said_at_once = "import sys; from biogrip import cli, progress; progress._EVERY_S = 0.0; "
+    said_at_once = "import sys; from biogrip import cli, terminal; terminal._EVERY_S = 0.0; "
     command = [sys.executable, "-c", f"{said_at_once}sys.exit(cli.main(sys.argv[1:]))"]
     command += ["identify", str(EXAMPLE), "--config", few, "--output", str(tmp_path / "f.json")]
     done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from biogrip import progress
+from biogrip import terminal
 from biogrip.cli import main
 from biogrip.terminal import aligned, visible, visible_lines
 from tests.helpers.places import EXAMPLE
 
 FEW = """
-least_squares: {candidates: 100, starts: 4}
-model_selection: {models: [damper, maxwell]}
+least_squares: {candidates: 50, starts: 2}
+model_selection: {models: []}
 """
 # A colour, the title of a window, a line that is cleared, text that runs from right to left.
 HOSTILE = "\x1b[31m\x9b2J\x1b]0;x\x07\r\u202ea\x7f"
@@ -40,13 +40,8 @@ def test_text_is_shown_as_it_is_but_for_what_a_terminal_obeys() -> None:
     assert visible(HOSTILE) == visible(visible(HOSTILE)) == shown
     assert visible("a\tb\nc\u2028d\udcffe") == r"a\tb\nc\u2028d\udcffe"
     assert visible_lines("a\n\x1bb\n") == "a\n\\x1bb\n"
-    for number in (
-        *range(0x20),
-        *range(0x7F, 0xA0),
-        *range(0x202A, 0x202F),
-        *range(0x2066, 0x206A),
-    ):
-        assert visible(chr(number)).isprintable()
+    obeyed = [*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A)]
+    assert all(visible(chr(number)).isprintable() for number in obeyed)
 
 
 @pytest.mark.parametrize(
@@ -105,17 +100,17 @@ def test_names_of_traces_are_shown_wherever_they_are_said(
 def test_progress_and_warnings_are_shown(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(progress, "_EVERY_S", 0.0)
-    with progress.Progress(HOSTILE, 1) as told:
+    monkeypatch.setattr(terminal, "_EVERY_S", 0.0)
+    with terminal.Progress(HOSTILE, 1) as told:
         told.doing(f"cell {HOSTILE}")
         told.done()
-    progress.warn(f"{HOSTILE}: a note")
+    terminal.warn(f"{HOSTILE}: a note")
     for text in capsys.readouterr():
         assert visible(HOSTILE) in text or not text
         assert not OBEYED.search(text)
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 @pytest.mark.parametrize(
     ("arguments", "status"),
     [("groups a.csv --by x", 1), ("identify a.csv --config few.yaml", 0), ("design", 2)],
@@ -127,14 +122,8 @@ def test_a_command_may_have_nobody_to_talk_to(
     """And what it would have said is in no file."""
     shutil.copy(EXAMPLE, tmp_path / "a.csv")
     (tmp_path / "few.yaml").write_text(FEW)
-    command = f'"$0" -m biogrip {arguments} {closed}'
-    done = subprocess.run(
-        ["sh", "-c", command, sys.executable],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = ["sh", "-c", f'"$0" -m biogrip {arguments} {closed}', sys.executable]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == status
     assert "Traceback" not in done.stdout + done.stderr
     for output in tmp_path.glob("*.json"):

@@ -1,9 +1,9 @@
 """The command ``biogrip design``: a train of steps that tells plausible samples better.
 
-A train holds a torque, a load or a deformation, then another, and so on; after each step it is read
-at one rate. SciPy's differential evolution searches levels, durations and rates for the lowest
-worst Cramér-Rao bound. While it searches, sums over readings are integrals; what is printed is
-computed from the readings themselves.
+A train controls a torque, a load or a deformation in steps; after each step it is read at one rate.
+SciPy's differential evolution searches levels, durations and rates for the lowest worst Cramér-Rao
+bound. While it searches, sums over readings are integrals; what is printed is computed from the
+readings themselves.
 """
 
 from collections.abc import Iterator, Sequence
@@ -102,7 +102,7 @@ class Limits:
     steps: int
     """Number of steps."""
     largest: float
-    """Level of the largest magnitude, in the SI unit of what is held."""
+    """Level of the largest magnitude, in the SI unit of what is controlled."""
     frames: int
     """Duration, in intervals of the camera at its highest rate."""
     rate_Hz: float
@@ -123,7 +123,7 @@ class Trains:
     """Trains of steps, (n_trains, n_steps) each."""
 
     levels: Array
-    """What is held, in its SI unit."""
+    """What is controlled, in its SI unit."""
     durations_s: Array
     """Durations of the steps."""
     readings: Array
@@ -144,13 +144,12 @@ class Trains:
     def bursts(self) -> tuple[Burst, ...]:
         """Readings of the first train, at one rate in each step."""
         starts_s = np.cumsum(self.durations_s[0]) - self.durations_s[0] + self.quiet_s
-        found = []
         rates_Hz = self.readings[0] / np.maximum(self.durations_s[0] - self.quiet_s, 1e-99)
-        for start_s, rate_Hz, count in zip(starts_s, rates_Hz, self.readings[0], strict=True):
-            if count:
-                from_s = _rounded(start_s + 0.5 / rate_Hz)
-                found.append(Burst(from_s, _rounded(rate_Hz), int(count)))
-        return tuple(found)
+        return tuple(
+            Burst(_rounded(start_s + 0.5 / rate_Hz), _rounded(rate_Hz), int(count))
+            for start_s, rate_Hz, count in zip(starts_s, rates_Hz, self.readings[0], strict=True)
+            if count
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,9 +168,19 @@ class Experiment:
 def design(config: Path, output: Path | None, *, force: bool) -> None:
     """Search for a train of steps, print what it tells, and write a config that runs it.
 
-    The config, a YAML file, is laid over the default study. By default the output is beside it,
-    with `_designed` in its name; with `force` it replaces a file that biogrip did not write, too.
-    A `BiogripError` says what cannot be used, or that no train tells anything.
+    Parameters
+    ----------
+    config
+        YAML file that is laid over the default study.
+    output
+        Config to write; by default beside the other, with `_designed` in its name.
+    force
+        If true, replace even a file that biogrip did not write.
+
+    Raises
+    ------
+    BiogripError
+        If something cannot be used, or if no train tells anything.
     """
     output = output or config.with_stem(f"{config.stem}_designed")
     refuse_inputs([output], [config])
@@ -187,12 +196,9 @@ def design(config: Path, output: Path | None, *, force: bool) -> None:
         sampling = Sampling(bursts=train.bursts)
     after = [rated(one, train.phases, sampling) for one in samples]
     write_text(output, as_config(read_config(config), samples, after))
-    print(visible_lines("\n".join(_said(samples, before, after, reached))))
-    print(
-        visible_lines(
-            f"Written to {output}; snakemake -j2 --configfile {output} simulates and fits it."
-        )
-    )
+    then = f"snakemake -j2 --configfile {output} simulates and fits it"
+    said = [*_said(samples, before, after, reached), f"Written to {output}; {then}."]
+    print(visible_lines("\n".join(said)))
 
 
 def make_plausible(cases: Sequence[Case], block: DesignBlock) -> Iterator[Plausible]:
@@ -200,11 +206,9 @@ def make_plausible(cases: Sequence[Case], block: DesignBlock) -> Iterator[Plausi
 
     A `BiogripError` says which case cannot be judged, and why.
     """
-    if not cases:
-        raise BiogripError("design: found no case, allowed is one with a sample or more.")
     for case in cases:
-        if problem := _problem(case, cases[0]):
-            raise BiogripError(f"design: {case.name}: {problem}")
+        if wrong := _problem(case, cases[0]):
+            raise BiogripError(f"design: {case.name}: {wrong}")
         names = case.searched.names
         own = np.log([case.parameters[name] for name in names])
         logs = own[None]
@@ -215,7 +219,12 @@ def make_plausible(cases: Sequence[Case], block: DesignBlock) -> Iterator[Plausi
             drawn = qmc.Halton(len(names), scramble=False).random(_DRAWN + 1)[1:]
             logs = np.concatenate((logs, own + np.log(block.factor) * (2 * drawn - 1)))
         required = np.array([name in (block.parameters or names) for name in names])
-        yield Plausible(case, np.exp(logs), _noise(case), required)
+        # The noise of an instrument: that of its own sample under its own protocol.
+        problem, network = case.problem, case.sample.model.sample(case.parameters)
+        times_s = case.sampling.over(problem.torque.end_s)
+        read = simulated_rotation(case.gripper, network, problem.torque, times_s, nonlinear=False)
+        noise = float(standard_deviation(read[0], case.noise)[0])
+        yield Plausible(case, np.exp(logs), noise, required)
 
 
 def _problem(case: Case, first: Case) -> str | None:
@@ -237,14 +246,6 @@ def _problem(case: Case, first: Case) -> str | None:
     if case.nonlinear_target or case.problem.nonlinear:
         return "models: found nonlinear, allowed is linear."
     return None
-
-
-def _noise(case: Case) -> float:
-    """Return the noise of an instrument: that of a case's own sample under its own protocol."""
-    problem, network = case.problem, case.sample.model.sample(case.parameters)
-    times_s = case.sampling.over(problem.torque.end_s)
-    read = simulated_rotation(case.gripper, network, problem.torque, times_s, nonlinear=False)
-    return float(standard_deviation(read[0], case.noise)[0])
 
 
 def make_limits(samples: Sequence[Plausible], block: DesignBlock) -> Limits:
@@ -338,7 +339,9 @@ def decode(unknowns: Array, samples: Sequence[Plausible], limits: Limits) -> Tra
     if counts:
         readings = _filled(10 ** (-_DECADES * counts[0]), readings, limits.readings)
     forces = [each for one in samples for each in one.forces]
-    levels = _pressing(forces, heights, durations_s) if forces else _rounded_up(heights)
+    levels = np.ceil(_FINE * heights) / _FINE
+    if forces:
+        levels = _pressing(forces, heights, durations_s)
     return Trains(limits.largest * levels, durations_s, readings, limits.quiet_s)
 
 
@@ -374,18 +377,12 @@ def _pressing(
             force = static * now[:, None] + (decay * carried[:, None]).sum(axis=2)
             share = (force / (static + (decay * weights).sum(axis=2))).min(axis=1)
             lowest = np.maximum(lowest, now - (1 - _KEPT) * share)
-        levels[:, step] = _rounded_up(lowest + heights[:, step] * (1 - lowest))
+        levels[:, step] = np.ceil(_FINE * (lowest + heights[:, step] * (1 - lowest))) / _FINE
         for (_, rates, weights), carried in zip(forces, moving, strict=True):
             carried += (levels[:, step] - now)[:, None] * weights
             carried *= np.exp(rates * durations_s[:, step, None])
         now = levels[:, step]
     return levels
-
-
-def _rounded_up(levels: Array) -> Array:
-    """Return levels, as shares of the largest, as ten-thousandths."""
-    found: Array = np.ceil(_FINE * levels) / _FINE
-    return found
 
 
 def information(samples: Plausible, trains: Trains) -> Array:
@@ -488,16 +485,15 @@ def as_config(
         for key in set(_TIMES) & set(block.get("measurement") or {}):
             del block["measurement"][key]
     for one, experiment in zip(samples, after, strict=True):
-        base = one.case.instrument.controlled.column
+        column, sampling = one.case.instrument.controlled.column, experiment.sampling
         phases = [
-            {"duration_s": phase.duration_s, base: phase.left.value_Nm}
+            {"duration_s": phase.duration_s, column: phase.left.value_Nm}
             for phase in experiment.phases
         ]
-        measured: dict[str, Any] = {"noise": {"level_rad": one.noise}}
-        if experiment.sampling.bursts:
-            measured["bursts"] = [vars(each) for each in experiment.sampling.bursts]
-        else:
-            measured["rate_Hz"] = experiment.sampling.rate_Hz
+        times: dict[str, Any] = {"rate_Hz": sampling.rate_Hz}
+        if sampling.bursts:
+            times = {"bursts": [vars(each) for each in sampling.bursts]}
+        measured = {"noise": {"level_rad": one.noise}, **times}
         own = {"protocol": {"phases": phases}, "measurement": measured}
         cases[one.case.name] = overlaid(cases.get(one.case.name) or {}, own)
     text = yaml.safe_dump(found, sort_keys=False, default_flow_style=None, width=100)
@@ -514,26 +510,27 @@ def _said(
     rows: list[tuple[str, ...]] = []
     notes = []
     for one, within, *both in zip(samples, reached, before, after, strict=True):
-        name, held, read = one.case.name, one.case.instrument.controlled, one.case.instrument.read
+        name, instrument = one.case.name, one.case.instrument
+        controlled, read, n = instrument.controlled, instrument.read, len(one.parameters)
         for index, parameter in enumerate(one.case.searched.names):
             bounds = [each.bounds[:, index] for each in both]
             rows.append((name, f"{parameter}: bound (%)", *(_percent(b[0]) for b in bounds)))
-            if (n := len(one.parameters)) > 1:
+            if n > 1:
                 worst = (_percent(b.max()) for b in bounds)
                 rows.append((name, f"{parameter}: worst of {n} samples (%)", *worst))
             if one.required[index] and not np.all(within[:, index]):
                 notes.append(f"No train that was tried tells {parameter} of {name}.")
-        for label, values in {
-            f"noise of the {read.name} ({read.unit})": (one.noise, one.noise),
-            f"largest {held.name} ({held.unit})": [largest_load(each.phases) for each in both],
+        values = {
+            f"noise of the {read.name} ({read.unit})": [one.noise, one.noise],
+            f"largest {controlled.name} ({controlled.unit})": [
+                largest_load(each.phases) for each in both
+            ],
             "highest rate (Hz)": [1 / np.diff(each.times_s).min() for each in both],
             "readings": [len(each.times_s) for each in both],
-            "least force of the jaws (N)": [
-                each.force_N for each in both if each.force_N is not None
-            ],
-        }.items():
-            if values:
-                rows.append((name, label, *(f"{value:.4g}" for value in values)))
+        }
+        if instrument.has_jaws:
+            values["least force of the jaws (N)"] = [each.force_N for each in both]
+        rows += [(name, what, *(f"{it:.4g}" for it in pair)) for what, pair in values.items()]
     yield aligned(rows, ("sample", "", "config's protocol", "designed"))
     yield from notes
     yield (

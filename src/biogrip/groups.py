@@ -152,11 +152,12 @@ def groups(found: Path, by: str, table: Path | None, *, force: bool) -> None:
         raise BiogripError(f"FOUND: {problem}")
     header, *rows = read_rows(found)
     traces = [dict(zip(header, map(visible, row), strict=False)) for row in rows]
-    if missing := [name for name in ("trace", "fit", "confidence", by) if name not in header]:
-        raise BiogripError(
-            f"{visible(found)}: found no column '{missing[0]}'; allowed is a table that `biogrip "
-            f"identify --csv` wrote, and of --by a column of it.{nearest(missing[0], header)}"
-        )
+    for name in ("trace", "fit", "confidence", by):
+        if name not in header:
+            raise BiogripError(
+                f"{visible(found)}: found no column '{name}'; allowed is a table that `biogrip "
+                f"identify --csv` wrote, and of --by a column of it.{nearest(name, header)}"
+            )
     if table is not None:
         refuse_inputs([table], [found])
         check_output(table, force=force)
@@ -172,9 +173,12 @@ def groups(found: Path, by: str, table: Path | None, *, force: bool) -> None:
     units = {it[1]: it[2] or "" for name in header if (it := _VALUE.fullmatch(name))}
     cells = _cells(used, by, units, confidence)
     compared = compare(cells, names, confidence)
-    lines = [f"{visible(found)}: {counted(len(cells), 'cell')}, {100 * confidence:g} % limits"]
-    lines += [_printed(compared, names[0], units)]
-    lines += [*_left_out(traces, by, cells), *_not_known(cells, compared)]
+    lines = [
+        f"{visible(found)}: {counted(len(cells), 'cell')}, {100 * confidence:g} % limits",
+        _printed(compared, names[0], units),
+        *_left_out(traces, by, cells),
+        *_not_known(cells, compared),
+    ]
     if doubtful := [cell.name for cell in cells if cell.doubtful]:
         again = compare([cell for cell in cells if not cell.doubtful], names, confidence)
         lines += [f"Without the doubtful {', '.join(doubtful)}:", _printed(again, names[0], units)]
@@ -211,18 +215,17 @@ def _cells(
 
 def _printed(compared: Compared, first: str, units: Mapping[str, str]) -> str:
     """Return a comparison as a table."""
-    header = ["quantity", "group", "determined in", "median", f"ratio to {first}", "p"]
-    rows = [
-        [
-            *(with_unit(name, units[name]), group, f"{row['determined']} of {row['cells']}"),
-            "{median:.3g} ({low:.3g} to {high:.3g})".format(**row)
-            if "median" in row
-            else "too few",
-            "{ratio:.3g} ({ratio_low:.3g} to {ratio_high:.3g})".format(**row) if "p" in row else "",
-            f"{row['p']:.2g}" if "p" in row else "",
-        ]
-        for (name, group), row in compared.items()
-    ]
+    rows = []
+    for (name, group), row in compared.items():
+        median, ratio, p = "too few", "", ""
+        if "median" in row:
+            median = "{median:.3g} ({low:.3g} to {high:.3g})".format(**row)
+        if "p" in row:
+            ratio = "{ratio:.3g} ({ratio_low:.3g} to {ratio_high:.3g})".format(**row)
+            p = f"{row['p']:.2g}"
+        determined = f"{row['determined']} of {row['cells']}"
+        rows.append((with_unit(name, units[name]), group, determined, median, ratio, p))
+    header = ("quantity", "group", "determined in", "median", f"ratio to {first}", "p")
     return aligned(rows, header)
 
 

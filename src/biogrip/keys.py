@@ -1,9 +1,9 @@
-"""Additions to pydantic for config blocks: names from a registry, and conflicts of keys.
+"""Config blocks: frozen dataclasses whose fields are their keys, as pydantic checks them.
 
-A block is a frozen dataclass whose fields are its keys, with pydantic's `Field` for bounds, and a
-docstring below each. Checks, messages, the JSON Schema and the documentation follow from them.
-
-Conversion between plain values, as in YAML and JSON, and config blocks.
+Bounds are pydantic's `Field`, and a docstring below each field says what the key means. Checks,
+messages, the JSON Schema and the documentation follow from them. Added to pydantic are names from a
+registry (`OneOf`), lists without twins (`Distinct`), and conflicts of keys (`problems` of a block).
+`built` and `plain` convert between plain values, as in YAML and JSON, and blocks.
 """
 
 import json
@@ -24,8 +24,10 @@ from pydantic import (
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, ValidationError
+from pydantic_core import CoreSchema, PydanticCustomError, ValidationError
 from pydantic_core.core_schema import literal_schema, no_info_after_validator_function
+
+T = TypeVar("T")
 
 Problem = tuple[tuple[Hashable, ...], str]
 """Path of a key, relative to its block, and a message: what was found and what is allowed."""
@@ -46,6 +48,8 @@ Printed = Annotated[
 ]
 """Text that is safe in tables, figures and file formats."""
 
+STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+"""Configuration of blocks."""
 
 OPEN = ConfigDict(strict=True, extra="allow", allow_inf_nan=False, frozen=True, defer_build=True)
 """Configuration of models that collect the keys that they do not name."""
@@ -80,23 +84,20 @@ class Checked:
 
     @model_validator(mode="after")
     def _refuse_conflicts(self, info: ValidationInfo) -> Self:
-        found = list(self.problems()) if info.context else []
+        found: list[Any] = [
+            {"type": PydanticCustomError(CONFLICT, text), "loc": path, "input": None}
+            for path, text in (self.problems() if info.context else ())
+        ]
         if found:
-            raise ValidationError.from_exception_data(CONFLICT, [_conflict(*it) for it in found])
+            raise ValidationError.from_exception_data(CONFLICT, found)
         return self
 
 
 class Block(Checked):
     """Base class of frozen dataclasses whose fields are the keys of a config block."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(
-        strict=True, extra="forbid", allow_inf_nan=False
-    )
-
-
-def _conflict(path: tuple[Hashable, ...], text: str) -> InitErrorDetails:
-    error = PydanticCustomError(CONFLICT, text)
-    return InitErrorDetails(type=error, loc=path, input=None)  # type: ignore[typeddict-item]
+    # A copy, which the documentation adds to.
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(**STRICT)
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ class OneOf:
     names: Iterable[str]
 
     def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
-        """Return the schema that pydantic validates with."""
+        """Check with pydantic as a `Literal`."""
         return literal_schema(list(self.names))
 
 
@@ -114,13 +115,13 @@ class Distinct:
     """Annotation of a list whose items must differ."""
 
     def __get_pydantic_core_schema__(self, kind: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Return the schema that pydantic validates with."""
+        """Check with pydantic that no item is there twice."""
         return no_info_after_validator_function(_without_twins, handler(kind))
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """Return the JSON Schema."""
+        """Say so in the JSON Schema."""
         return handler(schema) | {"uniqueItems": True}
 
 
@@ -128,10 +129,6 @@ def _without_twins(items: tuple[Any, ...]) -> tuple[Any, ...]:
     if any(item in items[:index] for index, item in enumerate(items)):
         raise PydanticCustomError(TWICE, "something is there twice")
     return items
-
-
-T = TypeVar("T")
-STRICT = ConfigDict(strict=True, extra="forbid")
 
 
 @cache

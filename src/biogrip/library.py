@@ -53,7 +53,7 @@ def set_up(
         Gripper, or one of `INSTRUMENTS`: ``INSTRUMENTS["strain"]`` is creep whose strain is read,
         ``INSTRUMENTS["modulus"]`` relaxation whose modulus is.
     protocol
-        Phases of the torque, or of what else is held.
+        Phases of the torque, or of what else is controlled.
     sample
         Constitutive model of the sample.
     ranges
@@ -92,14 +92,9 @@ def simulate(experiment: CaseProblem, parameters: Mapping[str, float], time_s: A
     (n_samples,)
         In SI units; of a rotation, rad.
     """
-    rotation: Array = simulated_rotation(
-        experiment.gripper,
-        experiment.model.sample(parameters),
-        experiment.torque,
-        time_s,
-        nonlinear=experiment.nonlinear,
-    )[0]
-    return rotation
+    network, torque = experiment.model.sample(parameters), experiment.torque
+    nonlinear = experiment.nonlinear
+    return simulated_rotation(experiment.gripper, network, torque, time_s, nonlinear=nonlinear)[0]
 
 
 def identify_sample(

@@ -1,9 +1,8 @@
-"""Handlers that end a command at once with a one-line message when it is stopped.
+"""How a command and its worker processes end: at once and with one line when they are stopped.
 
-An exception would not do: libraries that are loading, or call back, replace or swallow it. Files
-are written atomically, so only scratch files need to be removed.
-
-Processes that work side by side for a command, and end with it.
+Signals have handlers that exit, for an exception would not do: libraries that are loading, or call
+back, replace or swallow it. Files are written atomically, so only scratch files need to be removed.
+Processes that work side by side for a command end with it.
 """
 
 import os
@@ -17,10 +16,11 @@ from contextlib import suppress
 from multiprocessing import get_context
 from types import FrameType
 
-from biogrip.terminal import visible
+from biogrip.terminal import CLEARED, visible
 
 _SAID = {signal.SIGINT: "stopped", signal.SIGTERM: "ended by SIGTERM"}
-_CLEARED = "\r\x1b[K"
+
+_EVERY_S = 0.5
 
 unfinished: set[str] = set()
 """Scratch files that are being written, to be removed if the command is stopped."""
@@ -41,23 +41,24 @@ def end_at_once(number: int, line: str) -> None:
     # Ignore further signals.
     for other in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(other, signal.SIG_IGN)
-    for path in unfinished:
-        with suppress(OSError):
-            os.unlink(path)
+    _remove_unfinished()
     # A signal may arrive during a write to either stream.
     with suppress(OSError, RuntimeError, ValueError):
         sys.stdout.flush()
     with suppress(OSError):
-        cleared = _CLEARED if os.isatty(2) else ""
+        cleared = CLEARED if os.isatty(2) else ""
         os.write(2, f"{cleared}biogrip: {visible(line)}\n".encode())
     os._exit(128 + number)
 
 
+def _remove_unfinished() -> None:
+    for path in unfinished:
+        with suppress(OSError):
+            os.unlink(path)
+
+
 def _end(number: int, _: FrameType | None) -> None:
     end_at_once(number, f"{_SAID[signal.Signals(number)]}; no file was left half-written.")
-
-
-_EVERY_S = 0.5
 
 
 def worker_processes(count: int, begin: Callable[[], None] | None = None) -> ProcessPoolExecutor:
@@ -83,7 +84,5 @@ def _begin(parent: int, begin: Callable[[], None] | None) -> None:
 def _watch(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(_EVERY_S)
-    for path in unfinished:
-        with suppress(OSError):
-            os.unlink(path)
+    _remove_unfinished()
     os._exit(1)

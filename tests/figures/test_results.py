@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from matplotlib.patches import Rectangle
@@ -24,7 +25,7 @@ from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.records.identifications import columns
-from biogrip.records.traces import Measurements, table_of, write_measurements
+from biogrip.records.traces import Measurements, write_measurements
 from biogrip.stages import targets
 from tests.helpers.default import STUDY, seen, study_of
 
@@ -125,7 +126,7 @@ def test_histories_of_the_seeds_that_are_drawn_are_read(tmp_path: Path) -> None:
     path = tmp_path / "histories.parquet"
     seeds = np.repeat([0, 1, SHOWN_SEEDS, SHOWN_SEEDS + 1], 3)
     tables = [
-        table_of({"method": method, "seed": seeds, "generation": seeds, "k": seeds * 0.5}, 12)
+        pa.table({"method": [method] * 12, "seed": seeds, "generation": seeds, "k": seeds * 0.5})
         for method in ("genetic", "least_squares")
     ]
     with pq.ParquetWriter(path, tables[0].schema) as writer:

@@ -30,6 +30,16 @@ def documented() -> dict[str, Any]:
     return tidy(TypeAdapter(StudyConfig).json_schema())
 
 
+def leaves(block: Schema, path: str = "") -> dict[str, Schema]:
+    """Every key of a block and below, with what its value may look like."""
+    found: dict[str, Schema] = {}
+    for name, schema in block.keys.items():
+        found[f"{path}{name}"] = schema
+        for part in (schema, schema.inside(0), schema.values, *schema.inside(0).options):
+            found |= leaves(part, f"{path}{name}.")
+    return found
+
+
 def reference(config: Path) -> str:
     """Return Markdown tables of all keys: meaning, unit, default in a file, allowed values.
 
@@ -38,7 +48,7 @@ def reference(config: Path) -> str:
     defaults = yaml.safe_load(config.read_text(encoding="utf-8"))
     general: list[_Row] = []
     sections: list[str] = []
-    for name, schema in Schema(documented(), documented()["$defs"]).keys.items():
+    for name, schema in STUDY.keys.items():
         rows = list(_rows(name, schema, defaults.get(name)))
         if named := schema.values.keys:
             own = {key: inner for key, inner in named.items() if key not in OVERRIDABLE}
@@ -134,8 +144,11 @@ def _listed(choices: list[str]) -> str:
 
 def _shown(value: Any) -> str:
     if isinstance(value, list) and value and isinstance(value[0], str):
-        listed = ", ".join(value)
-        return f"`[{listed}]`" if len(value) <= _MOST_LISTED else f"{len(value)} keys"
-    if isinstance(value, bool):
-        return f"`{value}`".lower()
-    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+        shown = f"`[{', '.join(value)}]`"
+        return shown if len(value) <= _MOST_LISTED else f"{len(value)} keys"
+    shown = f"{value:g}" if isinstance(value, float) else str(value)
+    return f"`{shown.lower() if isinstance(value, bool) else shown}`"
+
+
+STUDY = Schema(documented(), documented()["$defs"])
+"""Schema of the top-level keys."""

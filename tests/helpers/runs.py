@@ -1,13 +1,15 @@
-"""Small studies that Snakemake runs, each in a folder of its own."""
+"""Small studies that Snakemake runs, each in a folder of its own, and what it would run."""
 
 import fcntl
 import os
+import re
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import Any
 
 import pytest
@@ -16,6 +18,7 @@ import yaml
 from tests.helpers.places import EXAMPLE, ROOT
 
 _SECONDS = 600
+_JOBS = re.compile(r"^(\w+) +(\d+) *$", re.MULTILINE)
 
 # Every kind of file, and of each as little as there can be: a simulated sample, and a trace that
 # a user recorded, which is `mine.csv` in the study's folder.
@@ -52,10 +55,29 @@ class Run:
     status: int
     output: str
 
+    @property
+    def jobs(self) -> dict[str, int]:
+        """Number of jobs of each rule, from the last table of jobs of a dry run."""
+        found = {rule: int(jobs) for rule, jobs in _JOBS.findall(self.output)}
+        return {rule: jobs for rule, jobs in found.items() if rule not in ("all", "study", "total")}
 
-def snakemake(
-    folder: Path, *arguments: str | Path, config: dict[str, Any] | None = None, root: Path = ROOT
-) -> Run:
+
+def called(folder: Path, *arguments: str | Path) -> Run:
+    """Call Snakemake in a folder."""
+    paths = [Path(sys.executable).parent, os.environ["PATH"]]
+    done = subprocess.run(
+        [sys.executable, "-m", "snakemake", *map(str, arguments)],
+        cwd=folder,
+        env={**os.environ, "PATH": os.pathsep.join(map(str, paths))},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=_SECONDS,
+    )
+    return Run(done.returncode, done.stdout)
+
+
+def snakemake(folder: Path, *arguments: str | Path, config: dict[str, Any] | None = None) -> Run:
     """Run the workflow in a folder, over a config that is laid on the default study.
 
     Parameters
@@ -66,27 +88,45 @@ def snakemake(
         Further ones of Snakemake's: targets, or `-n`.
     config
         The config, which is written to `overlay.yaml` in the folder; none by default.
-    root
-        The repository, or a copy of it.
     """
-    given: list[str | Path] = []
+    given: list[str | Path] = ["-s", ROOT / "Snakefile", "--directory", folder]
     if config is not None:
         (folder / "overlay.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
         given += ["--configfile", folder / "overlay.yaml"]
-    given += ["-s", root / "Snakefile", "--directory", folder]
-    if not any(str(argument).startswith(("-j", "--cores", "--profile")) for argument in arguments):
+    if not any(str(argument).startswith(("-j", "--profile")) for argument in arguments):
         given.append("-j2")
-    paths = [Path(sys.executable).parent, os.environ["PATH"]]
-    done = subprocess.run(
-        [sys.executable, "-m", "snakemake", *map(str, (*given, *arguments))],
-        cwd=folder,
-        env={**os.environ, "PATH": os.pathsep.join(map(str, paths))},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=_SECONDS,
-    )
-    return Run(done.returncode, done.stdout)
+    return called(folder, *given, *arguments)
+
+
+def dry_run(folder: Path, *arguments: str, config: dict[str, Any]) -> Run:
+    """Ask Snakemake what it would run, by its plain logger."""
+    # Other workers ask in the same folder.
+    with NamedTemporaryFile("w", suffix=".yaml") as overlay:
+        yaml.safe_dump(config, overlay)
+        overlay.flush()
+        options = ("--dry-run", "--configfile", overlay.name, "--workflow-profile", "none")
+        run = snakemake(folder, *options, *arguments)
+    assert run.status == 0, run.output
+    return run
+
+
+def planned(folder: Path, *targets: str, config: dict[str, Any]) -> dict[str, int]:
+    """Return the number of jobs of each rule that Snakemake would run."""
+    return dry_run(folder, "--quiet", "rules", "--", *targets, config=config).jobs
+
+
+def results_of(folder: Path) -> dict[str, bytes]:
+    """Return every result by name, but for logs and what tells times."""
+    results = folder / "results"
+    files = {file.relative_to(results): file for file in sorted(results.rglob("*.*"))}
+    return {
+        str(name): file.read_bytes()
+        for name, file in files.items()
+        if file.is_file()
+        and name.parts[0] not in ("logs", "timings")
+        # The processor times of the page's study.
+        and not name.name.startswith("timings.")
+    }
 
 
 def run_tiny(folder: Path) -> None:

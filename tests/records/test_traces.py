@@ -1,18 +1,18 @@
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.records import traces
+from biogrip.records.rows import read_parquet
 from biogrip.records.traces import (
     Measurements,
-    column_names,
     each_trace,
     read_jaw_force,
     read_measurements,
     read_target,
-    seeds_in,
     write_measurements,
     write_target,
 )
@@ -61,32 +61,32 @@ def test_a_damaged_target_is_explained(tmp_path: Path, line: int, text: str, mes
         read_target(path)
 
 
-def test_traces_are_read_one_after_the_other(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """However many at once; those of all seeds, and no other column."""
-    monkeypatch.setattr(traces, "_READ_AT_ONCE", 2)
-    written = {seed: np.full(4, float(seed)) for seed in (3, 4, 5, 6, 7)}
+@pytest.mark.parametrize("known", [{}, {"target_rad": TIMES - 1}, {"sd_rad": TIMES + 0.1}])
+def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> None:
+    """All of them or some, with what is known, bit for bit."""
     path = tmp_path / "seeds_3-7.parquet"
-    write_measurements(path, Measurements(np.arange(4.0), np.zeros(4), written))
-    assert seeds_in(path) == list(written)
-    np.testing.assert_array_equal(list(each_trace(path)), list(written.values()))
-
-
-def test_standard_deviations_are_kept(tmp_path: Path) -> None:
-    path, trace = tmp_path / "seeds_0-0.parquet", {0: np.ones(4)}
-    write_measurements(path, Measurements(np.arange(4.0), None, trace, sd_rad=np.full(4, 0.1)))
-    for seeds in ([0], None):
+    traces = {seed: np.random.default_rng(seed).random(5) for seed in (3, 4, 5, 6, 7)}
+    given = replace(Measurements(TIMES, None, traces), **known)
+    write_measurements(path, given)
+    for seeds in (None, [6, 4]):
         read = read_measurements(path, seeds)
-        assert read.sd_rad is not None
-        np.testing.assert_array_equal(read.sd_rad, 0.1)
-        assert list(read.rotation_rad) == [0]
-    assert seeds_in(path) == [0]
+        assert list(read.rotation_rad) == (seeds or list(traces))
+        for seed, trace in read.rotation_rad.items():
+            np.testing.assert_array_equal(trace, traces[seed])
+            assert trace.flags.c_contiguous
+        for name in ("time_s", "target_rad", "sd_rad"):
+            np.testing.assert_array_equal(getattr(read, name), getattr(given, name))
+    np.testing.assert_array_equal(list(each_trace(path)), list(traces.values()))
 
 
-def test_columns_have_names_for_any_instrument(tmp_path: Path) -> None:
-    trace, path = {0: np.arange(4.0)}, tmp_path / "t.parquet"
-    noisy = Measurements(np.arange(4.0), np.ones(4), trace, sd_rad=np.full(4, 0.1))
-    write_measurements(path, noisy)
-    assert column_names(path) == ["time_s", "target", "sd", "seed_0"]
-    np.testing.assert_array_equal(read_measurements(path).target_rad, 1.0)
+def test_damaged_measurements_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "m.parquet"
+    write_measurements(path, Measurements(TIMES, None, {0: TIMES}))
+    with pytest.raises(BiogripError, match=r"m.parquet: has no column seed_3"):
+        read_measurements(path, [0, 3])
+    with pytest.raises(BiogripError, match=r"m.parquet: cannot be read: No match .*y"):
+        read_parquet(path, ["y"])
+    path.write_bytes(path.read_bytes()[:-9])
+    for file in (path, tmp_path / "gone.parquet"):
+        with pytest.raises(BiogripError, match=f"{file.name}: cannot be read"):
+            read_measurements(file)

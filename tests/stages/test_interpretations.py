@@ -1,19 +1,17 @@
-"""Interpretations of section 4: each found as if the study had said so, and told in one table."""
+"""Interpretations of section 4: each found as if the study had said so."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from biogrip.errors import BiogripError
 from biogrip.records.identifications import INTERPRETATIONS, read_identifications
 from biogrip.stages.identification import identify
-from biogrip.stages.sweeps import read
+from biogrip.stages.sweeps import identify_interpreted
 from biogrip.stages.targets import measure, simulate
 from biogrip.study.study import Study
 from biogrip.tables.interpretations import interpretations
 from tests.helpers.default import study_of
-from tests.helpers.places import ROOT
 
 OVERLAY = """
 seeds: 3
@@ -37,40 +35,24 @@ def study() -> Study:
     return study_of(OVERLAY)
 
 
-@pytest.fixture(scope="module")
-def folder(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the interpretations have been tried, and the study's own algorithm."""
-    made = tmp_path_factory.mktemp("interpretations")
-    target, measured = made / "t.csv", made / "m.parquet"
+def test_one_that_changes_nothing_finds_what_the_study_finds(study: Study, tmp_path: Path) -> None:
+    target, measured, ours_file = (tmp_path / name for name in ("t.csv", "m.parquet", "ours.csv"))
     case = study.case(CASE)
     simulate(case, target)
     measure(case, range(3), target, measured)
-    outputs = [made / name for name in ("ours.csv", "h.parquet", "times.csv")]
-    identify(case, "genetic", range(3), measured, [], *outputs)
-    read(case, target, made / f"{CASE}.csv")
-    return made
-
-
-def test_a_reading_that_changes_nothing_finds_what_the_study_finds(folder: Path) -> None:
-    ours = read_identifications(folder / "ours.csv")
-    rows = INTERPRETATIONS.read(folder / f"{CASE}.csv")
+    others = tmp_path / "h.parquet", tmp_path / "times.csv"
+    identify(case, "genetic", range(3), measured, [], ours_file, *others)
+    interpreted = tmp_path / f"{CASE}.csv"
+    identify_interpreted(case, target, interpreted)
+    ours = read_identifications(ours_file)
+    rows = INTERPRETATIONS.read(interpreted)
     same = rows[rows["interpretation"] == "printed"].reset_index(drop=True)
-    for column in ("k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m", "misfit"):
+    for column in ("k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m", "misfit", "noise_rms"):
         np.testing.assert_array_equal(same[column], ours[column])
-    np.testing.assert_array_equal(same["noise_rms"], ours["noise_rms"])
     for name in ("three", "uniform"):
-        others = rows[rows["interpretation"] == name].reset_index(drop=True)
-        assert not np.array_equal(others["misfit"], same["misfit"]), name
-
-
-def test_the_table_has_a_row_for_each_case_and_reading(study: Study, folder: Path) -> None:
-    made = interpretations(study, [folder / f"{CASE}.csv"])
-    assert [row["interpretation"] for row in made.rows] == [
-        "as printed",
-        "patient",
-        "three digits",
-        "uniform noise",
-    ]
+        assert set(rows[rows["interpretation"] == name]["misfit"]) != set(same["misfit"]), name
+    titles = [row["interpretation"] for row in interpretations(study, [interpreted]).rows]
+    assert titles == ["as printed", "patient", "three digits", "uniform noise"]
 
 
 def test_a_reading_changes_only_what_it_says(study: Study) -> None:
@@ -82,18 +64,3 @@ def test_a_reading_changes_only_what_it_says(study: Study) -> None:
     )
     assert found["three"].problem.ranges["k"].digits == 3
     assert found["uniform"].noise.kind == "uniform"
-
-
-def test_a_reading_that_no_case_can_have_is_explained() -> None:
-    with pytest.raises(
-        BiogripError,
-        match=r"interpretations.odd.changes.genetic_algorithm.survivors: found 500, allowed",
-    ):
-        study_of(
-            "interpretations: {odd: {title: odd, changes: {genetic_algorithm: {survivors: 500}}}}"
-        )
-
-
-def test_the_overlay_that_is_published_is_a_study() -> None:
-    text = (ROOT / "config" / "interpretations.yaml").read_text(encoding="utf-8")
-    assert len(study_of(text).interpretation_titles) == 12

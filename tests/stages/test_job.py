@@ -1,7 +1,8 @@
-"""What a job is told of the config: the keys that its rule names, and nothing else."""
+"""What a job is told: the keys of the config that its rule names, and a batch of seeds."""
 
 import json
 from dataclasses import fields
+from itertools import combinations
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.stages.job import (
+    batch_names,
     case_of,
     job_case,
     job_seeds,
@@ -17,6 +19,7 @@ from biogrip.stages.job import (
     keys_of_cases,
     logged,
     paths,
+    seeds_of,
     settings,
     study_of,
 )
@@ -46,19 +49,13 @@ def told(given: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize("key", ["noise", "problem", "gripper", "seeds", "title"])
+@pytest.mark.parametrize("key", ["sampling", "problem", "gripper", "seeds", "title"])
 def test_what_the_rule_does_not_name_cannot_be_read(key: str) -> None:
-    case = case_of(NAME, settings(STUDY, ["sample"], NAME))
+    case = case_of(NAME, told(settings(STUDY, ["sample", "measurement.noise"], NAME)))
     assert case.block.sample == STUDY.cases[NAME].block.sample
-    with pytest.raises(AttributeError):
-        getattr(case, key)
-
-
-def test_of_a_block_only_what_is_named_can_be_read() -> None:
-    case = case_of(NAME, told(settings(STUDY, ["measurement.noise"], NAME)))
     assert case.noise == STUDY.cases[NAME].noise
     with pytest.raises(AttributeError, match="not among the keys that the rule names"):
-        _ = case.sampling
+        getattr(case, key)
 
 
 @pytest.mark.parametrize("overlay", ["", SWEPT])
@@ -100,14 +97,19 @@ def test_a_script_reads_what_its_rule_gives() -> None:
     assert paths(["a", "b"]) == [Path("a"), Path("b")]
 
 
-def test_an_error_of_ours_ends_a_job_with_its_message_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_log_has_what_a_user_can_correct_alone_and_else_a_traceback(tmp_path: Path) -> None:
     log = tmp_path / "job.log"
-    with pytest.raises(SystemExit) as ended, logged(SimpleNamespace(log=[str(log)])):
+    job = SimpleNamespace(log=[str(log)])
+    with pytest.raises(SystemExit) as ended, logged(job):
         raise BiogripError("a.csv: cannot be read.")
     assert ended.value.code == 1
     assert log.read_text() == "biogrip: a.csv: cannot be read.\n"
+    with pytest.raises(ZeroDivisionError), logged(job):
+        print(1 // 0)
+    said = log.read_text()
+    assert said.startswith("Traceback (most recent call last):")
+    assert "print(1 // 0)" in said
+    assert said.endswith("ZeroDivisionError: integer division or modulo by zero\n")
 
 
 def test_a_default_of_a_case_goes_before_what_the_study_has() -> None:
@@ -124,3 +126,46 @@ cases:
     )
     told_of = settings(study, ["instrument"], NAME)
     assert case_of(NAME, told_of).block.instrument == study.case(NAME).block.instrument
+
+
+def made(folder: Path, *names: str) -> Path:
+    """A folder with files of some batches."""
+    for name in names:
+        (folder / f"{name}.csv").touch()
+    return folder
+
+
+def test_batches_are_cut_at_multiples_of_the_size() -> None:
+    assert batch_names(50, 25) == ["seeds_0-24", "seeds_25-49"]
+    assert batch_names(7, 3) == ["seeds_0-2", "seeds_3-5", "seeds_6-6"]
+    assert list(seeds_of("seeds_25-27")) == [25, 26, 27]
+
+
+def test_batches_that_there_are_are_kept(tmp_path: Path) -> None:
+    there = made(tmp_path, *batch_names(60, 25))
+    # An odd end is kept too, and the gap after it filled up to the next multiple.
+    assert batch_names(130, 25, there)[2:4] == ["seeds_50-59", "seeds_60-74"]
+    # So are those of another size; one that goes beyond fewer seeds would bring its own in.
+    assert batch_names(40, 10, there) == ["seeds_0-24", "seeds_25-29", "seeds_30-39"]
+
+
+@pytest.mark.parametrize("seeds", [1, 5, 24, 25, 60])
+@pytest.mark.parametrize("size", [1, 3, 25, 1000])
+def test_every_seed_is_covered_once_whatever_there_is(
+    tmp_path: Path, seeds: int, size: int
+) -> None:
+    pool = ["seeds_0-4", "seeds_3-6", "seeds_5-9", "seeds_20-30", "seeds_70-80", "seeds_24-24"]
+    for number, existing in enumerate(combinations(pool, 2)):
+        (folder := tmp_path / str(number)).mkdir()
+        plan = batch_names(seeds, size, made(folder, *existing))
+        covered = [seed for batch in plan for seed in seeds_of(batch)]
+        assert covered == list(range(seeds))
+        # Half-way through, the plan does not change: a restarted run continues.
+        assert batch_names(seeds, size, made(folder, *plan[::2])) == plan
+
+
+def test_very_many_seeds_make_larger_batches_not_more() -> None:
+    assert len(batch_names(500)) == 1
+    assert {len(batch_names(seeds)) for seeds in (4_001, 6_001, 8_000)} == {8}
+    # But none that would take much memory.
+    assert len(batch_names(1_000_000)) == 1000

@@ -1,3 +1,4 @@
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,10 @@ from biogrip.records.identifications import columns
 from biogrip.records.rows import write_rows
 from biogrip.records.traces import read_jaw_force, read_measurements, read_target
 from biogrip.stages import identification as identifications
-from biogrip.stages import recording
+from biogrip.stages import judgement, recording
 from biogrip.stages import targets as target
 from biogrip.traces.columns import Columns
-from tests.helpers.default import STUDY, seen
+from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import EXAMPLE
 
 
@@ -137,3 +138,21 @@ def test_a_target_that_is_not_finite_is_refused_where_it_arises(
     said = str(error.value)
     assert f"the simulated rotation of Maxwell liquid with k = 1, c = 1 is {value} at 7 s" in said
     assert not list(tmp_path.iterdir())
+
+
+def test_all_stages_weight_the_readings(tmp_path: Path) -> None:
+    """They find the same optimum, with the noise that is known."""
+    file = f"{{file: {EXAMPLE}, time: time_s, rotation: rotation_rad, noise_share: 0.1}}"
+    case = study_of(
+        f"cases: {{mine: {{sample: {{model: liquid_drop}}, measurement: {file}}}}}"
+    ).cases["mine"]
+    traces, verdicts = tmp_path / "t.parquet", tmp_path / "v.json"
+    recording.record(case, EXAMPLE, traces)
+    judgement.judge(case, traces, [], verdicts)
+    judged = json.loads(verdicts.read_text())
+    assert judged["threshold"] == pytest.approx(3.8415, abs=1e-4)
+    outputs = [tmp_path / name for name in ("p.csv", "h.parquet", "t.csv")]
+    identifications.identify(case, "least_squares", range(1), traces, [], *outputs)
+    (found,) = pd.read_csv(outputs[0]).itertuples()
+    assert found.misfit == pytest.approx(judged["misfit"], rel=1e-4)
+    assert found.k_N_per_m == pytest.approx(judged["quantities"][0]["value"], rel=1e-3)

@@ -16,7 +16,7 @@ from biogrip.study.config import StudyConfig
 from biogrip.study.load import load_study
 from biogrip.study.messages import Schema
 from biogrip.study.source import overlaid, read_config
-from tests.study.keys import STUDY, leaves
+from tests.helpers.key_reference import STUDY, leaves
 
 DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"
 DEFAULTS = read_config(DEFAULT)

@@ -11,8 +11,7 @@ from jsonschema import Draft202012Validator
 from biogrip.fit.methods import METHODS
 from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.source import read_config
-from tests.helpers.key_reference import file_schema
-from tests.study.keys import STUDY, leaves
+from tests.helpers.key_reference import STUDY, file_schema, leaves
 
 CONFIG = Path(__file__).parents[2] / "config"
 SCHEMA: dict[str, Any] = json.loads(file_schema())

@@ -5,9 +5,6 @@ from pathlib import Path
 import pytest
 
 from biogrip.physics.noise import Noise
-from biogrip.study.load import load_study
-from biogrip.study.source import read_config
-from tests.helpers.places import CONFIG, ROOT
 from tests.study.test_config import load, refusal
 
 ARMS = ("gripper.left.stiffness_Nm_per_rad", "gripper.right.stiffness_Nm_per_rad")
@@ -147,13 +144,3 @@ def test_there_are_no_more_points_than_cases(tmp_path: Path) -> None:
     text = f"cases: {{{cases}}}\nsweeps: {{s: {{cases: {[f'c{i}' for i in range(8)]}, "
     text += f"rows: {axis % 'noise.level'}, columns: {axis % 'rate_Hz'}}}}}"
     assert "sweeps: found 2048 points, allowed are 2000 together" in refusal(tmp_path, text)
-
-
-def test_the_shipped_sweeps_cover_what_they_say() -> None:
-    sweeps = read_config(ROOT / "config" / "robustness.yaml")["sweeps"]
-    study = load_study(read_config(CONFIG) | {"sweeps": sweeps}, [CONFIG])
-    count = {
-        name: len(sweep.points(name, "endothelial_cell")) for name, sweep in study.sweeps.items()
-    }
-    assert count == {"noise": 28, "sampling": 15, "gripper": 25}
-    assert len(study.points) == 3 * sum(count.values())

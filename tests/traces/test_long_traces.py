@@ -15,7 +15,7 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import hold, torque_history
-from biogrip.records.verdicts import diagnosis_data
+from biogrip.records.identifications import diagnosis_data
 from biogrip.stages import judgement
 
 SAMPLES, MEANS_OF = 200_000, 50
@@ -45,7 +45,7 @@ def judged(path: Path, time_s: Array, rotation_rad: Array) -> dict[str, Any]:
     """What `identify_trace` finds of the sample, without a word on other models."""
     study = study_of(options(path))
     (case,) = study.cases.values()
-    fit = judgement.fit_judged(case, case.problem, time_s, rotation_rad, 0)
+    (fit,) = judgement.fits_judged([case], [case.problem], [(time_s, rotation_rad)], 0)
     searched, confidence = case.problem.searched, case.confidence
     return diagnosis_data(diagnose(fit.problem, searched, fit.found, confidence=confidence))
 

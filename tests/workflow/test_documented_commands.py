@@ -48,7 +48,7 @@ LEFT = {
     "howto/figure.md": ["results/figures/heights.png"],
 }
 TAKES_LONG = {"howto/relaxation.md", "howto/creep.md", "design.md", "tutorial.md"}
-TAKES_LONG |= {f"howto/{name}.md" for name in ("trace", "noise", "figure", "noise_kind")}
+TAKES_LONG |= {f"howto/{name}.md" for name in ("case", "trace", "noise", "figure", "noise_kind")}
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
     "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],

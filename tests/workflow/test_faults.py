@@ -1,4 +1,4 @@
-"""Runs that are killed, stopped, or out of room end with the undisturbed bytes when run again."""
+"""Runs that are killed end with the undisturbed bytes when run again."""
 
 import os
 import shutil
@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from tests.helpers.places import ROOT
-from tests.helpers.planned import results_of
-from tests.helpers.runs import TINY, snakemake
+from tests.helpers.runs import TINY, results_of, snakemake
+
+pytestmark = pytest.mark.nightly
 
 # What is asked for, and what is removed so that there is something to do.
 ERRORS = "results/tables/errors_liquid_drop_2.csv"
@@ -34,7 +35,7 @@ def started(folder: Path) -> "subprocess.Popen[bytes]":
         cwd=folder,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        # Ctrl-C reaches all of a terminal's programs.
+        # By which its jobs are found.
         process_group=0,
     )
 
@@ -78,24 +79,7 @@ def kill_snakemake(process: "subprocess.Popen[bytes]", folder: Path) -> None:
     assert snakemake(folder, "--unlock", config=TINY).status == 0
 
 
-def interrupt(process: "subprocess.Popen[bytes]", folder: Path) -> None:
-    """Ctrl-C, once."""
-    wait_for(lambda: jobs_below(process.pid), process)
-    os.killpg(process.pid, signal.SIGINT)
-    assert process.wait(120) != 0
-
-
-def run_beside(process: "subprocess.Popen[bytes]", folder: Path) -> None:
-    """A second run is refused by Snakemake's lock, and the first goes on."""
-    wait_for(lambda: [*folder.glob(".snakemake/locks/*")], process)
-    second = snakemake(folder, "--", ERRORS, config=TINY)
-    assert second.status == 1
-    assert "locked" in second.output
-    assert process.wait(120) == 0
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("fault", [kill_snakemake, kill_a_job, interrupt, run_beside])
+@pytest.mark.parametrize("fault", [kill_snakemake, kill_a_job])
 def test_the_same_command_ends_with_the_undisturbed_bytes(
     tiny: Path, tiny_copy: Path, fault: Callable[["subprocess.Popen[bytes]", Path], None]
 ) -> None:
@@ -105,47 +89,3 @@ def test_the_same_command_ends_with_the_undisturbed_bytes(
     ours, theirs = results_of(tiny_copy), results_of(tiny)
     assert ours.keys() == theirs.keys()
     assert [name for name in ours if ours[name] != theirs[name]] == []
-
-
-@pytest.mark.nightly
-def test_a_full_disk_is_said_and_the_run_goes_on(tiny: Path, tmp_path: Path) -> None:
-    """Results on a file system of their own, with no room for the page."""
-    study = tmp_path / "study"
-    shutil.copytree(tiny, study, ignore=shutil.ignore_patterns("results"))
-    disk = study / "results"
-    disk.mkdir()
-    tmpfs = ["mount", "-t", "tmpfs", "-o", "size=60m", "tmpfs", str(disk)]
-    if subprocess.run(tmpfs, capture_output=True, check=False).returncode:
-        pytest.skip("mounting a small file system takes root")
-    try:
-        shutil.copytree(tiny / "results", disk, dirs_exist_ok=True)
-        page = disk / "report.html"
-        half = page.stat().st_size // 2
-        page.unlink()
-        filler = disk / "filler"
-        filler.write_bytes(bytes(shutil.disk_usage(disk).free - half))
-        full = snakemake(study, config=TINY)
-        left = page.exists()
-        filler.unlink()
-        run = snakemake(study, config=TINY)
-        results = results_of(study)
-    finally:
-        subprocess.run(["umount", str(disk)], check=True)
-    assert full.status == 1
-    # On a terminal's width.
-    assert "cannot be written: No space left on device" in " ".join(full.output.split())
-    assert not left
-    assert run.status == 0, run.output
-    assert results == results_of(tiny)
-
-
-def test_a_trace_edited_after_a_run_is_read_again(tiny_copy: Path) -> None:
-    trace = tiny_copy / "mine.csv"
-    header, *rows = trace.read_text().splitlines()
-    readings = [(time_s, float(reading)) for time_s, reading in (row.split(",") for row in rows)]
-    lower = [f"{time_s},{0.9 * reading:.6e}" for time_s, reading in readings]
-    trace.write_text("\n".join([header, *lower, ""]))
-    before = (tiny_copy / "results/identifications/mine.csv").read_bytes()
-    run = snakemake(tiny_copy, "--", "results/identifications/mine.csv", config=TINY)
-    assert run.status == 0, run.output
-    assert (tiny_copy / "results/identifications/mine.csv").read_bytes() != before

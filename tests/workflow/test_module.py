@@ -10,9 +10,10 @@ import pytest
 import yaml
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import TINY, Run
+from tests.helpers.runs import TINY, Run, called
 
 ONE_CASE = {
+    "seeds": 1,
     "methods": ["genetic"],
     "identifiability": {"coverage_seeds": 0},
     "only": ["liquid_drop_2"],
@@ -33,17 +34,7 @@ rule mine:
 def host(folder: Path, text: str, *arguments: str) -> Run:
     """Run a Snakefile of the host's in a folder."""
     (folder / "Snakefile").write_text(text)
-    command = [sys.executable, "-m", "snakemake", "-j2", "--workflow-profile", "none"]
-    done = subprocess.run(
-        [*command, *arguments],
-        cwd=folder,
-        env={**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=600,
-    )
-    return Run(done.returncode, done.stdout)
+    return called(folder, "-j2", "--workflow-profile", "none", *arguments)
 
 
 def test_without_config_it_is_the_papers_study(tmp_path: Path) -> None:
@@ -103,12 +94,15 @@ use rule identification from biogrip as biogrip_identification with:
     )
 
 
-def test_a_wrong_value_in_a_module_is_one_message(tmp_path: Path) -> None:
-    text = f"{MODULE}    config: {{'seedz': 2}}\n\nuse rule * from biogrip as biogrip_*\n"
-    run = host(tmp_path, text, "-n")
-    assert run.status == 1
-    assert "seedz: unknown key. Did you mean 'seeds'?" in run.output
-    assert "Traceback" not in run.output
+def test_a_wrong_value_in_a_module_is_one_message_and_nothing_is_published(tmp_path: Path) -> None:
+    text = "{MODULE}    config: {config!r}\n\nuse rule * from biogrip as biogrip_*\n"
+    wrong = host(tmp_path, text.format(MODULE=MODULE, config={"seedz": 2}), "-n")
+    assert wrong.status == 1
+    assert "seedz: unknown key. Did you mean 'seeds'?" in wrong.output
+    assert "Traceback" not in wrong.output
+    used = text.format(MODULE=MODULE, config=CONFIG)
+    assert host(tmp_path, used, "--", "biogrip_publish").status == 1
+    assert "nothing in whose place" in (tmp_path / "results/logs/publish.log").read_text()
 
 
 @pytest.mark.nightly

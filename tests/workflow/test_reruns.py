@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from biogrip.study.source import overlaid
 from tests.helpers.places import ROOT
-from tests.helpers.planned import changed, dry_run, jobs_of, planned, results_of
-from tests.helpers.runs import TINY, snakemake
+from tests.helpers.runs import TINY, dry_run, planned, results_of, snakemake
 
 # Of the study: what puts all cases together.
 STUDY = {"figures": 1, "tables": 1, "claims": 1, "page": 1}
@@ -37,7 +37,6 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         {"genetic_algorithm": {"max_generations": 5}},
         {"identification": 3} | RECORDED | STUDY,
     ),
-    "tolerance": ({"evaluation": {"near_noise_tolerance": 0.03}}, RECORDED | STUDY),
     "seeds": (
         {"seeds": 7},
         {"measurement": 5, "identification": 10, "model_fits": 5, "model_errors": 1}
@@ -50,21 +49,31 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
 @pytest.mark.parametrize("name", CHANGES)
 def test_what_uses_a_setting_runs_again_and_nothing_else(tiny: Path, name: str) -> None:
     change, expected = CHANGES[name]
-    assert planned(tiny, config=changed(TINY, change)) == expected
+    assert planned(tiny, config=overlaid(TINY, change)) == expected
 
 
 def test_a_dry_run_says_which_setting_changed_from_what_to_what(tiny: Path) -> None:
-    told = dry_run(tiny, config=changed(TINY, {"evaluation": {"near_noise_tolerance": 0.03}}))
+    """Of the command line, from which a number in a block comes as text."""
+    block = "evaluation={near_noise_tolerance: 0.03}"
+    told = dry_run(tiny, "--config", block, config=TINY)
+    assert told.jobs == RECORDED | STUDY
     for when, value in (("before", 0.02), ("now", 0.03)):
         evaluation = f"'evaluation': {{'optimum_tolerance': 1.0, 'near_noise_tolerance': {value}}}"
         assert re.search(rf"{when}: {{[^:]*{evaluation}", told.output)
+
+
+def test_an_edited_trace_is_read_again(tiny_copy: Path) -> None:
+    with (tiny_copy / "mine.csv").open("a") as trace:
+        trace.write("400.5,1e-3\n")
+    again = {"recording": 1, "identification": 2, "recorded_judgement": 1, "case_tables": 1}
+    assert planned(tiny_copy, "results/identifications/mine.csv", config=TINY) == again
 
 
 def test_five_seeds_more_keep_what_there_is(tiny_copy: Path) -> None:
     """And the rows of the seeds that were there have the same bytes."""
     file = tiny_copy / "results/identifications/liquid_drop_2.csv"
     few = set(file.read_text().splitlines())
-    more = changed(TINY, {"seeds": 3, "batch_size": 2})
+    more = overlaid(TINY, {"seeds": 3, "batch_size": 2})
     run = snakemake(tiny_copy, "--", str(file.relative_to(tiny_copy)), config=more)
     assert run.status == 0, run.output
     many = file.read_text().splitlines()
@@ -78,12 +87,10 @@ def test_an_edit_of_the_library_runs_everything_again_and_is_named(
     for name in ("src", "config", "results/published"):
         shutil.copytree(ROOT / name, tmp_path / name)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "src"))
-    # What is published is elsewhere now, which claims are judged by.
-    assert planned(tiny).keys() <= {"claims", "page"}
     with (tmp_path / "src" / "biogrip" / "arrays.py").open("a") as module:
         module.write("# An edit.\n")
-    told = dry_run(tiny)
-    assert jobs_of(told)["target"] == jobs_of(told)["recording"] == 1
+    told = dry_run(tiny, config=TINY)
+    assert told.jobs["target"] == told.jobs["recording"] == 1
     assert re.search(r"before: .*'source': '\w+'.* now: .*'source': '\w+'", told.output)
 
 

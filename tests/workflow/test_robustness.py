@@ -7,9 +7,9 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from biogrip.study.source import overlaid
 from tests.helpers.pictures import assert_drawn
-from tests.helpers.planned import changed, planned
-from tests.helpers.runs import snakemake
+from tests.helpers.runs import planned, snakemake
 
 pytestmark = pytest.mark.nightly
 
@@ -72,6 +72,6 @@ def test_the_page_shows_heat_maps_but_no_figure_of_a_point(study: Path) -> None:
 def test_a_value_more_runs_its_own_points_alone(study: Path, tmp_path: Path) -> None:
     study = shutil.copytree(study, tmp_path / "study")
     rows = {"values": [0.3, 0.1, 0.0]}
-    more = changed(SWEEP, {"sweeps": {"small": {"rows": rows}}})
+    more = overlaid(SWEEP, {"sweeps": {"small": {"rows": rows}}})
     jobs = planned(study, TABLE, config=more)
     assert jobs == {"target": 2, "measurement": 2, "identification": 4, "sweep": 1}

@@ -122,11 +122,3 @@ def test_snakemakes_report_shows_tables_figures_and_pages(tiny: Path, tmp_path: 
         assert f'"{item}"' in page
     for kind in ("data:text/html", "data:image/png"):
         assert kind in page
-
-
-def test_nothing_to_compare_with_is_no_success(tiny_copy: Path) -> None:
-    """A config of another name has nothing published."""
-    run = snakemake(tiny_copy, "--", "check", config=TINY)
-    assert run.status == 1
-    said = (tiny_copy / "results" / "logs" / "check.log").read_text()
-    assert said.endswith("overlay/tables: holds no tables to compare with.\n")

@@ -1,9 +1,9 @@
 """The results beside those that are published: compared, or put in their place."""
 
-# A config of the same name has its published results in a folder of its own.
-OVERLAYS = [Path(file).stem for file in workflow.overwrite_configfiles]
-# What has no name, on the command line or of a module, has nothing published.
-OVERLAY = OVERLAYS[-1] if OVERLAYS else "unnamed" if config else ""
+# A config of the same name has its published results in a folder of its own. What has no name, on
+# the command line or of a module, has nothing published.
+OVERLAYS = ["unnamed" if config else "", *(Path(it).stem for it in workflow.overwrite_configfiles)]
+OVERLAY = OVERLAYS[-1]
 PUBLISHED = shipped("results/published") / OVERLAY
 
 
@@ -31,8 +31,8 @@ rule check:
 
 rule publish:
     input:
-        tables=published("tables", ".csv", ".md", ".tex"),
-        figures=published("figures", ".png", ".pdf"),
+        published("tables", ".csv", ".md", ".tex"),
+        published("figures", ".png", ".pdf"),
     log:
         "results/logs/publish.log",
     localrule: True
@@ -40,10 +40,8 @@ rule publish:
         published=PUBLISHED,
     message:
         "Publishing the tables and figures"
-    shell:
-        "mkdir -p {params.published:q}/tables {params.published:q}/figures 2> {log:q} && "
-        "cp {input.tables:q} {params.published:q}/tables 2>> {log:q} && "
-        "cp {input.figures:q} {params.published:q}/figures 2>> {log:q}"
+    script:
+        "../scripts/publish.py"
 
 
 # The picture of these rules in the documentation; `make docs` draws it.

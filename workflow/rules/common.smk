@@ -8,14 +8,12 @@ from snakemake.exceptions import WorkflowError
 
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
-from biogrip.stages.job import batch_names
-from biogrip.stages.job import keys_of_cases, settings, software
+from biogrip.stages.job import batch_names, keys_of_cases, settings, software
 from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.config import StudyConfig
-from biogrip.study.source import default_config, shipped
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.measurement_block import MeasurementBlock
-from biogrip.study.source import overlaid
+from biogrip.study.source import default_config, overlaid, shipped
 
 
 def usable(read, *given):
@@ -54,11 +52,6 @@ def settings_of(*keys):
     return {"software": {"software": SOFTWARE}} | {key: of(key) for key in keys}
 
 
-def method_settings(wildcards):
-    """The blocks of the config that the method of a job reads."""
-    return settings(STUDY, METHODS[wildcards.method].blocks, wildcards.case)
-
-
 @cache
 def batches(case, stage):
     """The batches of the traces of a case, or of those that its intervals are tested with."""
@@ -78,19 +71,14 @@ def files(pattern, cases):
     ]
 
 
-def of_case(pattern):
-    """The files of the case of a job."""
-    return lambda wildcards: files(pattern, [wildcards.case])
+def of_case(pattern, cases=STUDY.cases):
+    """The files of the case of a job, if it is one of some cases."""
+    return lambda wildcards: files(pattern, [case for case in [wildcards.case] if case in cases])
 
 
 def first_traces(cases):
     """The files of measurements with the traces that are judged."""
     return [files("results/measurements/{case}/{batch}.parquet", [case])[0] for case in cases]
-
-
-def only_of(cases, pattern):
-    """The file of a job's case, if it is one of some cases."""
-    return lambda wildcards: (files(pattern, [wildcards.case]) if wildcards.case in cases else [])
 
 
 def names(cases):
@@ -103,7 +91,7 @@ SIMULATED = [*STUDY.simulated, *STUDY.points]
 CALIBRATED = [n for n in [*STUDY.cases, *STUDY.points] if STUDY.case(n).is_calibrated]
 SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
 COUNTED = [name for name in STUDY.covered if STUDY.case(name).verdicts_every == 1]
-calibration_of = only_of(CALIBRATED, "results/calibrations/{case}.yaml")
+calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 
 # Tables and figures of the study, of what there is in it, and those of a case.
 TABLES = ["errors", "gene_ranges", "parameter_ranges"]
@@ -129,11 +117,6 @@ def case_figure_names(simulated, valley):
     return drawn + ["valley"] if valley else drawn
 
 
-def figures_of(case):
-    """Names of the figures of a case."""
-    return case_figure_names(case in STUDY.simulated, STUDY.case(case).has_valley)
-
-
 # All of them with the case or the sweep that they are of.
 SHOWN = {
     "tables": [
@@ -143,7 +126,11 @@ SHOWN = {
     ],
     "figures": [
         *((name, "") for name in FIGURES),
-        *((name, case) for case in STUDY.cases for name in figures_of(case)),
+        *(
+            (name, case)
+            for case, its in STUDY.cases.items()
+            for name in case_figure_names(not its.recorded, its.has_valley)
+        ),
         *(("robustness", sweep) for sweep in STUDY.sweeps),
     ],
 }

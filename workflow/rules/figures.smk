@@ -15,8 +15,8 @@ rule case_figures:
         history="results/histories/{case}.parquet",
         measurements=of_case("results/measurements/{case}/{batch}.parquet"),
         verdicts="results/identifiability/{case}.json",
-        expected=only_of(STUDY.simulated, "results/identifiability/expected/{case}.json"),
-        target=only_of(STUDY.simulated, "results/targets/{case}.csv"),
+        expected=of_case("results/identifiability/expected/{case}.json", STUDY.simulated),
+        target=of_case("results/targets/{case}.csv", STUDY.simulated),
         calibrated=calibration_of,
     output:
         *case_figures(simulated=True, valley=True),

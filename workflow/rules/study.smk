@@ -87,7 +87,7 @@ rule identification:
         runtime=120,
     params:
         **settings_of("study_seed", *PROBLEM),
-        method=method_settings,
+        method=lambda wildcards: settings(STUDY, METHODS[wildcards.method].blocks, wildcards.case),
     message:
         "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
     script:
@@ -97,7 +97,7 @@ rule identification:
 rule judgement:
     input:
         measurements=lambda wildcards: first_traces([wildcards.case]),
-        target=only_of(STUDY.simulated, "results/targets/{case}.csv"),
+        target=of_case("results/targets/{case}.csv", STUDY.simulated),
         calibrated=calibration_of,
     output:
         verdicts="results/identifiability/{case}.json",

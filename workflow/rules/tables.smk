@@ -6,7 +6,7 @@ rule case_tables:
         batches=of_case("results/identifications/{case}/{method}/{batch}.csv"),
         histories=of_case("results/histories/{case}/{method}/{batch}.parquet"),
         verdicts="results/identifiability/{case}.json",
-        expected=only_of(STUDY.simulated, "results/identifiability/expected/{case}.json"),
+        expected=of_case("results/identifiability/expected/{case}.json", STUDY.simulated),
     output:
         identifications="results/identifications/{case}.csv",
         history="results/histories/{case}.parquet",
@@ -75,11 +75,10 @@ rule claims:
         + files("results/tables/verdicts_{case}.csv", STUDY.cases),
         # As published, since these sweeps take longer than the study.
         sweeps=[
-            str(shipped(f"results/published/{overlay}/tables/{name}.csv"))
-            for overlay, name in (
-                ("robustness", "robustness_noise"),
-                ("robustness", "robustness_gripper"),
-                ("interpretations", "interpretations"),
+            str(shipped(f"results/published/{sweep}.csv"))
+            for sweep in (
+                *(f"robustness/tables/robustness_{name}" for name in ("noise", "gripper")),
+                "interpretations/tables/interpretations",
             )
         ],
     output:

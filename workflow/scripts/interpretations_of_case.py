@@ -3,7 +3,9 @@
 from pathlib import Path
 
 from biogrip.stages.job import job_case, logged
-from biogrip.stages.sweeps import read
+from biogrip.stages.sweeps import identify_interpreted
 
 with logged(snakemake):
-    read(job_case(snakemake), Path(snakemake.input.target), Path(snakemake.output.rows))
+    identify_interpreted(
+        job_case(snakemake), Path(snakemake.input.target), Path(snakemake.output.rows)
+    )

@@ -18,8 +18,8 @@ from biogrip.figures.style import (
     is_over_decades,
     scale_of_fit,
 )
+from biogrip.records.identifications import read_verdicts
 from biogrip.records.traces import read_measurements
-from biogrip.records.verdicts import read_verdicts
 from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case
 

@@ -32,8 +32,7 @@ from biogrip.figures.style import (
     row_of_panels,
 )
 from biogrip.judging.likelihood import CERTAIN
-from biogrip.records.identifications import read_identifications
-from biogrip.records.verdicts import read_verdicts
+from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.study.study import Case
 from biogrip.tables.verdicts import target_of
 

@@ -29,8 +29,7 @@ from biogrip.figures.style import (
 )
 from biogrip.fit.methods import near_noise, near_noise_words
 from biogrip.physics.models import Truth
-from biogrip.records.identifications import read_identifications
-from biogrip.records.verdicts import bounded_on_a_side, read_verdicts
+from biogrip.records.identifications import bounded_on_a_side, read_identifications, read_verdicts
 from biogrip.study.study import Study
 
 # End of the axis of identified over target values, on both sides of 1.

@@ -26,9 +26,8 @@ from biogrip.judging.fisher import bound
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.noise import standard_deviation
-from biogrip.records.identifications import read_identifications
+from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.records.traces import read_target
-from biogrip.records.verdicts import read_verdicts
 from biogrip.study.study import Case
 
 # Bound of a logarithm above which an axis shows decades instead of percent.

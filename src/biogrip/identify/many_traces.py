@@ -24,9 +24,8 @@ from biogrip.identify.outputs import WRITTEN_BY, name_in_units
 from biogrip.identify.trace_case import TraceCase
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION
 from biogrip.processes import worker_processes
-from biogrip.progress import Progress
 from biogrip.records.rows import read_rows, write_rows
-from biogrip.terminal import visible, visible_lines
+from biogrip.terminal import Progress, visible, visible_lines
 
 # Most traces of a batch, and most readings of traces that are fitted together.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000

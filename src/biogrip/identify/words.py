@@ -13,7 +13,7 @@ from biogrip.judging.verdicts import (
     DETERMINED,
     NOT_DETERMINED,
 )
-from biogrip.records.verdicts import FIT_REJECTED
+from biogrip.records.identifications import FIT_REJECTED
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
 

@@ -22,8 +22,8 @@ from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.page import answers
 from biogrip.page.explorer import explorer, fits_of
+from biogrip.records.identifications import read_verdicts
 from biogrip.records.rows import read_table
-from biogrip.records.verdicts import read_verdicts
 from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case, Study
 from biogrip.tables.verdicts import target_of

@@ -1,16 +1,9 @@
-"""Identified parameters, histories and processor times: a row per seed and method.
+"""Results of stages: what was identified, a row a seed, and verdicts on a trace, JSON.
 
-Misfit of each sample model: a row per model and seed.
-
-Estimates with intervals: a row per quantity and seed.
-
-Quantities that traces should determine have an estimate, its limits, and the estimate with
-uninformed parameters fixed at their true values. For some seeds, all quantities also have the
-verdict and limits that users are shown, from whole profiles.
-
-Difference of the linear from the nonlinear model: a row per case, angle and torque.
-
-Identifications by the genetic algorithm, a row for each interpretation of the paper and seed.
+Identifications by each method have a row per seed, with histories beside them and processor times,
+which are not reproducible, in a file of their own. Further files of rows have the fits of every
+sample model, the intervals of coverage tests, the difference of the linear from the nonlinear
+model, and identifications under other interpretations of the paper.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,28 +14,83 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.digits import significant
+from biogrip.digits import round_increase, rounded_numbers, significant
 from biogrip.errors import BiogripError
 from biogrip.fit.problem import Identification
+from biogrip.judging.doubts import (
+    REJECTED,
+    REJECTION,
+    Note,
+    compute_status,
+    find_reasons,
+    order_notes,
+)
 from biogrip.physics.sample_model import SINGLE_BRANCH, Parameter, SampleModel
-from biogrip.records.rows import RowFile, read_frame, write_rows
-from biogrip.records.traces import Table, table_of, write_tables
+from biogrip.records.rows import (
+    RowFile,
+    read_frame,
+    read_object,
+    read_parquet,
+    write_parquet,
+    write_rows,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from biogrip.judging.diagnosis import Diagnosis
+    from biogrip.judging.verdicts import Finding
+
 # Few enough that results on different processors agree.
 _DIGITS = 8
+
+LEADING = ("case", "method", "seed")
+TRAILING = ("misfit", "noise_rms", "generations", "evaluations", "stop_reason")
 
 TIMINGS = RowFile(
     "processor times",
     ("case", "method", "seed", "cpu_s"),
     "results/timings/{case}/{method}/{batch}.csv",
 )
-"""Processor time of each seed, in a file of its own since times are not reproducible."""
 
-LEADING = ("case", "method", "seed")
-TRAILING = ("misfit", "noise_rms", "generations", "evaluations", "stop_reason")
+MODEL_FITS = RowFile(
+    "fits of models",
+    ("case", "model", "seed", "parameters", "samples", "misfit"),
+    "results/selection/{case}/{batch}.csv",
+)
+
+INTERVALS = RowFile(
+    "intervals",
+    (
+        *("case", "quantity", "seed", "estimate", "low", "high", "estimate_rest_known"),
+        *("verdict", "shown_low", "shown_high"),
+    ),
+    "results/coverage/{case}/{batch}.csv",
+    words=("verdict",),
+)
+"""A row per quantity and seed. Quantities that traces should determine have an estimate, its
+limits, and the estimate with uninformed parameters fixed at their true values. For some seeds, all
+quantities also have the verdict and limits that users are shown, from whole profiles."""
+
+DIFFERENCES = RowFile(
+    "a comparison",
+    ("case", "reference_angle_deg", "torque_factor", "difference_over_peak"),
+    "results/linearisation.csv",
+)
+
+INTERPRETATIONS = RowFile(
+    "interpretations",
+    (
+        *("case", "interpretation", "seed"),
+        *(parameter.column for parameter in SINGLE_BRANCH),
+        *("misfit", "noise_rms", "last_improvement"),
+    ),
+    "results/interpretations/{case}.csv",
+    words=("interpretation",),
+)
+
+FIT_REJECTED = "fit rejected"
+"""Verdict on every quantity of a fit that is rejected."""
 
 
 def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
@@ -79,19 +127,61 @@ class Record:
     cpu_s: float
     """Processor time in seconds; the mean over seeds that are identified together."""
 
+    def by_column(self, identified: Array) -> dict[str, Any]:
+        """Return identified values, (n_searched, ...), fixed ones, and 0 for missing elements."""
+        values = {**self.fixed, **dict(zip(self.searched.names, identified, strict=True))}
+        return {p.column: values.get(p.name, 0.0) for p in parameters_in_file(self.model)}
+
 
 def write_identifications(path: Path, records: list[Record]) -> None:
-    """Write one row per seed as CSV; elements that the model lacks are 0.
+    """Write one row per seed as CSV.
 
     Numbers have six significant digits: more than a trace determines, and few enough that
     results on different processors agree.
     """
-    write_rows(path, columns(records[0].model), map(_row, records))
+    rows = (
+        (
+            *(record.case, record.method, record.seed),
+            *(f"{value:.6g}" for value in record.by_column(record.answer.parameters).values()),
+            f"{record.answer.misfit_rad:.6e}",
+            "" if record.noise_rms is None else f"{record.noise_rms:.6e}",
+            *(record.answer.generations, record.answer.evaluations, record.answer.stop_reason),
+        )
+        for record in records
+    )
+    write_rows(path, columns(records[0].model), rows)
 
 
 def write_histories(path: Path, records: list[Record]) -> None:
     """Write one row per seed and generation as Parquet, with eight significant digits."""
-    write_tables(path, [_history(record) for record in records])
+    import pandas as pd
+
+    write_parquet(path, pd.concat(map(_history, records)))
+
+
+def _history(record: Record) -> "pd.DataFrame":
+    import pandas as pd
+
+    history = record.answer.history
+    generations = len(history.best_misfit)
+    found = {
+        "best_misfit": history.best_misfit,
+        "median_misfit": history.median_misfit,
+        **record.by_column(history.best_parameters.T),
+    }
+    return pd.DataFrame(
+        {
+            "case": record.case,
+            "method": record.method,
+            "seed": record.seed,
+            "generation": np.arange(generations),
+            "evaluations": history.evaluations,
+            **{
+                name: significant(np.broadcast_to(values, generations), _DIGITS)
+                for name, values in found.items()
+            },
+        }
+    )
 
 
 def write_timings(path: Path, records: list[Record]) -> None:
@@ -116,112 +206,88 @@ def read_histories(
     values: Sequence[str],
     chosen: "Callable[[pd.Series[int]], pd.Series[bool]]" = lambda seed: seed >= 0,
 ) -> "pd.DataFrame":
-    """Read columns of one method's histories of the chosen seeds, Parquet.
+    """Read columns of one method's histories of the chosen seeds."""
+    names = ["seed", "generation", *values]
+    frame = read_parquet(path, names, [("method", "==", method)])
+    return frame[chosen(frame["seed"])].reset_index(drop=True)
 
-    Raises
-    ------
-    BiogripError
-        If the file cannot be read.
+
+def diagnosis_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[str, Any]:
+    """Return a diagnosis and further notes as plain data in SI units, rounded.
+
+    In a study the case says what is read, and no name has its unit.
     """
-    import pandas as pd
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    columns = ["seed", "generation", *values]
-    try:
-        # Import of pandas' own Parquet reader would take a tenth of the memory.
-        with pq.ParquetFile(path, read_dictionary=["method"]) as file:
-            groups = (
-                file.read_row_group(group, ["method", *columns]).to_pandas()
-                for group in range(file.num_row_groups)
-            )
-            parts = [rows[chosen(rows["seed"]) & (rows["method"] == method)] for rows in groups]
-        return pd.concat(parts, ignore_index=True)[columns]
-    except (KeyError, OSError, TypeError, ValueError, pa.ArrowException) as error:
-        raise BiogripError(f"{path}: cannot be read as histories: {error}.") from error
+    data = rounded_numbers(exact_data(diagnosis, notes))
+    return {key.removesuffix("_rad"): value for key, value in data.items()}
 
 
-def _row(record: Record) -> tuple[str | int, ...]:
-    answer = record.answer
-    values = _by_name(record, answer.parameters)
-    return (
-        record.case,
-        record.method,
-        record.seed,
-        *(f"{values.get(p.name, 0.0):.6g}" for p in parameters_in_file(record.model)),
-        f"{answer.misfit_rad:.6e}",
-        "" if record.noise_rms is None else f"{record.noise_rms:.6e}",
-        answer.generations,
-        answer.evaluations,
-        answer.stop_reason,
-    )
+def exact_data(
+    diagnosis: "Diagnosis", notes: Sequence[Note] = (), on_reading: Sequence[Note] = ()
+) -> dict[str, Any]:
+    """Return a diagnosis like `diagnosis_data`, with only chi^2 increases rounded.
+
+    A rejected fit determines nothing: its quantities have the best fit as value, no limits, and
+    the verdict `FIT_REJECTED`; its misfit tells no noise. Notes that neither reject it nor are on
+    reading the file speak of results that it does not have, and are left out.
+    """
+    likelihood = diagnosis.likelihood
+    every = [*diagnosis.notes, *on_reading, *notes]
+    status = compute_status(every)
+    rejected = status == REJECTED
+    if rejected:
+        every = [note for note in every if note.weight == REJECTION or note in on_reading]
+    ordered = order_notes(every)
+    return {
+        "fit": status,
+        "reasons": find_reasons(ordered),
+        "samples": likelihood.problem.residuals.samples,
+        "misfit_rad": likelihood.misfit_rad,
+        "noise_rad": None if rejected else likelihood.noise_rad,
+        "scatter_rad": likelihood.problem.residuals.noise_scale_rad,
+        "threshold": likelihood.threshold,
+        "certainty": likelihood.certainty,
+        "quantities": [_finding(each, rejected=rejected) for each in diagnosis.findings],
+        "trades": [
+            {
+                "members": list(trade.members),
+                "words": trade.words(),
+                **_finding(trade.finding, rejected=False),
+            }
+            for trade in ([] if rejected else diagnosis.trades)
+        ],
+        **({"jaw_force": dict(vars(diagnosis.grip))} if diagnosis.grip else {}),
+        "notes": [dict(vars(note)) for note in ordered],
+    }
 
 
-def _by_name(record: Record, identified: Array) -> dict[str, Any]:
-    """Return identified and fixed values by parameter name."""
-    return {**record.fixed, **dict(zip(record.searched.names, identified, strict=True))}
+def read_verdicts(path: Path) -> dict[str, Any]:
+    """Read a file of verdicts."""
+    return read_object(path, "verdicts", {"quantities", "trades", "notes"}, "holds no verdicts")
 
 
-def _history(record: Record) -> Table:
-    history = record.answer.history
-    generations = len(history.best_misfit)
-    values = _by_name(record, history.best_parameters.T)
-    return table_of(
-        {
-            "case": record.case,
-            "method": record.method,
-            "seed": np.full(generations, record.seed, dtype=np.int64),
-            "generation": np.arange(generations, dtype=np.int64),
-            "evaluations": history.evaluations,
-            "best_misfit": significant(history.best_misfit, _DIGITS),
-            "median_misfit": significant(history.median_misfit, _DIGITS),
-            **{
-                p.column: significant(
-                    np.broadcast_to(values.get(p.name, 0.0), generations), _DIGITS
-                )
-                for p in parameters_in_file(record.model)
-            },
+def bounded_on_a_side(verdicts: dict[str, Any]) -> set[str]:
+    """Return the quantities whose verdict is not just an upper bound."""
+    return {q["quantity"] for q in verdicts["quantities"] if q["verdict"] != "bounded above"}
+
+
+def _finding(finding: "Finding", *, rejected: bool) -> dict[str, Any]:
+    profile = finding.profile
+    return {
+        "quantity": finding.quantity.label,
+        "symbol": finding.quantity.symbol,
+        "unit": finding.quantity.unit,
+        "verdict": FIT_REJECTED if rejected else finding.verdict,
+        "value": finding.value,
+        "low": None if rejected else finding.low,
+        "high": None if rejected else finding.high,
+        "excluded": [] if rejected else [[start, end] for start, end in finding.gaps],
+        "deviation": finding.deviation,
+        "provided": finding.quantity.provided,
+        "in_words": f"fit rejected: the best fit, {finding.best_in_words}, is not to be used"
+        if rejected
+        else finding.words(),
+        "profile": {
+            "values": [float(value) for value in np.exp(profile.log_values)],
+            "increases": [round_increase(float(increase)) for increase in profile.increases],
         },
-        generations,
-    )
-
-
-MODEL_FITS = RowFile(
-    "fits of models",
-    ("case", "model", "seed", "parameters", "samples", "misfit"),
-    "results/selection/{case}/{batch}.csv",
-)
-
-
-INTERVALS = RowFile(
-    "intervals",
-    (
-        *("case", "quantity", "seed", "estimate", "low", "high", "estimate_rest_known"),
-        *("verdict", "shown_low", "shown_high"),
-    ),
-    "results/coverage/{case}/{batch}.csv",
-    words=("verdict",),
-)
-
-
-DIFFERENCES = RowFile(
-    "a comparison",
-    ("case", "reference_angle_deg", "torque_factor", "difference_over_peak"),
-    "results/linearisation.csv",
-)
-
-
-INTERPRETATIONS = RowFile(
-    "interpretations",
-    (
-        "case",
-        "interpretation",
-        "seed",
-        *(parameter.column for parameter in SINGLE_BRANCH),
-        "misfit",
-        "noise_rms",
-        "last_improvement",
-    ),
-    "results/interpretations/{case}.csv",
-    words=("interpretation",),
-)
+    }

@@ -1,40 +1,32 @@
-"""Reader of JSON results that checks for required keys.
+"""How files between rules are written and read: CSV with a header, Parquet, JSON.
 
-CSV files with a header, written atomically and safe for spreadsheets.
+They are written atomically. Text that a spreadsheet would take for a formula is written to CSV with
+an apostrophe before it, and read without. A reader raises a `BiogripError` that names a file which
+is missing, damaged or of another kind.
 """
 
 import csv
 import json
 import re
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 from biogrip.errors import BiogripError
 from biogrip.files import atomic_write
 
-
-def read_object(path: Path, kind: str, keys: Set[str], lacking: str) -> dict[str, Any]:
-    """Read a JSON object of some kind, with a message if one of the required keys is lacking."""
-    try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise BiogripError(f"{path}: cannot be read as {kind}: {error}.") from error
-    if not keys <= set(found):
-        raise BiogripError(f"{path}: {lacking}.")
-    return found
-
-
 if TYPE_CHECKING:
     import pandas as pd
 
+# pandas is imported by what needs it: it takes half of the time that a short job has.
 
 # A cell that a spreadsheet takes for a formula, and signed numbers, which it does not.
 _FORMULA = re.compile(r"'*[=+@\t\r-]")
 _SIGNED = re.compile(r"[+-]\d+(\.\d+)?(e[+-]?\d+)?|-(inf)?")
-
+# With this end of a line, `csv` puts quotes around both of its characters in a cell.
 _END = "\r\n"
 
 
@@ -67,22 +59,11 @@ def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]
         # File names may hold bytes that are not valid text.
         scratch.open("w", encoding="utf-8", errors="backslashreplace", newline="") as stream,
     ):
-        writer = csv.writer(_Lines(stream), lineterminator=_END)
+        lines = SimpleNamespace(write=lambda row: stream.write(row.removesuffix(_END) + "\n"))
+        writer = csv.writer(lines, lineterminator=_END)
         for row in chain((columns,), rows):
-            writer.writerow(
-                [escape_formula(cell) if isinstance(cell, str) else cell for cell in row]
-            )
-
-
-class _Lines:
-    """Stream wrapper that ends lines with LF, while line ends inside quoted cells are kept."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-
-    def write(self, row: str) -> None:
-        """Write a row."""
-        self._stream.write(row.removesuffix(_END) + "\n")
+            cells = [escape_formula(cell) if isinstance(cell, str) else cell for cell in row]
+            writer.writerow(cells)
 
 
 def escape_formula(text: str) -> str:
@@ -120,21 +101,53 @@ def read_frame(
 
 def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str]]:
     """Read the header, which may have to be given columns, and all rows as text."""
+    import pandas as pd
+
     try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            rows = [[as_it_was(cell) for cell in row] for row in csv.reader(stream)]
-    except (OSError, ValueError, csv.Error) as error:
+        frame = pd.read_csv(path, header=None, dtype=str, na_filter=False)
+    except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read: {error}.") from error
-    if not rows:
-        raise BiogripError(f"{path}: is empty.")
+    rows: list[list[str]] = frame.map(as_it_was).to_numpy().tolist()
     if columns is not None and rows[0] != list(columns):
-        raise BiogripError(
-            f"{path}, line 1: found {','.join(rows[0])}; wanted {','.join(columns)}."
-        )
+        found, wanted = ",".join(rows[0]), ",".join(columns)
+        raise BiogripError(f"{path}, line 1: found {found}; wanted {wanted}.")
     return rows
 
 
 def read_table(path: Path) -> list[dict[str, str]]:
     """Read the rows of a table as text by column."""
     header, *rows = read_rows(path)
-    return [dict(zip(header, row, strict=False)) for row in rows]
+    return [dict(zip(header, row, strict=True)) for row in rows]
+
+
+def write_parquet(path: Path, columns: "Mapping[str, Any] | pd.DataFrame") -> None:
+    """Write columns, (n_rows,) each or the same in every row, as Parquet."""
+    import pandas as pd
+
+    with atomic_write(path) as scratch:
+        pd.DataFrame(columns).to_parquet(scratch, index=False)
+
+
+def read_parquet(
+    path: Path,
+    columns: Sequence[str] | None = None,
+    filters: Sequence[tuple[str, str, Any]] | None = None,
+) -> "pd.DataFrame":
+    """Read all or some columns of a Parquet file, of all rows or those of pandas' filters."""
+    import pandas as pd
+
+    try:
+        return pd.read_parquet(path, columns=columns, filters=filters)
+    except (OSError, TypeError, ValueError) as error:
+        raise BiogripError(f"{path}: cannot be read: {error}.") from error
+
+
+def read_object(path: Path, kind: str, keys: Set[str], lacking: str) -> dict[str, Any]:
+    """Read a JSON object of some kind, with a message if one of the required keys is lacking."""
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise BiogripError(f"{path}: cannot be read as {kind}: {error}.") from error
+    if not keys <= set(found):
+        raise BiogripError(f"{path}: {lacking}.")
+    return found

@@ -1,10 +1,9 @@
-"""Groups of traces that are fitted together, small enough for little memory.
+"""Identification of the sample in every noisy trace, by a method or with every sample model.
 
-Stage 3: identification of the sample's parameters in each noisy trace.
-
-Stage 4: identifications of a case joined from batches, a row per method and seed.
-
-Stage 4: fits of every sample model to every trace, for model selection.
+A job has a batch of the seeds of a case. `identify` writes what a method finds in each trace, with
+the history of its search; `join` puts the batches of a case together, a row per method and seed.
+`fit` writes the misfits of all sample models, for model selection. Traces are fitted in groups,
+which are small enough for little memory; results do not depend on the grouping.
 """
 
 import time
@@ -12,17 +11,13 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-import pyarrow.compute as pc
-import pyarrow.parquet as pq
+import pandas as pd
 
 from biogrip.arrays import parts
 from biogrip.errors import BiogripError
-from biogrip.files import atomic_write
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.methods import identifier
 from biogrip.fit.nested_fits import fit_models
 from biogrip.physics.noise import rms, stream
-from biogrip.progress import Progress
 from biogrip.records.identifications import (
     MODEL_FITS,
     Record,
@@ -31,15 +26,16 @@ from biogrip.records.identifications import (
     write_identifications,
     write_timings,
 )
-from biogrip.records.rows import read_rows, write_rows
-from biogrip.records.traces import Measurements, read_measurements
+from biogrip.records.rows import read_parquet, read_rows, write_parquet, write_rows
+from biogrip.records.traces import read_measurements
 from biogrip.study.study import Case
+from biogrip.terminal import Progress
 
 _JOINT = 63
 
 
 def groups(seeds: Sequence[int], times: int = 1) -> Iterator[Sequence[int]]:
-    """Return the seeds of a batch in groups; results do not depend on the grouping."""
+    """Return the seeds of a batch in groups."""
     return (seeds[some] for some in parts(len(seeds), times * _JOINT))
 
 
@@ -94,28 +90,16 @@ def join(
     header = columns(case.sample.model)
     rows = [row for batch in batches for row in read_rows(batch, header)[1:]]
     rows = [row for row in rows if int(row[2]) < case.seeds]
-    seeds = range(case.seeds)
-    if [(row[1], int(row[2])) for row in rows] != [
-        (m, s) for m in case.study.methods for s in seeds
-    ]:
-        names = ", ".join(str(batch) for batch in batches)
+    wanted = [(method, seed) for method in case.study.methods for seed in range(case.seeds)]
+    if [(row[1], int(row[2])) for row in rows] != wanted:
+        names, methods = ", ".join(map(str, batches)), ", ".join(case.study.methods)
         raise BiogripError(
-            f"{names}: do not hold each of the seeds 0 to {seeds[-1]} once for each of "
-            f"{', '.join(case.study.methods)}. Delete them and run again."
+            f"{names}: do not hold each of the seeds 0 to {case.seeds - 1} once for each of "
+            f"{methods}. Delete them and run again."
         )
     write_rows(parameters, header, rows)
-    with atomic_write(history) as scratch:
-        schema = pq.read_schema(history_batches[0])
-        with pq.ParquetWriter(scratch, schema) as joined:
-            for batch in history_batches:
-                # The data set API would import pandas.
-                with pq.ParquetFile(batch) as file:
-                    table = file.read()
-                joined.write_table(table.filter(pc.less(table["seed"], case.seeds)))
-
-
-def _problem(case: Case) -> CaseProblem:
-    return case.problem.to_identify(*(sample.model for sample in case.models.values()))
+    histories = pd.concat([read_parquet(batch) for batch in history_batches])
+    write_parquet(history, histories[histories["seed"] < case.seeds])
 
 
 def fit(
@@ -126,44 +110,33 @@ def fit(
     fits: Path,
 ) -> None:
     """Fit a batch of seeds by least squares with each model."""
-    case_problem = _problem(case).calibrated(calibrated)
+    models = {name: sample.model for name, sample in case.models.items()}
     recorded = read_measurements(measurements, list(seeds))
-    weighted = case_problem.weighted(recorded.sd_rad)
-    MODEL_FITS.write(fits, _rows(case, weighted, seeds, recorded))
-
-
-def _rows(
-    case: Case, case_problem: CaseProblem, seeds: Sequence[int], recorded: Measurements
-) -> Iterator[tuple[str | int, ...]]:
-    samples, study_seed = len(recorded.time_s), case.study.study_seed
-    progress = Progress(f"{case.name}, models", len(case.models) * len(seeds))
-    rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in case.models}
+    problem = case.problem.to_identify(*models.values()).calibrated(calibrated)
+    problem = problem.weighted(recorded.sd_rad)
+    progress = Progress(f"{case.name}, models", len(models) * len(seeds))
+    rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
     for group in groups(seeds):
-        traces = [case_problem.of(recorded.time_s, recorded.rotation_rad[seed]) for seed in group]
-        models = {name: sample.model for name, sample in case.models.items()}
+        traces = [problem.of(recorded.time_s, recorded.rotation_rad[seed]) for seed in group]
         found = fit_models(
             {
-                name: [case_problem.for_model(trace, model) for trace in traces]
+                name: [problem.for_model(trace, model) for trace in traces]
                 for name, model in models.items()
             },
             case.least_squares,
             {
-                name: [stream(study_seed, case.name, seed, f"model {name}") for seed in group]
+                name: [
+                    stream(case.study.study_seed, case.name, seed, f"model {name}")
+                    for seed in group
+                ]
                 for name in models
             },
             partial(progress.done, len(group)),
         )
         for name, answers in found.items():
+            sizes = len(models[name].names), len(recorded.time_s)
             rows[name] += [
-                (
-                    case.name,
-                    name,
-                    seed,
-                    len(models[name].names),
-                    samples,
-                    f"{answer.misfit_rad:.8e}",
-                )
+                (case.name, name, seed, *sizes, f"{answer.misfit_rad:.8e}")
                 for seed, answer in zip(group, answers, strict=True)
             ]
-    for of_model in rows.values():
-        yield from of_model
+    MODEL_FITS.write(fits, (row for of_model in rows.values() for row in of_model))

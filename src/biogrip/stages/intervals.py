@@ -1,11 +1,13 @@
-"""Full verdicts, as users are shown them, for some seeds of the coverage test.
+"""Estimates and intervals of many seeds, to test the coverage of limits and the spread of fits.
 
-Stage 4: estimates and intervals of many seeds, to test coverage and spread.
+Every seed is fitted by least squares, and quantities that traces should determine get limits from
+their profile likelihoods. A second estimate has parameters without information fixed at their true
+values, as the Cramér-Rao bound assumes. Some seeds get a full verdict as well, as users are shown
+it: multiples of `verdicts_every`, whatever the batch.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,58 +26,13 @@ from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding
 from biogrip.physics.noise import add_noise, standard_deviation, stream
 from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.progress import Progress
-from biogrip.records.identifications import INTERVALS
+from biogrip.records.identifications import INTERVALS, read_verdicts
 from biogrip.records.traces import read_target
-from biogrip.records.verdicts import read_verdicts
 from biogrip.stages.identification import groups
 from biogrip.study.study import Case
+from biogrip.terminal import Progress
 
 _MOST_RESTARTS = 3
-
-
-@dataclass(frozen=True)
-class Shown:
-    """Verdict on a quantity, and its limits."""
-
-    verdict: str
-    low: float | None
-    high: float | None
-
-
-def refitted(likelihood: Likelihood, missed: np.ndarray, confidence: float) -> Likelihood | None:
-    """Fit again, started at parameters of a chi^2 below the optimum's; None if it did not fall."""
-    fit = fit_from([likelihood.problem], missed)
-    misfit_rad = float(fit.misfit_rad[0])
-    if likelihood.increase(misfit_rad) > -MISSED:
-        return None
-    return make_likelihood(likelihood.problem, fit.x[0], misfit_rad, confidence=confidence)
-
-
-def shown_of(
-    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], confidence: float
-) -> Iterator[list[Shown]]:
-    """Yield verdicts on each trace, as `diagnose` gives them, for all quantities."""
-    current = list(likelihoods)
-    profiles = compute_profiles(current, quantities, smooth=False)
-    for _ in range(_MOST_RESTARTS):
-        lowest = [min(own, key=lambda each: float(each.increases.min())) for own in profiles]
-        again = {
-            index: new
-            for index, each in enumerate(lowest)
-            if each.increases.min() < -MISSED
-            and (new := refitted(current[index], each.lowest, confidence)) is not None
-        }
-        if not again:
-            break
-        renewed = compute_profiles(list(again.values()), quantities, smooth=False)
-        for (index, likelihood), own in zip(again.items(), renewed, strict=True):
-            current[index], profiles[index] = likelihood, own
-    for own in profiles:
-        findings = [Finding(q, profile, 0.0) for q, profile in zip(quantities, own, strict=True)]
-        yield [Shown(found.verdict, found.low, found.high) for found in findings]
-
-
 # Significant digits, and those of values known to within a relative `_NARROW`.
 _DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3
 # Local fits need less memory per seed than populations.
@@ -90,25 +47,15 @@ def estimate(
     calibrated: list[Path],
     intervals: Path,
 ) -> None:
-    """Fit a batch of seeds by least squares, and compute intervals of determined quantities.
+    """Fit a batch of seeds, and compute intervals of what `expected` verdicts call determined.
 
-    The noise of a seed is that of its measurement. A second estimate has parameters without
-    information fixed at their true values, as the Cramér-Rao bound assumes. Some seeds get a full
-    verdict as well, as users are shown it: multiples of `verdicts_every`, whatever the batch.
+    The noise of a seed is that of its measurement.
     """
     case_problem = case.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
-    INTERVALS.write(
-        intervals, _rows(case, case_problem, seeds, time_s, rotation, _determined(expected))
-    )
-
-
-@dataclass(frozen=True)
-class _Quantities:
-    """All quantities, and indices of those that traces should determine."""
-
-    every: list[Quantity]
-    selected: list[int]
+    found = read_verdicts(expected)["quantities"]
+    determined = {item["quantity"] for item in found if item["verdict"] == DETERMINED}
+    INTERVALS.write(intervals, _rows(case, case_problem, seeds, time_s, rotation, determined))
 
 
 def _rows(
@@ -117,32 +64,39 @@ def _rows(
     seeds: Sequence[int],
     time_s: Array,
     rotation: Array,
-    selected: set[str],
+    determined: set[str],
 ) -> Iterator[tuple[str | int, ...]]:
     every = parameters_and_sum(case_problem.searched)
-    chosen = _Quantities(every, [i for i, q in enumerate(every) if q.label in selected])
+    selected = [index for index, quantity in enumerate(every) if quantity.label in determined]
     rest_known, informed, truth = _rest_known(case, case_problem, time_s, rotation)
     progress = Progress(f"{case.name}, intervals", len(seeds))
     # Combine groups until they hold enough seeds with full verdicts.
     for some in groups(seeds, case.verdicts_every):
-        lines: dict[int, list[list[str]]] = {}
+        estimates: dict[int, list[list[str]]] = {}
         in_full: dict[int, Likelihood] = {}
         for group in groups(some, _TIMES):
-            traces = _traces(case, group, time_s, rotation)
-            likelihoods, limits = _fitted(case, case_problem, group, time_s, traces, chosen)
+            rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in group]
+            traces = [add_noise(rotation, case.noise, rng, time_s) for rng in rngs]
+            quantities = [every[index] for index in selected]
+            likelihoods, limits = _fitted(case, case_problem, group, time_s, traces, quantities)
             known = np.tile(truth, (len(group), 1))
             if len(informed):
                 simpler = [case_problem.of(time_s, trace, rest_known) for trace in traces]
                 known[:, informed] = fit_from(simpler, truth[informed]).x
             for index, seed in enumerate(group):
+                with_limits = dict(zip(selected, limits[index], strict=True))
                 best = likelihoods[index].best
-                lines[seed] = _lines(chosen, best, limits[index], known[index])
+                estimates[seed] = _estimates(every, best, with_limits, known[index])
                 if seed % case.verdicts_every == 0:
                     in_full[seed] = likelihoods[index]
             progress.done(len(group))
-        shown = shown_of(list(in_full.values()), chosen.every, case.confidence)
-        verdicts = dict(zip(in_full, shown, strict=True))
-        yield from _of_seeds(case.name, chosen, lines, verdicts)
+        shown = shown_of(list(in_full.values()), every, case.confidence)
+        findings = dict(zip(in_full, shown, strict=True))
+        for seed, of_seed in estimates.items():
+            for index, (quantity, texts) in enumerate(zip(every, of_seed, strict=True)):
+                verdict = _verdict(findings[seed][index]) if seed in findings else ["", "", ""]
+                if seed in findings or index in selected:
+                    yield case.name, quantity.label, seed, *texts, *verdict
 
 
 def _rest_known(
@@ -158,18 +112,13 @@ def _rest_known(
     return with_fixed(case_problem.searched, given), informed, truth
 
 
-def _traces(case: Case, group: Sequence[int], time_s: Array, rotation: Array) -> list[Array]:
-    rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in group]
-    return [add_noise(rotation, case.noise, rng, time_s) for rng in rngs]
-
-
 def _fitted(
     case: Case,
     case_problem: CaseProblem,
     group: Sequence[int],
     time_s: Array,
     traces: list[Array],
-    chosen: _Quantities,
+    quantities: Sequence[Quantity],
 ) -> tuple[list[Likelihood], Array]:
     """Return optima of a group and their limits; refit where a profile has a lower chi^2."""
     rngs = [stream(case.study.study_seed, case.name, seed, "coverage") for seed in group]
@@ -178,7 +127,6 @@ def _fitted(
         make_likelihood(problem, np.log(each.parameters), each.misfit_rad, confidence=confidence)
         for problem, each in _optima(case, case_problem, time_s, traces, rngs)
     ]
-    quantities = [chosen.every[index] for index in chosen.selected]
     limits, missed = find_limits(found, quantities)
     for trace, x in missed.items():
         if (again := refitted(found[trace], x, confidence)) is not None:
@@ -208,36 +156,53 @@ def _optima(
         yield fit.problem, fit.found
 
 
-def _lines(chosen: _Quantities, best: Array, limits: Array, known: Array) -> list[list[str]]:
+def refitted(likelihood: Likelihood, missed: Array, confidence: float) -> Likelihood | None:
+    """Fit again, started at parameters of a chi^2 below the optimum's; None if it did not fall."""
+    fit = fit_from([likelihood.problem], missed)
+    misfit_rad = float(fit.misfit_rad[0])
+    if likelihood.increase(misfit_rad) > -MISSED:
+        return None
+    return make_likelihood(likelihood.problem, fit.x[0], misfit_rad, confidence=confidence)
+
+
+def shown_of(
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], confidence: float
+) -> Iterator[list[Finding]]:
+    """Yield verdicts on each trace, as `diagnose` gives them, for all quantities."""
+    current = list(likelihoods)
+    profiles = compute_profiles(current, quantities, smooth=False)
+    for _ in range(_MOST_RESTARTS):
+        lowest = [min(own, key=lambda each: float(each.increases.min())) for own in profiles]
+        again = {
+            index: new
+            for index, each in enumerate(lowest)
+            if each.increases.min() < -MISSED
+            and (new := refitted(current[index], each.lowest, confidence)) is not None
+        }
+        if not again:
+            break
+        renewed = compute_profiles(list(again.values()), quantities, smooth=False)
+        for (index, likelihood), own in zip(again.items(), renewed, strict=True):
+            current[index], profiles[index] = likelihood, own
+    for own in profiles:
+        yield [Finding(q, profile, 0.0) for q, profile in zip(quantities, own, strict=True)]
+
+
+def _estimates(
+    every: Sequence[Quantity], best: Array, with_limits: Mapping[int, Array], known: Array
+) -> list[list[str]]:
     """Return estimate, limits and estimate with the rest fixed for every quantity, as text."""
-    lines = [[_text(quantity.log(best), _DIGITS), "", "", ""] for quantity in chosen.every]
-    for which, index in enumerate(chosen.selected):
-        quantity, (low, high) = chosen.every[index], limits[which]
-        digits = _MORE_DIGITS if high - low < _NARROW else _DIGITS
-        found = quantity.log(best), low, high, quantity.log(known)
-        lines[index] = [_text(logarithm, digits) for logarithm in found]
-    return lines
+    texts = []
+    for index, quantity in enumerate(every):
+        logs, digits = [quantity.log(best), math.nan, math.nan, math.nan], _DIGITS
+        if index in with_limits:
+            low, high = with_limits[index]
+            logs[1:] = low, high, quantity.log(known)
+            digits = _MORE_DIGITS if high - low < _NARROW else _DIGITS
+        texts.append(["" if math.isnan(log) else f"{math.exp(log):.{digits}g}" for log in logs])
+    return texts
 
 
-def _of_seeds(
-    case: str,
-    chosen: _Quantities,
-    lines: Mapping[int, list[list[str]]],
-    verdicts: Mapping[int, Sequence[Shown]],
-) -> Iterator[tuple[str | int, ...]]:
-    for seed, of_seed in lines.items():
-        for index, (quantity, line) in enumerate(zip(chosen.every, of_seed, strict=True)):
-            shown = verdicts[seed][index] if seed in verdicts else None
-            if shown or index in chosen.selected:
-                limits = (shown.low, shown.high) if shown else (None, None)
-                texts = ["" if limit is None else f"{limit:.5g}" for limit in limits]
-                yield case, quantity.label, seed, *line, shown.verdict if shown else "", *texts
-
-
-def _text(logarithm: float, digits: int) -> str:
-    return "" if math.isnan(logarithm) else f"{math.exp(logarithm):.{digits}g}"
-
-
-def _determined(expected: Path) -> set[str]:
-    found = read_verdicts(expected)["quantities"]
-    return {item["quantity"] for item in found if item["verdict"] == DETERMINED}
+def _verdict(found: Finding) -> list[str]:
+    limits = ["" if limit is None else f"{limit:.5g}" for limit in (found.low, found.high)]
+    return [found.verdict, *limits]

@@ -1,12 +1,10 @@
-"""What a job is told of the config: some of its keys, and nothing else.
+"""What a job is told: some keys of the config, the seeds of its batch, and its files.
 
-A rule's ``params`` name keys of the config, a case's laid over the study's. In the job the same
-keys make a `Case` or a `Study` again, in which any other key is missing: a rule that forgets to
-name one fails, and cannot give a result that Snakemake would not renew.
-
-Division of the seeds of a case into batches, one per job.
-
-What a script of the workflow does around its work: it reads its params, and says what failed.
+A rule's ``params`` are some keys of the config as plain values, those of its case laid over the
+study's (`settings`). Its script makes a `Case` or a `Study` of these again (`job_case`,
+`job_study`), in which every other key is an error: a rule that forgets to name one fails, and
+cannot give a result that Snakemake would not renew. Each job has a batch of the case's seeds
+(`batch_names`, `job_seeds`), and writes what it says to its log (`logged`).
 """
 
 import hashlib
@@ -31,6 +29,12 @@ from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.study import Case, Study
 
+# Least and most seeds of a job, and the number of jobs aimed at in between, as the key batch_size
+# says.
+_SMALLEST, _LARGEST, _USUAL = 500, 1000, 8
+_BATCH = re.compile(r"seeds_(\d+)-(\d+)")
+_OF_CASE = [field.name for field in fields(CaseBlock)]
+
 
 def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any]:
     """Return some keys of a study's config as plain values, those of a case laid over them.
@@ -53,17 +57,21 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
     blocks = study.plain
     if case:
         # What the case leaves at its default is not the study's: it has all of its blocks.
-        of_case = {field.name for field in fields(CaseBlock)}
-        blocks = {key: value for key, value in blocks.items() if key not in of_case}
+        blocks = {key: value for key, value in blocks.items() if key not in _OF_CASE}
         blocks |= study.case(case).plain
     blocks = blocks | {"cases": {name: it.plain for name, it in study.cases.items()}}
-    return {key: _value(blocks, key) for key in keys}
+
+    def value_of(block: Mapping[str, Any] | None, key: str) -> Any:
+        name, _, inner = key.partition(".")
+        value = (block or {}).get(name)
+        return value_of(value, inner) if inner else value
+
+    return {key: value_of(blocks, key) for key in keys}
 
 
 def keys_of_cases(study: Study, *keys: str) -> list[str]:
     """Return keys of every case, by default all, as ``cases.NAME.KEY``."""
-    of_each = keys or [field.name for field in fields(CaseBlock)]
-    return [f"cases.{name}.{key}" for name in study.cases for key in of_each]
+    return [f"cases.{name}.{key}" for name in study.cases for key in keys or _OF_CASE]
 
 
 def case_of(name: str, given: Mapping[str, Any]) -> Case:
@@ -73,46 +81,18 @@ def case_of(name: str, given: Mapping[str, Any]) -> Case:
 
 def study_of(given: Mapping[str, Any]) -> Study:
     """Return a study of which, and of whose cases, some keys are given, by `settings`."""
-    own: dict[str, Any] = {}
+    own: dict[str, Any] = {"cases": None}
     cases: dict[str, dict[str, Any]] = {}
     for key, value in given.items():
-        of, _, inner = key.partition(".")
-        if of == "cases":
-            name, _, inner = inner.partition(".")
+        if key.startswith("cases."):
+            _, name, inner = key.split(".", 2)
             cases.setdefault(name, {})[inner] = value
         else:
             own[key] = value
-    config = _partial(StudyConfig, own | {"cases": None})
+    config = _partial(StudyConfig, own)
     blocks = {name: _partial(CaseBlock, block) for name, block in cases.items()}
     object.__setattr__(config, "cases", blocks)
     return Study(config)
-
-
-def _value(block: Mapping[str, Any] | None, key: str) -> Any:
-    """Return the plain value of a dotted key; None for its default."""
-    name, _, inner = key.partition(".")
-    value = (block or {}).get(name)
-    return _value(value, inner) if inner else value
-
-
-@cache
-def _adapter(kind: type, name: str) -> TypeAdapter[Any]:
-    hint = get_type_hints(kind, include_extras=True)[name]
-    return TypeAdapter(list[hint], config=STRICT)  # type: ignore[valid-type]
-
-
-@cache
-def _with_only(kind: Any, given: frozenset[str]) -> Any:
-    """Return a class like that of a block, in which all other fields are errors."""
-    absent = {field.name for field in fields(kind)} - given
-
-    class Part(kind):  # type: ignore[misc]
-        def __getattribute__(self, name: str) -> Any:
-            if name in absent:
-                raise AttributeError(f"{name} is not among the keys that the rule names.")
-            return super().__getattribute__(name)
-
-    return Part
 
 
 def _partial(kind: Any, given: Mapping[str, Any]) -> Any:
@@ -136,27 +116,41 @@ def _partial(kind: Any, given: Mapping[str, Any]) -> Any:
     return block
 
 
+@cache
+def _adapter(kind: type, name: str) -> TypeAdapter[Any]:
+    hint = get_type_hints(kind, include_extras=True)[name]
+    return TypeAdapter(list[hint], config=STRICT)  # type: ignore[valid-type]
+
+
+@cache
+def _with_only(kind: Any, given: frozenset[str]) -> Any:
+    """Return a class like that of a block, in which all other fields are errors."""
+    absent = {field.name for field in fields(kind)} - given
+
+    class Part(kind):  # type: ignore[misc]
+        def __getattribute__(self, name: str) -> Any:
+            if name in absent:
+                raise AttributeError(f"{name} is not among the keys that the rule names.")
+            return super().__getattribute__(name)
+
+    return Part
+
+
 def software() -> dict[str, str]:
     """Return versions of what computes results, and a digest of our source."""
     folder = Path(biogrip.__file__).parent
-    sources = sorted(file for file in folder.rglob("*") if file.suffix in (".py", ".j2", ".css"))
     digest = hashlib.sha256()
-    for file in sources:
-        digest.update(f"{file.relative_to(folder)}\n".encode())
-        digest.update(file.read_bytes())
+    for file in sorted(folder.rglob("*")):
+        if file.suffix in (".py", ".j2", ".css"):
+            digest.update(f"{file.relative_to(folder)}\n".encode())
+            digest.update(file.read_bytes())
     versions = {name: version(name) for name in ("numpy", "scipy")}
     return {"biogrip": biogrip.__version__, **versions, "source": digest.hexdigest()[:12]}
 
 
-# Least and most seeds of a job, and the number of jobs aimed at in between, as the key batch_size
-# says.
-_SMALLEST, _LARGEST, _USUAL = 500, 1000, 8
-_NAME = re.compile(r"seeds_(\d+)-(\d+)")
-
-
 def seeds_of(batch: str) -> range:
     """Return the seeds of a batch, whose name has the first and the last, e.g. ``seeds_0-24``."""
-    found = _NAME.fullmatch(batch)
+    found = _BATCH.fullmatch(batch)
     assert found, batch
     return range(int(found[1]), int(found[2]) + 1)
 
@@ -168,32 +162,22 @@ def batch_names(seeds: int, batch_size: int | None = None, folder: Path | None =
     a job. Batches that a folder has files of are kept, so that more seeds renew none of them.
     """
     size = batch_size or min(max(_SMALLEST, -(-seeds // _USUAL)), _LARGEST)
-    there = folder.glob("seeds_*") if folder else ()
-    existing = sorted((r.start, r.stop) for r in map(seeds_of, _stems(there)))
-    edges, covered = [], 0
-    for first, stop in existing:
-        if covered <= first < stop <= seeds:
-            edges += [*_cut(covered, first, size), (first, stop)]
+    there = {file.stem for file in (folder.glob("seeds_*") if folder else ())}
+    edges: list[tuple[int, int]] = []
+    covered = 0
+    kept = sorted((it.start, it.stop) for it in map(seeds_of, filter(_BATCH.fullmatch, there)))
+    for first, stop in [*kept, (seeds, seeds)]:
+        if covered <= first <= stop <= seeds:
+            multiples = range((covered // size + 1) * size, first, size)
+            edges += [*pairwise([covered, *multiples, first]), (first, stop)]
             covered = stop
-    edges += _cut(covered, seeds, size)
-    return [f"seeds_{first}-{stop - 1}" for first, stop in edges]
-
-
-def _stems(files: Iterable[Path]) -> list[str]:
-    return [file.stem for file in files if _NAME.fullmatch(file.stem)]
-
-
-def _cut(start: int, stop: int, size: int) -> list[tuple[int, int]]:
-    """Cut seeds start to stop - 1 at multiples of size."""
-    edges = [start, *range((start // size + 1) * size, stop, size), stop]
-    return [(a, b) for a, b in pairwise(edges) if a < b]
+    return [f"seeds_{first}-{stop - 1}" for first, stop in edges if first < stop]
 
 
 @contextmanager
 def logged(job: Any) -> Iterator[None]:
     """Write what is said to the job's log; an error of ours ends it with its message alone."""
-    log = Path(job.log[0])
-    with log.open("w", encoding="utf-8") as stream, redirect_stderr(stream):
+    with Path(job.log[0]).open("w", encoding="utf-8") as stream, redirect_stderr(stream):
         try:
             yield
         except BiogripError as error:
@@ -214,6 +198,13 @@ def job_study(job: Any) -> Study:
     return study_of(job_settings(job))
 
 
+def job_settings(job: Any) -> dict[str, Any]:
+    """Return the keys of the config that a job's rule names, as plain values."""
+    given = {key: value for param in job.params for key, value in param.items()}
+    del given["software"]
+    return given
+
+
 def job_seeds(job: Any) -> list[int]:
     """Return the seeds of a job's batch."""
     return list(seeds_of(job.wildcards.batch))
@@ -222,10 +213,3 @@ def job_seeds(job: Any) -> list[int]:
 def paths(files: Any) -> list[Path]:
     """Return files of Snakemake as paths; one file is a list of one."""
     return [Path(files)] if isinstance(files, str) else [Path(file) for file in files]
-
-
-def job_settings(job: Any) -> dict[str, Any]:
-    """Return the keys of the config that a job's rule names, as plain values."""
-    given = {key: value for param in job.params for key, value in param.items()}
-    del given["software"]
-    return given

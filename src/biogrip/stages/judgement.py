@@ -1,4 +1,8 @@
-"""Stage 4: confidence limits of one trace of a case, and expected ones without noise."""
+"""Verdicts on one trace of a case, and those to expect of any, from its trace without noise.
+
+The trace is fitted by least squares, with the noise model of the case. Profile likelihoods of the
+fit give limits and verdicts of every quantity.
+"""
 
 import json
 from collections.abc import Sequence
@@ -18,28 +22,13 @@ from biogrip.judging.likelihood import MISSED
 from biogrip.judging.onset_profiles import profile_over_onset
 from biogrip.judging.valley import compute_valley
 from biogrip.physics.noise import rms, standard_deviation, stream
+from biogrip.records.identifications import diagnosis_data
 from biogrip.records.traces import read_measurements, read_target
-from biogrip.records.verdicts import diagnosis_data
 from biogrip.study.study import Case
 from biogrip.traces.onset import note_late_onset
 
 TRACE = 0
 """Seed of the trace that is judged."""
-
-"""The measurements with that trace."""
-
-
-def fit_judged(
-    case: Case,
-    case_problem: CaseProblem,
-    time_s: Array,
-    rotation_rad: Array,
-    seed: int,
-    progress: Progress = silent,
-) -> TraceFit:
-    """Return the least-squares fit of a trace that its judgement is based on."""
-    (fit,) = fits_judged([case], [case_problem], [(time_s, rotation_rad)], seed, progress)
-    return fit
 
 
 def fits_judged(
@@ -49,14 +38,16 @@ def fits_judged(
     seed: int,
     progress: Progress = silent,
 ) -> list[TraceFit]:
-    """Return these fits of several traces, times and rotations, of cases with the same budget."""
+    """Return the least-squares fits of traces that their judgements are based on.
+
+    Traces are pairs of times and rotations, (n_samples,) each, one of each case; the cases have
+    the same budget of least squares.
+    """
     least_squares = identifier("least_squares", cases[0].least_squares)
 
     def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
-        chosen = [cases[index] for index in which]
-        rngs = [
-            stream(case.study.study_seed, case.name, seed, "identifiability") for case in chosen
-        ]
+        names = [(cases[index].study.study_seed, cases[index].name) for index in which]
+        rngs = [stream(study_seed, name, seed, "identifiability") for study_seed, name in names]
         return least_squares(problems, rngs, progress)
 
     return fit_traces(case_problems, traces, find)
@@ -66,13 +57,14 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
     """Fit the trace of seed 0 by least squares, and write verdicts, profiles and valley."""
     recorded = read_measurements(measurements, [TRACE])
     case_problem = case.problem.calibrated(calibrated).weighted(recorded.sd_rad)
-    fit = fit_judged(case, case_problem, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
+    trace = recorded.rotation_rad[TRACE]
+    (fit,) = fits_judged([case], [case_problem], [(recorded.time_s, trace)], TRACE)
     diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
     if case_problem.fit_start:
         diagnosis = profile_over_onset(diagnosis, recorded.time_s)
     notes = notes_on_fit(fit)
     if case.may_start_late:
-        trace, near = recorded.rotation_rad[TRACE], diagnosis.likelihood.best
+        near = diagnosis.likelihood.best
         notes += note_late_onset(case_problem, recorded.time_s, trace, near)
     said = diagnosis_data(diagnosis, notes)
     _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": valley})
@@ -83,9 +75,8 @@ def notes_on_fit(fit: TraceFit) -> list[Note]:
     notes = [Note(HARMLESS, text) for text in fit.notes()]
     if fit.noise_model is None:
         return notes
-    misfit = find_slow_misfit(
-        fit.noise_model, fit.problem.residuals.duration_s, fit.problem.residuals.instrument
-    )
+    residuals = fit.problem.residuals
+    misfit = find_slow_misfit(fit.noise_model, residuals.duration_s, residuals.instrument)
     return [misfit, *notes] if misfit else notes
 
 
@@ -99,8 +90,7 @@ def _diagnosed(
     if missed is not None:
         again = found.at(fit_from([problem], missed))
         if diagnosis.likelihood.increase(again.misfit_rad) < -MISSED:
-            found = again
-            diagnosis = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+            diagnosis = diagnose(problem, model, again, confidence=confidence, noise_rad=noise_rad)
             valley, _ = compute_valley(diagnosis.likelihood, model)
     return diagnosis, valley
 

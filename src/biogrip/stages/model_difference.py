@@ -1,4 +1,7 @@
-"""Difference of the linear from the nonlinear model, over angle and torque."""
+"""Difference of the linear from the nonlinear model, on a grid of angles and torques.
+
+At every point the largest difference over the protocol is compared with the peak rotation.
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -25,7 +28,7 @@ def network_of(case: Case) -> Network:
 
 
 def compare(study: Study, differences: Path) -> None:
-    """Compare the models on a grid; write a row per case, angle and torque factor, CSV."""
+    """Write a row per case, angle and torque factor, CSV."""
     DIFFERENCES.write(differences, _rows(study))
 
 
@@ -72,8 +75,7 @@ def scaled(torque: TorqueHistory, factor: float) -> TorqueHistory:
 def _times(torque: TorqueHistory) -> Array:
     """Return times that are dense after every jump and reach up to the next."""
     ends = np.append(torque.time_s[1:], torque.end_s)
-    pieces = [
-        start + np.geomspace(min(0.1, (end - start) / 2), end - start, 60)
-        for start, end in zip(torque.time_s, ends, strict=True)
-    ]
-    return np.concatenate(pieces)
+    lasting = zip(torque.time_s, ends - torque.time_s, strict=True)
+    return np.concatenate(
+        [start + np.geomspace(min(0.1, lasts / 2), lasts, 60) for start, lasts in lasting]
+    )

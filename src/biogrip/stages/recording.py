@@ -15,9 +15,9 @@ from biogrip.fit.fitted_onset import OnsetFits
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.whitening import MOST_SAMPLES
-from biogrip.progress import warn
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.study.study import Case
+from biogrip.terminal import warn
 from biogrip.traces.any_sample import proportional_deviations
 from biogrip.traces.columns import Columns, place
 from biogrip.traces.onset import guess_onset

@@ -1,6 +1,8 @@
-"""Stage 3: identifications by the genetic algorithm under other interpretations of the paper.
+"""Studies around a study: points of a sweep, and other interpretations of the paper.
 
-Identification errors at every point of a sweep.
+`judge` reads what is identified at every point of a sweep, and writes the errors and the share of
+seeds in the basin of the truth. `identify_interpreted` identifies the traces of a case by the
+genetic algorithm under every interpretation of the paper.
 """
 
 import math
@@ -14,65 +16,18 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.fit.genetic import identify_many
 from biogrip.fit.genome import nearest_encodable
 from biogrip.fit.methods import near_noise
-from biogrip.fit.problem import Identification
 from biogrip.judging.fisher import bounds_percent, headlines
 from biogrip.judging.quantities import Quantity
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import simulated_rotation
-from biogrip.progress import Progress
 from biogrip.records.identifications import INTERPRETATIONS, read_identifications
 from biogrip.records.rows import RowFile
 from biogrip.records.traces import read_target
 from biogrip.stages.identification import groups
 from biogrip.study.study import Case, Study
 from biogrip.study.sweeps import Point
-
-
-def read(case: Case, target: Path, rows: Path) -> None:
-    """Identify every noisy trace of a case under every interpretation by the genetic algorithm.
-
-    Random streams are those of the study, so a interpretation that changes nothing reproduces the
-    study's results.
-    """
-    INTERPRETATIONS.write(rows, _interpretation_rows(case, target))
-
-
-def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
-    time_s, _, rotation = read_target(target)
-    progress = Progress(f"{case.name}, interpretations", len(case.interpretations) * case.seeds)
-    for name, interpretation in case.interpretations.items():
-        case_problem = interpretation.problem
-        for seeds in groups(range(case.seeds)):
-            streams = {
-                purpose: [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]
-                for purpose in ("noise", "genetic")
-            }
-            traces = [
-                add_noise(rotation, interpretation.noise, rng, time_s) for rng in streams["noise"]
-            ]
-            problems = [case_problem.of(time_s, trace) for trace in traces]
-            found = identify_many(problems, interpretation.genetic, streams["genetic"])
-            for seed, trace, answer in zip(seeds, traces, found, strict=True):
-                names = case_problem.searched.names
-                values = {**case_problem.fixed, **dict(zip(names, answer.parameters, strict=True))}
-                yield (
-                    case.name,
-                    name,
-                    seed,
-                    *(f"{values.get(p.name, 0.0):.6g}" for p in SINGLE_BRANCH),
-                    f"{answer.misfit_rad:.6e}",
-                    f"{rms(trace - rotation):.6e}",
-                    _last_improvement(answer),
-                )
-            progress.done(len(seeds))
-
-
-def _last_improvement(answer: Identification) -> int:
-    """Return the last generation in which the best misfit fell."""
-    falls = np.flatnonzero(np.diff(answer.history.best_misfit) < 0)
-    return int(falls[-1]) + 1 if len(falls) else 0
-
+from biogrip.terminal import Progress
 
 POINTS = RowFile(
     "a sweep",
@@ -116,12 +71,8 @@ def judge(
         files.setdefault((path.parts[-3], path.parts[-2]), []).append(path)
     calibrations = {path.stem: [path] for path in calibrated}
     block = study.sweeps[sweep]
-    rows = [
-        row
-        for case in block.cases
-        for row in _rows(study, block.points(sweep, case), files, calibrations)
-    ]
-    POINTS.write(points, rows)
+    each = (_rows(study, block.points(sweep, case), files, calibrations) for case in block.cases)
+    POINTS.write(points, (row for rows in each for row in rows))
 
 
 def _rows(
@@ -144,8 +95,11 @@ def _rows(
         for method in study.methods:
             batches = files[point.name, method]
             found = pd.concat([read_identifications(path, method) for path in batches])
-            tolerance = study.near_noise_tolerance
-            for judged in _judged(case, true, found, bounds[point.name], heads, tolerance):
+            if case.noise.absent:
+                # Without noise, the misfit of the true values rounded to the genes' digits.
+                found = found.assign(noise_rms=_resolution_rad(case, true))
+            near = float(np.mean(near_noise(found, study.near_noise_tolerance)))
+            for judged in _judged(case, true, found, bounds[point.name], heads, near):
                 yield point.name, point.row.text, point.column.text, method, *judged
 
 
@@ -155,7 +109,7 @@ def _judged(
     found: pd.DataFrame,
     bounds: list[tuple[Quantity, float]],
     heads: list[str],
-    tolerance: float,
+    near: float,
 ) -> Iterator[tuple[str | int, ...]]:
     """Yield what one method finds at a point, for every quantity."""
     searched = point.searched.parameters
@@ -165,17 +119,17 @@ def _judged(
         label: found[[p.column for p in of]].sum(axis=1).to_numpy(float)
         for label, of in members.items()
     }
-    near = float(np.mean(_succeeded(point, true, found, tolerance)))
     inside = np.ones(len(found), dtype=bool)
     for q, percent in bounds:
         if q.label in heads:
             inside &= in_basin(values[q.label], truths[q.label], percent / 100)
     for q, percent in bounds:
-        errors = _errors_percent(values[q.label], truths[q.label])
-        within = _median(errors[inside])
+        truth = truths[q.label]
+        errors = 100 * np.abs(values[q.label] - truth) / (truth or np.nan)
+        medians = [np.median(some) if len(some) else np.nan for some in (errors, errors[inside])]
         share = float(np.mean(inside)) if heads else np.nan
-        numbers = (near, share, _median(errors), within, percent)
-        yield q.label, len(found), *(_text(number) for number in numbers)
+        numbers = (near, share, *medians, percent)
+        yield q.label, len(found), *("" if np.isnan(it) else f"{it:.6g}" for it in numbers)
 
 
 def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
@@ -187,29 +141,6 @@ def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
     with np.errstate(divide="ignore"):
         away = np.abs(np.log(values / truth))
     return away <= np.fmax(_FACTOR, _BOUNDS * bound)
-
-
-def _errors_percent(values: Array, truth: float) -> Array:
-    if not truth:
-        return np.full(len(values), np.nan)
-    return 100 * np.abs(values - truth) / truth
-
-
-def _median(values: Array) -> float:
-    return float(np.median(values)) if len(values) else np.nan
-
-
-def _succeeded(
-    point: Case, true: Mapping[str, float], found: pd.DataFrame, tolerance: float
-) -> np.ndarray:
-    """Return True for each seed near the noise, (n_seeds,).
-
-    Without noise, the misfit of the true values rounded to the genes' two digits takes its
-    place.
-    """
-    if point.noise.absent:
-        found = found.assign(noise_rms=_resolution_rad(point, true))
-    return near_noise(found, tolerance)
 
 
 def _resolution_rad(point: Case, true: Mapping[str, float]) -> float:
@@ -231,5 +162,37 @@ def _resolution_rad(point: Case, true: Mapping[str, float]) -> float:
     return rms(both[1] - both[0])
 
 
-def _text(number: float) -> str:
-    return "" if np.isnan(number) else f"{number:.6g}"
+def identify_interpreted(case: Case, target: Path, rows: Path) -> None:
+    """Identify every noisy trace of a case under every interpretation by the genetic algorithm.
+
+    Random streams are those of the study, so an interpretation that changes nothing reproduces the
+    study's results.
+    """
+    INTERPRETATIONS.write(rows, _interpretation_rows(case, target))
+
+
+def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
+    time_s, _, rotation = read_target(target)
+    progress = Progress(f"{case.name}, interpretations", len(case.interpretations) * case.seeds)
+    for name, interpretation in case.interpretations.items():
+        case_problem = interpretation.problem
+        for seeds in groups(range(case.seeds)):
+            noises, searches = (
+                [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]
+                for purpose in ("noise", "genetic")
+            )
+            traces = [add_noise(rotation, interpretation.noise, rng, time_s) for rng in noises]
+            problems = [case_problem.of(time_s, trace) for trace in traces]
+            answers = identify_many(problems, interpretation.genetic, searches)
+            for seed, trace, answer in zip(seeds, traces, answers, strict=True):
+                names = case_problem.searched.names
+                values = {**case_problem.fixed, **dict(zip(names, answer.parameters, strict=True))}
+                falls = np.flatnonzero(np.diff(answer.history.best_misfit) < 0)
+                yield (
+                    *(case.name, name, seed),
+                    *(f"{values.get(p.name, 0.0):.6g}" for p in SINGLE_BRANCH),
+                    f"{answer.misfit_rad:.6e}",
+                    f"{rms(trace - rotation):.6e}",
+                    int(falls[-1]) + 1 if len(falls) else 0,
+                )
+            progress.done(len(seeds))

@@ -1,8 +1,8 @@
-"""Stage 0: calibration of the gripper's arms by a test without sample.
+"""What is simulated of a case: its response, noisy traces of it, and a test without sample.
 
-Stage 1: noise-free rotation of a case, and the force of the jaws on its sample.
-
-Stage 2: noisy traces of a target, one per seed.
+A target is the response without noise: what the instrument reads and, of the gripper, the force of
+the jaws. A measurement adds noise to it, a trace a seed. A calibration identifies the gripper's
+arms by a test without sample.
 """
 
 from collections.abc import Iterable
@@ -20,17 +20,85 @@ from biogrip.physics.protocol import TorqueHistory, sample_times, torque_at, tor
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.physics.unilateral import unilateral_response
-from biogrip.progress import warn
+from biogrip.records.rows import write_parquet
 from biogrip.records.traces import (
     Measurements,
     read_target,
-    table_of,
     write_measurements,
-    write_tables,
     write_target,
     write_target_without_jaws,
 )
 from biogrip.study.study import Case
+from biogrip.terminal import warn
+
+
+def simulate(case: Case, target: Path) -> None:
+    """Simulate a case, and write its target, CSV.
+
+    Raises
+    ------
+    BiogripError
+        If the response is not finite, or turns the arms beyond the stroke of the comb drives.
+    """
+    torque = torque_history(case.phases, deforms=case.instrument.deforms)
+    network = case.sample.model.sample(case.parameters)
+    time_s = case.sampling.over(torque.end_s)
+    controlled = torque_at(torque, time_s)
+    if not case.instrument.has_jaws:
+        read = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0]
+        _check_finite(case, time_s, read)
+        write_target_without_jaws(target, time_s, controlled, read, case.instrument)
+        return
+    rotation, force = _response(case, network, torque, time_s)
+    _check_finite(case, time_s, rotation)
+    largest = float(np.max(np.abs(rotation)))
+    if largest > case.stroke_rad:
+        raise BiogripError(
+            f"the protocol turns the arms by {1e3 * largest:.4g} mrad, allowed is what the comb "
+            f"drive's stroke leaves, {1e3 * case.stroke_rad:.4g} mrad."
+        )
+    _warn_if_contact_is_lost(case, network, torque)
+    write_target(target, time_s, controlled, rotation, force)
+
+
+def _response(
+    case: Case, network: Network, torque: TorqueHistory, time_s: Array
+) -> tuple[Array, Array]:
+    """Return the rotation of the left arm and the jaw force, (n_samples,) each."""
+    gripper, nonlinear = case.gripper, case.nonlinear_target
+    if case.unilateral:
+        found = unilateral_response(gripper, network, torque, time_s)
+        return found.rotation_rad[0], found.jaw_force_N
+    rotation = simulated_rotation(gripper, network, torque, time_s, nonlinear=nonlinear)
+    return rotation[0], jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear)[0]
+
+
+def _check_finite(case: Case, time_s: Array, simulated: Array) -> None:
+    model, read = case.sample.model, case.instrument.read.name
+    for sample in np.flatnonzero(~np.isfinite(simulated))[:1]:
+        values = ", ".join(f"{name} = {case.parameters[name]:g}" for name in model.names)
+        raise BiogripError(
+            f"the simulated {read} of {model.title} with {values} is {simulated[sample]} "
+            f"at {time_s[sample]:g} s; allowed are parameters, a gripper and a protocol for which "
+            "it is finite."
+        )
+
+
+def _warn_if_contact_is_lost(case: Case, network: Network, torque: TorqueHistory) -> None:
+    grip = compute_grip(case.gripper, network, torque, nonlinear=case.nonlinear_target)
+    if words := grip.words():
+        then = "without adhesion contact is lost there (contact: unilateral simulates that)"
+        if case.unilateral:
+            then = "contact is lost there, which its identification ignores"
+        warn(f"{case.name}: under this protocol {words}; {then}.")
+
+
+def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) -> None:
+    """Add noise of each seed in a batch to a target, CSV, and write the traces, Parquet."""
+    time_s, _, rotation = read_target(target)
+    rngs = {seed: stream(case.study.study_seed, case.name, seed, "noise") for seed in seeds}
+    traces = {seed: add_noise(rotation, case.noise, rng, time_s) for seed, rng in rngs.items()}
+    write_measurements(measurements, Measurements(time_s, rotation, traces))
 
 
 def run(case: Case, gripper: Path, records: Path) -> None:
@@ -50,90 +118,5 @@ def run(case: Case, gripper: Path, records: Path) -> None:
         )
         columns |= {f"{name}_step_rad": record.step_rad, f"{name}_impulse_rad": record.impulse_rad}
         found[name] = calibrate(record, *causes)
-    write_tables(records, [table_of(columns, len(time_s))], dictionary=False)
+    write_parquet(records, columns)
     write_text(gripper, calibration_yaml(found["left"], found["right"]))
-
-
-def simulate(case: Case, target: Path) -> None:
-    """Simulate a case, and write its target, CSV.
-
-    Raises
-    ------
-    BiogripError
-        If the rotation is not finite, or exceeds the stroke of the comb drives.
-    """
-    torque = torque_history(case.phases, deforms=case.instrument.deforms)
-    network = case.sample.model.sample(case.parameters)
-    time_s = case.sampling.over(torque.end_s)
-    if not case.instrument.has_jaws:
-        read = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0]
-        _check_finite(case, time_s, read)
-        controlled = torque_at(torque, time_s)
-        write_target_without_jaws(target, time_s, controlled, read, case.instrument)
-        return
-    rotation, force = _response(case, network, torque, time_s)
-    _check(case, time_s, rotation)
-    _say_if_contact_is_lost(case, network, torque)
-    write_target(target, time_s, torque_at(torque, time_s), rotation, force)
-
-
-def _response(
-    case: Case, network: Network, torque: TorqueHistory, time_s: Array
-) -> tuple[Array, Array]:
-    """Return the rotation of the left arm and the jaw force."""
-    gripper, nonlinear = case.gripper, case.nonlinear_target
-    if case.unilateral:
-        found = unilateral_response(gripper, network, torque, time_s)
-        return found.rotation_rad[0], found.jaw_force_N
-    rotation = simulated_rotation(gripper, network, torque, time_s, nonlinear=nonlinear)
-    return rotation[0], jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear)[0]
-
-
-def _say_if_contact_is_lost(case: Case, network: Network, torque: TorqueHistory) -> None:
-    grip = compute_grip(case.gripper, network, torque, nonlinear=case.nonlinear_target)
-    words = grip.words()
-    if words is None:
-        return
-    then = (
-        "contact is lost there, which its identification ignores"
-        if case.unilateral
-        else "without adhesion contact is lost there (contact: unilateral simulates that)"
-    )
-    warn(f"{case.name}: under this protocol {words}; {then}.")
-
-
-def _check_finite(case: Case, time_s: Array, simulated: Array) -> None:
-    model = case.sample.model
-    for sample in np.flatnonzero(~np.isfinite(simulated))[:1]:
-        values = ", ".join(f"{name} = {case.parameters[name]:g}" for name in model.names)
-        read = case.instrument.read.name
-        raise BiogripError(
-            f"the simulated {read} of {model.title} with {values} is {simulated[sample]} "
-            f"at {time_s[sample]:g} s; allowed are parameters, a gripper and a protocol for which "
-            "it is finite."
-        )
-
-
-def _check(case: Case, time_s: Array, simulated: Array) -> None:
-    _check_finite(case, time_s, simulated)
-    largest = float(np.max(np.abs(simulated)))
-    if largest > case.stroke_rad:
-        raise BiogripError(
-            f"the protocol turns the arms by {1e3 * largest:.4g} mrad, allowed is what the comb "
-            f"drive's stroke leaves, {1e3 * case.stroke_rad:.4g} mrad."
-        )
-
-
-def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) -> None:
-    """Add noise of each seed in a batch to a target, CSV, and write the traces, Parquet."""
-    time_s, _, rotation = read_target(target)
-    traces = {
-        seed: add_noise(
-            rotation,
-            case.noise,
-            stream(case.study.study_seed, case.name, seed, "noise"),
-            time_s,
-        )
-        for seed in seeds
-    }
-    write_measurements(measurements, Measurements(time_s, rotation, traces))

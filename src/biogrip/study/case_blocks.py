@@ -1,16 +1,25 @@
-"""Config blocks of a case, and those that a study sets for all cases."""
+"""Config blocks of a case, and those that a study sets for all cases.
+
+A case has all blocks of the study, merged with its own. Beside the bounds of single keys, its
+blocks must fit each other: protocol and readings to the instrument, true values to what is
+searched, sampling to the protocol.
+"""
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, dataclass, field, fields, make_dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, Tag
 
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
+from biogrip.fit.differential_evolution import DifferentialEvolutionSettings
+from biogrip.fit.genetic import GeneticSettings
+from biogrip.fit.genetic_refined import Polishing
 from biogrip.fit.genome import GeneRange, SearchRange
-from biogrip.fit.methods import METHODS, block_class
+from biogrip.fit.least_squares import LeastSquaresSettings
+from biogrip.fit.methods import METHODS
 from biogrip.keys import BY_KIND, Block, OneOf, Printed, Problem, below, plain
 from biogrip.physics.actuator import CombDrive
 from biogrip.physics.calibration import CalibrationTest
@@ -30,9 +39,6 @@ from biogrip.study.experiment_blocks import (
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.messages import checked
 from biogrip.study.source import overlaid
-
-METHOD_BLOCKS = tuple(dict.fromkeys(name for it in METHODS.values() for name in it.blocks))
-"""Config blocks of the methods."""
 
 CALIBRATED = "calibrated"
 
@@ -68,7 +74,7 @@ class Identifiability(Block):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Given(Block):
+class Shared(Block):
     """Blocks that a study sets for all cases, and that a case may change for itself."""
 
     # With descriptions, for docstrings below fields are not inherited.
@@ -101,6 +107,11 @@ class _Given(Block):
             "an element out."
         ),
     ] = field(default_factory=dict)
+    # Of the methods, as `METHODS` names them.
+    genetic_algorithm: GeneticSettings
+    genetic_refined: Polishing
+    least_squares: LeastSquaresSettings
+    differential_evolution: DifferentialEvolutionSettings
 
     def method(self, name: str) -> object:
         """Return the settings object of a method."""
@@ -108,20 +119,6 @@ class _Given(Block):
         found = [getattr(self, block) for block in method.blocks]
         return method.named(method.settings)(*found) if method.settings else found[0]
 
-
-def _of_method(name: str) -> tuple[str, type, Any]:
-    """Return the field of a method's block, which may be left out if all of its keys may be."""
-    kind = block_class(name)
-    needed = any(it.default is it.default_factory is MISSING for it in fields(kind))
-    return name, kind, field() if needed else field(default_factory=kind)
-
-
-if TYPE_CHECKING:
-    Shared = _Given
-else:
-    Shared = make_dataclass(
-        "Shared", map(_of_method, METHOD_BLOCKS), bases=(_Given,), frozen=True, kw_only=True
-    )
 
 OVERRIDABLE = tuple(each.name for each in fields(Shared))
 """Blocks that a study sets for all cases, those of methods among them, and that a case may change
@@ -178,15 +175,13 @@ class CaseBlock(Shared):
         # A chromosome has the digits and the exponent of every parameter.
         ranges = [getattr(self.search_range, p.range_name) for p in self.searched]
         genes = sum(each.digits + 1 for each in ranges)
-        for name in METHOD_BLOCKS:
-            if hasattr(settings := getattr(self, name), "problems_of"):
-                yield from below((name,), settings.problems_of(genes))
+        yield from below(("genetic_algorithm",), self.genetic_algorithm.problems_of(genes))
         if self.assumed_gripper == CALIBRATED:
             arms = self.gripper.left, self.gripper.right
             yield from below(("calibration",), self.calibration.problems_of(arms))
         elif isinstance(self.assumed_gripper, str):
-            text = f"found '{self.assumed_gripper}', allowed is '{CALIBRATED}' or keys of a "
-            yield ("assumed_gripper",), f"{text}gripper block."
+            text = f"found '{self.assumed_gripper}', allowed is '{CALIBRATED}'"
+            yield ("assumed_gripper",), f"{text} or keys of a gripper block."
         elif self.assumed_gripper is not None:
             believed = overlaid(plain(self.gripper.neutral), self.assumed_gripper)
             yield from below(("assumed_gripper",), checked(Gripper, believed)[1])
@@ -245,11 +240,10 @@ class CaseBlock(Shared):
             low = 10.0 ** math.floor(math.log10(genes.low))
             high = 10.0 ** math.ceil(math.log10(genes.high))
             vanishes = value == 0 and parameter.may_vanish
-            if value is None or vanishes or low <= value <= high:
-                continue
-            text = f"found {value:g}, which is not searched for; allowed is {low:g} to {high:g} "
-            text = f"{text}{parameter.unit}".rstrip()
-            yield ("sample", parameter.name), f"{text}, or another search_range."
+            if value is not None and not vanishes and not low <= value <= high:
+                limits = f"{low:g} to {high:g} {parameter.unit}".rstrip()
+                text = f"found {value:g}, which is not searched for; allowed is {limits}"
+                yield ("sample", parameter.name), f"{text}, or another search_range."
 
     def _band_problems(self) -> Iterator[Problem]:
         """Find times outside the validity of power laws."""
@@ -271,17 +265,17 @@ class CaseBlock(Shared):
         coloured = measured.coloured and key == "rate_Hz"
         most = MOST_SAMPLES if coloured else _MOST_SAMPLES
         if not needed <= samples <= most:
-            text = f"found {measured.rate_Hz:g}, which gives " if key == "rate_Hz" else "found "
-            text += f"{counted(f'{samples:.6g}', 'sample')} over the protocol; allowed are {needed}"
+            rate = f"{measured.rate_Hz:g}, which gives " if key == "rate_Hz" else ""
+            found = f"found {rate}{counted(f'{samples:.6g}', 'sample')} over the protocol"
             how = " with a coloured noise model" if coloured else ""
-            yield (key,), f"{text} to {most}{how}."
+            yield (key,), f"{found}; allowed are {needed} to {most}{how}."
             return
         spans = [(it.from_s, it.from_s + (it.samples - 1) / it.rate_Hz) for it in measured.bursts]
         last = -1.0
         for index, (first, ends) in enumerate(spans or [(time, time) for time in measured.times_s]):
             if not last < first <= ends <= end:
-                text = f"found {first:g}" if first == ends else f"found {first:g} to {ends:g}"
-                text += f", allowed is later than {max(last, 0):g} and at most {end:g} s."
-                yield (key, index), text
+                found = f"{first:g}" if first == ends else f"{first:g} to {ends:g}"
+                allowed = f"later than {max(last, 0):g} and at most {end:g} s"
+                yield (key, index), f"found {found}, allowed is {allowed}."
                 return
             last = ends

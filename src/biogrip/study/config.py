@@ -1,4 +1,4 @@
-"""Top-level keys of a study's config."""
+"""Top-level keys of a study's config, and conflicts between its parts."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -171,13 +171,14 @@ class StudyConfig(Shared):
             yield from below(("cases", name), case.comb_problems(self.actuator))
         known = adapter(StudyConfig).dump_python([self])[0] if self.reconstructed else {}
         for index, key in enumerate(self.reconstructed):
-            if not _exists(known, key):
+            block: Any = known
+            for part in key.split("."):
+                block = block.get(part) if isinstance(block, Mapping) else None
+            if block is None:
                 yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
         chosen = [name for name in self.cases if name in (self.only or self.cases)]
-        points = sum(1 for _ in list_points(self.sweeps))
-        if points > MOST_POINTS:
-            text = f"found {points} points, allowed are {MOST_POINTS} together."
-            yield ("sweeps",), text
+        if (points := len([*list_points(self.sweeps)])) > MOST_POINTS:
+            yield ("sweeps",), f"found {points} points, allowed are {MOST_POINTS} together."
         yield from below(("sweeps",), name_problems(self.sweeps, chosen))
         searched = [p.name for case in self.cases.values() for p in case.searched]
         lists: dict[tuple[str, ...], tuple[Iterable[str], Iterable[str]]] = {
@@ -190,9 +191,3 @@ class StudyConfig(Shared):
                 if name not in allowed:
                     text = f"found '{name}', allowed are {', '.join([*allowed][:_SHOWN])}."
                     yield (*path, index), text + nearest(name, allowed)
-
-
-def _exists(block: Any, key: str) -> bool:
-    for part in key.split("."):
-        block = block.get(part) if isinstance(block, Mapping) else None
-    return block is not None

@@ -1,8 +1,8 @@
-"""Config block of the gripper.
+"""Config blocks of an experiment: the gripper, the protocol, and the sample.
 
-Config block of the protocol: what is held over time, as torques or voltages of comb drives.
-
-Config block of the sample: constitutive model and true parameters.
+The gripper has two arms, a jaw gap, and standard uncertainties. The protocol says what is
+controlled over time: torques or voltages of the comb drives or, of another instrument, a load or a
+deformation. The sample is a constitutive model with the true values of its parameters.
 """
 
 import math
@@ -23,11 +23,20 @@ from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import Phase, largest_load, load
 from biogrip.physics.sample_model import MOST_BRANCHES, SampleModel
 
+LARGEST_PARAMETER = 1e12
+_LEAST_PARAMETER = 1e-18
+_LONGEST_S = 1e9
+_VOLTAGE = "voltage_V"
+# Keys that say what is controlled; with the first two a comb drive pulls.
+_BASES = (CONTROLLED[0].column, _VOLTAGE, *(each.column for each in CONTROLLED[1:]))
+_PULLS = _BASES[:2]
 # Share of a property; a larger change of the response would not be linear.
 _MOST_UNCERTAIN = 0.5
 _OWN = ("arm_length_m", "reference_angle_deg")
 _OF_COMB = ("finger_gap_m", "thickness_m")
 
+# A load or a deformation, either way.
+_Signed = Annotated[float | None, Field(ge=-1e12, le=1e12)]
 _Uncertainties = Mapping[Annotated[str, OneOf(ARM_KEYS)], Annotated[float, Field(ge=0, le=1e3)]]
 
 
@@ -117,15 +126,6 @@ def _too_uncertain(path: tuple[str, ...], uncertainty: float, owner: object) -> 
         yield path, f"found {uncertainty:g}, allowed is less than half of {value:g}."
 
 
-_LONGEST_S = 1e9
-_VOLTAGE = "voltage_V"
-_BASES = (CONTROLLED[0].column, _VOLTAGE, *(each.column for each in CONTROLLED[1:]))
-# What a comb drive pulls with.
-_PULLS = _BASES[:2]
-# A load or a deformation, either way.
-_Signed = Annotated[float | None, Field(ge=-1e12, le=1e12)]
-
-
 @dataclass(frozen=True)
 class PhaseBlock(Block):
     """A phase of the protocol: a hold, a ramp or a sinusoid, of one quantity in all phases."""
@@ -180,14 +180,13 @@ class PhaseBlock(Block):
 
     @property
     def bases(self) -> list[str]:
-        """Keys that say what is held; in a valid phase, one."""
+        """Keys that say what is controlled; in a valid phase, one."""
         return [key for key in _BASES if getattr(self, key) is not None]
 
     @property
     def drives(self) -> bool:
-        """True if anything that the phase holds differs from zero."""
-        own = vars(self).items()
-        return any(value for key, value in own if key not in ("duration_s", "frequency_Hz"))
+        """True if anything that the phase controls differs from zero."""
+        return any(vars(self)[key] for key in vars(self).keys() - {"duration_s", "frequency_Hz"})
 
     def phase(self, per_square_volt: float) -> Phase:
         """Return the phase in torques; a voltage's torque is `per_square_volt` V^2 (eq. 9)."""
@@ -238,27 +237,28 @@ class ProtocolBlock(Block):
         return sum(phase.duration_s for phase in self.phases)
 
     def make_phases(self, instrument: Instrument, comb: CombDrive) -> tuple[Phase, ...]:
-        """Return all phases in units of what the instrument holds, or of the largest load."""
+        """Return all phases in units of what the instrument controls, or of the largest load."""
         per_square_volt = 0.5 * capacitance_slope(comb)
         phases = tuple(phase.phase(per_square_volt) for phase in self.phases)
         if not instrument.relative:
             return phases
-        largest = largest_load(phases)
-        divided = [(phase.duration_s, phase.left.divided(largest)) for phase in phases]
-        return tuple(Phase(duration_s, load, load) for duration_s, load in divided)
+        divided = [phase.left.divided(largest_load(phases)) for phase in phases]
+        return tuple(
+            Phase(phase.duration_s, it, it) for phase, it in zip(phases, divided, strict=True)
+        )
 
     def problems(self) -> Iterator[Problem]:
         """Refuse a protocol that is too long, or in which all torques are zero."""
         if self.end_s > _LONGEST_S:
-            text = f"found {self.end_s:g} s in all phases together, allowed is at most "
-            yield ("phases",), f"{text}{_LONGEST_S:g} s."
+            text = f"found {self.end_s:g} s in all phases together"
+            yield ("phases",), f"{text}, allowed is at most {_LONGEST_S:g} s."
         if not any(phase.drives for phase in self.phases):
             name = self.phases[0].bases[0].partition("_")[0]
             text = f"no phase has a {name}, so nothing would move; allowed is at least one above 0."
             yield ("phases",), text
 
     def instrument_problems(self, instruments: Sequence[Instrument]) -> Iterator[Problem]:
-        """Find phases that hold what none of some instruments, of one kind, holds."""
+        """Find phases that control what none of some instruments, of one kind, does."""
         columns = list(dict.fromkeys(instrument.controlled.column for instrument in instruments))
         allowed = [*columns, _VOLTAGE] if _BASES[0] in columns else columns
         for index, phase in enumerate(self.phases):
@@ -274,10 +274,6 @@ class ProtocolBlock(Block):
 def further_keys(base: str) -> tuple[str, str]:
     """Return the keys of a ramp's end and of a sinusoid's amplitude."""
     return f"to_{base}", f"amplitude_{base.rpartition('_')[2]}"
-
-
-LARGEST_PARAMETER = 1e12
-_LEAST = 1e-18
 
 
 class SampleBlock(Checked, BaseModel):
@@ -298,10 +294,7 @@ class SampleBlock(Checked, BaseModel):
     model: Annotated[
         str,
         OneOf(MODELS),
-        Field(
-            description='Constitutive model; which parameters it has is listed under "Sample '
-            'models".'
-        ),
+        Field(description='Constitutive model, see "Sample models" for its parameters.'),
     ]
     branches: Annotated[
         int,
@@ -317,8 +310,7 @@ class SampleBlock(Checked, BaseModel):
         Field(
             ge=SMALLEST_M,
             le=LARGEST_M,
-            description="Diameter of the sample. It decides at which angle the jaws touch the "
-            "sample.",
+            description="Diameter of the sample. It decides at which angle the jaws touch it.",
         ),
     ] = None
 
@@ -367,9 +359,12 @@ def _parameter_problems(
             continue
         parameter = by_name[name]
         vanishes = value == 0 and parameter.may_vanish
-        if not (vanishes or _LEAST <= value <= LARGEST_PARAMETER) or value >= parameter.below:
+        if (
+            not (vanishes or _LEAST_PARAMETER <= value <= LARGEST_PARAMETER)
+            or value >= parameter.below
+        ):
             zero = "0 or " if parameter.may_vanish else ""
             bounded = parameter.below < LARGEST_PARAMETER
             most = f"below {parameter.below:g}" if bounded else f"at most {LARGEST_PARAMETER:g}"
-            text = f"found {value:g}, allowed is {zero}at least {_LEAST:g} and {most}"
+            text = f"found {value:g}, allowed is {zero}at least {_LEAST_PARAMETER:g} and {most}"
             yield (name,), f"{text} {parameter.unit}".rstrip() + "."

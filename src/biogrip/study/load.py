@@ -1,4 +1,8 @@
-"""Loading of config files into a checked study, or messages that name file, line and key."""
+"""From config files to a checked study, or to messages that name file, line and key.
+
+The study's blocks are merged into every case before it is checked. Points of sweeps, and cases
+under other interpretations of the paper, are checked as if they were cases of the config.
+"""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace

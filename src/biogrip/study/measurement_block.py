@@ -1,4 +1,9 @@
-"""Config block of the measurement: sampling, noise, and the file of a recorded trace."""
+"""Config block of the measurement: sampling, noise, and the file of a recorded trace.
+
+A simulated trace has a rate, times or bursts, and a noise. A recorded one has a file, the names of
+its columns with their units, and what is known of its noise; what identifications fit along
+with the sample is the same for both.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,6 +1,8 @@
-"""JSON Schema of config blocks as pydantic derives it, and a way to the part about a key.
+"""What a config block allows, as a JSON Schema, and messages about values that it does not allow.
 
-Messages about config values, from pydantic's errors: what was found, and what is allowed.
+Pydantic derives the schema of a block (`schema_of`), and finds what is wrong in its values
+(`checked`). The place of each error is followed in the schema to the part about the key, which says
+what is allowed there.
 """
 
 import re
@@ -17,17 +19,113 @@ from biogrip.keys import CONFLICT, TWICE, Problem, adapter, built, kind_of
 from biogrip.physics.instruments import ROTATION
 from biogrip.traces.columns import TIME_UNITS, nearest_unit
 
-_SCHEMA_UNITS = {
+T = TypeVar("T")
+
+MISSING = "is missing and has no default."
+
+# Choices of which an unknown one has a nearest by its meaning.
+_BY_MEANING = ([*TIME_UNITS], [*ROTATION.units])
+_BOUNDS = {"exclusiveMinimum": "greater than", "minimum": "at least", "maximum": "at most"}
+# Most errors that are explained, and most characters of a value that are shown.
+_MOST, _LONGEST = 1000, 40
+
+_UNITS = {
     **{name: name for name in ("s", "m", "Hz", "rad", "deg", "V")},
     "percent": "%",
     **{"Nm": "N m", "Nms": "N m s", "kgm2": "kg m²"},
     **{"Nms_per_rad": "N m s/rad", "Nm_per_rad": "N m/rad"},
 }
-_UNIT = re.compile(rf".*?_({'|'.join(_SCHEMA_UNITS)})")
+_ENDS = re.compile(rf".*?_({'|'.join(_UNITS)})")
 _WORDS = {"integer": "an integer", "boolean": "true or false", "string": "text", "array": "a list"}
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 # Beyond 2^53 a float does not hold every integer.
 _MOST_COUNTED = 2**53
+
+
+def checked(kind: Callable[..., T], block: Any) -> tuple[T | None, list[Problem]]:
+    """Build a config block from plain keys and values, or find what is not allowed in it."""
+    try:
+        return built(kind, block, check=True), []
+    except ValidationError as error:
+        errors = error.errors(include_url=False)
+    errors.sort(key=lambda error: [str(part) for part in error["loc"]])
+    # A list is also called too short because its items are not valid.
+    own = [
+        error
+        for error in errors[:_MOST]
+        if error["type"] != "too_short" or len(error["input"]) < error["ctx"]["min_length"]
+    ]
+    return None, [_explained(schema_of(kind), error) for error in own]
+
+
+def bound(limit: float) -> str:
+    """Return a bound as text, whole numbers in full."""
+    return f"{limit:g}" if isinstance(limit, float) else str(limit)
+
+
+def _explained(schema: "Schema", error: ErrorDetails) -> Problem:
+    """Follow the path of an error, which names alternatives and keys, too, to what is allowed."""
+    path: tuple[int | str, ...] = ()
+    above = leaf = schema
+    for part in error["loc"][1:]:
+        chosen = leaf.option(str(part))
+        if part == "[key]":
+            leaf = above.within(above.get("propertyNames"))
+        elif chosen is not leaf:
+            leaf = chosen
+        else:
+            path, above, leaf = (*path, part), leaf, leaf.inside(part)
+    of_name = error["loc"][-1] == "[key]"
+    text = _text(path, leaf, above, error, of_name=of_name)
+    # An unknown key of a mapping is reported for the block that contains it.
+    return path[:-1] if of_name and error["type"] == "literal_error" else path, text
+
+
+def _text(
+    path: Sequence[Hashable], leaf: "Schema", above: "Schema", error: ErrorDetails, *, of_name: bool
+) -> str:
+    """Say what was found, and what is allowed; `above` is the schema of the block with the key."""
+    found = error["input"]
+    match error["type"]:
+        case "extra_forbidden" | "unexpected_keyword_argument":
+            names = [*above.keys]
+            return f"unknown key.{nearest(path[-1], names)} Allowed here: {', '.join(names)}."
+        case "missing":
+            return MISSING
+        case "literal_error":
+            choices = leaf.get("enum")
+            hint = (nearest_unit if choices in _BY_MEANING else nearest)(found, choices)
+            return f"found {_shown(found)}.{hint} Allowed: {', '.join(choices)}."
+        case "string_pattern_mismatch" if of_name:
+            kind = str(path[-2]).removesuffix("s")
+            return f"not a usable {kind} name: {leaf.get('form')} (it names files)."
+        case "string_pattern_mismatch":
+            return f"found {_shown(found)}, allowed is {leaf.get('form')}."
+        case _ if error["type"] == TWICE:
+            return "holds something twice; allowed is every item once."
+        case _ if error["type"] == CONFLICT:
+            return error["msg"]
+        case "too_short" | "too_long" | "string_too_short" | "string_too_long":
+            few = "min_length" in error["ctx"]
+            words, limit = ("at least", "min_length") if few else ("at most", "max_length")
+            what = "character" if isinstance(found, str) else "item"
+            given = f"{_shown(found)} of {counted(len(found), what)}"
+            return f"found {given}, allowed are {words} {error['ctx'][limit]}."
+        case "finite_number":
+            return f"found {_shown(found)}, allowed is a finite number."
+        case "greater_than" | "greater_than_equal" | "less_than_equal":
+            limits = [f"{_BOUNDS[it]} {bound(leaf.node[it])}" for it in _BOUNDS if it in leaf.node]
+            text = f"{' and '.join(limits)} {leaf.get('unit', '')}".rstrip()
+            return f"found {_shown(found)}, allowed is {text}."
+    return f"found {_shown(found)}, allowed is {leaf.word}."
+
+
+def _shown(value: Any) -> str:
+    kind = kind_of(value)
+    if value is None or kind in ("a block of keys", "a list"):
+        return kind or "nothing"
+    text = repr(value)
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
 class Schema:
@@ -96,7 +194,11 @@ class Schema:
         kinds = {option.get("type", "number") for option in (here, *self.options)}
         if isinstance(value, str) and "boolean" in kinds:
             return {"true": True, "false": False}.get(value.lower(), value)
-        return _number(value) if isinstance(value, str) and kinds & {"number", "integer"} else value
+        wanted = isinstance(value, str) and kinds & {"number", "integer"}
+        if not wanted or not _NUMBER.fullmatch(value.strip()):
+            return value
+        number = float(value)
+        return int(number) if number.is_integer() and abs(number) < _MOST_COUNTED else number
 
 
 @cache
@@ -116,111 +218,8 @@ def tidy(node: Any, name: str = "") -> Any:
         return node
     said = {key: tidy(inner, key) for key, inner in node.items()}
     if name == "properties":
-        return {key: _unit(key) | inner for key, inner in said.items()}
+        units = {key: {"unit": _UNITS[it[1]]} for key in said if (it := _ENDS.fullmatch(key))}
+        return {key: units.get(key, {}) | inner for key, inner in said.items()}
     if len(said.get("anyOf", ())) == 1:
         said |= said.pop("anyOf")[0] | said
     return said
-
-
-def _unit(name: str) -> dict[str, str]:
-    found = _UNIT.fullmatch(name)
-    return {"unit": _SCHEMA_UNITS[found[1]]} if found else {}
-
-
-def _number(text: str) -> float | str:
-    if not _NUMBER.fullmatch(text.strip()):
-        return text
-    number = float(text)
-    return int(number) if number.is_integer() and abs(number) < _MOST_COUNTED else number
-
-
-T = TypeVar("T")
-MISSING = "is missing and has no default."
-
-_UNITS = ([*TIME_UNITS], [*ROTATION.units])
-_BOUNDS = {"exclusiveMinimum": "greater than", "minimum": "at least", "maximum": "at most"}
-_MOST, _LONGEST = 1000, 40
-
-
-def checked(kind: Callable[..., T], block: Any) -> tuple[T | None, list[Problem]]:
-    """Build a config block from plain keys and values, or find what is not allowed in it."""
-    try:
-        return built(kind, block, check=True), []
-    except ValidationError as error:
-        errors = error.errors(include_url=False)
-    errors.sort(key=lambda error: [str(part) for part in error["loc"]])
-    return None, [_explained(schema_of(kind), it) for it in errors[:_MOST] if not _follows(it)]
-
-
-def bound(limit: float) -> str:
-    """Return a bound as text, whole numbers in full."""
-    return f"{limit:g}" if isinstance(limit, float) else str(limit)
-
-
-def _explained(schema: Schema, error: ErrorDetails) -> Problem:
-    """Follow the path of an error, which names alternatives and keys, too, to what is allowed."""
-    path: tuple[int | str, ...] = ()
-    above = leaf = schema
-    for part in error["loc"][1:]:
-        chosen = leaf.option(str(part))
-        if part == "[key]":
-            leaf = above.within(above.get("propertyNames"))
-        elif chosen is not leaf:
-            leaf = chosen
-        else:
-            path, above, leaf = (*path, part), leaf, leaf.inside(part)
-    of_name = error["loc"][-1] == "[key]"
-    text = _text(path, leaf, above, error, of_name=of_name)
-    # An unknown key of a mapping is reported for the block that contains it.
-    return path[:-1] if of_name and error["type"] == "literal_error" else path, text
-
-
-def _follows(error: ErrorDetails) -> bool:
-    """Return True if a list is called too short because its items are not valid."""
-    return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
-
-
-def _text(
-    path: Sequence[Hashable], leaf: Schema, above: Schema, error: ErrorDetails, *, of_name: bool
-) -> str:
-    found = error["input"]
-    match error["type"]:
-        case "extra_forbidden" | "unexpected_keyword_argument":
-            names = [*above.keys]
-            return f"unknown key.{nearest(path[-1], names)} Allowed here: {', '.join(names)}."
-        case "missing":
-            return MISSING
-        case "literal_error":
-            choices = leaf.get("enum")
-            hint = (nearest_unit if choices in _UNITS else nearest)(found, choices)
-            return f"found {_shown(found)}.{hint} Allowed: {', '.join(choices)}."
-        case "string_pattern_mismatch" if of_name:
-            kind = str(path[-2]).removesuffix("s")
-            return f"not a usable {kind} name: {leaf.get('form')} (it names files)."
-        case "string_pattern_mismatch":
-            return f"found {_shown(found)}, allowed is {leaf.get('form')}."
-        case _ if error["type"] == TWICE:
-            return "holds something twice; allowed is every item once."
-        case _ if error["type"] == CONFLICT:
-            return error["msg"]
-        case "too_short" | "too_long" | "string_too_short" | "string_too_long":
-            few = "min_length" in error["ctx"]
-            words, limit = ("at least", "min_length") if few else ("at most", "max_length")
-            what = "character" if isinstance(found, str) else "item"
-            given = f"{_shown(found)} of {counted(len(found), what)}"
-            return f"found {given}, allowed are {words} {error['ctx'][limit]}."
-        case "finite_number":
-            return f"found {_shown(found)}, allowed is a finite number."
-        case "greater_than" | "greater_than_equal" | "less_than_equal":
-            limits = [f"{_BOUNDS[it]} {bound(leaf.node[it])}" for it in _BOUNDS if it in leaf.node]
-            text = f"{' and '.join(limits)} {leaf.get('unit', '')}".rstrip()
-            return f"found {_shown(found)}, allowed is {text}."
-    return f"found {_shown(found)}, allowed is {leaf.word}."
-
-
-def _shown(value: Any) -> str:
-    kind = "nothing" if value is None else kind_of(value)
-    if kind in ("nothing", "a block of keys", "a list"):
-        return kind
-    text = repr(value)
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."

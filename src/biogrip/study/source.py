@@ -1,6 +1,7 @@
-"""Paths of the default config, the Snakefile and other files, installed or in the repository.
+"""YAML config files: where the default one is, what they hold, and in which line each key stands.
 
-Reading of YAML config files: their keys, and the lines of these for messages.
+YAML of Python is YAML 1.1, which reads ``1:30`` in base 60 and ``010`` in base 8; such values, keys
+that are given twice, and files that are too large are refused.
 """
 
 import re
@@ -14,6 +15,20 @@ import yaml
 
 from biogrip.errors import BiogripError
 from biogrip.terminal import visible
+
+KeyPath = tuple[Hashable, ...]
+Lines = Mapping[KeyPath, int | None]
+Source = tuple[str, Lines]
+"""Name of a file or of another source of keys, and the line (from 1) of each that it has."""
+
+LARGEST_BYTES = 1_000_000
+"""Bytes of a config file at most."""
+
+# Aliases of aliases make many values of a few lines, and endless ones of an alias of itself.
+_MOST_KEYS, _DEEPEST = 100_000, 50
+# libyaml is ten times faster, but not part of every PyYAML.
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_OCTAL = re.compile(r"[-+]?0[0-7_]+")
 
 # The wheel contains a copy of these files of the repository.
 _PACKAGED = Path(__file__).parents[1] / "workflow"
@@ -35,23 +50,11 @@ def shipped(name: str) -> Path:
     return _TOP / name
 
 
-KeyPath = tuple[Hashable, ...]
-Lines = Mapping[KeyPath, int | None]
-Source = tuple[str, Lines]
-"""Name of a file or of another source of keys, and the line (from 1) of each that it has."""
-
-LARGEST_BYTES = 1_000_000
-# Aliases of aliases make many values of a few lines, and endless ones of an alias of itself.
-_MOST_KEYS, _DEEPEST = 100_000, 50
-# libyaml is ten times faster, but not part of every PyYAML.
-_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-_OCTAL = re.compile(r"[-+]?0[0-7_]+")
-
-
 def keys_in(block: Any, above: KeyPath = ()) -> Iterator[KeyPath]:
     """Yield the paths of all keys and list items of a block and of the blocks below."""
-    items = enumerate(block) if isinstance(block, list) else ()
-    for key, inner in block.items() if isinstance(block, Mapping) else items:
+    if isinstance(block, list):
+        block = dict(enumerate(block))
+    for key, inner in block.items() if isinstance(block, Mapping) else ():
         yield (*above, key)
         yield from keys_in(inner, (*above, key))
 
@@ -156,10 +159,8 @@ def _walk(file: Path, node: yaml.Node, path: KeyPath, lines: dict[KeyPath, int])
     """Collect the lines of keys and items, and refuse what stands twice or would be misread."""
     line = node.start_mark.line + 1
     if len(path) > _DEEPEST or len(lines) > _MOST_KEYS:
-        text = (
-            f"found more than {_DEEPEST} levels or {_MOST_KEYS} values, those of an alias counted"
-        )
-        raise _wrong(file, line, f"{text} wherever it is used; allowed are fewer.")
+        text = f"found more than {_DEEPEST} levels or {_MOST_KEYS} values, those of an alias"
+        raise _wrong(file, line, f"{text} counted wherever it is used; allowed are fewer.")
     if isinstance(node, yaml.ScalarNode) and (problem := scalar_problem(node)):
         raise _wrong(file, line, f"{dotted(path)}: {problem}")
     if isinstance(node, yaml.MappingNode):

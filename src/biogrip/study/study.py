@@ -1,8 +1,7 @@
-"""Typed access to a checked config: the study and its cases."""
+"""A checked config as the study and its cases, with what other modules need of them."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -99,16 +98,15 @@ class Case:
     @property
     def parameters(self) -> dict[str, float]:
         """True parameters by name, SI units, branches by relaxation time; none if recorded."""
-        given = self.block.sample.parameters
-        known = {name: float(given[name]) for name in self.sample.model.names if name in given}
-        searched = with_fixed(self.sample.model, self.fixed)
-        whole = len(known) == len(self.sample.model.names)
-        return searched.named_in_order(known) if whole else known
+        given, model = self.block.sample.parameters, self.sample.model
+        known = {name: float(given[name]) for name in model.names if name in given}
+        whole = len(known) == len(model.names)
+        return with_fixed(model, self.fixed).named_in_order(known) if whole else known
 
     @cached_property
     def _contact(self) -> Contact | None:
         """State of the gripper when it is closed onto the sample, if its size is known."""
-        size_m = self.block.sample.size_m
+        size_m = self.size_m
         return None if size_m is None else self.block.gripper.contact(self.actuator, size_m)
 
     @cached_property
@@ -160,11 +158,9 @@ class Case:
     @property
     def interpretations(self) -> dict[str, "Case"]:
         """The case under each interpretation of the paper, by the interpretation's name."""
-        blocks = self.study.config.interpretations
-        return {
-            name: replace(self, block=built(CaseBlock, overlaid(self.plain, block.changes)))
-            for name, block in blocks.items()
-        }
+        changes = {name: it.changes for name, it in self.study.config.interpretations.items()}
+        blocks = {name: overlaid(self.plain, changed) for name, changed in changes.items()}
+        return {name: replace(self, block=built(CaseBlock, it)) for name, it in blocks.items()}
 
     @property
     def models(self) -> dict[str, Sample]:
@@ -193,6 +189,8 @@ class Study:
 
     config: StudyConfig
     """The whole config, with the study's blocks merged into every case."""
+    only: tuple[str, ...] | None = None
+    """Names of its cases; by default those of the config."""
 
     sweeps = _of_study(lambda study: study.config.sweeps)
     study_seed = _of_study(lambda study: study.config.study_seed)
@@ -208,7 +206,7 @@ class Study:
     plain = _of_study(lambda study: cast("dict[str, Any]", plain(study.config)))
     """Config as plain values, without keys that have their default."""
 
-    cases = _of_study(lambda study: study._cases(study.config.cases))
+    cases = _of_study(lambda study: study._cases(study.config.cases, study.only))
     """Cases by name, in the order of the config."""
     simulated = _of_study(lambda study: study._where(lambda case: not case.recorded))
     """Names of cases that are simulated."""
@@ -240,14 +238,13 @@ class Study:
 
     def of(self, names: Iterable[str]) -> "Study":
         """Return the study of some of its cases."""
-        cases = {name: self.config.cases[name] for name in names}
-        # Of the study of a job, which lacks keys, `replace` would ask for all.
-        config = copy(self.config)
-        object.__setattr__(config, "cases", cases)
-        return Study(config)
+        return Study(self.config, tuple(names))
 
-    def _cases(self, blocks: Mapping[str, CaseBlock]) -> dict[str, Case]:
-        return {name: Case(name, block, self) for name, block in blocks.items()}
+    def _cases(
+        self, blocks: Mapping[str, CaseBlock], only: Iterable[str] | None = None
+    ) -> dict[str, Case]:
+        names = blocks if only is None else only
+        return {name: Case(name, blocks[name], self) for name in names}
 
     def case(self, name: str) -> Case:
         """Return a case of the study or of a sweep's point."""
@@ -265,6 +262,6 @@ class Study:
     def phases(self) -> tuple[Phase, ...]:
         """Protocol of all cases if it is the same, else of the study."""
         own = {case.phases for case in self.cases.values()}
-        return (
-            own.pop() if len(own) == 1 else self.config.protocol.make_phases(GRIPPER, self.actuator)
-        )
+        if len(own) == 1:
+            return own.pop()
+        return self.config.protocol.make_phases(GRIPPER, self.actuator)

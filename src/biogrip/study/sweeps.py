@@ -1,4 +1,8 @@
-"""Sweeps: grids of cases that differ from a case of the study in two values."""
+"""Sweeps: grids of cases that differ from a case of the study in two values.
+
+A point of a grid is a case of its own. Its name is made of its values, so that the random streams,
+which derive from it, stay the same when values are added.
+"""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -11,6 +15,7 @@ from pydantic import BaseModel, Field, Tag
 from biogrip.errors import nearest
 from biogrip.keys import BY_KIND, OPEN, Block, Distinct, Printed, Problem, plain
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
+from biogrip.study.source import overlaid
 
 MOST_POINTS = 2000
 
@@ -92,7 +97,7 @@ class AxisBlock(Block):
 
     def _level(self, value: float | str | ValueBlock) -> Value:
         if isinstance(value, ValueBlock):
-            inner = {name: value.changes[name] for name in sorted(value.changes)}
+            inner = dict(sorted(value.changes.items()))
             overrides = {f"{key}.{name}": inner[name] for key in self.keys for name in inner}
             return Value("-".join(map(_word, inner.values())), value.label, value.label, overrides)
         shown = value if isinstance(value, str) else f"{value / self.unit_in_si:.4g}"
@@ -115,8 +120,7 @@ class Point:
     """A point of a sweep's grid, i.e. a case with two values changed."""
 
     name: str
-    """Name of the point's case. It is made of the values only, since random streams derive from it:
-    an added value must not rename other points."""
+    """Name of the point's case."""
     case: str
     """Case that the point's case is derived from."""
     row: Value
@@ -176,12 +180,13 @@ def point_blocks(
     found = {}
     blocks = {name: plain(case) for name, case in cases.items()} if sweeps else {}
     for _, point in list_points(sweeps):
-        block = blocks[point.case]
+        found[point.name] = blocks[point.case]
         for key, value in (point.row.overrides | point.column.overrides).items():
             # A key that counts takes no 8.0.
-            whole = isinstance(value, float) and value.is_integer()
-            block = _changed(block, key, int(value) if whole else value)
-        found[point.name] = block
+            changed: Any = int(value) if isinstance(value, float) and value.is_integer() else value
+            for name in reversed(key.split(".")):
+                changed = {name: changed}
+            found[point.name] = overlaid(found[point.name], changed)
     return found
 
 
@@ -202,9 +207,3 @@ def _text(value: float | str) -> str:
 def _word(value: float | str) -> str:
     """Return a value as text that is safe in file names."""
     return re.sub(r"[^A-Za-z0-9-]+", "_", _text(value))
-
-
-def _changed(block: dict[str, Any], key: str, value: float | str) -> dict[str, Any]:
-    name, _, rest = key.partition(".")
-    inner = block[name] if isinstance(block.get(name), dict) else {}
-    return {**block, name: _changed(inner, rest, value) if rest else value}

@@ -10,8 +10,7 @@ from scipy.stats import binomtest
 
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, NOT_DETERMINED, WIDE
-from biogrip.records.identifications import INTERVALS
-from biogrip.records.verdicts import read_verdicts
+from biogrip.records.identifications import INTERVALS, read_verdicts
 from biogrip.study.study import Case, Study
 from biogrip.tables.coverage import holds
 from biogrip.tables.layout import Column, Row, Table

@@ -1,0 +1,63 @@
+"""Configs of every kind, and such as stop a run before any job with one message."""
+
+from pathlib import Path
+
+from tests.helpers.runs import snakemake
+
+DROP = {"model": "liquid_drop", "k": 1.0, "k_p": 0.1, "c": 10.0}
+CASES = {
+    "crept": {
+        "instrument": "creep",
+        "sample": {"model": "zener_maxwell", "k": 300.0, "k_p": 200.0, "c": 900.0},
+        "protocol": {"phases": [{"duration_s": 30, "stress_Pa": 40}]},
+    },
+    "sized": {"sample": DROP | {"size_m": 60e-6}, "assumed_gripper": "calibrated"},
+    "in_volts": {"sample": DROP, "protocol": {"phases": [{"duration_s": 50, "voltage_V": 12}]}},
+}
+CONFIG = {
+    "seeds": 1,
+    "methods": ["genetic"],
+    "identifiability": {"coverage_seeds": 0},
+    "genetic_algorithm": {
+        "population": 20,
+        "survivors": 10,
+        "min_generations": 2,
+        "max_generations": 4,
+    },
+    "only": list(CASES),
+    "cases": CASES,
+}
+
+
+def test_every_kind_of_case_is_identified(tmp_path: Path) -> None:
+    """What a simulated case is told is enough for its first jobs."""
+    files = [f"results/identifications/{case}/genetic/seeds_0-0.csv" for case in CASES]
+    run = snakemake(tmp_path, "--", *files, config=CONFIG)
+    assert run.status == 0, run.output
+    assert (tmp_path / "results/calibrations/sized.yaml").is_file()
+
+
+def test_a_wrong_config_stops_with_one_message(tmp_path: Path) -> None:
+    """Of a file, and of the command line."""
+    wrong = {"seedz": 3, "methods": ["gentic"]}
+    run = snakemake(tmp_path, "-n", "--config", "onyl=x", "seeds=0", config=wrong)
+    assert run.status == 1
+    for said in (
+        "overlay.yaml, line 3: seedz: unknown key. Did you mean 'seeds'?",
+        "overlay.yaml, line 2: methods[0]: found 'gentic'. Did you mean 'genetic'?",
+        "command line, --config: onyl: unknown key. Did you mean 'only'?",
+        "command line, --config: seeds: found 0, allowed is",
+    ):
+        assert said in run.output
+    assert "Traceback" not in run.output
+    assert len(run.output.splitlines()) < 16
+
+
+def test_what_has_no_name_has_nothing_published(tmp_path: Path) -> None:
+    """Nothing is compared with, and nothing replaced, where only a command line says the config."""
+    run = snakemake(tmp_path, "-k", "--config", "seeds=2", "--", "check", "publish")
+    assert run.status == 1
+    for name, said in (("check", "no tables to compare"), ("publish", "nothing in whose place")):
+        log = (tmp_path / "results" / "logs" / f"{name}.log").read_text()
+        assert "published/unnamed" in log
+        assert said in log
