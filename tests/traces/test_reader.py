@@ -101,7 +101,7 @@ def test_what_pandas_writes_is_read_to_the_last_bit(
         sep=decimal[0],
         decimal=decimal[1],
         index=False,
-        quoting=quoting,  # type: ignore[arg-type]
+        quoting=quoting,
         na_rep=gap,
         lineterminator="\n",
     )

@@ -117,12 +117,11 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
     # Imported here: loading pandas takes long.
     import pandas as pd
 
-    encoding, text = _read_text(path)
-    lines = _LINE_END.split(text)
-    kept = [i for i, line in enumerate(lines) if not _LEFT_OUT.match(line)]
-    if not kept:
+    encoding, lines = _read_lines(path)
+    kept = np.flatnonzero([not _LEFT_OUT.match(line) for line in lines])
+    if not len(kept):
         raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
-    lines, numbers = [lines[i] for i in kept], np.array(kept) + 1
+    lines = [lines[i] for i in kept]
     headers = [i for i, line in enumerate(lines) if i == 0 or not _ROW.match(line)]
     separator = _separator(lines, [lines[i] for i in headers], columns)
     widths = np.array([line.count(separator) for line in lines]) + 1
@@ -145,15 +144,15 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
         is_open = re.compile(rf'(?:^|{separator}) *"(?:[^"]|"")*$')
         row = next((i for i, line in enumerate(lines) if is_open.search(line)), 0)
         raise BiogripError(
-            f"{place(path, numbers[row])}: found a quote without its end, allowed are quoted cells "
-            "that end on their line."
+            f"{place(path, kept[row] + 1)}: found a quote without its end, allowed are quoted "
+            "cells that end on their line."
         )
     cells = np.vectorize(str.strip, otypes=[object])(frame.to_numpy())
-    return Sheet(encoding, separator, cells, widths, numbers, headers)
+    return Sheet(encoding, separator, cells, widths, kept + 1, headers)
 
 
-def _read_text(path: Path) -> tuple[str, str]:
-    """Return the encoding that a file seems to have, and its text."""
+def _read_lines(path: Path) -> tuple[str, list[str]]:
+    """Return the encoding that a file seems to have, and its lines."""
     from charset_normalizer import from_bytes
 
     if problem := trace_file_problem(path):
@@ -166,7 +165,7 @@ def _read_text(path: Path) -> tuple[str, str]:
     # What can be UTF-8 is.
     best = next((match for match in matches if match.encoding == "utf_8"), matches.best())
     if best is not None:
-        return _ENCODINGS[best.encoding], str(best)
+        return _ENCODINGS[best.encoding], _LINE_END.split(str(best))
     codec = "utf-16" if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8"
     line, found = None, "binary data"
     try:
