@@ -180,10 +180,11 @@ def _read_lines(path: Path) -> tuple[str, list[str]]:
 
 def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -> str:
     """Return the separator by which a line has most columns to read, or which most lines have."""
+    wanted = {*map(plain_name, columns.named.values())}
 
     def merit(separator: str) -> tuple[int, int]:
         rows = ({plain_name(cell.strip('" ')) for cell in row.split(separator)} for row in headers)
-        common = max(len(columns.plain_names & row) for row in rows)
+        common = max(len(wanted & row) for row in rows)
         return common, sum(separator in line for line in lines[:_LINES_SEARCHED])
 
     return max(SEPARATORS, key=merit)
@@ -258,7 +259,7 @@ def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
     if below and not any(sheet.cells[below[0], len(names) :]):
         units = sheet.cells[below[0], : len(names)].tolist()
         numbers = _count_numbers(sheet.cells[below[1]]) if len(below) > 1 else 0
-        times = [units[i] for i in table.indices(columns.time) if i < len(units)]
+        times = [units[i] for i in table.indices(columns.time)]
         if (
             (is_step and numbers > _count_numbers(units))
             or (all(in_brackets(unit) for unit in units if unit) and (has_columns or numbers > 0))
@@ -277,7 +278,7 @@ def _likely_table(sheet: Sheet) -> Table:
         if below > here == 0 and sum(map(bool, sheet.cells[at])) > 1
     ]
     at = likely[0] if likely else 0
-    return Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1)
+    return Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1, end=at + 1)
 
 
 def _end(sheet: Sheet, table: Table, following: Table) -> int:
