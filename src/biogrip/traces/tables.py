@@ -33,7 +33,7 @@ from biogrip.traces.columns import (
     unit_in_cell,
 )
 
-SEPARATORS = ("\t", ";", ",")
+SEPARATORS = (",", ";", "\t")
 
 # Guesses among all encodings take µ for Chinese.
 _ENCODINGS = {
@@ -187,7 +187,8 @@ def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -
         common = max(len(wanted & row) for row in rows)
         return common, sum(separator in line for line in lines[:_LINES_SEARCHED])
 
-    return max(SEPARATORS, key=merit)
+    # Where as many lines have commas as tabs or semicolons, these are decimal commas.
+    return max(reversed(SEPARATORS), key=merit)
 
 
 def find_tables(path: Path, sheet: Sheet, columns: Columns) -> tuple[list[Table], int]:
