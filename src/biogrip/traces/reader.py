@@ -241,7 +241,7 @@ def _numbers(path: Path, sheet: Sheet, table: Table, indices: list[int]) -> tupl
         )
     decimal, values = "point", np.empty((len(cells), len(indices)))
     for column, index in enumerate(indices):
-        texts = cells[:, index]
+        texts = cells[:, index].tolist()
         if sheet.separator != "," and any("," in text for text in texts):
             decimal, texts = "comma", [text.replace(",", ".") for text in texts]
         values[:, column] = np.fromiter(map(number_or_inf, texts), float, len(cells))
