@@ -155,7 +155,7 @@ def test_a_trace_is_no_table(tmp_path: Path, text: str) -> None:
 def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
     path = tmp_path / "cells.tsv"
     header = ["file", "measurment.noise_rad", "measurement.noise_rad", "fixed.cp", "dish", "dish"]
-    header += ["models.target", "fit", "k value", "measurement.skip", "sample.model"]
+    header += ["models.target", "fit", "k value", "measurement.block", "sample.model"]
     write(
         path,
         [
@@ -181,7 +181,7 @@ def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
         "... and 2 more.",
     ]
     assert lines[3].startswith("1, column 'models.target': is no key that a row may set.")
-    assert lines[7].startswith("2, column 'measurement.skip': found 2.5, allowed is")
+    assert lines[7].startswith("2, column 'measurement.block': found 2.5, allowed is")
     assert lines[8].startswith("2, column 'sample.model': found 'maxwel'. Did you mean 'maxwell'?")
 
 

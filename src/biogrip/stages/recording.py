@@ -94,11 +94,16 @@ def read_checked(
             problem.noise_share,
             problem.noise_rad,
         )
-    rotations = {0: trace.rotation_rad}
-    gaps = trace.without_number
     return Measurements(
-        *(trace.time_s, None, rotations, gaps, sd_rad, suspicion, onset_s, at_steps),
-        trace.recognised,
+        trace.time_s,
+        None,
+        {0: trace.rotation_rad},
+        gaps=trace.without_number,
+        sd_rad=sd_rad,
+        suspicion=suspicion,
+        onset_s=onset_s,
+        at_steps=at_steps,
+        recognised=trace.recognised,
     )
 
 
@@ -113,13 +118,12 @@ def without_steps(trace: Recording, protocol: TorqueHistory) -> tuple[Recording,
 
 
 def _part(trace: Recording, kept: BoolArray) -> Recording:
-    sd_rad = None if trace.sd_rad is None else trace.sd_rad[kept]
     return replace(
         trace,
         time_s=trace.time_s[kept],
         rotation_rad=trace.rotation_rad[kept],
         lines=trace.lines[kept],
-        sd_rad=sd_rad,
+        sd_rad=None if trace.sd_rad is None else trace.sd_rad[kept],
     )
 
 
@@ -159,14 +163,10 @@ def notes_on_recording(trace: Measurements) -> list[str]:
     if trace.gaps:
         rows = f"{counted(trace.gaps, 'row')} of {len(trace.time_s) + trace.gaps}"
         notes.append(f"Left out for want of a number: {rows}.")
-    if trace.recognised is not None and trace.recognised.averaged:
-        notes.append(
-            f"Averaged at repeated times: {counted(trace.recognised.averaged, 'reading')}."
-        )
-    if trace.recognised is not None and trace.recognised.outside:
-        notes.append(
-            f"Left out by from_s and until_s: {counted(trace.recognised.outside, 'reading')}."
-        )
+    if (form := trace.recognised) is not None and form.averaged:
+        notes.append(f"Averaged at repeated times: {counted(form.averaged, 'reading')}.")
+    if form is not None and form.outside:
+        notes.append(f"Left out by from_s and until_s: {counted(form.outside, 'reading')}.")
     if trace.at_steps:
         notes.append(
             f"Left out at the instant of a step: {counted(trace.at_steps, 'reading')}, of which "

@@ -85,18 +85,12 @@ class Columns:
         names = {"time": self.time, self.quantity.name: self.reading}
         return names if self.sd is None else {**names, "sd": self.sd}
 
-    @property
-    def plain_names(self) -> set[str]:
-        """Names of the columns as `plain_name` writes them."""
-        return {*map(plain_name, self.named.values())}
-
     def said_by(self, *keys: str) -> str:
         """Return the options or config keys that say something, for messages."""
         if self.by_options:
             return " and ".join(map(_option, keys))
-        values = {key: _BY_SET.get(key, "UNIT") for key in keys}
-        said = [key if value == "UNIT" else f"{key}: {value}" for key, value in values.items()]
-        return f"{' and '.join(said)} under measurement"
+        values = [f"{key}: {_BY_SET.get(key, 'UNIT')}".removesuffix(": UNIT") for key in keys]
+        return f"{' and '.join(values)} under measurement"
 
 
 def _option(key: str) -> str:

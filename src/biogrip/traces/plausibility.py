@@ -85,24 +85,17 @@ def check_recording(
 
     Parameters
     ----------
-    recording
-        Trace that was read from `path`, its times counted from the start of the protocol.
-    gripper, torque
-        Gripper and protocol it was recorded with.
-    path, columns
-        Source of the trace, for messages.
+    recording, path, columns
+        Trace, its times counted from the start of the protocol, and its source, for messages.
+    gripper, torque, instrument
+        What it was recorded with: gripper, protocol, and what is controlled and read.
     nuisance : (n_functions, n_samples)
         Orthonormal nuisance functions of the instrument, see `nuisance_basis`.
-    instrument
-        What is controlled and read.
-    noise_rad
-        Standard deviation of the noise, if known; otherwise it is estimated from the residuals
-        of the fit.
-    typical_rad
-        Standard deviation of the noise where it is given in any way.
+    noise_rad, typical_rad
+        Standard deviation of the noise, if it is the same everywhere and known, by default that of
+        the fit's residuals; and a typical one where it is given in any way.
     onset_s
-        Time of the trace's clock at which the protocol starts; readings before it are allowed if
-        it is given.
+        Time of the clock at which the protocol starts; if given, readings before it are allowed.
 
     Returns
     -------
@@ -112,8 +105,7 @@ def check_recording(
     Raises
     ------
     BiogripError
-        With file, line, column, what was found and allowed, and the unit that would be
-        plausible.
+        With file, line, column, what was found and allowed, and a unit that would be plausible.
     """
     _check_times(recording, torque, path, columns, onset_s)
     trace, free = recording.rotation_rad, free_rotation(gripper, torque)

@@ -122,10 +122,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
 
     Parameters
     ----------
-    path
-        The file.
-    columns
-        Columns to read; units as `unit_of` finds them.
+    path, columns
+        The file, and its columns to read; units as `unit_of` finds them.
 
     Returns
     -------
@@ -135,11 +133,10 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     Raises
     ------
     BiogripError
-        If the file cannot be read as text, lacks a column or repeats it, has it in several blocks
-        of which none is named, its unit is unknown or contradicts the name, a row has too few or
-        too many cells, or text that is neither a finite number nor a gap, a standard deviation is
-        not positive, the time does not increase, or there are fewer than `FEWEST_SAMPLES` samples
-        or more than `MOST_ROWS` rows.
+        If the file is no text, lacks a column or repeats it, has it in several blocks of which none
+        is named, a unit is unknown or contradicted, a row has too few or too many cells, or text
+        that is neither a finite number nor a gap, a standard deviation is not positive, the time
+        does not increase, or there are fewer than `FEWEST_SAMPLES` samples.
     """
     sheet = read_sheet(path, columns)
     tables, index = find_tables(path, sheet, columns)
@@ -243,15 +240,16 @@ def _numbers(path: Path, sheet: Sheet, table: Table, indices: list[int]) -> tupl
             "separators."
         )
     decimal, values = "point", np.empty((len(cells), len(indices)))
-    for column, texts in enumerate(cells[:, indices].T):
+    for column, index in enumerate(indices):
+        texts = cells[:, index].tolist()
         if sheet.separator != "," and any("," in text for text in texts):
             decimal, texts = "comma", [text.replace(",", ".") for text in texts]
         values[:, column] = np.fromiter(map(number_or_inf, texts), float, len(cells))
         for row in np.flatnonzero(np.isinf(values[:, column]))[:1]:
-            name = table.names[indices[column]]
             raise BiogripError(
-                f"{place(path, lines[row], name)}: found '{shortened(texts[row])}', allowed is a "
-                "finite number, or nan, NA, N/A, - or nothing where there is none."
+                f"{place(path, lines[row], table.names[index])}: found "
+                f"'{shortened(cells[row, index])}', allowed is a finite number, or nan, NA, N/A, - "
+                "or nothing where there is none."
             )
     return values, decimal
 

@@ -33,7 +33,7 @@ from biogrip.traces.columns import (
     unit_in_cell,
 )
 
-SEPARATORS = ("\t", ";", ",")
+SEPARATORS = (",", ";", "\t")
 
 # Guesses among all encodings take µ for Chinese.
 _ENCODINGS = {
@@ -117,12 +117,11 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
     # Imported here: loading pandas takes long.
     import pandas as pd
 
-    encoding, text = _read_text(path)
-    lines = _LINE_END.split(text)
-    kept = [i for i, line in enumerate(lines) if not _LEFT_OUT.match(line)]
-    if not kept:
+    encoding, lines = _read_lines(path)
+    kept = np.flatnonzero([not _LEFT_OUT.match(line) for line in lines])
+    if not len(kept):
         raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
-    lines, numbers = [lines[i] for i in kept], np.array(kept) + 1
+    lines = [lines[i] for i in kept]
     headers = [i for i, line in enumerate(lines) if i == 0 or not _ROW.match(line)]
     separator = _separator(lines, [lines[i] for i in headers], columns)
     widths = np.array([line.count(separator) for line in lines]) + 1
@@ -145,15 +144,15 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
         is_open = re.compile(rf'(?:^|{separator}) *"(?:[^"]|"")*$')
         row = next((i for i, line in enumerate(lines) if is_open.search(line)), 0)
         raise BiogripError(
-            f"{place(path, numbers[row])}: found a quote without its end, allowed are quoted cells "
-            "that end on their line."
+            f"{place(path, kept[row] + 1)}: found a quote without its end, allowed are quoted "
+            "cells that end on their line."
         )
     cells = np.vectorize(str.strip, otypes=[object])(frame.to_numpy())
-    return Sheet(encoding, separator, cells, widths, numbers, headers)
+    return Sheet(encoding, separator, cells, widths, kept + 1, headers)
 
 
-def _read_text(path: Path) -> tuple[str, str]:
-    """Return the encoding that a file seems to have, and its text."""
+def _read_lines(path: Path) -> tuple[str, list[str]]:
+    """Return the encoding that a file seems to have, and its lines."""
     from charset_normalizer import from_bytes
 
     if problem := trace_file_problem(path):
@@ -166,7 +165,7 @@ def _read_text(path: Path) -> tuple[str, str]:
     # What can be UTF-8 is.
     best = next((match for match in matches if match.encoding == "utf_8"), matches.best())
     if best is not None:
-        return _ENCODINGS[best.encoding], str(best)
+        return _ENCODINGS[best.encoding], _LINE_END.split(str(best))
     codec = "utf-16" if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8"
     line, found = None, "binary data"
     try:
@@ -181,13 +180,15 @@ def _read_text(path: Path) -> tuple[str, str]:
 
 def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -> str:
     """Return the separator by which a line has most columns to read, or which most lines have."""
+    wanted = {*map(plain_name, columns.named.values())}
 
     def merit(separator: str) -> tuple[int, int]:
         rows = ({plain_name(cell.strip('" ')) for cell in row.split(separator)} for row in headers)
-        common = max(len(columns.plain_names & row) for row in rows)
+        common = max(len(wanted & row) for row in rows)
         return common, sum(separator in line for line in lines[:_LINES_SEARCHED])
 
-    return max(SEPARATORS, key=merit)
+    # Where as many lines have commas as tabs or semicolons, these are decimal commas.
+    return max(reversed(SEPARATORS), key=merit)
 
 
 def find_tables(path: Path, sheet: Sheet, columns: Columns) -> tuple[list[Table], int]:
@@ -259,7 +260,7 @@ def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
     if below and not any(sheet.cells[below[0], len(names) :]):
         units = sheet.cells[below[0], : len(names)].tolist()
         numbers = _count_numbers(sheet.cells[below[1]]) if len(below) > 1 else 0
-        times = [units[i] for i in table.indices(columns.time) if i < len(units)]
+        times = [units[i] for i in table.indices(columns.time)]
         if (
             (is_step and numbers > _count_numbers(units))
             or (all(in_brackets(unit) for unit in units if unit) and (has_columns or numbers > 0))
@@ -278,7 +279,7 @@ def _likely_table(sheet: Sheet) -> Table:
         if below > here == 0 and sum(map(bool, sheet.cells[at])) > 1
     ]
     at = likely[0] if likely else 0
-    return Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1)
+    return Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1, end=at + 1)
 
 
 def _end(sheet: Sheet, table: Table, following: Table) -> int:
