@@ -1,4 +1,8 @@
-"""Model selection for one trace: fits of other sample models, ranked by AIC and BIC."""
+"""Model selection for a trace: fits of other sample models, ranked by AIC and BIC.
+
+With fixed parameters and with the nonlinear model, which takes minutes, no other is tried. If one
+of the fits is better than the diagnosed one, the trace is diagnosed again.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -33,19 +37,14 @@ _POWER_LAWS = ["fractional_kelvin_voigt", "fractional_maxwell"]
 
 @dataclass(frozen=True)
 class FittedModels:
-    """Best fits of sample models to a trace.
-
-    Parameters
-    ----------
-    tried, answers
-        Rank and fit of each model, in the same order.
-    chosen
-        Sample model that the trace was identified with.
-    """
+    """Best fits of sample models to a trace."""
 
     chosen: str
+    """Sample model that the trace was identified with."""
     tried: list[FittedModel] = field(default_factory=list)
+    """Rank of each model."""
     answers: list[Identification] = field(default_factory=list)
+    """Fit of each, in the same order."""
 
     @property
     def names(self) -> list[str]:
@@ -61,11 +60,8 @@ class FittedModels:
     def data(self, findings: Sequence[Finding] | None) -> dict[str, Any]:
         """Return one row per model, and advice in words, as plain data.
 
-        Parameters
-        ----------
-        findings
-            Findings on the quantities of the chosen model; None if its fit is rejected. Advice is
-            then only another model that may be the reason.
+        Findings are those on the quantities of the chosen model; None if its fit is rejected.
+        Advice is then only another model that may be the reason.
         """
         if not self.tried:
             return {"models": [], "advice": None}
@@ -123,17 +119,7 @@ def models_tried(
 ) -> list[FittedModels]:
     """Fit several sample models to each trace with the noise model of its fit.
 
-    None are fitted with fixed parameters, with the nonlinear model, which takes minutes, or if
-    there is only one model.
-
-    Parameters
-    ----------
-    traces
-        Traces of the same chosen model and budget.
-    fits
-        Fit of each with the chosen model.
-    diagnoses
-        Diagnosis of that fit; its best fit is one of the starts.
+    The traces have the same chosen model and budget. Best fits so far are among the starts.
     """
     candidates = [_candidates(*pair) for pair in zip(traces, fits, strict=True)]
     found: dict[int, FittedModels] = {}
@@ -150,7 +136,9 @@ def _candidates(trace: TraceCase, fit: TraceFit) -> tuple[str, ...]:
     # With very many samples the dozens of modes of a springpot would take gigabytes.
     few = fit.problem.residuals.samples <= _MOST_SAMPLES
     power_laws = few and not trace.names_models
-    others = _power_laws(trace.problem.torque.end_s) if power_laws else []
+    # In longer experiments power laws are not valid.
+    power_laws = power_laws and trace.problem.torque.end_s <= LONGEST_S
+    others = _POWER_LAWS if power_laws else []
     names = tuple(dict.fromkeys((*trace.case.models, *others)))
     return names if len(names) > 1 else ()
 
@@ -168,25 +156,20 @@ def _tried(
     if not names:
         yield from [FittedModels(chosen)] * len(which)
         return
-    found = fit_models(
-        {
-            name: [
-                traces[index].problem.for_model(fits[index].problem, CANDIDATES[name].model)
-                for index in which
-            ]
-            for name in names
-        },
-        case.least_squares,
-        {
-            name: [
-                stream(own.study.study_seed, own.name, 0, f"model {name}")
-                for own in (traces[index].case for index in which)
-            ]
-            for name in names
-        },
-        lambda: None,
-        near={chosen: np.array([diagnoses[index].likelihood.best for index in which])},
-    )
+    problems = {
+        name: [
+            traces[index].problem.for_model(fits[index].problem, CANDIDATES[name].model)
+            for index in which
+        ]
+        for name in names
+    }
+    cases = [traces[index].case for index in which]
+    streams = {
+        name: [stream(own.study.study_seed, own.name, 0, f"model {name}") for own in cases]
+        for name in names
+    }
+    near = {chosen: np.array([diagnoses[index].likelihood.best for index in which])}
+    found = fit_models(problems, case.least_squares, streams, lambda: None, near=near)
     for place, index in enumerate(which):
         answers = [found[name][place] for name in names]
         misfits = [answer.misfit_rad for answer in answers]
@@ -197,21 +180,9 @@ def _tried(
 def judge_again(
     trace: TraceCase, fit: TraceFit, diagnosis: Diagnosis, models: FittedModels
 ) -> tuple[Diagnosis, list[Note]]:
-    """Diagnose a trace again if fits of other models found a lower chi^2 within the search range.
+    """Diagnose a trace again if its own model was fitted better, within the search range, since.
 
-    Parameters
-    ----------
-    trace, fit, diagnosis
-        Trace, and its fit and diagnosis so far.
-    models
-        Fits of all models.
-
-    Returns
-    -------
-    diagnosis
-        The new diagnosis, or the one so far.
-    notes
-        Notes; one if the lower chi^2 is outside the search range.
+    Return the new diagnosis, or the one so far, and a note if the lower chi^2 is outside the range.
     """
     own = models.own
     if own is None or (increase := diagnosis.likelihood.increase(own.misfit_rad)) > -MISSED:
@@ -232,8 +203,3 @@ def judge_again(
         "The limits hold for samples within the range."
     )
     return diagnosis, [Note(DOUBT, text)]
-
-
-def _power_laws(duration_s: float) -> list[str]:
-    """Return power-law models, if the experiment is not longer than their range of validity."""
-    return _POWER_LAWS if duration_s <= LONGEST_S else []

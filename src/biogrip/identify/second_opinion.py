@@ -1,4 +1,9 @@
-"""Test for an offset or drift of the instrument that the user did not declare."""
+"""Test for an offset or drift of the instrument that the user did not declare.
+
+Both are fitted along. The test is a likelihood ratio: if neither is in the trace, the decrease of
+chi^2 follows a chi-squared distribution with as many degrees of freedom as terms are added (Wilks
+1938). A warning is due at a p-value below `FALSE_ALARM`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,27 +28,12 @@ from biogrip.physics.noise import stream
 def second_opinions(
     traces: Sequence[TraceCase], diagnoses: Sequence[Diagnosis], progress: Progress
 ) -> list[list[Note]]:
-    """Fit an offset and a drift along, and return a warning if they lower chi^2 significantly.
+    """Fit an offset and a drift along, and warn if they lower chi^2 significantly.
 
-    The test is a likelihood ratio: if neither is in the trace, the decrease of chi^2 follows a
-    chi-squared distribution with as many degrees of freedom as terms are added (Wilks 1938). A
-    warning is due at a p-value below `FALSE_ALARM`.
-
-    Parameters
-    ----------
-    traces
-        Traces of the same model, budget and confidence.
-    diagnoses
-        Diagnosis of each without the added terms.
-    progress
-        Callback for progress.
-
-    Returns
-    -------
-    list of list of Note
-        By trace, at most one; with a rejected fit, only if that with both terms is not. None if
-        both are declared already, if the model is nonlinear, or if the noise model is coloured,
-        which fits both unless they are refused.
+    Traces have the same model, budget and confidence. Each gets at most one note; with a rejected
+    fit, only if that with both terms is not rejected. None are tried if both are declared already,
+    if the model is nonlinear, or if the noise model is coloured, which fits both unless they are
+    refused.
     """
     notes: list[list[Note]] = [[] for _ in traces]
     tried = [index for index, trace in enumerate(traces) if _may_have_more(trace.problem)]

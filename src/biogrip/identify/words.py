@@ -43,13 +43,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines += one_sided_in_words([found])
     lines += [found["limits"]] if found["fit"] != REJECTED else []
     lines += [trade["words"] for trade in found["trades"]]
-    lines += fixed_in_words(found)
-    if "onset_s" in found:
-        lines.append(f"The protocol starts at {found['onset_s']:.4g} s of the clock, as fitted.")
-    if "offset_rad" in found:
-        lines.append(f"Offset of the instrument: {in_unit(found['offset_rad'], found)}")
-    if "drift_rad_per_s" in found:
-        lines.append(f"Drift of the instrument: {in_unit(found['drift_rad_per_s'], found)}/s")
+    lines += fitted_in_words(found)
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
@@ -70,6 +64,18 @@ def noise_in_words(found: Mapping[str, Any]) -> str:
 def in_unit(value: float, found: Mapping[str, Any]) -> str:
     """Return a number with the unit of what the instrument reads."""
     return f"{value:.3g} {found['reads']['unit']}".rstrip()
+
+
+def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
+    """Return lines on fixed parameters, and on onset, offset and drift as far as fitted."""
+    lines = fixed_in_words(found)
+    if "onset_s" in found:
+        lines.append(f"The protocol starts at {found['onset_s']:.4g} s of the clock, as fitted.")
+    if "offset_rad" in found:
+        lines.append(f"Offset of the instrument: {in_unit(found['offset_rad'], found)}")
+    if "drift_rad_per_s" in found:
+        lines.append(f"Drift of the instrument: {in_unit(found['drift_rad_per_s'], found)}/s")
+    return lines
 
 
 def fixed_in_words(found: Mapping[str, Any]) -> list[str]:
