@@ -88,8 +88,8 @@ def test_readings_of_a_rounded_clock_are_averaged_and_counted(
     few = config(tmp_path / "few.yaml", {})
     command = ["identify", str(trace), *READ, "--config", few, "--block", "2", "--start", "7"]
     assert main(command) == 1
-    assert "are averaged by --average-repeated." in capsys.readouterr().err
-    assert main([*command, "--average-repeated"]) == 0
+    assert "are averaged by average_repeated: true under measurement." in capsys.readouterr().err
+    assert main([*command, "--set", "measurement.average_repeated=true"]) == 0
     notes = found(trace)["notes"]
     assert {"weight": "harmless", "text": "Averaged at repeated times: 58 readings."} in notes
     assert found(trace)["samples"] in (30, 31)

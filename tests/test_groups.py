@@ -289,7 +289,8 @@ def test_nothing_of_others_is_replaced(
     for table, words in ((mine, "biogrip did not write it"), (found, "is read; allowed is")):
         assert main(["groups", str(found), "--by", "dish", "--csv", str(table)]) == 1
         assert words in capsys.readouterr().err
-    said(capsys, found, "--by", "dish", "--csv", mine, "--force")
+    mine.unlink()
+    said(capsys, found, "--by", "dish", "--csv", mine)
 
 
 def test_nobody_reading_on_is_no_error(tmp_path: Path, rows: list[dict[str, str]]) -> None:

@@ -23,9 +23,7 @@ _SHOWN = 200
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, and return its exit status."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    parser = _parser()
-    options = parser.parse_args(given)
+    options = _parser().parse_args(arguments)
     # Matrices are small: BLAS threads cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
@@ -93,8 +91,8 @@ def _examples(*commands: str, cost: str = "") -> str:
 
 
 def _reading(text: str) -> tuple[tuple[str, ...], Any]:
-    quantity, _, column = text.rpartition("=")
-    return ("measurement", quantity or "rotation"), column
+    quantity, found, column = text.partition("=")
+    return ("measurement", quantity if found else "rotation"), column if found else text
 
 
 def _start(text: str) -> tuple[tuple[str, ...], Any]:
@@ -149,35 +147,28 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
             "what was held from 0 to the end, without a config: a stress in Pa for a strain, a "
             "force in N for a displacement, and the reverse; 1 for a compliance or a modulus",
         ),
-        (
-            *("--start", _start, "SECONDS"),
-            "time of the clock at which the protocol starts, or fit to fit it along [0]",
-        ),
+        ("--start", _start, "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
         ("--from", "measurement.from_s", "SECONDS", "first time of the clock to use [all]"),
         ("--until", "measurement.until_s", "SECONDS", "last time of the clock to use [all]"),
     ],
     "the noise and the instrument": [
         ("--noise", "measurement.noise_rad", "SD", "known noise, in the readings' SI unit"),
+        ("--noise-model", "measurement.noise_model", "NAME", "white, or coloured: autocorrelated"),
         (
-            *("--noise-model", "measurement.noise_model", "NAME"),
-            "white, or coloured: intervals that allow for autocorrelation",
+            "--noise-share",
+            "measurement.noise_share",
+            "SHARE",
+            "known noise, as a share of the readings",
         ),
-        ("--noise-share", "measurement.noise_share", "SHARE", "known noise, of the reading"),
         ("--offset", "measurement.offset", "", "fit an offset along, or not"),
         ("--drift", "measurement.drift", "", "fit a linear drift along, or not"),
     ],
     "the sample": [
         ("--model", "sample.model", "NAME", "sample model [generalized_maxwell]"),
-        (
-            *("--fix", _fix, "NAME=VALUE"),
-            "known parameter, SI units; 0 leaves an element out; repeat for more",
-        ),
+        ("--fix", _fix, "NAME=VALUE", "known parameter, SI units; 0 for no element; repeatable"),
     ],
     "any other key of the config": [
-        (
-            *("--set", _any_key, "KEY=VALUE"),
-            "key with dots, and its value in YAML: measurement.time_unit=ms; repeat for more",
-        ),
+        ("--set", _any_key, "KEY=VALUE", "as in measurement.time_unit=ms, YAML; repeatable"),
     ],
 }
 """Options of `identify` by what they are about: name; key of the config, or what reads the value
@@ -230,12 +221,9 @@ def _identify_parser(stages: Any) -> None:
             group.add_argument("--config", type=Path, help=text)
     output = identify.add_argument_group("output")
     output.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row per trace")
-    output.add_argument(
-        "--report", type=Path, metavar="PAGE", help="HTML page with all results and figures"
-    )
-    output.add_argument(
-        "--output", type=Path, help="JSON file, of one trace [TRACE.identified.json]"
-    )
+    output.add_argument("--report", type=Path, metavar="PAGE", help="HTML page with pictures")
+    text = "JSON file, of one trace [TRACE.identified.json]"
+    output.add_argument("--output", type=Path, metavar="FILE", help=text)
 
 
 def _groups_parser(stages: Any) -> None:
@@ -271,11 +259,10 @@ def _identify(options: argparse.Namespace) -> int:
     from biogrip.identify.identify import identify
     from biogrip.identify.settings import Setting
 
-    settings = [Setting(*each) for each in options.settings]
     return identify(
         options.traces,
         options.config,
-        settings,
+        [Setting(*each) for each in options.settings],
         output=options.output,
         report=options.report,
         table=options.csv,

@@ -77,11 +77,11 @@ def test_what_is_changed_and_only_that_is_identified_again(lab: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("fixed.c\n", "fixed.x\n", "line 1, column 'fixed.x': is no key that a row may set."),
-        ("3.csv\tB\t\n", "3.csv\tB\tmuch\n", "line 5, column 'fixed.c': found 'much', allowed"),
+        ("fixed.c\n", "fixed.x\n", "line 4: fixed.x: is no parameter of the sample"),
+        ("3.csv\tB\t\n", "3.csv\tB\tmuch\n", "line 5: fixed.c: found 'much', allowed is a number"),
     ],
 )
-def test_a_table_that_cannot_be_used_stops_with_line_and_column(
+def test_a_table_that_cannot_be_used_stops_with_line_and_key(
     lab: Path, old: str, new: str, said: str
 ) -> None:
     table = lab / "cells.tsv"

@@ -8,8 +8,7 @@ from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs
 from biogrip.identify.one_trace import identify_batch, identify_traces
 from biogrip.identify.outputs import check_output, write_table
-from biogrip.identify.settings import Asked, Setting, check_settings
-from biogrip.identify.table_of_traces import is_table, read_table
+from biogrip.identify.settings import Asked, Setting, check_settings, is_table, read_table
 from biogrip.identify.words import in_words, side_by_side
 from biogrip.terminal import visible
 from biogrip.traces.trace_file import trace_file_problem
@@ -28,31 +27,14 @@ def identify(
     table: Path | None = None,
     rows: tuple[int, int] | None = None,
 ) -> int:
-    """Identify traces, write the results, and print them.
+    """Identify traces and tables of traces, write the results, and print them.
 
-    Parameters
-    ----------
-    files
-        CSV files of traces, and tables that list some.
-    config, settings
-        What is said of all traces, see `Asked`.
-    output
-        JSON file of a single trace. By default each trace has one beside it.
-    report, table
-        HTML and CSV file to write, if any.
-    rows
-        First and last row of a table to identify, from 0, in one process and without JSON files;
-        by default all.
+    Config and settings are those of all traces. `output` is the JSON file of a single trace, by
+    default one beside each; `report` and `table` are HTML and CSV files to write, if any. `rows`
+    are the first and last row of a table to identify, from 0, without JSON files; by default all.
 
-    Returns
-    -------
-    int
-        1 if any of several traces could not be used.
-
-    Raises
-    ------
-    BiogripError
-        If an option or the config cannot be used, or the only trace cannot.
+    Return 1 if any of several traces could not be used. A `BiogripError` says that an option, the
+    config or the only trace cannot.
     """
     alone = len(files) == 1
     asked: list[Asked] = []
@@ -76,8 +58,8 @@ def identify(
         raise BiogripError(absent[str(files[0])])
     if output is not None and not alone:
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
-    if not alone:
-        check_settings(every)
+    # Errors of options and config concern all traces: they are raised once, here.
+    check_settings(every)
     outputs = [output or own.trace.with_suffix(".identified.json") for own in every]
     outputs = outputs if rows is None else []
     written = [*outputs, *filter(None, (report, table))]

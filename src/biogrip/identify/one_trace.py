@@ -26,9 +26,13 @@ from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.trace_fit import TraceFit
-from biogrip.identify.fitted_models import FittedModels, judge_again, models_tried
+from biogrip.identify.other_fits import (
+    FittedModels,
+    judge_again,
+    models_tried,
+    second_opinions,
+)
 from biogrip.identify.outputs import WRITTEN_BY, Outcome, in_own_units
-from biogrip.identify.second_opinion import second_opinions
 from biogrip.identify.settings import Asked, case_of
 from biogrip.identify.trace_case import TraceCase, read_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all
@@ -184,20 +188,6 @@ def _alike(traces: Mapping[int, TraceCase]) -> list[list[int]]:
     return groups
 
 
-def identify_trace(asked: Asked, output: Path) -> Identified:
-    """Identify the sample in a recorded trace, and write the result as JSON.
-
-    Raises
-    ------
-    BiogripError
-        With file, line and column or key, if trace or config cannot be used.
-    """
-    with Progress(str(asked.trace), 5, quiet=True) as progress:
-        trace = _read(asked, progress)
-        (identified,) = identify_alike([asked.trace], [trace], [output], progress)
-    return identified
-
-
 def identify_alike(
     files: Sequence[Path],
     traces: Sequence[TraceCase],
@@ -206,19 +196,8 @@ def identify_alike(
 ) -> list[Identified]:
     """Identify traces of the same model, budget of fits and confidence, each as if it were alone.
 
-    Parameters
-    ----------
-    files, traces
-        The traces.
-    outputs
-        JSON file of each; None to write nothing.
-    progress
-        Counter of the last four of five steps.
-
-    Raises
-    ------
-    BiogripError
-        If one of the traces cannot be fitted; nothing is then written.
+    A JSON file of each is written, if `outputs` has any. The counter's last four of five steps are
+    made here. A `BiogripError` says that one of the traces cannot be fitted; nothing is written.
     """
     first = traces[0]
     progress.doing(f"fitting {counted(sum(len(own.readings[0]) for own in traces), 'sample')}")
@@ -250,8 +229,11 @@ def identify_alike(
         data = _data(own, fits[index], diagnoses[index], models[index], notes)
         data = {WRITTEN_BY: __version__, "trace": str(files[index]), **data}
         found.append(Identified(data, own.problem, own.recorded))
-    for identified, output in zip(found, outputs or (), strict=False):
-        write_text(output, json.dumps(_written(identified.data), indent=1) + "\n")
+    for data, output in zip((each.data for each in found), outputs or (), strict=False):
+        # Assumptions, which must be repeatable, are not rounded.
+        rounded = rounded_numbers(data) | {"assumed": data["assumed"]}
+        read = INSTRUMENTS[data["reads"]["quantity"]].read
+        write_text(output, json.dumps(in_own_units(rounded, read), indent=1) + "\n")
     return found
 
 
@@ -285,19 +267,10 @@ def _data(
         **said,
         "noise_model": fit.noise_data(),
         **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
-        "assumed": _assumed(case, models.names or list(case.models)),
+        "assumed": _assumed(case, list(models.answers or case.models)),
         "by_default": _by_default(trace.given) if instrument.has_jaws else [],
         "versions": {name: version(name) for name in ("biogrip", "numpy", "scipy")},
     }
-
-
-def _written(data: dict[str, Any]) -> dict[str, Any]:
-    """Round results; keep assumptions, which must be repeatable, as they are."""
-    read = INSTRUMENTS[data["reads"]["quantity"]].read
-    found: dict[str, Any] = in_own_units(
-        {**rounded_numbers(data), "assumed": data["assumed"]}, read
-    )
-    return found
 
 
 def _fixed(problem: CaseProblem) -> dict[str, list[str]]:

@@ -46,13 +46,7 @@ class Outcome:
 
 
 def check_output(output: Path) -> None:
-    """Refuse an output that cannot be written, or a file that biogrip did not write.
-
-    Raises
-    ------
-    BiogripError
-        With what is allowed.
-    """
+    """Refuse, by a `BiogripError`, a file that cannot be written, or that biogrip did not write."""
     folder = output.parent
     if os.path.isdir(output) or not os.path.isdir(folder) or not os.access(folder, os.W_OK):
         raise BiogripError(
@@ -67,18 +61,16 @@ def check_output(output: Path) -> None:
         raise BiogripError(f"{visible(output)}: cannot be written: {error.strerror}.") from error
     if output.exists() and not output.is_symlink() and not output.is_file():
         raise BiogripError(f"{visible(output)}: is no regular file; allowed is one.")
-    if os.path.lexists(output) and not _is_ours(output):
-        raise BiogripError(
-            f"{visible(output)}: is there, and biogrip did not write it; allowed is another name, "
-            "or delete it."
-        )
-
-
-def _is_ours(output: Path) -> bool:
-    if output.is_symlink():
-        return False
-    with output.open("rb") as stream:
-        return WRITTEN_BY.encode() in stream.read(_HEAD_BYTES)
+    if not os.path.lexists(output):
+        return
+    if not output.is_symlink():
+        with output.open("rb") as stream:
+            if WRITTEN_BY.encode() in stream.read(_HEAD_BYTES):
+                return
+    raise BiogripError(
+        f"{visible(output)}: is there, and biogrip did not write it; allowed is another name, or "
+        "to delete it first."
+    )
 
 
 def in_own_units(data: Any, read: Quantity) -> Any:
@@ -99,28 +91,24 @@ def write_table(
 ) -> None:
     """Write one row per trace as CSV: numbers, their units in the header, and why it failed if so.
 
-    Parameters
-    ----------
-    outcome
-        Results of the traces.
-    table
-        The file.
-    copied
-        Cells to copy of each trace, by file and column, in the order of rows. By default nothing
-        is copied, and traces that failed come last.
+    What is copied are cells of each trace, by file and column, in the order of rows. By default
+    nothing is, and traces that failed come last.
     """
     # The same is read in all traces.
     names = {each["reads"]["quantity"] for each in outcome.found} or {ROTATION.name}
     read = INSTRUMENTS[names.pop()].read
-    rows: dict[str, dict[str, Any]] = {
-        each["trace"]: {
-            **{name: each[name] for name in COLUMNS if name in each},
-            "preferred_model": _preferred(each),
-            "fixed": "; ".join(each.get("fixed", ())),
-            **_of_quantities(each),
-        }
-        for each in map(rounded_numbers, outcome.found)
-    }
+    rows: dict[str, dict[str, Any]] = {}
+    for each in map(rounded_numbers, outcome.found):
+        row = {name: each[name] for name in COLUMNS if name in each}
+        # The model of the lowest BIC, if others were compared.
+        best = [model["model"] for model in each["models"] if model["delta_bic"] == 0]
+        row |= {"preferred_model": "".join(best[:1]), "fixed": "; ".join(each.get("fixed", ()))}
+        for own in each["quantities"]:
+            for what in _OF_QUANTITY:
+                unit = own["unit"] if what != "verdict" else ""
+                name = with_unit(f"{own['quantity']} {what}", unit)
+                row[name] = "" if own[what] is None else own[what]
+        rows[each["trace"]] = row
     for trace, why in outcome.refused.items():
         why = visible_lines(why).replace("\n", " ")
         rows[trace] = {"trace": trace, "fit": FAILED, FAILED: why, WRITTEN_BY: __version__}
@@ -137,22 +125,6 @@ def write_table(
             for trace, own in copied.items()
         ],
     )
-
-
-def _preferred(found: Mapping[str, Any]) -> str:
-    """Return the model of the lowest BIC; "" if none were compared."""
-    return next((row["model"] for row in found["models"] if row["delta_bic"] == 0), "")
-
-
-def _of_quantities(found: Mapping[str, Any]) -> dict[str, Any]:
-    """Return verdict, value and limits of each quantity by column, "" for limits that are none."""
-    return {
-        with_unit(f"{own['quantity']} {what}", own["unit"] if what != "verdict" else ""): (
-            "" if own[what] is None else own[what]
-        )
-        for own in found["quantities"]
-        for what in _OF_QUANTITY
-    }
 
 
 def join_tables(parts: Sequence[Path], table: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+import PIL.Image
 import yaml
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -46,20 +47,24 @@ def draw(identified: Identified) -> list[str]:
 
 
 def _address(drawn: Figure) -> str:
-    png = BytesIO()
+    png, few = BytesIO(), BytesIO()
     save_png(drawn, png)
-    return png_address(png.getvalue())
+    # With few colours a picture is a third as large.
+    with PIL.Image.open(png) as image:
+        image.convert("RGB").quantize(64, dither=PIL.Image.Dither.NONE).save(few, "png")
+    return png_address(few.getvalue())
 
 
-def draw_strip(label: str, unit: str, traces: Sequence[Mapping[str, Any]]) -> Figure:
+def draw_strip(label: str, traces: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw a quantity of all traces in their order: values with limits, or the only limit."""
     drawn = figure(COLUMN_IN, 2.2)
     axes = drawn.subplots()
-    ends: list[float] = []
+    title, ends = label, list[float]()
     for number, each in enumerate(traces, 1):
         item = next((q for q in each["quantities"] if q["quantity"] == label), None)
         if item is None or item["low"] is item["high"] is None:
             continue
+        title = with_unit(item["symbol"], item["unit"])
         shape: dict[str, Any] = {"color": BLUE, "markersize": 4, "linewidth": 0.8}
         shape["markerfacecolor"] = BLUE if each["fit"] == OK else "white"
         low, value, high = item["low"], item["value"], item["high"]
@@ -75,7 +80,7 @@ def draw_strip(label: str, unit: str, traces: Sequence[Mapping[str, Any]]) -> Fi
     axes.set_xlim(0.5, len(traces) + 0.5)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("number of the trace")
-    axes.set_ylabel(with_unit(label, unit))
+    axes.set_ylabel(title)
     return drawn
 
 
@@ -88,14 +93,10 @@ def write_page(
     """
     here = Path(__file__).parent
     traces, copied = outcome.found, copied or {}
-    labels = words.labels_of(traces)
-    units = {q["quantity"]: q["unit"] for each in traces for q in each["quantities"]}
+    columns = words.columns_of(traces)
     several = len(traces) != 1 or bool(outcome.refused)
-    strips = {}
-    if several:
-        with styled():
-            for label in labels:
-                strips[label] = _address(draw_strip(label, units[label], traces))
+    with styled():
+        strips = {name: _address(draw_strip(name, traces)) for name in columns if several}
     assumed: dict[str, list[str]] = {}
     for each in traces:
         assumed.setdefault(_assumed(each), []).append(each["trace"])
@@ -112,14 +113,13 @@ def write_page(
         pictures=outcome.pictures,
         strips=strips,
         several=several,
-        columns={label: with_unit(label, units[label]) for label in labels},
+        columns=columns,
         copied=copied,
         names=list(dict.fromkeys(name for own in copied.values() for name in own)),
         assumed=assumed,
         marks=_MARKS,
         counts={status: sum(each["fit"] == status for each in traces) for status in _MARKS},
         words=words,
-        sorts_as=_sorts_as,
         written_by=f"{WRITTEN_BY} {__version__}",
         style=(here.parent / "page/report.css").read_text(encoding="utf-8"),
     )
@@ -134,10 +134,3 @@ def _assumed(found: Mapping[str, Any]) -> str:
     dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
     text: str = yaml.dump(assumed, Dumper=dumper, sort_keys=False, allow_unicode=True)
     return text
-
-
-def _sorts_as(quantity: Mapping[str, Any]) -> float | str:
-    """Return the number by which a quantity is sorted: value or limit, or "" without any."""
-    low, high = quantity["low"], quantity["high"]
-    found = quantity["value"] if low is not None and high is not None else low or high
-    return "" if found is None else found

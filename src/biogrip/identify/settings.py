@@ -8,6 +8,7 @@ What is read tells the instrument. What is controlled comes from the protocol or
 of the trace, from ``--hold``; where a compliance or a modulus is read, that is 1.
 """
 
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
@@ -17,7 +18,8 @@ from typing import Any
 
 import yaml
 
-from biogrip.errors import BiogripError
+from biogrip.errors import BiogripError, nearest
+from biogrip.identify.outputs import COLUMNS
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.load import load_study, read_configs
@@ -33,10 +35,14 @@ from biogrip.study.source import (
 )
 from biogrip.study.study import Case
 from biogrip.terminal import visible
+from biogrip.traces.columns import listed, place
 from biogrip.traces.recordings import read_recording
 
 MODEL = "generalized_maxwell"
 """Sample model of traces of which nothing says another."""
+
+FILE = "file"
+"""The column that every table of traces has."""
 
 HOLD = ("--hold",)
 """Path of the only setting that is no key: what is controlled from 0 to the end of the trace."""
@@ -48,6 +54,9 @@ _ONE_OF: Sequence[Sequence[tuple[str, ...]]] = (
     [HOLD, ("protocol",)],
 )
 _MOST_SHOWN = 10
+_SEPARATORS = ",;\t"
+_OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
+_HEAD_BYTES = 100_000
 
 
 @dataclass(frozen=True)
@@ -241,11 +250,106 @@ def check_settings(traces: Sequence[Asked]) -> None:
             text += f"{visible(first[0].trace)}; allowed is one quantity read for all traces of a "
             problems[f"{text}command."] = None
     if problems:
-        raise BiogripError("\n".join(first_few([*problems])))
+        raise BiogripError("\n".join(_first_few([*problems])))
 
 
-def first_few(problems: Sequence[str]) -> Iterator[str]:
+def _first_few(problems: Sequence[str]) -> Iterator[str]:
     """Yield the first few of many problems, and the number of the others."""
     yield from problems[:_MOST_SHOWN]
     if more := problems[_MOST_SHOWN:]:
         yield f"... and {len(more)} more."
+
+
+def is_table(path: Path) -> bool:
+    """Return True if the first line of a file is a header with a column `file`."""
+    with path.open("rb") as stream:
+        first = stream.readline(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
+    # Another spelling, as File, is a table, too, whose reader says what is wrong.
+    names = [name.strip(' "\r\n').lower() for name in re.split(f"[{_SEPARATORS}]", first)]
+    return FILE in names
+
+
+def read_table(
+    path: Path, config: Path | None = None, options: Sequence[Setting] = ()
+) -> list[Asked]:
+    """Read the traces of a table with config and options of the command; settings are not checked.
+
+    The table is text in UTF-8: `.tsv` is separated by tabs, another by what its header has.
+
+    Raises
+    ------
+    BiogripError
+        With line and column of the first few problems: text that is no table, values that are no
+        YAML, a trace twice.
+    """
+    header, *rows = _cells(path)
+    if FILE not in header:
+        raise BiogripError(
+            f"{place(path, 1)}: found no column '{FILE}' among {listed(header)}; allowed is one."
+            f"{nearest(FILE, header)}"
+        )
+    problems = list(_name_problems(path, header))
+    found, lines = [], dict[str, int]()
+    for line, row in enumerate(rows, 2):
+        if not any(row):
+            continue
+        by_name = dict(zip(header, row, strict=True))
+        trace = path.parent / by_name.pop(FILE)
+        # Resolved, so that links to one file are found.
+        before = lines.setdefault(os.path.realpath(trace), line)
+        if trace == path.parent:
+            problems.append(f"{place(path, line, FILE)}: found nothing, allowed is a trace.")
+        elif before != line:
+            text = f"found '{visible(trace)}' again, as on line {before}; allowed is each"
+            problems.append(f"{place(path, line, FILE)}: {text} trace once.")
+        settings = list(options)
+        for name, cell in by_name.items():
+            if "." in name and cell:
+                try:
+                    value = value_of(cell)
+                    settings.append(Setting(visible(path), tuple(name.split(".")), value, line))
+                except BiogripError as error:
+                    problems.append(f"{place(path, line, name)}: {error}")
+        copied = {name: cell for name, cell in by_name.items() if name and "." not in name}
+        found.append(Asked(trace, config, tuple(settings), place(path, line), copied))
+    if not found:
+        problems.append(f"{place(path)}: found no traces, allowed is a row for each.")
+    if problems:
+        raise BiogripError("\n".join(_first_few(problems)))
+    return found
+
+
+def _cells(path: Path) -> list[list[str]]:
+    """Return the header and all rows as text, empty where a row is shorter."""
+    # Imported here: loading pandas takes long.
+    import pandas as pd
+
+    try:
+        with path.open(encoding="utf-8-sig") as stream:
+            header = stream.readline()
+        frame = pd.read_csv(
+            path,
+            sep="\t" if path.suffix == ".tsv" else max(_SEPARATORS, key=header.count),
+            header=None,
+            dtype=str,
+            keep_default_na=False,
+            skip_blank_lines=False,
+            skipinitialspace=True,
+            encoding="utf-8-sig",
+        )
+    except (OSError, ValueError) as error:
+        found = " ".join(str(error).split())
+        raise BiogripError(f"{place(path)}: cannot be read as a table: {found}.") from error
+    return [[str(cell).strip() for cell in row] for row in frame.fillna("").to_numpy()]
+
+
+def _name_problems(path: Path, header: Sequence[str]) -> Iterator[str]:
+    """Find names that stand twice, or would be taken for results."""
+    for number, name in enumerate(header):
+        text = ""
+        if name and name in header[:number]:
+            text = "stands twice; allowed is each name once."
+        elif name in COLUMNS or _OF_RESULTS.fullmatch(name):
+            text = "is a column of the results; allowed is another name."
+        if text:
+            yield f"{place(path, 1, name)}: {text}"
