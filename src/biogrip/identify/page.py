@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
 import PIL.Image
 import yaml
 from matplotlib.figure import Figure
@@ -59,22 +60,22 @@ def draw_strip(label: str, traces: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw a quantity of all traces in their order: values with limits, or the only limit."""
     drawn = figure(COLUMN_IN, 2.2)
     axes = drawn.subplots()
-    title, ends = label, list[float]()
+    title, bars, ends = label, [], list[float]()
+    marks: dict[tuple[str, str], list[tuple[int, float]]] = {}
     for number, each in enumerate(traces, 1):
         item = next((q for q in each["quantities"] if q["quantity"] == label), None)
         if item is None or item["low"] is item["high"] is None:
             continue
-        title = with_unit(item["symbol"], item["unit"])
-        shape: dict[str, Any] = {"color": BLUE, "markersize": 4, "linewidth": 0.8}
-        shape["markerfacecolor"] = BLUE if each["fit"] == OK else "white"
-        low, value, high = item["low"], item["value"], item["high"]
+        title, low, high = with_unit(item["symbol"], item["unit"]), item["low"], item["high"]
+        kind, value = ("v", high) if low is None else ("^", low)
         if low is not None and high is not None:
-            axes.plot([number, number], [low, high], "-", **shape)
-            axes.plot(number, value, "o", **shape)
-        else:
-            value = high if low is None else low
-            axes.plot(number, value, "v" if low is None else "^", **shape)
+            kind, value = "o", item["value"]
+            bars.append((number, low, high))
+        marks.setdefault((kind, BLUE if each["fit"] == OK else "white"), []).append((number, value))
         ends += [end for end in (low, value, high) if end]
+    axes.vlines(*np.reshape(bars, (-1, 3)).T, color=BLUE, linewidth=0.8)
+    for (kind, face), points in marks.items():
+        axes.plot(*np.transpose(points), kind, color=BLUE, markersize=4, markerfacecolor=face)
     if ends and max(ends) > _WIDE * min(ends):
         axes.set_yscale("log")
     axes.set_xlim(0.5, len(traces) + 0.5)
