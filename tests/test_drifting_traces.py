@@ -9,9 +9,9 @@ from scipy.stats import chi2, norm
 
 from biogrip.arrays import Array
 from biogrip.fit.problem import silent
-from biogrip.identify.one_trace import IdentifyOptions, identify_trace, study_of
-from biogrip.identify.read_as import ReadAs
-from biogrip.identify.second_opinion import second_opinions
+from biogrip.identify.one_trace import identify_batch
+from biogrip.identify.other_fits import second_opinions
+from biogrip.identify.settings import Asked, Setting, case_of
 from biogrip.identify.trace_case import TraceCase
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import Note, wandering
@@ -22,7 +22,7 @@ from tests.helpers.problems import clean, run
 TIMES, CLEAN = clean("endothelial_cell", 5.0)
 SIGMA = 0.1 * float(CLEAN.max())
 DRIFT = SIGMA * TIMES / TIMES[-1]
-UNDECLARED = ReadAs()
+DECLARED = [Setting(f"--{name}", ("measurement", name), True) for name in ("offset", "drift")]
 SLOW = SIGMA * np.sin(2 * np.pi * TIMES / 150)
 
 
@@ -37,19 +37,22 @@ def written(path: Path, rotation: Array) -> Path:
     return path
 
 
+def asked(
+    file: Path, *declared: Setting, model: str = "liquid_drop", config: Path | None = None
+) -> Asked:
+    return Asked(file, config, (Setting("--model", ("sample", "model"), model), *declared))
+
+
 def suspected(
-    folder: Path, seed: int, added: Array, declared: ReadAs = UNDECLARED
+    folder: Path, seed: int, added: Array, *declared: Setting
 ) -> tuple[Diagnosis, list[Note]]:
     """What is said of a trace, and of an offset and a drift in it."""
     rotation = trace(seed, added)
-    study = study_of(
-        IdentifyOptions(written(folder / "t.csv", rotation), "liquid_drop", declared, None)
-    )
-    (case,) = study.cases.values()
+    case = case_of(asked(written(folder / "t.csv", rotation), *declared))
     problem = case.problem.of(TIMES, rotation)
     told = diagnose(problem, case.problem.searched, run("least_squares", problem), confidence=0.95)
     recorded = Measurements(TIMES, None, {0: rotation})
-    read = TraceCase(case, recorded, case.problem, names_models=False)
+    read = TraceCase(case, recorded, case.problem, {})
     (notes,) = second_opinions([read], [told], silent)
     return told, notes
 
@@ -92,8 +95,7 @@ def test_a_trace_that_does_not_drift_is_not_suspected(tmp_path: Path) -> None:
 
 def test_an_offset_beside_a_declared_drift_is_one_degree_of_freedom(tmp_path: Path) -> None:
     """What is said of the fall of chi^2 is rounded to three digits, and its chance to one."""
-    declared = ReadAs(drift=True)
-    (said,) = suspected(tmp_path, 0, np.full(len(TIMES), 0.6 * SIGMA), declared)[1]
+    (said,) = suspected(tmp_path, 0, np.full(len(TIMES), 0.6 * SIGMA), DECLARED[1])[1]
     found = re.search(r"falls by (\S+); by chance it would once in (\S+) traces", said.text)
     assert found is not None
     assert float(found[2]) == pytest.approx(1 / chi2.sf(float(found[1]), 1), rel=0.6)
@@ -120,10 +122,10 @@ def test_what_is_declared_is_not_suspected(tmp_path: Path) -> None:
     few.write_text(
         "model_selection: {models: [damper]}\nleast_squares: {candidates: 100, starts: 4}\n"
     )
-    for declared in (ReadAs(), ReadAs(offset=True, drift=True)):
-        wanted = IdentifyOptions(file, "liquid_drop", declared, few)
-        notes = identify_trace(wanted, tmp_path / "t.json").data["notes"]
-        assert any("--offset --drift" in note["text"] for note in notes) == (not declared.drift)
+    for declared in ([], DECLARED):
+        (found,) = identify_batch([asked(file, *declared, config=few)], None).found
+        said = any("--offset --drift" in note["text"] for note in found["notes"])
+        assert said == (not declared)
 
 
 def test_under_a_constant_torque_a_drift_is_not_told_from_flow(tmp_path: Path) -> None:
@@ -133,10 +135,8 @@ def test_under_a_constant_torque_a_drift_is_not_told_from_flow(tmp_path: Path) -
     file = written(tmp_path / "t.csv", trace(0, 0 * DRIFT))
     rows = file.read_text().splitlines()
     file.write_text("\n".join(rows[: 1 + np.count_nonzero(TIMES <= 200)]) + "\n")
-    found = identify_trace(
-        IdentifyOptions(file, "kelvin_voigt", UNDECLARED, held), tmp_path / "t.json"
-    )
-    (said,) = [note["text"] for note in found.data["notes"] if "χ² falls" in note["text"]]
+    (found,) = identify_batch([asked(file, model="kelvin_voigt", config=held)], None).found
+    (said,) = [note["text"] for note in found["notes"] if "χ² falls" in note["text"]]
     assert "the instrument drifts, or the sample flows" in said
     assert "--drift" not in said
     assert "would be" not in said

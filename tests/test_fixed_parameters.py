@@ -100,25 +100,3 @@ def test_a_config_fixes_and_an_option_adds(folder: Path) -> None:
     (folder / "fixing.yaml").write_text(f"{FEW}fixed: {{k: 2.0, c_p: 1.0}}\n")
     found = identified(folder, "--fix", "c_p=0", config="fixing.yaml")
     assert found["assumed"]["fixed"] == {"k": 2.0, "c_p": 0.0}
-
-
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        ("kp=1", "--fix: kp: is no parameter of the sample, which has k, k_p, c, c_p."),
-        ("kp=1", "Did you mean 'k_p'?"),
-        ("k=0", "--fix: k: found 0, allowed is at least 1e-18 and at most 1e+12 N/m."),
-    ],
-)
-def test_what_cannot_be_fixed_is_refused(
-    folder: Path, given: str, text: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["identify", str(folder / "trace.csv"), "--fix", given]) == 1
-    assert text in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("given", ["k", "k=much", "=1"])
-def test_text_that_is_no_value_is_refused(given: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["identify", "trace.csv", "--fix", given])
-    assert f"found '{given}', allowed is NAME=VALUE" in capsys.readouterr().err

@@ -116,8 +116,8 @@ def test_units_separators_offset_and_drift(
     shifted = 1e3 * (values + 5e-4 + 1e-6 * times)
     other = written(tmp_path / "b.csv", times / 60, shifted, "t;phi_mrad;note")
     other.write_text(other.read_text().replace(",", ";") + "6.67;-;\n6.68;;\n")
-    options = ("--time", "t", "--set", "measurement.time_unit=min", "--reading", "phi_mrad")
-    options += ("--offset", "--drift", "--config", few)
+    columns = ("--time", "t", "--set", "measurement.time_unit=min", "--reading", "phi_mrad")
+    options = (*columns, "--offset", "--drift", "--config", few)
     found = identified(other, *options, output=tmp_path / "shifted.json")
     left_out = f"Left out for want of a number: 2 rows of {len(times) + 2}."
     assert {"weight": "harmless", "text": left_out} in found["notes"]
@@ -374,6 +374,8 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) 
         assert "not identified" in text.lower()
         assert "bad.csv, line" in text
     assert "5 traces: 2 ok, 0 doubtful, 0 rejected, 3 not identified." in page.read_text()
+    # Fit and profiles of each, and a strip of each quantity.
+    assert page.read_text().count("<img") == 2 * 2 + 5
     # What biogrip wrote is replaced, be there nothing to draw.
     assert identify(bad, missing, *options)[0] == 1
     assert "2 traces: 0 ok, 0 doubtful, 0 rejected, 2 not identified." in page.read_text()

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from biogrip.cli import main
-from biogrip.identify.search_ranges import ranges_of
+from biogrip.identify.trace_case import ranges_of
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import hold, torque_history
@@ -51,7 +51,7 @@ def polystyrene(tmp_path: Path) -> Path:
 def identified(trace: Path, **config: object) -> Any:
     file, output = trace.with_suffix(".yaml"), trace.with_suffix(".json")
     file.write_text(yaml.safe_dump({**CONFIG, **config}))
-    main(["identify", str(trace), "--config", str(file), "--output", str(output), "--force"])
+    main(["identify", str(trace), "--config", str(file), "--output", str(output)])
     return json.loads(output.read_text())
 
 
@@ -81,20 +81,18 @@ def test_elements_at_the_ends_do_not_show(case: str) -> None:
     """A spring or damper beyond either end is as good as absent, or rigid: less than the noise."""
     chosen = STUDY.cases[case]
     problem, time_s = chosen.problem, chosen.sampling.over(chosen.problem.torque.end_s)
-    parameters = problem.searched.sample(chosen.parameters)
-    simulated = simulated_rotation(
-        problem.gripper, parameters, problem.torque, time_s, nonlinear=False
-    )[0]
-    noise_rad = 0.1 * simulated.max()
-    rng = np.random.default_rng(2)
-    trace = simulated + noise_rad * rng.standard_normal(len(time_s))
-    ranges = ranges_of(problem, time_s, trace)
 
     def response(**changes: float) -> np.ndarray:
         network = problem.searched.sample({**chosen.parameters, **changes})
         return simulated_rotation(
             problem.gripper, network, problem.torque, time_s, nonlinear=False
         )[0]
+
+    simulated = response()
+    noise_rad = 0.1 * simulated.max()
+    rng = np.random.default_rng(2)
+    trace = simulated + noise_rad * rng.standard_normal(len(time_s))
+    ranges = ranges_of(problem, time_s, trace)
 
     for name, genes in ranges.items():
         for end, beyond in ((genes.low, 1e-3), (genes.high, 1e3)):

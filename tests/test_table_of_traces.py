@@ -12,7 +12,8 @@ import yaml
 
 from biogrip.cli import main
 from biogrip.errors import BiogripError
-from biogrip.identify.table_of_traces import is_table, read_table
+from biogrip.identify import identify as command
+from biogrip.identify.settings import Setting, is_table, read_table
 from biogrip.library import hold
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS
@@ -135,12 +136,13 @@ def test_a_table_is_told_by_its_column(tmp_path: Path, name: str, separator: str
         path.write_text(path.read_text().replace("cell, no", '"cell, no"'))
     assert is_table(path)
     rows = read_table(path)
-    assert [(row.line, row.file) for row in rows] == [
-        (2, tmp_path / "d1/a.csv"),
-        (5, tmp_path / "b.csv"),
-        (6, tmp_path / "c.csv"),
+    assert [(row.place, row.trace) for row in rows] == [
+        (f"{path}, line 2", tmp_path / "d1/a.csv"),
+        (f"{path}, line 5", tmp_path / "b.csv"),
+        (f"{path}, line 6", tmp_path / "c.csv"),
     ]
-    assert [row.settings for row in rows] == [{}, {"fixed": {"c_p": 0}}, {}]
+    setting = Setting(str(path), ("fixed", "c_p"), 0, 5)
+    assert [row.settings for row in rows] == [(), (setting,), ()]
     assert [row.copied for row in rows] == [
         {"dish": dish, "cell, no": ""} for dish in ("left", "", "NA")
     ]
@@ -154,35 +156,21 @@ def test_a_trace_is_no_table(tmp_path: Path, text: str) -> None:
 
 def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
     path = tmp_path / "cells.tsv"
-    header = ["file", "measurment.noise_rad", "measurement.noise_rad", "fixed.cp", "dish", "dish"]
-    header += ["models.target", "fit", "k value", "measurement.skip", "sample.model"]
-    write(
-        path,
-        [
-            header,
-            ["a.csv", "1", "-1", "1", "", "", "linear", "", "", "2.5", "maxwel"],
-            ["./a.csv", "", "much", "", "", "", "", "", "", "010", "maxwell"],
-        ],
-    )
-    lines = [line.removeprefix(f"{path}, line ") for line in refused(path)]
+    header = ["file", "dish", "dish", "fit", "k value", "measurement.skip"]
+    write(path, [header, ["a.csv", *[""] * 4, "1:30"], ["./a.csv", *[""] * 4, "[1"]])
+    *lines, last = [line.removeprefix(f"{path}, line ") for line in refused(path)]
     assert lines == [
-        "1, column 'measurment.noise_rad': is no key that a row may set. Did you mean "
-        "'measurement.noise_rad'? A name without a dot is copied.",
-        "1, column 'fixed.cp': is no key that a row may set. Did you mean 'fixed.c_p'? A name "
-        "without a dot is copied.",
         "1, column 'dish': stands twice; allowed is each name once.",
-        *lines[3:4],
         "1, column 'fit': is a column of the results; allowed is another name.",
         "1, column 'k value': is a column of the results; allowed is another name.",
-        "2, column 'measurement.noise_rad': found -1, allowed is at least 1e-15 and at most "
-        "1e+12 rad.",
-        *lines[7:9],
-        "3, column 'file': found './a.csv' again, as on line 2; allowed is each trace once.",
-        "... and 2 more.",
+        "2, column 'measurement.skip': found 1:30, which YAML reads in base 60; allowed is a "
+        "number without colons, or text in quotes.",
+        f"3, column 'file': found '{tmp_path}/a.csv' again, as on line 2; allowed is each trace "
+        "once.",
     ]
-    assert lines[3].startswith("1, column 'models.target': is no key that a row may set.")
-    assert lines[7].startswith("2, column 'measurement.skip': found 2.5, allowed is")
-    assert lines[8].startswith("2, column 'sample.model': found 'maxwel'. Did you mean 'maxwell'?")
+    assert last.startswith("3, column 'measurement.skip': not valid YAML: ")
+    write(path, [["file", "fixed.c"], *([f"{number}.csv", "[1"] for number in range(30))])
+    assert refused(path)[10:] == ["... and 20 more."]
 
 
 @pytest.mark.parametrize(
@@ -203,22 +191,28 @@ def test_text_that_is_no_table_is_refused(tmp_path: Path, text: str, said: str) 
     assert said in line
 
 
-def test_settings_that_cannot_be_used_together_are_said_at_once(
+def test_settings_that_cannot_be_used_are_said_at_once(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """As those of a config are, by row and key; of a key that all rows have, once a row."""
+    header = ["file", "measurement.noise_rad", "fixed.k_s", "sample.model", "measurment.skip"]
     write(
         here / "cells.tsv",
         [
-            ["file", "fixed.k_s", "fixed.k_v"],
-            ["usual.csv", "2", ""],
-            ["other.csv", "", "3"],
+            header,
+            ["usual.csv", "-1", "", "maxwel", "2"],
+            ["other.csv", "", "2", "", ""],
         ],
     )
     assert identify("cells.tsv") == 1
     lines = capsys.readouterr().err.splitlines()
-    assert [line.partition(": ")[0] for line in lines[1:]] == [
-        "cells.tsv, line 2",
-        "cells.tsv, line 3",
+    assert [line.removeprefix("biogrip: ").partition(" Allowed")[0] for line in lines] == [
+        "cells.tsv, line 2: measurement.noise_rad: found -1, allowed is at least 1e-15 and at most "
+        "1e+12 rad.",
+        "cells.tsv, line 2: sample.model: found 'maxwel'. Did you mean 'maxwell'?",
+        "cells.tsv, line 2: measurment: unknown key. Did you mean 'measurement'?",
+        "cells.tsv, line 3: fixed.k_s: is no parameter of the sample, which has k_p, c_p. Did you "
+        "mean 'k_p'?",
     ]
     assert not list(here.glob("*.json"))
 
@@ -238,7 +232,7 @@ def test_traces_of_a_command_read_one_quantity(
     assert identify("cells.tsv") == 1
     error = capsys.readouterr().err
     assert (
-        "cells.tsv, line 3: found a reading of stress, but a reading of modulus of cells" in error
+        "cells.tsv, line 3: found a reading of stress, but a reading of modulus of usual" in error
     )
 
 
@@ -304,7 +298,10 @@ def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None
     written = {row[0]: found(row[0]) for row in rows[1:]}
     for file in here.glob("*.json"):
         file.unlink()
-    assert identify("cells.tsv", "--csv", "some.csv", "--rows", "2-4") == 0
+    # As a batch of a workflow.
+    usual = [Setting("--model", ("sample", "model"), "kelvin_voigt")]
+    batch = {"table": Path("some.csv"), "rows": (2, 4)}
+    assert command.identify([Path("cells.tsv")], Path("few.yaml"), usual, **batch) == 0
     assert [row["trace"] for row in listed("some.csv")] == [row[0] for row in rows[3:6]]
     assert not list(here.glob("*.json"))
     for row in rows[1:]:
@@ -316,9 +313,6 @@ def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("cells.tsv", "--rows", "2-9"), "--rows: found 2-9, allowed are some of the 2 of cells."),
-        (("usual.csv", "--rows", "0-9"), "--rows: only for one table of traces."),
-        (("cells.tsv", "usual.csv", "--rows", "0-9"), "--rows: only for one table of traces."),
         (("cells.tsv", "--output", "x.json"), "--output: only for one trace"),
         (("cells.tsv", "--csv", "other.csv"), "other.csv: is read; allowed is another file"),
     ],
@@ -329,13 +323,6 @@ def test_options_that_do_not_go_with_a_table_are_refused(
     assert identify(*arguments) == 1
     assert said in capsys.readouterr().err
     assert not list(here.glob("*.json"))
-
-
-@pytest.mark.parametrize("text", ["9-0", "1", "a-b", "-1-2", "0-"])
-def test_rows_are_a_first_and_a_last(text: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["identify", "cells.tsv", f"--rows={text}"])
-    assert f"found '{text}', allowed is FIRST-LAST" in capsys.readouterr().err
 
 
 def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met(here: Path) -> None:
