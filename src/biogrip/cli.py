@@ -9,7 +9,6 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from textwrap import fill
 from typing import Any, NoReturn
 
 from biogrip import __version__
@@ -87,7 +86,7 @@ def _parser() -> argparse.ArgumentParser:
 def _examples(*commands: str, cost: str = "") -> str:
     """Return examples of a command, and a sentence on what takes long."""
     lines = ["\nexamples:", *(f"  biogrip {command}" for command in commands), ""]
-    return "\n".join([*lines, fill(cost, 80), ""] if cost else lines)
+    return "\n".join([*lines, cost, ""] if cost else lines)
 
 
 def _reading(text: str) -> tuple[tuple[str, ...], Any]:
@@ -247,12 +246,10 @@ def _design_parser(stages: Any) -> None:
         "design my.yaml --output designed.yaml",
         cost="The search takes some ten seconds.",
     )
-    design.add_argument(
-        "config", type=Path, help="YAML file with your samples, laid over the default study"
-    )
-    design.add_argument(
-        "--output", type=Path, help="config of the designed study, YAML [CONFIG_designed.yaml]"
-    )
+    text = "YAML file with your samples, laid over the default study"
+    design.add_argument("config", type=Path, help=text)
+    text = "config of the designed study, YAML [CONFIG_designed.yaml]"
+    design.add_argument("--output", type=Path, help=text)
 
 
 def _identify(options: argparse.Namespace) -> int:

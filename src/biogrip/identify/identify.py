@@ -47,30 +47,31 @@ def identify(
     if rows is not None:
         # The last may be beyond the end.
         asked = asked[rows[0] : rows[1] + 1]
-    problems = {own.trace: trace_file_problem(own.trace) for own in asked}
     absent = {
         str(own.trace): f"{own.place}: {problem}"
         for own in asked
-        if (problem := problems[own.trace])
+        if (problem := trace_file_problem(own.trace))
     }
-    every = [own for own in asked if not problems[own.trace]]
+    every = [own for own in asked if str(own.trace) not in absent]
     if alone and absent:
         raise BiogripError(absent[str(files[0])])
     if output is not None and not alone:
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
     # Errors of options and config concern all traces: they are raised once, here.
     check_settings(every)
-    outputs = [output or own.trace.with_suffix(".identified.json") for own in every]
-    outputs = outputs if rows is None else []
-    written = [*outputs, *filter(None, (report, table))]
+    outputs = {
+        own.trace: output or own.trace.with_suffix(".identified.json")
+        for own in (every if rows is None else ())
+    }
+    written = [*outputs.values(), *filter(None, (report, table))]
     if len({path.absolute() for path in written}) < len(written):
         raise BiogripError("found the same file to be written twice; allowed are different ones.")
     refuse_inputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
     for path in written:
         check_output(path)
     drawn = report is not None and len(every) <= MOST_DRAWN
-    if rows is None:
-        outcome = identify_traces(every, outputs, drawn=drawn)
+    if outputs:
+        outcome = identify_traces(every, list(outputs.values()), drawn=drawn)
     else:
         outcome = identify_batch(every, None, drawn=drawn)
     if alone and outcome.refused:
@@ -84,9 +85,7 @@ def identify(
 
         write_page(outcome, report, copied)
     print(in_words(outcome.found[0]) if alone else side_by_side(outcome.found, outcome.refused))
-    used = {each["trace"] for each in outcome.found}
-    if outputs:
-        outputs = [path for own, path in zip(every, outputs, strict=True) if str(own.trace) in used]
-    if said := [visible(path) for path in (*outputs, report, table) if path]:
+    made = [path for trace, path in outputs.items() if str(trace) not in outcome.refused]
+    if said := [visible(path) for path in (*made, report, table) if path]:
         print(f"Written to {', '.join(said)}.")
     return 1 if outcome.refused else 0

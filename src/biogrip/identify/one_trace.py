@@ -12,7 +12,6 @@ import sys
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
@@ -109,7 +108,7 @@ def identify_batch(
     alone = len(asked) == 1 and outputs is not None
     with Progress(str(asked[0].trace) if alone else "", 5, live=alone, quiet=not alone) as progress:
         for index, own in enumerate(asked):
-            read = _tried(own.trace, partial(_read, own, progress))
+            read = _tried(own, _read, own, progress)
             if isinstance(read, BiogripError):
                 results[index] = read
             else:
@@ -118,13 +117,12 @@ def identify_batch(
 
         def identify(group: Sequence[int]) -> None:
             found = _tried(
-                asked[group[0]].trace,
-                lambda: identify_alike(
-                    [asked[index].trace for index in group],
-                    [traces[index] for index in group],
-                    outputs and [outputs[index] for index in group],
-                    progress,
-                ),
+                asked[group[0]],
+                identify_alike,
+                [asked[index].trace for index in group],
+                [traces[index] for index in group],
+                outputs and [outputs[index] for index in group],
+                progress,
             )
             if not isinstance(found, BiogripError):
                 results.update(zip(group, found, strict=True))
@@ -148,7 +146,9 @@ def identify_batch(
             # Imported here: loading Matplotlib takes long.
             from biogrip.identify.page import draw
 
-            outcome.pictures[str(own.trace)] = draw(result)
+            pictures = _tried(own, draw, result)
+            if not isinstance(pictures, BiogripError):
+                outcome.pictures[str(own.trace)] = pictures
     return outcome
 
 
@@ -156,10 +156,10 @@ def _read(asked: Asked, progress: Progress) -> TraceCase:
     return read_trace(asked.trace, case_of(asked), asked.given, progress.note)
 
 
-def _tried(trace: Path, work: Callable[[], T]) -> T | BiogripError:
+def _tried(asked: Asked, work: Callable[..., T], *given: Any) -> T | BiogripError:
     """Return what work on a trace gives, or the error by which it fails, whatever that is."""
     try:
-        return work()
+        return work(*given)
     except BiogripError as error:
         return error
     except BrokenPipeError:
@@ -168,9 +168,9 @@ def _tried(trace: Path, work: Callable[[], T]) -> T | BiogripError:
     except Exception as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
         return BiogripError(
-            f"{visible(trace)}: the fit failed, which is a fault of biogrip and not of the trace: "
-            f"{type(error).__name__}: {error} ({Path(where.filename).name}, line {where.lineno}). "
-            "Please report it, with the trace if it may be shared."
+            f"{visible(asked.trace)}: the fit failed, which is a fault of biogrip and not of the "
+            f"trace: {type(error).__name__}: {error} ({Path(where.filename).name}, line "
+            f"{where.lineno}). Please report it, with the trace if it may be shared."
         )
 
 

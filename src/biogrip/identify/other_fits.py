@@ -237,16 +237,11 @@ def _fitted(
     # The fit without offset and drift is a start as well: with them, chi^2 cannot be higher.
     starts = np.array([diagnosis.likelihood.best for diagnosis in diagnoses])
     again = fit_from([fit.problem for fit in fits], starts)
-    return [
+    for own, fit in enumerate(fits):
+        both = fit.found, fit.found.at(again, own)
         # Last bits do not decide.
-        replace(
-            fit,
-            found=min(
-                fit.found, fit.found.at(again, own), key=lambda found: np.float32(found.misfit_rad)
-            ),
-        )
-        for own, fit in enumerate(fits)
-    ]
+        fits[own] = replace(fit, found=min(both, key=lambda each: np.float32(each.misfit_rad)))
+    return fits
 
 
 def _decrease(problem: CaseProblem, diagnosis: Diagnosis, fit: TraceFit) -> tuple[float, float]:

@@ -49,10 +49,8 @@ def check_output(output: Path) -> None:
     """Refuse, by a `BiogripError`, a file that cannot be written, or that biogrip did not write."""
     folder = output.parent
     if os.path.isdir(output) or not os.path.isdir(folder) or not os.access(folder, os.W_OK):
-        raise BiogripError(
-            f"{visible(output)}: cannot be written; allowed is a file in a folder that you "
-            "may write to."
-        )
+        text = "cannot be written; allowed is a file in a folder that you may write to."
+        raise BiogripError(f"{visible(output)}: {text}")
     try:
         # A name that is too long for the system is found here.
         for place in (output, scratch_path(output)):
@@ -67,10 +65,8 @@ def check_output(output: Path) -> None:
         with output.open("rb") as stream:
             if WRITTEN_BY.encode() in stream.read(_HEAD_BYTES):
                 return
-    raise BiogripError(
-        f"{visible(output)}: is there, and biogrip did not write it; allowed is another name, or "
-        "to delete it first."
-    )
+    text = "is there, and biogrip did not write it; allowed is another name, or to delete it first."
+    raise BiogripError(f"{visible(output)}: {text}")
 
 
 def in_own_units(data: Any, read: Quantity) -> Any:

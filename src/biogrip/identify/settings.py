@@ -132,10 +132,7 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
 def case_of(asked: Asked) -> Case:
     """Return the case that a trace is, before its readings are looked at.
 
-    Raises
-    ------
-    BiogripError
-        With option, row, or file, line and key, if settings or config cannot be used.
+    A `BiogripError` has option, row, or file, line and key, if settings or config cannot be used.
     """
     files = [default_config(), *([asked.config] if asked.config else [])]
     below = read_configs(files)
@@ -227,10 +224,7 @@ def _duration_s(trace: Path, measurement: Mapping[str, Any]) -> float:
 def check_settings(traces: Sequence[Asked]) -> None:
     """Refuse settings that cannot be used, of all traces at once, before anything is fitted.
 
-    Raises
-    ------
-    BiogripError
-        With the first few problems, or if traces are of different quantities.
+    So are traces of different quantities. A `BiogripError` has the first few problems.
     """
     read: dict[str, str] = {}
     problems: dict[str, None] = {}
@@ -249,15 +243,14 @@ def check_settings(traces: Sequence[Asked]) -> None:
             text = f"{own.place}: found a reading of {read[key]}, but a reading of {first[1]} of "
             text += f"{visible(first[0].trace)}; allowed is one quantity read for all traces of a "
             problems[f"{text}command."] = None
+    _refuse([*problems])
+
+
+def _refuse(problems: Sequence[str]) -> None:
+    """Raise an error with the first few problems, if there are any."""
+    more = [f"... and {len(problems) - _MOST_SHOWN} more."] if problems[_MOST_SHOWN:] else []
     if problems:
-        raise BiogripError("\n".join(_first_few([*problems])))
-
-
-def _first_few(problems: Sequence[str]) -> Iterator[str]:
-    """Yield the first few of many problems, and the number of the others."""
-    yield from problems[:_MOST_SHOWN]
-    if more := problems[_MOST_SHOWN:]:
-        yield f"... and {len(more)} more."
+        raise BiogripError("\n".join([*problems[:_MOST_SHOWN], *more]))
 
 
 def is_table(path: Path) -> bool:
@@ -274,13 +267,9 @@ def read_table(
 ) -> list[Asked]:
     """Read the traces of a table with config and options of the command; settings are not checked.
 
-    The table is text in UTF-8: `.tsv` is separated by tabs, another by what its header has.
-
-    Raises
-    ------
-    BiogripError
-        With line and column of the first few problems: text that is no table, values that are no
-        YAML, a trace twice.
+    The table is text in UTF-8: `.tsv` is separated by tabs, another by what its header has. A
+    `BiogripError` has line and column of the first few problems: text that is no table, values that
+    are no YAML, a trace twice.
     """
     header, *rows = _cells(path)
     if FILE not in header:
@@ -314,8 +303,7 @@ def read_table(
         found.append(Asked(trace, config, tuple(settings), place(path, line), copied))
     if not found:
         problems.append(f"{place(path)}: found no traces, allowed is a row for each.")
-    if problems:
-        raise BiogripError("\n".join(_first_few(problems)))
+    _refuse(problems)
     return found
 
 

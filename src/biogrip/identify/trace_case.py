@@ -54,11 +54,10 @@ class TraceCase:
 
     def is_like(self, other: "TraceCase") -> bool:
         """Return True if the model, the budget of fits and the confidence are the same."""
-        own, others = self.case, other.case
         return (
             self.problem.searched == other.problem.searched
-            and own.confidence == others.confidence
-            and own.least_squares == others.least_squares
+            and self.case.confidence == other.case.confidence
+            and self.case.least_squares == other.case.least_squares
         )
 
 
@@ -67,10 +66,7 @@ def read_trace(
 ) -> TraceCase:
     """Read a trace as a case; `show` is given a table of what is recognised in an unusual file.
 
-    Raises
-    ------
-    BiogripError
-        With file, line and column, if the trace cannot be used.
+    A `BiogripError` has file, line and column, if the trace cannot be used.
     """
 
     def show_unusual(form: Recognised) -> None:
