@@ -7,7 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from contextlib import redirect_stderr, redirect_stdout, suppress
+from contextlib import redirect_stderr, suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -25,47 +25,24 @@ from biogrip.identify import one_trace
 from biogrip.identify.other_fits import FittedModels
 from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.identify.settings import Asked, Setting, case_of
+from biogrip.identify.trace_case import read_trace
 from biogrip.identify.words import for_a_paper, side_by_side
 from biogrip.judging.profiles import Profile
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.models import CANDIDATES, MODELS
 from biogrip.traces.late_onset import note_late_onset
+from tests.helpers.identified import FEW, identified, identify, write_trace
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean
 
-FEW = """
-least_squares: {candidates: 100, starts: 4}
-model_selection: {models: [damper, maxwell]}
-"""
 TRUTH = yaml.safe_load((ROOT / "data" / "example_truth.yaml").read_text())["cases"]["example"]
 
 
-def identify(*arguments: str | Path) -> tuple[int, str, str]:
-    """Status of the command, and what it says and complains of."""
-    with redirect_stdout(StringIO()) as said, redirect_stderr(StringIO()) as complained:
-        status = main(["identify", *map(str, arguments)])
-    return status, said.getvalue(), complained.getvalue()
-
-
-def identified(*arguments: str | Path, output: Path) -> dict[str, Any]:
-    status, _, complained = identify(*arguments, "--output", output)
-    assert status == 0, complained
-    found: dict[str, Any] = json.loads(output.read_text())
-    return found
-
-
-def written(path: Path, times: Array, values: Array, header: str = "time_s,rotation_rad") -> Path:
-    np.savetxt(path, np.c_[times, values], "%.8g", ",", header=header, comments="")
-    return path
-
-
-@pytest.fixture(scope="module")
-def few(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A config with few starts, and few models to compare, where that is not looked at."""
-    config = tmp_path_factory.mktemp("config") / "few.yaml"
-    config.write_text(FEW)
-    return str(config)
+@pytest.fixture
+def few(tmp_path: Path) -> str:
+    (tmp_path / "few.yaml").write_text(FEW)
+    return str(tmp_path / "few.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -107,18 +84,16 @@ def test_the_example_gives_its_truth(example: tuple[str, dict[str, Any]]) -> Non
     assert found["by_default"] == ["gripper", "protocol"]
 
 
-def test_units_separators_offset_and_drift(
-    tmp_path: Path, trace: tuple[Array, Array], few: str
-) -> None:
+def test_units_separators_offset_and_drift(tmp_path: Path, trace: tuple[Array, Array]) -> None:
     times, values = trace
-    file = written(tmp_path / "a.csv", times, values)
-    plain = identified(file, "--config", few, output=tmp_path / "plain.json")
+    file = write_trace(tmp_path / "a.csv", times, values)
+    plain = identified(tmp_path, file)
     shifted = 1e3 * (values + 5e-4 + 1e-6 * times)
-    other = written(tmp_path / "b.csv", times / 60, shifted, "t;phi_mrad;note")
+    other = write_trace(tmp_path / "b.csv", times / 60, shifted, "t;phi_mrad;note")
     other.write_text(other.read_text().replace(",", ";") + "6.67;-;\n6.68;;\n")
     columns = ("--time", "t", "--set", "measurement.time_unit=min", "--reading", "phi_mrad")
-    options = (*columns, "--offset", "--drift", "--config", few)
-    found = identified(other, *options, output=tmp_path / "shifted.json")
+    options = (*columns, "--offset", "--drift")
+    found = identified(tmp_path, other, *options)
     left_out = f"Left out for want of a number: 2 rows of {len(times) + 2}."
     assert {"weight": "harmless", "text": left_out} in found["notes"]
     # Fitted along, both are known to some per cent of the rotation.
@@ -151,6 +126,20 @@ def test_options_are_keys_of_the_config_and_the_last_one_counts(
     by_options = case_of(Asked(EXAMPLE, None, tuple(settings)))
     assert by_options.block == case_of(Asked(EXAMPLE, tmp_path / "same.yaml", (model,))).block
     assert by_options.sample.candidate == "generalized_maxwell_2"
+
+
+def test_known_deviations_are_weights_of_the_fit(tmp_path: Path) -> None:
+    """By a column in the unit of the readings, or as a share of a smooth course."""
+    times, rotation = clean("liquid_drop_2")
+    values = 1e6 * np.c_[rotation, 0.04 * rotation + 1e-6]
+    file = write_trace(tmp_path / "a.csv", times[1:], values[1:], "time_s,rotation_urad,sd")
+    usual = Setting("--reading", ("measurement", "rotation"), "rotation_urad")
+    for name, value in (("sd", "sd"), ("noise_share", 0.04)):
+        asked = Asked(file, settings=(usual, Setting(f"--{name}", ("measurement", name), value)))
+        sd_rad = read_trace(file, case_of(asked), asked.given, print).problem.sd_rad
+        expected = 0.04 * rotation[1:] + (1e-6 if name == "sd" else 0.0)
+        assert sd_rad is not None
+        np.testing.assert_allclose(sd_rad[100:], expected[100:], rtol=0.02)
 
 
 REFUSED = {
@@ -242,7 +231,7 @@ def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: str) -> None:
 @pytest.mark.parametrize("name", ["a{b}.csv", "<results>.csv", "=1+1.csv", "a\nb.csv"])
 def test_a_trace_of_any_name_is_read(tmp_path: Path, trace: tuple[Array, Array], name: str) -> None:
     """Without a workflow, no name is a pattern; the trace is refused for what is in it."""
-    status, _, error = identify(written(tmp_path / name, trace[0], -trace[1]))
+    status, _, error = identify(write_trace(tmp_path / name, trace[0], -trace[1]))
     assert status == 1
     assert "found a rotation that goes against the torque" in error
     assert not list(tmp_path.glob("*.json"))
@@ -402,17 +391,16 @@ def test_all_that_is_assumed_repeats_it(
     tmp_path: Path, options: tuple[str, ...], models: str
 ) -> None:
     """Every byte of the answer, without any option but the model's."""
-    config, output = tmp_path / "c.yaml", tmp_path / "f.json"
-    config.write_text(EVERYTHING + models)
+    config = EVERYTHING + models
     told = []
     arguments: tuple[str, ...] = ("--model", "liquid_drop", *options)
     for _ in range(2):
-        data = identified(EXAMPLE, *arguments, "--config", config, output=output)
+        data = identified(tmp_path, EXAMPLE, *arguments, config=config)
         data.pop("by_default")
         told.append(json.dumps(data))
         assumed = data["assumed"]
         arguments = ("--model", assumed.pop("model"))
-        config.write_text(yaml.safe_dump(assumed))
+        config = yaml.safe_dump(assumed)
     assert told[0] == told[1]
 
 
@@ -424,11 +412,11 @@ def test_all_that_is_assumed_repeats_it(
     ],
 )
 def test_models_that_are_named_are_those_that_are_tried(
-    tmp_path: Path, few: str, named: str, tried: list[str]
+    tmp_path: Path, named: str, tried: list[str]
 ) -> None:
     """Beside the one that the trace is identified with."""
     models = ("--set", f"model_selection.models={named}")
-    found = identified(EXAMPLE, "--config", few, *models, output=tmp_path / "found.json")
+    found = identified(tmp_path, EXAMPLE, *models)
     assert [row["model"] for row in found["models"]] == tried
     assert (found["advice"] is None) == (not tried)
 
@@ -444,11 +432,9 @@ def test_the_chosen_model_is_held_against_others(
     assert sum(CANDIDATES[name].model.power_law for name in tried) == 2
     assert example[0].count("97.5 %") == 1
     assert "generalized_maxwell_3" in tried
-    config = tmp_path / "few.yaml"
-    config.write_text(FEW.replace("maxwell]", "maxwell, liquid_drop, generalized_maxwell]"))
+    config = FEW.replace("maxwell]", "maxwell, liquid_drop, generalized_maxwell]")
     for model, said in (("liquid_drop", "suits the trace better"), ("damper", "is not adequate")):
-        options = ("--config", config, "--model", model)
-        assert said in identified(EXAMPLE, *options, output=tmp_path / f"{model}.json")["advice"]
+        assert said in identified(tmp_path, EXAMPLE, "--model", model, config=config)["advice"]
 
 
 def test_values_of_a_simpler_model_are_held_against_limits() -> None:
@@ -537,32 +523,6 @@ def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path, few: str) -> No
     assert "\r\x1b[K" in said.split(str(EXAMPLE))[-2]
     assert "\x1b[32mdetermined: " in said
     assert "\x1b[33monly bounded above" in said
-
-
-@pytest.mark.nightly
-def test_weights_from_a_column_or_a_share_reach_the_fit(tmp_path: Path, few: str) -> None:
-    """Noise of 4 % of the rotation: with either, limits are narrower and nothing is doubted."""
-    times, rotation = clean("endothelial_cell", 2.0)
-    rng = np.random.default_rng(8)
-    trace = rotation * (1 + 0.04 * rng.standard_normal(len(times)))
-    deviations = 0.04 * np.maximum(rotation, 0.01 * rotation.max())
-    file, values = tmp_path / "trace.csv", np.c_[1e6 * trace, 1e6 * deviations]
-    written(file, times, values, "time_s,rotation_urad,sd")
-    usual = ("--reading", "rotation_urad", "--model", "liquid_drop", "--config", few)
-    unweighted, by_column, by_share = (
-        identified(file, *usual, *options, output=tmp_path / "found.json")
-        for options in ((), ("--sd", "sd"), ("--noise-share", "0.04"))
-    )
-    assert unweighted["fit"] == "doubtful"
-    assert any("The noise grows with the rotation" in text for text in unweighted["reasons"])
-    for weighted in (by_column, by_share):
-        assert weighted["fit"] == "ok", weighted["reasons"]
-        k, before = weighted["quantities"][0], unweighted["quantities"][0]
-        assert k["high"] - k["low"] < 0.9 * (before["high"] - before["low"])
-        assert weighted["threshold"] == pytest.approx(3.8415, abs=1e-4)
-    assert by_column["noise_rad"] == pytest.approx(np.sqrt(np.mean(deviations**2)), rel=1e-4)
-    assert by_share["noise_rad"] == pytest.approx(by_column["noise_rad"], rel=0.01)
-    assert by_share["assumed"]["measurement"]["noise_share"] == 0.04
 
 
 @pytest.mark.parametrize(

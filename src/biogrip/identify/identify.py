@@ -59,11 +59,9 @@ def identify(
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
     # Errors of options and config concern all traces: they are raised once, here.
     check_settings(every)
-    outputs = {
-        own.trace: output or own.trace.with_suffix(".identified.json")
-        for own in (every if rows is None else ())
-    }
-    written = [*outputs.values(), *filter(None, (report, table))]
+    outputs = [output or own.trace.with_suffix(".identified.json") for own in every]
+    outputs = outputs if rows is None else []
+    written = [*outputs, *filter(None, (report, table))]
     if len({path.absolute() for path in written}) < len(written):
         raise BiogripError("found the same file to be written twice; allowed are different ones.")
     refuse_inputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
@@ -71,7 +69,7 @@ def identify(
         check_output(path)
     drawn = report is not None and len(every) <= MOST_DRAWN
     if outputs:
-        outcome = identify_traces(every, list(outputs.values()), drawn=drawn)
+        outcome = identify_traces(every, outputs, drawn=drawn)
     else:
         outcome = identify_batch(every, None, drawn=drawn)
     if alone and outcome.refused:
@@ -85,7 +83,8 @@ def identify(
 
         write_page(outcome, report, copied)
     print(in_words(outcome.found[0]) if alone else side_by_side(outcome.found, outcome.refused))
-    made = [path for trace, path in outputs.items() if str(trace) not in outcome.refused]
+    pairs = zip(every, outputs, strict=False)
+    made = [path for own, path in pairs if str(own.trace) not in outcome.refused]
     if said := [visible(path) for path in (*made, report, table) if path]:
         print(f"Written to {', '.join(said)}.")
     return 1 if outcome.refused else 0
