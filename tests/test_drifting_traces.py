@@ -9,20 +9,21 @@ from scipy.stats import chi2, norm
 
 from biogrip.arrays import Array
 from biogrip.fit.problem import silent
-from biogrip.identify.one_trace import IdentifyOptions, identify_trace, study_of
-from biogrip.identify.read_as import ReadAs
-from biogrip.identify.second_opinion import second_opinions
+from biogrip.identify.one_trace import identify_batch
+from biogrip.identify.other_fits import second_opinions
+from biogrip.identify.settings import Asked, Setting, case_of
 from biogrip.identify.trace_case import TraceCase
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import Note, wandering
 from biogrip.judging.likelihood import compute_fall
 from biogrip.records.traces import Measurements
+from tests.helpers.identified import write_trace
 from tests.helpers.problems import clean, run
 
 TIMES, CLEAN = clean("endothelial_cell", 5.0)
 SIGMA = 0.1 * float(CLEAN.max())
 DRIFT = SIGMA * TIMES / TIMES[-1]
-UNDECLARED = ReadAs()
+DECLARED = [Setting(f"--{name}", ("measurement", name), True) for name in ("offset", "drift")]
 SLOW = SIGMA * np.sin(2 * np.pi * TIMES / 150)
 
 
@@ -31,25 +32,22 @@ def trace(seed: int, added: Array) -> Array:
     return CLEAN + added + noise
 
 
-def written(path: Path, rotation: Array) -> Path:
-    rows = zip(TIMES, rotation, strict=True)
-    path.write_text("time_s,rotation_rad\n" + "".join(f"{t:.6g},{x:.8e}\n" for t, x in rows))
-    return path
+def asked(
+    file: Path, *declared: Setting, model: str = "liquid_drop", config: Path | None = None
+) -> Asked:
+    return Asked(file, config, (Setting("--model", ("sample", "model"), model), *declared))
 
 
 def suspected(
-    folder: Path, seed: int, added: Array, declared: ReadAs = UNDECLARED
+    folder: Path, seed: int, added: Array, *declared: Setting
 ) -> tuple[Diagnosis, list[Note]]:
     """What is said of a trace, and of an offset and a drift in it."""
     rotation = trace(seed, added)
-    study = study_of(
-        IdentifyOptions(written(folder / "t.csv", rotation), "liquid_drop", declared, None)
-    )
-    (case,) = study.cases.values()
+    case = case_of(asked(write_trace(folder / "t.csv", TIMES, rotation), *declared))
     problem = case.problem.of(TIMES, rotation)
     told = diagnose(problem, case.problem.searched, run("least_squares", problem), confidence=0.95)
     recorded = Measurements(TIMES, None, {0: rotation})
-    read = TraceCase(case, recorded, case.problem, names_models=False)
+    read = TraceCase(case, recorded, case.problem, {})
     (notes,) = second_opinions([read], [told], silent)
     return told, notes
 
@@ -77,7 +75,7 @@ def test_what_is_slow_is_seen_where_samples_next_to_each_other_do_not_show_it(
 
 def test_a_drift_that_a_sample_could_have_shown_is_suspected(tmp_path: Path) -> None:
     """Most of it is fitted away, as a softer sample."""
-    for seed in range(3):
+    for seed in range(2):
         (said,) = suspected(tmp_path, seed, 0.6 * DRIFT)[1]
         assert "--offset --drift" in said.text
         assert "k_p would be " in said.text
@@ -88,12 +86,13 @@ def test_a_trace_that_does_not_drift_is_not_suspected(tmp_path: Path) -> None:
     for seed in range(4):
         told, doubts = suspected(tmp_path, seed, 0 * DRIFT)
         assert (told.notes, doubts) == ([], [])
+    # Nor is one whose drift is declared.
+    assert suspected(tmp_path, 0, DRIFT, *DECLARED)[1] == []
 
 
 def test_an_offset_beside_a_declared_drift_is_one_degree_of_freedom(tmp_path: Path) -> None:
     """What is said of the fall of chi^2 is rounded to three digits, and its chance to one."""
-    declared = ReadAs(drift=True)
-    (said,) = suspected(tmp_path, 0, np.full(len(TIMES), 0.6 * SIGMA), declared)[1]
+    (said,) = suspected(tmp_path, 0, np.full(len(TIMES), 0.6 * SIGMA), DECLARED[1])[1]
     found = re.search(r"falls by (\S+); by chance it would once in (\S+) traces", said.text)
     assert found is not None
     assert float(found[2]) == pytest.approx(1 / chi2.sf(float(found[1]), 1), rel=0.6)
@@ -113,30 +112,14 @@ def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(
     assert found == pytest.approx(2 * (after - before), rel=1e-12)
 
 
-@pytest.mark.nightly
-def test_what_is_declared_is_not_suspected(tmp_path: Path) -> None:
-    file = written(tmp_path / "t.csv", trace(0, DRIFT))
-    few = tmp_path / "few.yaml"
-    few.write_text(
-        "model_selection: {models: [damper]}\nleast_squares: {candidates: 100, starts: 4}\n"
-    )
-    for declared in (ReadAs(), ReadAs(offset=True, drift=True)):
-        wanted = IdentifyOptions(file, "liquid_drop", declared, few)
-        notes = identify_trace(wanted, tmp_path / "t.json").data["notes"]
-        assert any("--offset --drift" in note["text"] for note in notes) == (not declared.drift)
-
-
 def test_under_a_constant_torque_a_drift_is_not_told_from_flow(tmp_path: Path) -> None:
     """A drop that flows, read as one that does not, is not said to drift."""
     held = tmp_path / "held.yaml"
     held.write_text("protocol: {phases: [{duration_s: 200.0, torque_Nm: 1.6e-9}]}\n")
-    file = written(tmp_path / "t.csv", trace(0, 0 * DRIFT))
-    rows = file.read_text().splitlines()
-    file.write_text("\n".join(rows[: 1 + np.count_nonzero(TIMES <= 200)]) + "\n")
-    found = identify_trace(
-        IdentifyOptions(file, "kelvin_voigt", UNDECLARED, held), tmp_path / "t.json"
-    )
-    (said,) = [note["text"] for note in found.data["notes"] if "χ² falls" in note["text"]]
+    first = TIMES <= 200
+    file = write_trace(tmp_path / "t.csv", TIMES[first], trace(0, 0 * DRIFT)[first])
+    (found,) = identify_batch([asked(file, model="kelvin_voigt", config=held)], None).found
+    (said,) = [note["text"] for note in found["notes"] if "χ² falls" in note["text"]]
     assert "the instrument drifts, or the sample flows" in said
     assert "--drift" not in said
     assert "would be" not in said

@@ -2,18 +2,16 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
 from biogrip.arrays import Array
-from biogrip.cli import main
 from biogrip.library import Sample, set_up, simulate
 from tests.helpers.default import STUDY
+from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
 
-FEW = "least_squares: {candidates: 100, starts: 4}\nmodel_selection: {models: [maxwell]}\n"
 SAMPLE = Sample("generalized_maxwell")
 TRUTH = {"k": 20.0, "k_p": 5.0, "c": 400.0, "c_p": 50.0}
 EXPERIMENT = set_up(STUDY.gripper, STUDY.phases, SAMPLE)
@@ -29,29 +27,13 @@ def trace() -> tuple[Array, Array]:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, trace: tuple[Array, Array]) -> Path:
-    folder = tmp_path_factory.mktemp("fixed")
-    rows = (f"{t:.6g},{v:.12e}" for t, v in zip(*trace, strict=True))
-    (folder / "trace.csv").write_text("\n".join(["time_s,rotation_rad", *rows]) + "\n")
-    (folder / "few.yaml").write_text(FEW)
-    return folder
-
-
-def identified(folder: Path, *options: str, config: str = "few.yaml") -> dict[str, Any]:
-    output = folder / "found.json"
-    given = ["--config", str(folder / config), "--output", str(output)]
-    assert main(["identify", str(folder / "trace.csv"), *given, *options]) == 0
-    found: dict[str, Any] = json.loads(output.read_text())
-    return found
-
-
-def quantities(found: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    return {item["quantity"]: item for item in found["quantities"]}
+def file(tmp_path_factory: pytest.TempPathFactory, trace: tuple[Array, Array]) -> Path:
+    return write_trace(tmp_path_factory.mktemp("fixed") / "trace.csv", *trace)
 
 
 @pytest.mark.parametrize("fixed", [{"c_p": 0.0}, {"k_p": 4.9, "c_p": 50.0}])
 def test_the_others_are_scipys(
-    folder: Path, trace: tuple[Array, Array], fixed: dict[str, float]
+    file: Path, tmp_path: Path, trace: tuple[Array, Array], fixed: dict[str, float]
 ) -> None:
     free = [name for name in SAMPLE.model.names if name not in fixed]
 
@@ -61,8 +43,9 @@ def test_the_others_are_scipys(
 
     start = [np.log(TRUTH[name]) for name in free]
     best, covariance = curve_fit(response, trace[0], 1e6 * trace[1], start, xtol=1e-12, ftol=1e-12)
-    found = identified(folder, *(f"--fix={name}={value}" for name, value in fixed.items()))
-    own = quantities(found)
+    options = (f"--fix={name}={value}" for name, value in fixed.items())
+    found = identified(tmp_path, file, *options)
+    own = by_quantity(found)
     assert set(own) == set(free)
     assert found["assumed"]["fixed"] == fixed
     for name, log, deviation in zip(free, best, np.sqrt(np.diag(covariance)), strict=True):
@@ -73,52 +56,29 @@ def test_the_others_are_scipys(
             assert width == pytest.approx(2 * 1.966 * deviation, rel=0.02)
 
 
-def test_an_element_at_zero_is_absent(folder: Path) -> None:
-    without = quantities(identified(folder, "--fix", "c_p=0"))
-    other = quantities(identified(folder, "--model", "liquid_drop"))
+def test_an_element_at_zero_is_absent(file: Path, tmp_path: Path) -> None:
+    without = by_quantity(identified(tmp_path, file, "--fix", "c_p=0"))
+    other = by_quantity(identified(tmp_path, file, "--model", "liquid_drop"))
     assert set(without) == set(other)
     for name, item in other.items():
         for key in ("value", "low", "high"):
             assert without[name][key] == pytest.approx(item[key], rel=1e-5)
 
 
-def test_it_is_said_everywhere(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    page, table = folder / "page.html", folder / "table.csv"
-    found = identified(folder, "--fix", "c_p=0", "--report", str(page), "--csv", str(table))
-    said = capsys.readouterr().out
-    assert found["fixed"] == ["c_p = 0 N s/m"]
-    assert "Fixed: c_p = 0 N s/m." in said
+def test_a_config_fixes_an_option_adds_and_it_is_said_everywhere(
+    file: Path, tmp_path: Path
+) -> None:
+    page, table, config = (tmp_path / name for name in ("page.html", "table.csv", "c.yaml"))
+    config.write_text(f"{FEW}fixed: {{k: 20.0, c_p: 1.0}}\n")
+    outputs = ("--report", page, "--csv", table, "--output", tmp_path / "f.json")
+    status, said, _ = identify(file, "--config", config, "--fix", "c_p=50", *outputs)
+    assert status == 0
+    found = json.loads((tmp_path / "f.json").read_text())
+    assert found["assumed"]["fixed"] == {"k": 20.0, "c_p": 50.0}
+    assert "Fixed: k = 20 N/m, c_p = 50 N s/m." in said
     assert "no other sample models are tried" in said
     assert found["models"] == []
-    assert "Fixed: c_p = 0 N s/m." in page.read_text()
+    assert "Fixed: k = 20 N/m, c_p = 50 N s/m." in page.read_text()
     header, row = (line.split(",") for line in table.read_text().splitlines())
-    assert row[header.index("fixed")] == "c_p = 0 N s/m"
+    assert row[header.index("fixed")] == "k = 20 N/m; c_p = 50 N s/m"
     assert not [name for name in header if name.startswith("c_p")]
-
-
-def test_a_config_fixes_and_an_option_adds(folder: Path) -> None:
-    (folder / "fixing.yaml").write_text(f"{FEW}fixed: {{k: 2.0, c_p: 1.0}}\n")
-    found = identified(folder, "--fix", "c_p=0", config="fixing.yaml")
-    assert found["assumed"]["fixed"] == {"k": 2.0, "c_p": 0.0}
-
-
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        ("kp=1", "--fix: kp: is no parameter of the sample, which has k, k_p, c, c_p."),
-        ("kp=1", "Did you mean 'k_p'?"),
-        ("k=0", "--fix: k: found 0, allowed is at least 1e-18 and at most 1e+12 N/m."),
-    ],
-)
-def test_what_cannot_be_fixed_is_refused(
-    folder: Path, given: str, text: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["identify", str(folder / "trace.csv"), "--fix", given]) == 1
-    assert text in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("given", ["k", "k=much", "=1"])
-def test_text_that_is_no_value_is_refused(given: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["identify", "trace.csv", "--fix", given])
-    assert f"found '{given}', allowed is NAME=VALUE" in capsys.readouterr().err

@@ -39,7 +39,7 @@ def identified(folder: Path, trace: Array, config: str, *options: str) -> tuple[
     rows = np.column_stack((TIMES, trace))
     np.savetxt(file, rows, delimiter=",", header="time_s,rotation_rad", comments="")
     settings.write_text(FEW + config)
-    arguments = ["--config", str(settings), "--output", str(output), "--force", *options]
+    arguments = ["--config", str(settings), "--output", str(output), *options]
     return main(["identify", str(file), *arguments]), output
 
 

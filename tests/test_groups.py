@@ -274,7 +274,8 @@ def test_nothing_of_others_is_replaced(
     for table, words in ((mine, "biogrip did not write it"), (found, "is read; allowed is")):
         assert main(["groups", str(found), "--by", "dish", "--csv", str(table)]) == 1
         assert words in capsys.readouterr().err
-    said(rows, "--csv", str(mine), "--force")
+    mine.unlink()
+    said(rows, "--csv", str(mine))
 
 
 def test_identify_and_groups_say_the_same_of_a_cell(

@@ -1,6 +1,5 @@
 """Search ranges that follow from a trace."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -8,13 +7,13 @@ import numpy as np
 import pytest
 import yaml
 
-from biogrip.cli import main
-from biogrip.identify.search_ranges import ranges_of
+from biogrip.identify.trace_case import ranges_of
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import hold, torque_history
 from biogrip.physics.simulation import simulated_rotation
 from tests.helpers.default import STUDY
+from tests.helpers.identified import by_quantity, identified, write_trace
 
 # Creep of polystyrene, in Pa and Pa s, as of a gripper: jaws of l = b at 90 degrees whose arms have
 # 0.25 % of the sample's stiffness.
@@ -42,33 +41,26 @@ def polystyrene(tmp_path: Path) -> Path:
     torque = torque_history((hold(DURATION_S, TORQUE_NM),))
     clean = simulated_rotation(gripper, network, torque, times, nonlinear=False)[0]
     noisy = clean + NOISE_RAD * np.random.default_rng(1).standard_normal(len(times))
-    file = tmp_path / "polystyrene.csv"
-    rows = np.column_stack((times, noisy))
-    np.savetxt(file, rows, delimiter=",", header="time_s,rotation_rad", comments="")
-    return file
+    return write_trace(tmp_path / "polystyrene.csv", times, noisy)
 
 
-def identified(trace: Path, **config: object) -> Any:
-    file, output = trace.with_suffix(".yaml"), trace.with_suffix(".json")
-    file.write_text(yaml.safe_dump({**CONFIG, **config}))
-    main(["identify", str(trace), "--config", str(file), "--output", str(output), "--force"])
-    return json.loads(output.read_text())
+def of_ranges(trace: Path, **config: Any) -> dict[str, Any]:
+    return identified(trace.parent, trace, config=yaml.safe_dump({**CONFIG, **config}))
 
 
 def test_a_sample_beyond_the_ranges_of_the_paper_is_found(polystyrene: Path) -> None:
-    found = identified(polystyrene)
+    found = of_ranges(polystyrene)
     assert found["fit"] == "ok"
-    for quantity in found["quantities"]:
-        if quantity["quantity"] in ("k_p", "c + c_p"):
-            truth = K_P if quantity["quantity"] == "k_p" else C + 1e3
-            assert quantity["verdict"] == "determined"
-            assert quantity["low"] < truth < quantity["high"]
-    again = identified(polystyrene, search_range=found["assumed"]["search_range"])
+    for name, truth in (("k_p", K_P), ("c + c_p", C + 1e3)):
+        own = by_quantity(found)[name]
+        assert own["verdict"] == "determined"
+        assert own["low"] < truth < own["high"]
+    again = of_ranges(polystyrene, search_range=found["assumed"]["search_range"])
     assert again["quantities"] == found["quantities"]
 
 
 def test_a_given_range_stays(polystyrene: Path) -> None:
-    found = identified(polystyrene, **DEFAULT)
+    found = of_ranges(polystyrene, **DEFAULT)
     ranges = found["assumed"]["search_range"]
     assert ranges["c"]["exponent"] == ranges["c_p"]["exponent"] == [-4, 5]
     assert ranges["k"]["exponent"] != [-3, 8]
@@ -81,20 +73,18 @@ def test_elements_at_the_ends_do_not_show(case: str) -> None:
     """A spring or damper beyond either end is as good as absent, or rigid: less than the noise."""
     chosen = STUDY.cases[case]
     problem, time_s = chosen.problem, chosen.sampling.over(chosen.problem.torque.end_s)
-    parameters = problem.searched.sample(chosen.parameters)
-    simulated = simulated_rotation(
-        problem.gripper, parameters, problem.torque, time_s, nonlinear=False
-    )[0]
-    noise_rad = 0.1 * simulated.max()
-    rng = np.random.default_rng(2)
-    trace = simulated + noise_rad * rng.standard_normal(len(time_s))
-    ranges = ranges_of(problem, time_s, trace)
 
     def response(**changes: float) -> np.ndarray:
         network = problem.searched.sample({**chosen.parameters, **changes})
         return simulated_rotation(
             problem.gripper, network, problem.torque, time_s, nonlinear=False
         )[0]
+
+    simulated = response()
+    noise_rad = 0.1 * simulated.max()
+    rng = np.random.default_rng(2)
+    trace = simulated + noise_rad * rng.standard_normal(len(time_s))
+    ranges = ranges_of(problem, time_s, trace)
 
     for name, genes in ranges.items():
         for end, beyond in ((genes.low, 1e-3), (genes.high, 1e3)):

@@ -10,15 +10,17 @@ import numpy as np
 import pytest
 import yaml
 
-from biogrip.cli import main
 from biogrip.errors import BiogripError
-from biogrip.identify.table_of_traces import is_table, read_table
+from biogrip.identify import identify as command
+from biogrip.identify.settings import Setting, is_table, read_table
 from biogrip.library import hold
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import torque_history
 from biogrip.tables.mechanics import contacts
 from tests.helpers.default import STUDY
+from tests.helpers.identified import identify as run
+from tests.helpers.identified import write_trace
 from tests.helpers.problems import GRIPPER, TORQUE
 
 SHORT = {"phases": [{"duration_s": 100.0, "torque_Nm": 2e-9}]}
@@ -43,9 +45,7 @@ def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Path:
         times = np.linspace(0, end, 81)
         clean = rotation(step_response(GRIPPER, network), torque, times)[0]
         measured = clean + 0.05 * clean.max() * rng.standard_normal(len(times))
-        rows = np.column_stack((times, measured))
-        header = f"{column},rotation_rad"
-        np.savetxt(folder / f"{name}.csv", rows, "%.9g", ",", header=header, comments="")
+        write_trace(folder / f"{name}.csv", times, measured, f"{column},rotation_rad")
     write(folder / "cells.tsv", TABLE)
     (folder / "few.yaml").write_text(yaml.safe_dump(FEW))
     return folder
@@ -64,9 +64,8 @@ def write(path: Path, rows: list[list[str]], separator: str = "\t") -> None:
         csv.writer(stream, delimiter=separator).writerows(rows)
 
 
-def identify(*arguments: str) -> int:
-    given = ["identify", *arguments, "--config", "few.yaml", "--model", "kelvin_voigt"]
-    return main(given)
+def identify(*arguments: str) -> tuple[int, str, str]:
+    return run(*arguments, "--config", "few.yaml", "--model", "kelvin_voigt")
 
 
 def found(trace: str) -> dict[str, Any]:
@@ -86,21 +85,19 @@ def refused(path: Path) -> list[str]:
     return str(error.value).splitlines()
 
 
-def test_a_row_says_what_options_and_config_say_of_one_trace(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert identify("cells.tsv", "--csv", "found.csv") == 0
+def test_a_row_says_what_options_and_config_say_of_one_trace(here: Path) -> None:
+    status, printed, _ = identify("cells.tsv", "--csv", "found.csv")
+    assert status == 0
     # What is not so of all traces is said of each.
-    printed = capsys.readouterr().out
     assert "\nusual.csv: Assumed: the default study's gripper and the default study's" in printed
     assert "other.csv: Assumed" not in printed
     rows = {name: found(name) for name in ("usual.csv", "other.csv")}
     assert [each["by_default"] for each in rows.values()] == [["gripper", "protocol"], []]
-    assert identify("usual.csv") == 0
+    assert identify("usual.csv")[0] == 0
     assert found("usual.csv") == rows["usual.csv"]
     said = {"protocol": SHORT, "gripper": {"arm_length_m": 3e-3}}
     (here / "few.yaml").write_text(yaml.safe_dump(FEW | said))
-    assert identify("other.csv", "--time", "t_s") == 0
+    assert identify("other.csv", "--time", "t_s")[0] == 0
     assert found("other.csv") == rows["other.csv"]
     columns = ("trace", "dish", "fit", "confidence")
     assert [[row[name] for name in columns] for row in listed()] == [
@@ -110,17 +107,12 @@ def test_a_row_says_what_options_and_config_say_of_one_trace(
     assert list(listed()[0])[:3] == ["trace", "dish", "fit"]
 
 
-def test_tables_and_traces_may_be_mixed(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_tables_and_traces_may_be_mixed(here: Path) -> None:
     write(here / "cells.tsv", [TABLE[0], TABLE[2]])
-    assert identify("usual.csv", "cells.tsv", "--csv", "found.csv", "--report", "page.html") == 0
-    assert [(row["trace"], row["dish"]) for row in listed()] == [
-        ("usual.csv", ""),
-        ("other.csv", "right"),
-    ]
-    page = (here / "page.html").read_text()
-    assert "<td>right</td>" in page
-    assert identify("cells.tsv", "other.csv") == 1
-    assert "the same file to be written twice" in capsys.readouterr().err
+    assert identify("usual.csv", "cells.tsv", "--csv", "found.csv")[0] == 0
+    rows = [(row["trace"], row["dish"]) for row in listed()]
+    assert rows == [("usual.csv", ""), ("other.csv", "right")]
+    assert "the same file to be written twice" in identify("cells.tsv", "other.csv")[2]
 
 
 @pytest.mark.parametrize(
@@ -135,12 +127,13 @@ def test_a_table_is_told_by_its_column(tmp_path: Path, name: str, separator: str
         path.write_text(path.read_text().replace("cell, no", '"cell, no"'))
     assert is_table(path)
     rows = read_table(path)
-    assert [(row.line, row.file) for row in rows] == [
-        (2, tmp_path / "d1/a.csv"),
-        (5, tmp_path / "b.csv"),
-        (6, tmp_path / "c.csv"),
+    assert [(row.place, row.trace) for row in rows] == [
+        (f"{path}, line 2", tmp_path / "d1/a.csv"),
+        (f"{path}, line 5", tmp_path / "b.csv"),
+        (f"{path}, line 6", tmp_path / "c.csv"),
     ]
-    assert [row.settings for row in rows] == [{}, {"fixed": {"c_p": 0}}, {}]
+    setting = Setting(str(path), ("fixed", "c_p"), 0, 5)
+    assert [row.settings for row in rows] == [(), (setting,), ()]
     assert [row.copied for row in rows] == [
         {"dish": dish, "cell, no": ""} for dish in ("left", "", "NA")
     ]
@@ -154,35 +147,21 @@ def test_a_trace_is_no_table(tmp_path: Path, text: str) -> None:
 
 def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
     path = tmp_path / "cells.tsv"
-    header = ["file", "measurment.noise_rad", "measurement.noise_rad", "fixed.cp", "dish", "dish"]
-    header += ["models.target", "fit", "k value", "measurement.block", "sample.model"]
-    write(
-        path,
-        [
-            header,
-            ["a.csv", "1", "-1", "1", "", "", "linear", "", "", "2.5", "maxwel"],
-            ["./a.csv", "", "much", "", "", "", "", "", "", "010", "maxwell"],
-        ],
-    )
-    lines = [line.removeprefix(f"{path}, line ") for line in refused(path)]
+    header = ["file", "dish", "dish", "fit", "k value", "measurement.skip"]
+    write(path, [header, ["a.csv", *[""] * 4, "1:30"], ["./a.csv", *[""] * 4, "[1"]])
+    *lines, last = [line.removeprefix(f"{path}, line ") for line in refused(path)]
     assert lines == [
-        "1, column 'measurment.noise_rad': is no key that a row may set. Did you mean "
-        "'measurement.noise_rad'? A name without a dot is copied.",
-        "1, column 'fixed.cp': is no key that a row may set. Did you mean 'fixed.c_p'? A name "
-        "without a dot is copied.",
         "1, column 'dish': stands twice; allowed is each name once.",
-        *lines[3:4],
         "1, column 'fit': is a column of the results; allowed is another name.",
         "1, column 'k value': is a column of the results; allowed is another name.",
-        "2, column 'measurement.noise_rad': found -1, allowed is at least 1e-15 and at most "
-        "1e+12 rad.",
-        *lines[7:9],
-        "3, column 'file': found './a.csv' again, as on line 2; allowed is each trace once.",
-        "... and 2 more.",
+        "2, column 'measurement.skip': found 1:30, which YAML reads in base 60; allowed is a "
+        "number without colons, or text in quotes.",
+        f"3, column 'file': found '{tmp_path}/a.csv' again, as on line 2; allowed is each trace "
+        "once.",
     ]
-    assert lines[3].startswith("1, column 'models.target': is no key that a row may set.")
-    assert lines[7].startswith("2, column 'measurement.block': found 2.5, allowed is")
-    assert lines[8].startswith("2, column 'sample.model': found 'maxwel'. Did you mean 'maxwell'?")
+    assert last.startswith("3, column 'measurement.skip': not valid YAML: ")
+    write(path, [["file", "fixed.c"], *([f"{number}.csv", "[1"] for number in range(30))])
+    assert refused(path)[10:] == ["... and 20 more."]
 
 
 @pytest.mark.parametrize(
@@ -203,55 +182,42 @@ def test_text_that_is_no_table_is_refused(tmp_path: Path, text: str, said: str) 
     assert said in line
 
 
-def test_settings_that_cannot_be_used_together_are_said_at_once(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write(
-        here / "cells.tsv",
-        [
-            ["file", "fixed.k_s", "fixed.k_v"],
-            ["usual.csv", "2", ""],
-            ["other.csv", "", "3"],
-        ],
-    )
-    assert identify("cells.tsv") == 1
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.partition(": ")[0] for line in lines[1:]] == [
-        "cells.tsv, line 2",
-        "cells.tsv, line 3",
+def test_settings_that_cannot_be_used_are_said_at_once(here: Path) -> None:
+    """As those of a config are, by row and key."""
+    header = ["file", "measurement.noise_rad", "fixed.k_s", "sample.model", "measurment.skip"]
+    rows = [["usual.csv", "-1", "", "maxwel", "2"], ["other.csv", "", "2", "", ""]]
+    write(here / "cells.tsv", [header, *rows])
+    status, _, error = identify("cells.tsv")
+    assert status == 1
+    lines = error.splitlines()
+    assert [line.removeprefix("biogrip: ").partition(" Allowed")[0] for line in lines] == [
+        "cells.tsv, line 2: measurement.noise_rad: found -1, allowed is at least 1e-15 and at most "
+        "1e+12 rad.",
+        "cells.tsv, line 2: sample.model: found 'maxwel'. Did you mean 'maxwell'?",
+        "cells.tsv, line 2: measurment: unknown key. Did you mean 'measurement'?",
+        "cells.tsv, line 3: fixed.k_s: is no parameter of the sample, which has k_p, c_p. Did you "
+        "mean 'k_p'?",
     ]
     assert not list(here.glob("*.json"))
 
 
-def test_traces_of_a_command_read_one_quantity(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (here / "few.yaml").write_text(yaml.safe_dump(FEW | {"instrument": "relaxation"}))
-    write(
-        here / "cells.tsv",
-        [
-            ["file", "measurement.modulus", "measurement.stress", "protocol.phases"],
-            ["usual.csv", "G", "", "[{duration_s: 400, strain: 1}]"],
-            ["other.csv", "", "S", "[{duration_s: 400, strain: 1}]"],
-        ],
-    )
-    assert identify("cells.tsv") == 1
-    error = capsys.readouterr().err
-    assert (
-        "cells.tsv, line 3: found a reading of stress, but a reading of modulus of cells" in error
-    )
+def test_traces_of_a_command_read_one_quantity(here: Path) -> None:
+    protocol = {"phases": [{"duration_s": 400, "strain": 1}]}
+    lab = FEW | {"instrument": "relaxation", "protocol": protocol}
+    (here / "few.yaml").write_text(yaml.safe_dump(lab))
+    header = ["file", "measurement.modulus", "measurement.stress"]
+    write(here / "cells.tsv", [header, ["usual.csv", "G", ""], ["other.csv", "", "S"]])
+    said = "cells.tsv, line 3: found a reading of stress, but a reading of modulus of usual.csv"
+    assert said in identify("cells.tsv")[2]
 
 
-def test_a_trace_that_fails_is_a_row_that_says_why(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
     """In its place, with what the table says of it; of a single row, too."""
     (here / "bad.csv").write_text("time_s,rotation_rad\n0,1e-6\nten,2e-6\n")
     rows = [["file", "dish"], ["gone.csv", "lost"], ["usual.csv", "left"], ["bad.csv", "broken"]]
     write(here / "cells.tsv", rows)
-    options = ("--csv", "found.csv", "--report", "page.html")
-    assert identify("cells.tsv", *options) == 1
-    printed = capsys.readouterr().out
+    status, printed, _ = identify("cells.tsv", "--csv", "found.csv", "--report", "page.html")
+    assert status == 1
     assert "Not identified, 2 of 3:" in printed
     assert "cells.tsv, line 2: found 'gone.csv', allowed is a file that exists." in printed
     table = listed()
@@ -264,7 +230,7 @@ def test_a_trace_that_fails_is_a_row_that_says_why(
     assert table[1]["failed"] == ""
     assert "<td>lost</td>" in (here / "page.html").read_text()
     write(here / "cells.tsv", [rows[0], rows[1]])
-    assert identify("cells.tsv", "--csv", "found.csv") == 1
+    assert identify("cells.tsv", "--csv", "found.csv")[0] == 1
     assert [row["fit"] for row in listed()] == ["failed"]
 
 
@@ -272,7 +238,7 @@ def test_what_a_row_says_goes_before_options(here: Path) -> None:
     keys = ["measurement.start_s", "fixed.c_p", "sample.model", "measurement.noise_rad"]
     write(here / "cells.tsv", [["file", *keys], ["usual.csv", "0", "200", "", "2e-6"]])
     options = ("--start", "fit", "--fix", "c_p=100", "--noise", "1e-6", "--drift")
-    assert identify("cells.tsv", *options) == 0
+    assert identify("cells.tsv", *options)[0] == 0
     data = found("usual.csv")
     assert data["fixed"] == ["c_p = 200 N s/m"]
     assert data["assumed"]["measurement"]["start_s"] == 0
@@ -300,53 +266,34 @@ def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None
             [f"{number}.csv", *[value if n == number else "" for n in range(len(settings))]]
         )
     write(here / "cells.tsv", rows)
-    assert identify("cells.tsv", "--csv", "found.csv") == 0
+    assert identify("cells.tsv", "--csv", "found.csv")[0] == 0
     written = {row[0]: found(row[0]) for row in rows[1:]}
     for file in here.glob("*.json"):
         file.unlink()
-    assert identify("cells.tsv", "--csv", "some.csv", "--rows", "2-4") == 0
+    # As a batch of a workflow.
+    usual = [Setting("--model", ("sample", "model"), "kelvin_voigt")]
+    given = ([Path("cells.tsv")], Path("few.yaml"), usual)
+    assert command.identify(*given, table=Path("some.csv"), rows=(2, 4)) == 0
     assert [row["trace"] for row in listed("some.csv")] == [row[0] for row in rows[3:6]]
     assert not list(here.glob("*.json"))
     for row in rows[1:]:
         write(here / "cells.tsv", [rows[0], row])
-        assert identify("cells.tsv") == 0
+        assert identify("cells.tsv")[0] == 0
         assert found(row[0]) == written[row[0]]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("cells.tsv", "--rows", "2-9"), "--rows: found 2-9, allowed are some of the 2 of cells."),
-        (("usual.csv", "--rows", "0-9"), "--rows: only for one table of traces."),
-        (("cells.tsv", "usual.csv", "--rows", "0-9"), "--rows: only for one table of traces."),
-        (("cells.tsv", "--output", "x.json"), "--output: only for one trace"),
-        (("cells.tsv", "--csv", "other.csv"), "other.csv: is read; allowed is another file"),
-    ],
-)
-def test_options_that_do_not_go_with_a_table_are_refused(
-    here: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], said: str
-) -> None:
-    assert identify(*arguments) == 1
-    assert said in capsys.readouterr().err
+def test_options_that_do_not_go_with_a_table_are_refused(here: Path) -> None:
+    assert "--output: only for one trace" in identify("cells.tsv", "--output", "x.json")[2]
+    assert "other.csv: is read; allowed is" in identify("cells.tsv", "--csv", "other.csv")[2]
     assert not list(here.glob("*.json"))
 
 
-@pytest.mark.parametrize("text", ["9-0", "1", "a-b", "-1-2", "0-"])
-def test_rows_are_a_first_and_a_last(text: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["identify", "cells.tsv", f"--rows={text}"])
-    assert f"found '{text}', allowed is FIRST-LAST" in capsys.readouterr().err
-
-
 def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met(here: Path) -> None:
-    """A trace tells stiffnesses times the square of the sine: smaller samples seem stiffer.
-
-    The table of contact says so of a config in which the neutral angle is taken for all sizes.
-    """
+    """A trace tells stiffnesses times the square of the sine: smaller samples seem stiffer."""
     shutil.copy(here / "usual.csv", here / "small.csv")
     rows = [["file", "sample.size_m"], ["usual.csv", ""], ["small.csv", "30e-6"]]
     write(here / "cells.tsv", rows)
-    assert identify("cells.tsv") == 0
+    assert identify("cells.tsv")[0] == 0
     unsized, sized = (
         {each["quantity"]: each["value"] for each in found(name)["quantities"]}
         for name in ("usual.csv", "small.csv")
@@ -356,6 +303,7 @@ def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met(here: Path) -> N
     ratio = (np.sin(angle) / np.sin(np.radians(75))) ** 2
     for name in ("k_p", "c_p"):
         assert unsized[name] / sized[name] == pytest.approx(ratio, rel=1e-3)
+    # So says the table of contact.
     smallest = contacts(STUDY).rows[0]
     assert smallest["size_um"] == pytest.approx(30)
     assert smallest["off_percent"] == pytest.approx(100 * (ratio - 1))

@@ -1,24 +1,20 @@
 """The ``biogrip`` command."""
 
 import argparse
+import math
 import os
 import re
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from textwrap import fill
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from biogrip import __version__
 from biogrip.errors import BiogripError
 from biogrip.terminal import visible, visible_lines
 
-if TYPE_CHECKING:
-    from biogrip.identify.read_as import ReadAs
-
-FIT = "fit"
 _SHOWN = 200
 
 # Imports are inside the commands, so that jobs import only what they use.
@@ -26,13 +22,11 @@ _SHOWN = 200
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, and return its exit status."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    parser = _parser()
-    options = parser.parse_args(given)
+    options = _parser().parse_args(arguments)
     # Matrices are small: BLAS threads cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        options.command(options)
+        status: int = options.command(options)
         sys.stdout.flush()
     except BiogripError as error:
         print(f"biogrip: {visible_lines(error)}", file=sys.stderr)
@@ -46,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         place = "" if error.filename is None else f"{visible(error.filename)[:_SHOWN]}: "
         print(f"biogrip: {place}{error.strerror or error}.", file=sys.stderr)
         return 1
-    return options.status
+    return status
 
 
 class _Parser(argparse.ArgumentParser):
@@ -81,27 +75,125 @@ def _models() -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="biogrip", description=__doc__)
-    parser.set_defaults(status=0)
     parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-
     _identify_parser(commands)
     _groups_parser(commands)
     _design_parser(commands)
-
     return parser
 
 
 def _examples(*commands: str, cost: str = "") -> str:
     """Return examples of a command, and a sentence on what takes long."""
     lines = ["\nexamples:", *(f"  biogrip {command}" for command in commands), ""]
-    return "\n".join([*lines, fill(cost, 80), ""] if cost else lines)
+    return "\n".join([*lines, cost, ""] if cost else lines)
+
+
+def _reading(text: str) -> tuple[tuple[str, ...], Any]:
+    quantity, found, column = text.partition("=")
+    return ("measurement", quantity if found else "rotation"), column if found else text
+
+
+def _start(text: str) -> tuple[tuple[str, ...], Any]:
+    name, value = ("fit_start", True) if text == "fit" else ("start_s", text)
+    return ("measurement", name), value
+
+
+def _hold(text: str) -> tuple[tuple[str, ...], Any]:
+    from biogrip.identify.settings import HOLD
+
+    with suppress(ValueError):
+        if (value := float(text)) and math.isfinite(value):
+            return HOLD, value
+    raise argparse.ArgumentTypeError(f"found '{text}', allowed is a number, and not 0")
+
+
+def _fix(text: str) -> tuple[tuple[str, ...], Any]:
+    name, _, value = text.partition("=")
+    with suppress(ValueError):
+        if name:
+            return ("fixed", name), float(value)
+    raise argparse.ArgumentTypeError(f"found '{text}', allowed is NAME=VALUE, as in k_p=0")
+
+
+def _any_key(text: str) -> tuple[tuple[str, ...], Any]:
+    from biogrip.identify.settings import value_of
+
+    key, found, value = text.partition("=")
+    if not (key and found):
+        text = f"found '{text}', allowed is KEY=VALUE, as in measurement.time_unit=ms"
+        raise argparse.ArgumentTypeError(text)
+    try:
+        return tuple(key.split(".")), value_of(value)
+    except BiogripError as error:
+        raise argparse.ArgumentTypeError(f"{key}: {error}") from error
+
+
+_SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
+    "the file's columns": [
+        ("--time", "measurement.time", "COLUMN", "of times [time_s]"),
+        (
+            *("--reading", _reading, "[QUANTITY=]COLUMN"),
+            "of readings [rotation=rotation_rad]; or displacement, strain, compliance (creep), "
+            "force, stress, modulus (relaxation)",
+        ),
+        ("--sd", "measurement.sd", "COLUMN", "of the readings' standard deviations"),
+        ("--block", "measurement.block", "N", "table to read, where a file has several"),
+    ],
+    "what was done": [
+        (
+            *("--hold", _hold, "VALUE"),
+            "what was held from 0 to the end, without a config: a stress in Pa for a strain, a "
+            "force in N for a displacement, and the reverse; 1 for a compliance or a modulus",
+        ),
+        ("--start", _start, "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
+        ("--from", "measurement.from_s", "SECONDS", "first time of the clock to use [all]"),
+        ("--until", "measurement.until_s", "SECONDS", "last time of the clock to use [all]"),
+    ],
+    "the noise and the instrument": [
+        ("--noise", "measurement.noise_rad", "SD", "known noise, in the readings' SI unit"),
+        ("--noise-model", "measurement.noise_model", "NAME", "white, or coloured: autocorrelated"),
+        (
+            "--noise-share",
+            "measurement.noise_share",
+            "SHARE",
+            "known noise, as a share of the readings",
+        ),
+        ("--offset", "measurement.offset", "", "fit an offset along, or not"),
+        ("--drift", "measurement.drift", "", "fit a linear drift along, or not"),
+    ],
+    "the sample": [
+        ("--model", "sample.model", "NAME", "sample model [generalized_maxwell]"),
+        ("--fix", _fix, "NAME=VALUE", "known parameter, SI units; 0 for no element; repeatable"),
+    ],
+    "any other key of the config": [
+        ("--set", _any_key, "KEY=VALUE", "as in measurement.time_unit=ms, YAML; repeatable"),
+    ],
+}
+"""Options of `identify` by what they are about: name; key of the config, or what reads the value
+and returns the key's path and value; what is given, nothing for a switch; and help."""
+
+
+class _Set(argparse.Action):
+    """Append what an option sets: the path of a config key, by default `dest`, and its value."""
+
+    def __call__(
+        self, parser: Any, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        """Append the option with path and value; one that takes no value is a switch."""
+        path, value = tuple(self.dest.split(".")), values
+        if isinstance(values, tuple):
+            path, value = values
+        elif self.nargs == 0:
+            value = not str(option).startswith("--no-")
+        namespace.settings = [*namespace.settings, (str(option), path, value)]
 
 
 def _identify_parser(stages: Any) -> None:
     text = "identify the sample in recorded traces, without a workflow"
     identify = stages.add_parser("identify", help=text, description=text)
-    identify.set_defaults(command=_identify)
+    identify.set_defaults(command=_identify, settings=[])
+    identify.lists_models = True
     identify.examples = _examples(
         "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
         "identify cells.tsv --config my_gripper.yaml --csv found.csv",
@@ -115,44 +207,22 @@ def _identify_parser(stages: Any) -> None:
         help="CSV file with a header, or a table of traces: its header has the column file, and "
         "others that are keys of the config, with dots, or copied to the CSV",
     )
-    identify.lists_models = True
-    _reading_options(identify)
-    identify.add_argument(
-        "--model", default="generalized_maxwell", help="sample model [%(default)s]"
-    )
-    identify.add_argument(
-        "--fix",
-        type=_parameter,
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="known parameter, SI units; 0 leaves an element out; repeat for more",
-    )
-    identify.add_argument(
-        "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
-    )
-    identify.add_argument(
-        "--noise-model", help="white, or coloured: intervals that allow for autocorrelation"
-    )
-    identify.add_argument(
-        "--force", action="store_true", help="replace a file that biogrip did not write"
-    )
-    identify.add_argument(
-        "--strict", action="store_true", help="end with status 1 if a fit is rejected"
-    )
-    identify.add_argument(
-        "--report", type=Path, metavar="PAGE", help="HTML page with all results and figures"
-    )
-    identify.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, one row per trace")
-    identify.add_argument(
-        "--rows",
-        type=_rows,
-        metavar="FIRST-LAST",
-        help="some rows of a table, from 0, without JSON files [all]",
-    )
-    identify.add_argument(
-        "--output", type=Path, help="JSON file, of one trace [TRACE.identified.json]"
-    )
+
+    for title, options in _SETTINGS.items():
+        group = identify.add_argument_group(title)
+        for name, key, metavar, text in options:
+            names = [name] if metavar else [name, name.replace("--", "--no-")]
+            of_key: dict[str, Any] = {"dest": key} if isinstance(key, str) else {"type": key}
+            of_key |= {"metavar": metavar} if metavar else {"nargs": 0}
+            group.add_argument(*names, action=_Set, help=text, **of_key)
+        if title == "what was done":
+            text = "YAML file with your gripper, protocol, search range, ..."
+            group.add_argument("--config", type=Path, help=text)
+    output = identify.add_argument_group("output")
+    output.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row per trace")
+    output.add_argument("--report", type=Path, metavar="PAGE", help="HTML page with pictures")
+    text = "JSON file, of one trace [TRACE.identified.json]"
+    output.add_argument("--output", type=Path, metavar="FILE", help=text)
 
 
 def _groups_parser(stages: Any) -> None:
@@ -165,9 +235,6 @@ def _groups_parser(stages: Any) -> None:
     groups.add_argument("found", type=Path, help="CSV file that identify --csv wrote")
     groups.add_argument("--by", required=True, metavar="COLUMN", help="column that makes groups")
     groups.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row a median")
-    groups.add_argument(
-        "--force", action="store_true", help="replace a file that biogrip did not write"
-    )
 
 
 def _design_parser(stages: Any) -> None:
@@ -179,173 +246,35 @@ def _design_parser(stages: Any) -> None:
         "design my.yaml --output designed.yaml",
         cost="The search takes some ten seconds.",
     )
-    design.add_argument(
-        "config", type=Path, help="YAML file with your samples, laid over the default study"
-    )
-    design.add_argument(
-        "--output", type=Path, help="config of the designed study, YAML [CONFIG_designed.yaml]"
-    )
-    design.add_argument(
-        "--force", action="store_true", help="replace a file that biogrip did not write"
-    )
+    text = "YAML file with your samples, laid over the default study"
+    design.add_argument("config", type=Path, help=text)
+    text = "config of the designed study, YAML [CONFIG_designed.yaml]"
+    design.add_argument("--output", type=Path, help=text)
 
 
-def _reading_options(command: argparse.ArgumentParser) -> None:
-    """Add options for columns, noise and nuisance terms of recorded traces."""
-    command.add_argument("--time", help="column of times [time_s]")
-    command.add_argument("--rotation", help="column of rotations [rotation_rad]")
-    command.add_argument(
-        "--reading",
-        type=_reading,
-        metavar="QUANTITY=COLUMN",
-        help="column of another instrument's readings: displacement, strain or compliance (creep), "
-        "force, stress or modulus (relaxation)",
-    )
-    command.add_argument(
-        "--hold",
-        type=float,
-        metavar="VALUE",
-        help="what was held from 0 to the end, without a config: a stress in Pa for a strain, a "
-        "force in N for a displacement, and the reverse; 1 for a compliance or a modulus",
-    )
-    command.add_argument("--time-unit", help="s, ms, min or h, if the column's name has none")
-    command.add_argument("--rotation-unit", help="rad, mrad, urad or deg, likewise")
-    command.add_argument("--reading-unit", help="unit of another reading, likewise")
-    command.add_argument("--skip", type=int, metavar="N", help="lines before the header [0]")
-    command.add_argument(
-        "--block", type=int, metavar="N", help="table to read, where a file has several"
-    )
-    command.add_argument(
-        "--average-repeated",
-        action="store_true",
-        default=None,
-        help="average the readings of equal times",
-    )
-    command.add_argument(
-        "--scale", type=float, metavar="FACTOR", help="reading = FACTOR times the column [1]"
-    )
-    command.add_argument(
-        "--start",
-        type=_start,
-        metavar="SECONDS",
-        help="time of the clock at which the protocol starts, or fit to fit it along [0]",
-    )
-    for name, what in (("from", "first"), ("until", "last")):
-        command.add_argument(
-            f"--{name}",
-            type=float,
-            dest=f"{name}_s",
-            metavar="SECONDS",
-            help=f"{what} time of the clock to use [all]",
-        )
-    command.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
-    for name, what in (("--offset", "an offset"), ("--drift", "a linear drift")):
-        command.add_argument(
-            name, action=argparse.BooleanOptionalAction, help=f"fit {what} along, or not"
-        )
-    command.add_argument(
-        "--sd", metavar="COLUMN", help="column of the readings' standard deviations"
-    )
-    command.add_argument(
-        "--noise-share", type=float, metavar="SHARE", help="known noise, as a share of the reading"
-    )
-
-
-def _start(text: str) -> float | str:
-    """Read the value of ``--start``."""
-    with suppress(ValueError):
-        return text if text == FIT else float(text)
-    raise argparse.ArgumentTypeError(f"found '{text}', allowed are seconds, or {FIT}")
-
-
-def _rows(text: str) -> tuple[int, int]:
-    """Read the value of ``--rows``."""
-    first, _, last = text.partition("-")
-    if first.isdecimal() and last.isdecimal() and int(first) <= int(last):
-        return int(first), int(last)
-    raise argparse.ArgumentTypeError(f"found '{text}', allowed is FIRST-LAST, as in 0-99")
-
-
-def _fixed(given: Sequence[tuple[str, float]]) -> dict[str, float]:
-    """Return the values of all ``--fix`` by name, each of which may come once."""
-    for number, (name, _) in enumerate(given):
-        if name in dict(given[:number]):
-            raise BiogripError(f"--fix: found {name} repeated, allowed is each parameter once.")
-    return dict(given)
-
-
-def _parameter(text: str) -> tuple[str, float]:
-    """Read a value of ``--fix``."""
-    name, _, value = text.partition("=")
-    with suppress(ValueError):
-        if name:
-            return name, float(value)
-    raise argparse.ArgumentTypeError(f"found '{text}', allowed is NAME=VALUE, as in k_p=0")
-
-
-def _reading(text: str) -> tuple[str, str]:
-    """Read the value of ``--reading``."""
-    quantity, _, column = text.partition("=")
-    if quantity and column:
-        return quantity, column
-    raise argparse.ArgumentTypeError(
-        f"found '{text}', allowed is QUANTITY=COLUMN, as in compliance=J"
-    )
-
-
-def _identify(options: argparse.Namespace) -> None:
+def _identify(options: argparse.Namespace) -> int:
     from biogrip.identify.identify import identify
+    from biogrip.identify.settings import Setting
 
-    options.status = identify(
+    return identify(
         options.traces,
-        options.model,
-        _read_as(options),
         options.config,
+        [Setting(*each) for each in options.settings],
         output=options.output,
         report=options.report,
         table=options.csv,
-        rows=options.rows,
-        fixed=_fixed(options.fix),
-        strict=options.strict,
-        force=options.force,
     )
 
 
-def _groups(options: argparse.Namespace) -> None:
+def _groups(options: argparse.Namespace) -> int:
     from biogrip.groups import groups
 
-    groups(options.found, options.by, options.csv, force=options.force)
+    groups(options.found, options.by, options.csv)
+    return 0
 
 
-def _design(options: argparse.Namespace) -> None:
+def _design(options: argparse.Namespace) -> int:
     from biogrip.design import design
 
-    design(options.config, options.output, force=options.force)
-
-
-def _read_as(options: argparse.Namespace) -> "ReadAs":
-    from biogrip.identify.read_as import ReadAs
-
-    return ReadAs(
-        options.time,
-        options.rotation,
-        reading=options.reading,
-        hold=options.hold,
-        time_unit=options.time_unit,
-        rotation_unit=options.rotation_unit,
-        reading_unit=options.reading_unit,
-        skip=options.skip,
-        scale=options.scale,
-        block=options.block,
-        average_repeated=options.average_repeated,
-        from_s=options.from_s,
-        until_s=options.until_s,
-        start_s=None if options.start == FIT else options.start,
-        fit_start=options.start == FIT or None,
-        noise_rad=options.noise,
-        offset=options.offset,
-        drift=options.drift,
-        noise_model=options.noise_model,
-        sd=options.sd,
-        noise_share=options.noise_share,
-    )
+    design(options.config, options.output)
+    return 0

@@ -165,26 +165,16 @@ class Experiment:
     """Least force of the jaws, if there are jaws; negative if they have to pull."""
 
 
-def design(config: Path, output: Path | None, *, force: bool) -> None:
+def design(config: Path, output: Path | None) -> None:
     """Search for a train of steps, print what it tells, and write a config that runs it.
 
-    Parameters
-    ----------
-    config
-        YAML file that is laid over the default study.
-    output
-        Config to write; by default beside the other, with `_designed` in its name.
-    force
-        If true, replace even a file that biogrip did not write.
-
-    Raises
-    ------
-    BiogripError
-        If something cannot be used, or if no train tells anything.
+    The config, a YAML file, is laid over the default study. By default the output is beside it,
+    with `_designed` in its name; a file that biogrip did not write is not replaced.
+    A `BiogripError` says what cannot be used, or that no train tells anything.
     """
     output = output or config.with_stem(f"{config.stem}_designed")
     refuse_inputs([output], [config])
-    check_output(output, force=force)
+    check_output(output)
     files = [default_config(), config]
     study = load_study(read_configs(files), files)
     samples = list(make_plausible(list(study.cases.values()), study.config.design))

@@ -24,8 +24,7 @@ from biogrip.arrays import Array
 from biogrip.digits import counted, rounded_numbers, with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs
-from biogrip.identify.many_traces import FAILED
-from biogrip.identify.outputs import WRITTEN_BY, check_output
+from biogrip.identify.outputs import FAILED, WRITTEN_BY, check_output
 from biogrip.judging.doubts import DOUBTFUL, REJECTED
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED
 from biogrip.records.rows import read_rows, write_rows
@@ -129,7 +128,7 @@ def compare(cells: Sequence[Cell], groups: Sequence[str], confidence: float) -> 
     return found
 
 
-def groups(found: Path, by: str, table: Path | None, *, force: bool) -> None:
+def groups(found: Path, by: str, table: Path | None) -> None:
     """Compare groups of cells, print the comparison, and write it as CSV if asked.
 
     Parameters
@@ -140,8 +139,6 @@ def groups(found: Path, by: str, table: Path | None, *, force: bool) -> None:
         Column that makes the groups. Traces of a cell, as a column `cell` says, are averaged.
     table
         CSV file to write, if any.
-    force
-        If true, replace even a file that biogrip did not write.
 
     Raises
     ------
@@ -160,7 +157,7 @@ def groups(found: Path, by: str, table: Path | None, *, force: bool) -> None:
             )
     if table is not None:
         refuse_inputs([table], [found])
-        check_output(table, force=force)
+        check_output(table)
     used = [own for own in traces if own["fit"] not in (REJECTED, FAILED) and own[by]]
     levels = sorted({own["confidence"] for own in used})
     if len(levels) != 1:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.identify.many_traces import Outcome, write_table
+from biogrip.identify.outputs import Outcome, write_table
 from biogrip.records.rows import (
     as_it_was,
     escape_formula,

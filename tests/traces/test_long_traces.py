@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.identify.one_trace import IdentifyOptions, identify_trace, study_of
-from biogrip.identify.read_as import ReadAs
+from biogrip.identify.one_trace import identify_batch
+from biogrip.identify.settings import Asked, Setting, case_of
 from biogrip.judging.diagnosis import diagnose
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import rotation, step_response
@@ -34,17 +34,16 @@ def written(path: Path, time_s: Array, rotation_rad: Array) -> Path:
     return path
 
 
-def options(path: Path) -> IdentifyOptions:
+def options(path: Path) -> Asked:
     """A trace to be identified with its own model alone: others take as much memory, and time."""
     config = path.with_suffix(".yaml")
     config.write_text("model_selection: {models: []}\n")
-    return IdentifyOptions(path, MODEL.name, ReadAs(), config)
+    return Asked(path, config, (Setting("--model", ("sample", "model"), MODEL.name),))
 
 
 def judged(path: Path, time_s: Array, rotation_rad: Array) -> dict[str, Any]:
-    """What `identify_trace` finds of the sample, without a word on other models."""
-    study = study_of(options(path))
-    (case,) = study.cases.values()
+    """What `identify_batch` finds of the sample, without a word on other models."""
+    case = case_of(options(path))
     (fit,) = judgement.fits_judged([case], [case.problem], [(time_s, rotation_rad)], 0)
     searched, confidence = case.problem.searched, case.confidence
     return diagnosis_data(diagnose(fit.problem, searched, fit.found, confidence=confidence))
@@ -72,9 +71,9 @@ def test_the_answer_is_that_of_means(gripper: Gripper, times: str, tmp_path: Pat
     fewer = judged(path, *means)
     # What libraries take is no part of it.
     few = written(tmp_path / "few.csv", time_s[::2000], trace[::2000])
-    identify_trace(options(few), tmp_path / "few.json")
+    identify_batch([options(few)], None)
     tracemalloc.start()
-    every = identify_trace(options(path), tmp_path / "every.json").data
+    every = identify_batch([options(path)], None).found[0]
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 330 * len(time_s)

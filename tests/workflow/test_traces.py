@@ -75,8 +75,18 @@ def test_what_is_changed_and_only_that_is_identified_again(lab: Path) -> None:
     assert planned(lab, TABLE, config=other) == {"traces_batch": 3, "traces": 1}
 
 
-def test_a_table_that_cannot_be_used_stops_with_line_and_column(lab: Path) -> None:
-    (lab / "cells.tsv").write_text(CELLS.replace("300", "much"))
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("fixed.c\n", "fixed.x\n", "line 4: fixed.x: is no parameter of the sample"),
+        ("3.csv\tB\t\n", "3.csv\tB\tmuch\n", "line 5: fixed.c: found 'much', allowed is a number"),
+    ],
+)
+def test_a_table_that_cannot_be_used_stops_with_line_and_key(
+    lab: Path, old: str, new: str, said: str
+) -> None:
+    table = lab / "cells.tsv"
+    table.write_text(table.read_text().replace(old, new, 1))
     run = snakemake(lab, "-n", "--", TABLE, config=STUDY)
     assert run.status == 1
     assert "cells.tsv, line 4, column 'fixed.c': found 'much', allowed" in run.output

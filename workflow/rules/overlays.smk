@@ -1,7 +1,7 @@
 """What only some configs have: sweeps, interpretations of the paper, and tables of recorded traces."""
 
 from biogrip.physics.models import SINGLE_BRANCH
-from biogrip.identify.table_of_traces import read_table
+from biogrip.identify.settings import Setting, check_settings, read_table
 
 # Simulated cases whose model has the paper's parameters, and what is read of each.
 OURS = {parameter.name for parameter in SINGLE_BRANCH}
@@ -72,17 +72,20 @@ rule interpretations:
 
 
 if STUDY.traces:
-    ROWS = usable(read_table, Path(STUDY.traces.table))
+    MODEL = Setting("traces.model", ("sample", "model"), STUDY.traces.model)
+    CONFIG = Path(STUDY.traces.config) if STUDY.traces.config else None
+    ROWS = usable(read_table, Path(STUDY.traces.table), CONFIG, [MODEL])
+    usable(check_settings, [row for row in ROWS if row.trace.is_file()])
 
     def rows_of(wildcards):
-        """The rows of the table that a batch has, as `biogrip identify --rows` chooses them."""
+        """The rows of the table that a batch has."""
         first, last = map(int, wildcards.rows.split("-"))
         return ROWS[first : last + 1]
 
     # Batches have fixed rows, so that more rows redo the last at most.
     rule traces_batch:
         input:
-            lambda wildcards: [str(row.file) for row in rows_of(wildcards) if row.file.is_file()],
+            lambda wildcards: [str(row.trace) for row in rows_of(wildcards) if row.trace.is_file()],
             config=STUDY.traces.config or [],
             default=str(default_config()),
             table=ancient(STUDY.traces.table),
@@ -97,7 +100,10 @@ if STUDY.traces:
         params:
             **settings_of(),
             model=STUDY.traces.model,
-            rows=lambda wildcards: [[str(r.file), r.settings, r.copied] for r in rows_of(wildcards)],
+            rows=lambda wildcards: [
+                [str(row.trace), [[s.path, s.value] for s in row.settings], row.copied]
+                for row in rows_of(wildcards)
+            ],
         message:
             "Identifying the traces in rows {wildcards.rows} of {input.table}"
         script:

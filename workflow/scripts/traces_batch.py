@@ -1,16 +1,20 @@
-"""Identify the traces in some rows of a table, as `biogrip identify --rows` does."""
+"""Identify the traces in some rows of a table, as `biogrip identify` does, without JSON files."""
 
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from biogrip.cli import main
+from biogrip.identify.identify import identify
+from biogrip.identify.settings import Setting
 from biogrip.stages.job import logged
 
 with logged(snakemake), Path(snakemake.log[0]).open("a") as log, redirect_stdout(log):
-    files, made = snakemake.input, snakemake.output
-    config = ["--config", files.config] if files.config else []
-    options = ["--rows", snakemake.wildcards.rows, "--model", snakemake.params.model, *config]
-    status = main(["identify", files.table, *options, "--csv", made.found])
-# A trace that is not there or cannot be used is a row that says so.
-if not Path(made.found).exists():
-    raise SystemExit(status)
+    config = Path(snakemake.input.config) if snakemake.input.config else None
+    first, last = map(int, snakemake.wildcards.rows.split("-"))
+    # A trace that is not there or cannot be used is a row that says so.
+    identify(
+        [Path(snakemake.input.table)],
+        config,
+        [Setting("traces.model", ("sample", "model"), snakemake.params.model)],
+        table=Path(snakemake.output.found),
+        rows=(first, last),
+    )

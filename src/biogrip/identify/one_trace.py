@@ -1,42 +1,49 @@
-"""Identification of one recorded trace from a CSV file to verdicts, without Snakemake."""
+"""Identification of recorded traces from CSV files to verdicts, alone or in batches.
+
+Each trace is fitted by least squares and diagnosed by profile likelihoods; other sample models, and
+an offset and a drift of the instrument, are held against it. Traces of the same model and budget
+are fitted together. The result of a trace is the same, to the last bit, in any batch and alone, and
+one that fails costs no other its result.
+"""
 
 import json
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+import os
+import sys
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from biogrip import __version__
 from biogrip.arrays import Array
 from biogrip.digits import counted, rounded_numbers
-from biogrip.errors import BiogripError, nearest
+from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.trace_fit import TraceFit
-from biogrip.identify.assumed import (
-    assumed,
-    by_default,
-    gripper_in_limits,
-    names_models,
-    versions,
+from biogrip.identify.other_fits import (
+    FittedModels,
+    judge_again,
+    models_tried,
+    second_opinions,
 )
-from biogrip.identify.fitted_models import FittedModels, judge_again, models_tried
-from biogrip.identify.instrument_of_trace import with_instrument
-from biogrip.identify.outputs import WRITTEN_BY, in_own_units
-from biogrip.identify.read_as import ReadAs, laid_over, read_trace
-from biogrip.identify.second_opinion import second_opinions
-from biogrip.identify.trace_case import TraceCase
+from biogrip.identify.outputs import WRITTEN_BY, Outcome, in_own_units
+from biogrip.identify.settings import Asked, case_of
+from biogrip.identify.trace_case import TraceCase, read_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
 from biogrip.judging.onset_profiles import profile_over_onset
+from biogrip.keys import plain
 from biogrip.physics.drift import within
 from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.physics.models import CANDIDATES, Sample
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.records.identifications import exact_data
+from biogrip.processes import worker_processes
+from biogrip.progress import Progress
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
 from biogrip.stages.judgement import fits_judged, notes_on_fit
@@ -47,163 +54,157 @@ from biogrip.study.study import Case, Study
 from biogrip.terminal import Progress, visible
 from biogrip.traces.columns import place, trace_file_problem
 from biogrip.traces.onset import note_late_onset
+from biogrip.study.study import Case
+from biogrip.terminal import visible
+from biogrip.traces.late_onset import note_late_onset
 
+# Most traces of a batch, and most readings of traces that are fitted together.
+_MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
 _NOT_COMPARED = (
     "With fixed parameters no other sample models are tried: a value that is known in this model "
     "says nothing of theirs, and without it they would fit better for their freedom alone."
 )
 
-
-@dataclass(frozen=True)
-class IdentifyOptions:
-    """A recorded trace, and the options to identify it with.
-
-    Parameters
-    ----------
-    trace
-        CSV file.
-    model
-        Name of the sample model.
-    read_as
-        Columns of the file, and offset, drift and noise of the instrument.
-    config
-        YAML file laid over the default study: gripper, protocol, search range.
-    fixed
-        Known parameters by name, SI units, beside those of the config.
-    settings
-        Blocks of a config with what a row of a table says of the trace, which goes before options
-        and config.
-    table, line
-        The table and the line of the row, if there is one.
-    """
-
-    trace: Path
-    model: str
-    read_as: ReadAs
-    config: Path | None
-    fixed: Mapping[str, float] = field(default_factory=dict)
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    table: Path | None = None
-    line: int = 0
-
-    @property
-    def configs(self) -> list[Path]:
-        """The default study's config, and over it the user's if there is one."""
-        return [default_config(), *([self.config] if self.config else [])]
-
-    @property
-    def given(self) -> dict[str, Any]:
-        """Blocks of the user's: those of the config, and over them those of a row."""
-        found: dict[str, Any] = overlaid(read_configs(self.configs[1:]), dict(self.settings))
-        return found
-
-    @property
-    def place(self) -> str:
-        """The trace, or the row that lists it, for messages."""
-        return place(self.table, self.line) if self.table else visible(self.trace)
-
-    def lines(self, case: str) -> list[tuple[str, dict[KeyPath, int]]]:
-        """Return the table, with the row's line for each of its settings; nothing without one."""
-        if self.table is None:
-            return []
-        paths = [
-            ("cases", case, *path) if path[0] in ("sample", "fixed") else path
-            for path in keys_in(self.settings)
-            if len(path) > 1
-        ]
-        return [(shown_path(self.table), dict.fromkeys(paths, self.line))]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Identified:
-    """Results of one trace.
-
-    Parameters
-    ----------
-    data
-        Content of the JSON file; numbers of the diagnosis are not rounded.
-    problem
-        Assumptions of the fit.
-    recorded
-        The trace.
-    """
+    """Results of one trace."""
 
     data: dict[str, Any]
+    """Content of the JSON file; numbers of the diagnosis are not rounded."""
     problem: CaseProblem
+    """Assumptions of the fit."""
     recorded: Measurements
+    """The trace."""
 
 
-def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
-    """Identify the sample in a recorded trace by least squares, and compute confidence limits.
+def identify_traces(asked: Sequence[Asked], outputs: Sequence[Path], *, drawn: bool) -> Outcome:
+    """Identify traces in batches, several processes at once, and write a JSON file of each.
 
-    Parameters
-    ----------
-    options
-        The trace and the options.
-    output
-        JSON file to write.
-
-    Raises
-    ------
-    BiogripError
-        With file, line and column or key, if trace or config cannot be used.
+    Errors of those that fail are collected. If `drawn`, there are pictures of each.
     """
-    case = case_of(options)
-    with Progress(str(options.trace), 5, live=True) as progress:
-        trace = read(options, case, progress)
+    if len(asked) <= 1:
+        return identify_batch(asked, outputs, drawn=drawn)
+    processors = len(os.sched_getaffinity(0))
+    size = min(_MOST_IN_BATCH, -(-len(asked) // processors))
+    batches = [slice(start, start + size) for start in range(0, len(asked), size)]
+    every = Outcome([], {})
+    with worker_processes(min(processors, len(batches))) as processes:
+        jobs = [
+            processes.submit(identify_batch, asked[own], outputs[own], drawn=drawn)
+            for own in batches
+        ]
+        for own, job in zip(batches, jobs, strict=True):
+            outcome = job.result()
+            every.found.extend(outcome.found)
+            every.refused.update(outcome.refused)
+            every.pictures.update(outcome.pictures)
+            for number, each in enumerate(asked[own], start=own.start + 1):
+                print(f"{number} of {len(asked)}: {visible(each.trace)}", file=sys.stderr)
+    return every
+
+
+def identify_batch(
+    asked: Sequence[Asked], outputs: Sequence[Path] | None, *, drawn: bool = False
+) -> Outcome:
+    """Identify the traces of one batch, see `identify_traces`; None to write no JSON files."""
+    results: dict[int, Identified | BiogripError] = {}
+    traces: dict[int, TraceCase] = {}
+    alone = len(asked) == 1 and outputs is not None
+    with Progress(str(asked[0].trace) if alone else "", 5, live=alone, quiet=not alone) as progress:
+        for index, own in enumerate(asked):
+            read = _tried(own, _read, own, progress)
+            if isinstance(read, BiogripError):
+                results[index] = read
+            else:
+                traces[index] = read
         progress.done()
-        (identified,) = identify_alike([options], [trace], [output], progress)
-    return identified
+
+        def identify(group: Sequence[int]) -> None:
+            found = _tried(
+                asked[group[0]],
+                identify_alike,
+                [asked[index].trace for index in group],
+                [traces[index] for index in group],
+                outputs and [outputs[index] for index in group],
+                progress,
+            )
+            if not isinstance(found, BiogripError):
+                results.update(zip(group, found, strict=True))
+            elif len(group) == 1:
+                results[group[0]] = found
+            else:
+                # The error is of one of them.
+                for index in group:
+                    identify([index])
+
+        for group in _alike(traces):
+            identify(group)
+    outcome = Outcome([], {})
+    for index, own in enumerate(asked):
+        result = results[index]
+        if isinstance(result, BiogripError):
+            outcome.refused[str(own.trace)] = str(result)
+            continue
+        outcome.found.append(result.data)
+        if drawn:
+            # Imported here: loading Matplotlib takes long.
+            from biogrip.identify.page import draw
+
+            pictures = _tried(own, draw, result)
+            if not isinstance(pictures, BiogripError):
+                outcome.pictures[str(own.trace)] = pictures
+    return outcome
 
 
-def case_of(options: IdentifyOptions) -> Case:
-    """Return the case that the trace of some options is, before its file is read.
-
-    Raises
-    ------
-    BiogripError
-        With option, or file, line and key, if options or config cannot be used for any trace.
-    """
-    (case,) = study_of(options).cases.values()
-    return case
+def _read(asked: Asked, progress: Progress) -> TraceCase:
+    return read_trace(asked.trace, case_of(asked), asked.given, progress.note)
 
 
-def read(options: IdentifyOptions, case: Case, progress: Progress) -> TraceCase:
-    """Read the trace of some options as a case.
+def _tried(asked: Asked, work: Callable[..., T], *given: Any) -> T | BiogripError:
+    """Return what work on a trace gives, or the error by which it fails, whatever that is."""
+    try:
+        return work(*given)
+    except BiogripError as error:
+        return error
+    except BrokenPipeError:
+        # Whoever reads the progress has gone.
+        raise
+    except Exception as error:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        return BiogripError(
+            f"{visible(asked.trace)}: the fit failed, which is a fault of biogrip and not of the "
+            f"trace: {type(error).__name__}: {error} ({Path(where.filename).name}, line "
+            f"{where.lineno}). Please report it, with the trace if it may be shared."
+        )
 
-    Raises
-    ------
-    BiogripError
-        With file, line and column, if the trace cannot be used.
-    """
-    recorded, case = read_trace(options.trace, case, options.given, progress.note)
-    problem = case.problem.weighted(recorded.sd_rad)
-    return TraceCase(case, recorded, problem, names_models(options.given))
+
+def _alike(traces: Mapping[int, TraceCase]) -> list[list[int]]:
+    """Group the indices of traces that can be fitted together, none with too many readings."""
+    groups: list[list[int]] = []
+    for index, trace in traces.items():
+        for group in groups:
+            readings = sum(len(traces[other].readings[0]) for other in (*group, index))
+            if readings <= _MOST_READINGS and trace.is_like(traces[group[0]]):
+                group.append(index)
+                break
+        else:
+            groups.append([index])
+    return groups
 
 
 def identify_alike(
-    options: Sequence[IdentifyOptions],
+    files: Sequence[Path],
     traces: Sequence[TraceCase],
     outputs: Sequence[Path] | None,
     progress: Progress,
 ) -> list[Identified]:
-    """Identify several traces, each as if it were alone, and write the result of each.
+    """Identify traces of the same model, budget of fits and confidence, each as if it were alone.
 
-    Parameters
-    ----------
-    options
-        Options of each trace.
-    traces
-        The traces: of the same model, budget of fits and confidence.
-    outputs
-        JSON file of each; None to write nothing.
-    progress
-        Counter of the five steps.
-
-    Raises
-    ------
-    BiogripError
-        If one of the traces cannot be fitted; nothing is then written.
+    A JSON file of each is written, if `outputs` has any. The counter's last four of five steps are
+    made here. A `BiogripError` says that one of the traces cannot be fitted; nothing is written.
     """
     first = traces[0]
     progress.doing(f"fitting {counted(sum(len(own.readings[0]) for own in traces), 'sample')}")
@@ -229,166 +230,109 @@ def identify_alike(
     progress.done()
     progress.doing("trying an offset and a drift")
     opinions = second_opinions(traces, diagnoses, progress.within)
-    judged = [
-        Judged(fit, diagnosis, own_models, [*doubts, *opinion])
-        for fit, diagnosis, own_models, (_, doubts), opinion in zip(
-            fits, diagnoses, models, again, opinions, strict=True
-        )
-    ]
-    data = [_data(*each) for each in zip(options, traces, judged, strict=True)]
-    for of_trace, output in zip(data, outputs or (), strict=False):
-        write_text(output, json.dumps(_written(of_trace), indent=1) + "\n")
-    return [
-        Identified(of_trace, own.problem, own.recorded)
-        for own, of_trace in zip(traces, data, strict=True)
-    ]
+    found = []
+    for index, own in enumerate(traces):
+        notes = [*again[index][1], *opinions[index]]
+        data = _data(own, fits[index], diagnoses[index], models[index], notes)
+        data = {WRITTEN_BY: __version__, "trace": str(files[index]), **data}
+        found.append(Identified(data, own.problem, own.recorded))
+    for data, output in zip((each.data for each in found), outputs or (), strict=False):
+        # Assumptions, which must be repeatable, are not rounded.
+        rounded = rounded_numbers(data) | {"assumed": data["assumed"]}
+        read = INSTRUMENTS[data["reads"]["quantity"]].read
+        write_text(output, json.dumps(in_own_units(rounded, read), indent=1) + "\n")
+    return found
 
 
-@dataclass(frozen=True)
-class Judged:
-    """The fit of a trace, its diagnosis, fits of other models, and notes that follow from these."""
-
-    fit: TraceFit
-    diagnosis: Diagnosis
-    models: FittedModels
-    notes: list[Note]
-
-
-def _data(options: IdentifyOptions, trace: TraceCase, judged: Judged) -> dict[str, Any]:
-    """Return all that is said of a trace, as plain data."""
-    case, case_problem, recorded = trace.case, trace.problem, trace.recorded
-    diagnosis, models, doubts = judged.diagnosis, judged.models, judged.notes
-    if case.may_start_late:
-        near = diagnosis.likelihood.best
-        doubts = [*doubts, *note_late_onset(case_problem, *trace.readings, near)]
+def _data(
+    trace: TraceCase,
+    fit: TraceFit,
+    diagnosis: Diagnosis,
+    models: FittedModels,
+    notes: Sequence[Note],
+) -> dict[str, Any]:
+    """Return all that is said of a trace, as plain data; notes follow from other fits."""
+    case, problem, recorded = trace.case, trace.problem, trace.recorded
+    instrument = problem.instrument
+    best = diagnosis.likelihood.best
+    late = note_late_onset(problem, *trace.readings, best) if case.may_start_late else []
+    assumptions = [Note(HARMLESS, _NOT_COMPARED)] if problem.fixed else []
     read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
-    assumptions = [Note(HARMLESS, _NOT_COMPARED)] if case_problem.fixed else []
-    instrument = case_problem.instrument
-    said = exact_data(diagnosis, [*assumptions, *notes_on_fit(judged.fit), *doubts], read)
+    said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *notes, *late], read)
+    form = recorded.recognised
+    unusual = form and not form.is_usual(case.columns)
     return {
-        WRITTEN_BY: __version__,
-        "trace": str(options.trace),
-        "model": case_problem.model.name,
-        "model_title": case_problem.model.title,
+        "model": problem.model.name,
+        "model_title": problem.model.title,
         "confidence": case.confidence,
         "instrument": instrument.kind,
         "reads": {"quantity": instrument.read.name, "unit": instrument.read.unit},
-        **_read_as(case, recorded),
-        **fixed_data(case_problem),
-        "limits": gripper_in_limits(case_problem),
-        **_instrument(case_problem, recorded, np.exp(diagnosis.likelihood.best)),
+        **({"read_as": form.data()} if form and unusual else {}),
+        **_fixed(problem),
+        "limits": _gripper_in_limits(problem),
+        **_fitted_along(problem, recorded, np.exp(best)),
         **said,
-        "noise_model": judged.fit.noise_data(),
+        "noise_model": fit.noise_data(),
         **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
-        "assumed": assumed(case, models.names or list(case.models)),
-        "by_default": by_default(options.given) if instrument.has_jaws else [],
-        "versions": versions(),
+        "assumed": _assumed(case, list(models.answers or case.models)),
+        "by_default": _by_default(trace.given) if instrument.has_jaws else [],
+        "versions": {name: version(name) for name in ("biogrip", "numpy", "scipy")},
     }
 
 
-def _read_as(case: Case, recorded: Measurements) -> dict[str, Any]:
-    """Return what was recognised in an unusual file, or nothing."""
-    form = recorded.recognised
-    return {"read_as": form.data()} if form and not form.is_usual(case.columns) else {}
-
-
-def _written(data: dict[str, Any]) -> dict[str, Any]:
-    """Round results; keep assumptions, which must be repeatable, as they are."""
-    read = INSTRUMENTS[data["reads"]["quantity"]].read
-    return in_own_units({**rounded_numbers(data), "assumed": data["assumed"]}, read)
-
-
-def check_trace_file(trace: Path) -> None:
-    """Refuse a path at which there is no file.
-
-    Raises
-    ------
-    BiogripError
-        With the nearest name among the files beside it.
-    """
-    if problem := trace_file_problem(trace):
-        raise BiogripError(f"TRACE: {problem}")
-
-
-def study_of(options: IdentifyOptions) -> Study:
-    """Return a study that has the trace as its only case.
-
-    Raises
-    ------
-    BiogripError
-        With option, or file, line and key, if options or config cannot be used for any trace.
-    """
-    check_trace_file(options.trace)
-    options.read_as.check()
-    if options.model not in CANDIDATES:
-        hint, names = nearest(options.model, CANDIDATES), ", ".join(CANDIDATES)
-        raise BiogripError(f"--model: found '{options.model}'.{hint} Allowed: {names}.")
-    sample = CANDIDATES[options.model]
-    for path, text in fixed_problems(sample.model, options.fixed):
-        raise BiogripError(f"--fix: {dotted(path)}: {text}" if path else f"--fix: {text}")
-    merged = read_configs(options.configs)
-    name = re.sub(r"[^A-Za-z0-9_-]", "_", options.trace.stem)[:60]
-    case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
-    read_as, settings = options.read_as, dict(options.settings)
-    of_sample = settings.pop("sample", {})
-    own = settings.pop("measurement", {})
-    merged = overlaid(merged, settings)
-    if "protocol" in settings:
-        read_as = replace(read_as, hold=None)
-    if isinstance(measured := merged.get("measurement"), dict):
-        measured = laid_over(read_as.over(measured), own)
-        merged["measurement"] = measured | {"file": str(options.trace)}
-        merged = with_instrument(merged, options.given, read_as, options.trace)
-    # Cases and a table of the config are meant for the workflow.
-    for name in ("only", "traces"):
-        merged.pop(name, None)
-    merged["cases"] = {
-        case: {
-            "sample": _sample(sample, of_sample),
-            "fixed": {**options.fixed, **settings.get("fixed", {})},
-        }
-    }
-    return load_study(
-        merged,
-        options.configs,
-        {"cases": merged["cases"]},
-        over=options.lines(case),
-    )
-
-
-def _sample(by_option: Sample, own: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the block of a sample: a row that names another model says its branches, too."""
-    if "model" in own:
-        return dict(own)
-    return {"model": by_option.name, "branches": by_option.branches, **own}
-
-
-def fixed_data(case_problem: CaseProblem) -> dict[str, Any]:
+def _fixed(problem: CaseProblem) -> dict[str, list[str]]:
     """Return values and units of fixed parameters in words, or nothing if there are none."""
-    fixed = case_problem.fixed
-    units = {p.name: p.unit for p in case_problem.model.parameters}
-    words = [f"{name} = {value:g} {units[name]}".rstrip() for name, value in fixed.items()]
+    units = {p.name: p.unit for p in problem.model.parameters}
+    words = [f"{name} = {value:g} {units[name]}".rstrip() for name, value in problem.fixed.items()]
     return {"fixed": words} if words else {}
 
 
-def _instrument(
-    case_problem: CaseProblem, recorded: Measurements, parameters: Array
-) -> dict[str, Any]:
+def _gripper_in_limits(problem: CaseProblem) -> str:
+    """Return a sentence on the part that the gripper's uncertainty has in the limits."""
+    exact = "gripper" if problem.instrument.has_jaws else problem.instrument.controlled.name
+    if not problem.uncertain_keys or not problem.instrument.has_jaws:
+        return f"Limits are statistical only: the {exact} is taken as exact."
+    keys = ", ".join(key.removesuffix(".share") for key in problem.uncertain_keys)
+    return f"Limits include uncertainties of the gripper: {keys}."
+
+
+def _fitted_along(
+    problem: CaseProblem, recorded: Measurements, parameters: Array
+) -> dict[str, float | None]:
     """Return onset, offset and drift of the instrument in the best fit, as far as fitted."""
-    onset = {"onset_s": recorded.onset_s} if case_problem.fit_start else {}
-    if not (case_problem.offset or case_problem.drift):
-        return onset
+    found = {"onset_s": recorded.onset_s} if problem.fit_start else {}
+    if not (problem.offset or problem.drift):
+        return found
     time_s, measured = recorded.time_s, recorded.rotation_rad[0]
-    network = case_problem.searched.network(parameters)
+    network = problem.searched.network(parameters)
     simulated = simulated_rotation(
-        case_problem.gripper, network, case_problem.torque, time_s, nonlinear=case_problem.nonlinear
+        problem.gripper, network, problem.torque, time_s, nonlinear=problem.nonlinear
     )[0]
-    basis = case_problem.nuisance(time_s)
-    added = within(basis, measured - simulated, case_problem.sd_rad)
+    added = within(problem.nuisance(time_s), measured - simulated, problem.sd_rad)
     slope = float((added[-1] - added[0]) / (time_s[-1] - time_s[0]))
-    start = float(added[0] - slope * time_s[0])
-    return (
-        onset
-        | ({"offset_rad": start} if case_problem.offset else {})
-        | ({"drift_rad_per_s": slope} if case_problem.drift else {})
-    )
+    if problem.offset:
+        found["offset_rad"] = float(added[0] - slope * time_s[0])
+    if problem.drift:
+        found["drift_rad_per_s"] = slope
+    return found
+
+
+def _assumed(case: Case, tried: Sequence[str]) -> dict[str, Any]:
+    """Return what an identification relies on: its model, and a config that repeats it."""
+    blocks = ["instrument", "protocol", "search_range", "measurement", "models", "least_squares"]
+    blocks += ["gripper"] if case.instrument.has_jaws else []
+    return {
+        "model": case.sample.candidate,
+        **{name: plain(getattr(case.block, name)) for name in blocks},
+        **({"actuator": plain(case.actuator)} if case.instrument.has_jaws else {}),
+        "fixed": case.fixed,
+        "identifiability": {"confidence": case.confidence},
+        "model_selection": {"models": list(tried)},
+        "study_seed": case.study.study_seed,
+    }
+
+
+def _by_default(given: Mapping[str, Any]) -> list[str]:
+    """Return which of gripper and protocol the user does not set; uncertainties are no gripper."""
+    blocks = ("gripper", "protocol")
+    return [name for name in blocks if not set(given.get(name) or ()) - {"uncertainty"}]

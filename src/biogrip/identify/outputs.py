@@ -1,79 +1,72 @@
-"""Checks of output files, so that files of others are not overwritten."""
+"""Files that biogrip writes of traces: their keys and columns, and which may be replaced."""
 
-import json
 import os
 import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from biogrip import __version__
+from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
-from biogrip.files import scratch_path
-from biogrip.physics.instruments import Quantity
-from biogrip.terminal import visible
+from biogrip.files import scratch_path, write_text
+from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Quantity
+from biogrip.records.rows import write_rows
+from biogrip.terminal import visible, visible_lines
 
 WRITTEN_BY = "written_by_biogrip"
-"""Mark in every file that biogrip writes; files without it are not replaced."""
+"""Mark at the beginning of every file that biogrip writes; files without it are not replaced."""
 
-_HEAD_BYTES = 500
-_LONGEST = 100_000
+FAILED = "failed"
+"""Status of a trace that could not be read, or whose fit failed; and the column that says why."""
+
+COLUMNS = (
+    *("trace", "fit", "confidence", "model", "preferred_model", "samples"),
+    *("noise_rad", "misfit_rad", "fixed", FAILED, WRITTEN_BY),
+)
+"""Columns of the table of traces, but for those of quantities."""
+
+_OF_QUANTITY = ("verdict", "value", "low", "high")
+_RADIANS = re.compile("_rad(?=$|_per_s$)")
+# A header that may be long has its mark at the end.
+_HEAD_BYTES = 100_000
 
 
-def check_output(output: Path, *, force: bool) -> None:
-    """Refuse an output that cannot be written, or that biogrip did not write.
+@dataclass(frozen=True)
+class Outcome:
+    """Results of several traces."""
 
-    Parameters
-    ----------
-    output
-        The file.
-    force
-        If true, replace even a file that biogrip did not write.
+    found: list[dict[str, Any]]
+    """Result of each usable trace, as `Identified.data`."""
+    refused: dict[str, str]
+    """Message of each other trace, which could not be read or whose fit failed, by file."""
+    pictures: dict[str, list[str]] = field(default_factory=dict)
+    """Drawings of usable traces as data URLs, by file, if there is to be a page."""
 
-    Raises
-    ------
-    BiogripError
-        If the file cannot be written or must not be replaced.
-    """
+
+def check_output(output: Path) -> None:
+    """Refuse, by a `BiogripError`, a file that cannot be written, or that biogrip did not write."""
     folder = output.parent
     if os.path.isdir(output) or not os.path.isdir(folder) or not os.access(folder, os.W_OK):
-        raise BiogripError(
-            f"{visible(output)}: cannot be written; allowed is a file in a folder that you "
-            "may write to."
-        )
-    for place in (output, scratch_path(output)):
-        try:
-            os.lstat(place)
-        except FileNotFoundError:
-            continue
-        except OSError as error:
-            raise BiogripError(
-                f"{visible(output)}: cannot be written: {error.strerror}."
-            ) from error
-    if os.path.exists(output) and not output.is_symlink() and not output.is_file():
-        raise BiogripError(f"{visible(output)}: is no regular file; allowed is one.")
-    if os.path.lexists(output) and not force and not _is_ours(output):
-        raise BiogripError(
-            f"{visible(output)}: is there, and biogrip did not write it; allowed is another name, "
-            "or --force to replace it."
-        )
-
-
-def _is_ours(output: Path) -> bool:
-    if output.is_symlink():
-        return False
+        text = "cannot be written; allowed is a file in a folder that you may write to."
+        raise BiogripError(f"{visible(output)}: {text}")
     try:
-        if output.suffix == ".json":
-            return WRITTEN_BY in json.loads(output.read_bytes())
+        # A name that is too long for the system is found here.
+        for place in (output, scratch_path(output)):
+            place.exists()
+    except OSError as error:
+        raise BiogripError(f"{visible(output)}: cannot be written: {error.strerror}.") from error
+    if output.exists() and not output.is_symlink() and not output.is_file():
+        raise BiogripError(f"{visible(output)}: is no regular file; allowed is one.")
+    if not os.path.lexists(output):
+        return
+    if not output.is_symlink():
         with output.open("rb") as stream:
-            # The mark is in the header of a table, however long, and in the first lines of a page.
-            head = (
-                stream.readline(_LONGEST) if output.suffix == ".csv" else stream.read(_HEAD_BYTES)
-            )
-            return WRITTEN_BY.encode() in head
-    except (OSError, ValueError, TypeError, RecursionError):
-        return False
-
-
-_RADIANS = re.compile("_rad(?=$|_per_s$)")
+            if WRITTEN_BY.encode() in stream.read(_HEAD_BYTES):
+                return
+    text = "is there, and biogrip did not write it; allowed is another name, or to delete it first."
+    raise BiogripError(f"{visible(output)}: {text}")
 
 
 def in_own_units(data: Any, read: Quantity) -> Any:
@@ -82,9 +75,59 @@ def in_own_units(data: Any, read: Quantity) -> Any:
         return [in_own_units(each, read) for each in data]
     if not isinstance(data, dict):
         return data
-    return {name_in_units(key, read): in_own_units(each, read) for key, each in data.items()}
+    return {_in_units(key, read): in_own_units(each, read) for key, each in data.items()}
 
 
-def name_in_units(name: str, read: Quantity) -> str:
-    """Return a name of a key or column that ends with the unit of what is read."""
+def _in_units(name: str, read: Quantity) -> str:
     return _RADIANS.sub(read.suffix, name)
+
+
+def write_table(
+    outcome: Outcome, table: Path, copied: Mapping[str, Mapping[str, str]] | None = None
+) -> None:
+    """Write one row per trace as CSV: numbers, their units in the header, and why it failed if so.
+
+    What is copied are cells of each trace, by file and column, in the order of rows. By default
+    nothing is, and traces that failed come last.
+    """
+    # The same is read in all traces.
+    names = {each["reads"]["quantity"] for each in outcome.found} or {ROTATION.name}
+    read = INSTRUMENTS[names.pop()].read
+    rows: dict[str, dict[str, Any]] = {}
+    for each in map(rounded_numbers, outcome.found):
+        row = {name: each[name] for name in COLUMNS if name in each}
+        # The model of the lowest BIC, if others were compared.
+        best = [model["model"] for model in each["models"] if model["delta_bic"] == 0]
+        row |= {"preferred_model": "".join(best[:1]), "fixed": "; ".join(each.get("fixed", ()))}
+        for own in each["quantities"]:
+            for what in _OF_QUANTITY:
+                unit = own["unit"] if what != "verdict" else ""
+                name = with_unit(f"{own['quantity']} {what}", unit)
+                row[name] = "" if own[what] is None else own[what]
+        rows[each["trace"]] = row
+    for trace, why in outcome.refused.items():
+        why = visible_lines(why).replace("\n", " ")
+        rows[trace] = {"trace": trace, "fit": FAILED, FAILED: why, WRITTEN_BY: __version__}
+    copied = copied or {trace: {} for trace in rows}
+    words = dict.fromkeys(name for own in copied.values() for name in own)
+    quantities = dict.fromkeys(name for row in rows.values() for name in row if name not in COLUMNS)
+    first, *columns = COLUMNS
+    header = [first, *words, *columns[:-2], *quantities, *columns[-2:]]
+    write_rows(
+        table,
+        [name if name in words else _in_units(name, read) for name in header],
+        [
+            [{**rows[trace], **own}.get(name, "") for name in header]
+            for trace, own in copied.items()
+        ],
+    )
+
+
+def join_tables(parts: Sequence[Path], table: Path) -> None:
+    """Write the rows of several tables of traces as one, as if `write_table` had written all."""
+    # Imported here: loading pandas takes long.
+    import pandas as pd
+
+    every = pd.concat([pd.read_csv(part, dtype=str, keep_default_na=False) for part in parts])
+    last = list(COLUMNS[-2:])
+    write_text(table, every[[*every.columns.drop(last), *last]].to_csv(index=False))

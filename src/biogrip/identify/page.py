@@ -1,99 +1,137 @@
 """An HTML page of identified traces, self-contained: a table, distributions, and each trace.
 
-Texts and tables are HTML; `traces.js` draws in the browser, from the numbers of `curves`.
+Pictures are Matplotlib's. A page of very many traces has the table and the distributions only.
 """
 
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
+import PIL.Image
+import yaml
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from biogrip import __version__
 from biogrip.digits import with_unit
+from biogrip.figures.fit import draw_fit
+from biogrip.figures.profiles import draw_profiles
+from biogrip.figures.results import fit_of
+from biogrip.figures.style import BLUE, COLUMN_IN, figure, save_png, styled
 from biogrip.files import write_text
-from biogrip.identify.curves import normal_quantiles
-from biogrip.identify.on_page import json_in_page
-from biogrip.identify.outputs import WRITTEN_BY
-from biogrip.identify.strips import strips_of
-from biogrip.identify.words import in_unit, labels_of
+from biogrip.identify import words
+from biogrip.identify.one_trace import Identified
+from biogrip.identify.outputs import WRITTEN_BY, Outcome
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
+from biogrip.page.png_address import png_address
 from biogrip.terminal import visible, visible_lines
 
-_STATUSES = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
-"""Status of a fit, and its mark in the table."""
-_STYLES = (Path(__file__).parents[1] / "page/report.css", "traces.css")
+_MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
+# Ratio of the largest to the smallest limit above which an axis is logarithmic.
+_WIDE = 5.0
+
+
+def draw(identified: Identified) -> list[str]:
+    """Return pictures of a trace as data URLs: the fit with its residuals, and all profiles."""
+    data, problem = identified.data, identified.problem
+    found = {item["quantity"]: item["value"] for item in data["quantities"]}
+    values = {name: found[name] for name in problem.searched.names}
+    fit = fit_of(problem, {**problem.fixed, **values}, identified.recorded, 0)
+    with styled():
+        return [
+            _address(draw_fit(fit, "best fit", "")),
+            _address(draw_profiles("", {}, data)),
+        ]
+
+
+def _address(drawn: Figure) -> str:
+    png, few = BytesIO(), BytesIO()
+    save_png(drawn, png)
+    # With few colours a picture is a third as large.
+    with PIL.Image.open(png) as image:
+        image.convert("RGB").quantize(64, dither=PIL.Image.Dither.NONE).save(few, "png")
+    return png_address(few.getvalue())
+
+
+def draw_strip(label: str, traces: Sequence[Mapping[str, Any]]) -> Figure:
+    """Draw a quantity of all traces in their order: values with limits, or the only limit."""
+    drawn = figure(COLUMN_IN, 2.2)
+    axes = drawn.subplots()
+    title, bars, ends = label, [], list[float]()
+    marks: dict[tuple[str, str], list[tuple[int, float]]] = {}
+    for number, each in enumerate(traces, 1):
+        item = next((q for q in each["quantities"] if q["quantity"] == label), None)
+        if item is None or item["low"] is item["high"] is None:
+            continue
+        title, low, high = with_unit(item["symbol"], item["unit"]), item["low"], item["high"]
+        kind, value = ("v", high) if low is None else ("^", low)
+        if low is not None and high is not None:
+            kind, value = "o", item["value"]
+            bars.append((number, low, high))
+        marks.setdefault((kind, BLUE if each["fit"] == OK else "white"), []).append((number, value))
+        ends += [end for end in (low, value, high) if end]
+    axes.vlines(*np.reshape(bars, (-1, 3)).T, color=BLUE, linewidth=0.8)
+    for (kind, face), points in marks.items():
+        axes.plot(*np.transpose(points), kind, color=BLUE, markersize=4, markerfacecolor=face)
+    if ends and max(ends) > _WIDE * min(ends):
+        axes.set_yscale("log")
+    axes.set_xlim(0.5, len(traces) + 0.5)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("number of the trace")
+    axes.set_ylabel(title)
+    return drawn
 
 
 def write_page(
-    traces: Sequence[Mapping[str, Any]],
-    refused: Mapping[str, str],
-    page: Path,
-    copied: Mapping[str, Mapping[str, str]] | None = None,
+    outcome: Outcome, page: Path, copied: Mapping[str, Mapping[str, str]] | None = None
 ) -> None:
-    """Write a page as HTML.
+    """Write results, with pictures as far as there are any, as HTML.
 
-    Parameters
-    ----------
-    traces
-        Results of `for_page`.
-    refused
-        Error messages of other traces, by file.
-    page
-        File to write.
-    copied
-        Cells to copy of each trace, by file and column. By default none.
+    What is copied are cells of each trace, by file and column.
     """
     here = Path(__file__).parent
-    words = {visible(trace): _shown(own) for trace, own in (copied or {}).items()}
-    traces = [{**each, "copied": words.get(each["trace"], {})} for each in traces]
-    columns = list(dict.fromkeys(name for own in words.values() for name in own))
+    traces, copied = outcome.found, copied or {}
+    columns = words.columns_of(traces)
+    several = len(traces) != 1 or bool(outcome.refused)
+    with styled():
+        strips = {name: _address(draw_strip(name, traces)) for name in columns if several}
+    assumed: dict[str, list[str]] = {}
+    for each in traces:
+        assumed.setdefault(_assumed(each), []).append(each["trace"])
     environment = jinja2.Environment(
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         loader=jinja2.FileSystemLoader(here),
     )
-    several = len(traces) != 1 or bool(refused)
-    setups: dict[str, list[str]] = {}
-    for each in traces:
-        setups.setdefault(each["setup"], []).append(each["trace"])
-    units = {q["quantity"]: q["unit"] for each in traces for q in each["quantities"]}
-    counts = {status: sum(each["fit"] == status for each in traces) for status in _STATUSES}
-    text = environment.get_template("traces.html.j2").render(
+    environment.filters["visible"] = visible
+    text = environment.get_template("page.html.j2").render(
         traces=traces,
-        refused=[
-            (visible(trace), words.get(visible(trace), {}), visible_lines(reason))
-            for trace, reason in refused.items()
-        ],
+        refused={trace: visible_lines(reason) for trace, reason in outcome.refused.items()},
+        pictures=outcome.pictures,
+        strips=strips,
         several=several,
+        columns=columns,
+        copied=copied,
+        names=list(dict.fromkeys(name for own in copied.values() for name in own)),
+        assumed=assumed,
+        marks=_MARKS,
+        counts={status: sum(each["fit"] == status for each in traces) for status in _MARKS},
+        words=words,
         written_by=f"{WRITTEN_BY} {__version__}",
-        style="".join((here / name).read_text(encoding="utf-8") for name in _STYLES),
-        script=(here / "traces.js").read_text(encoding="utf-8"),
-        normal=json_in_page(_normal(traces)),
-        strips=json_in_page(strips_of(traces, columns)) if several and traces else "",
-        columns={label: with_unit(label, units[label]) for label in labels_of(traces)},
-        copied=columns,
-        sorts_as=_sorts_as,
-        marks=_STATUSES,
-        counts=counts,
-        setups=setups,
-        in_unit=in_unit,
+        style=(here.parent / "page/report.css").read_text(encoding="utf-8"),
     )
     write_text(page, text)
 
 
-def _shown(words: Mapping[str, str]) -> dict[str, str]:
-    return {visible(name): visible(word) for name, word in words.items()}
-
-
-def _normal(traces: Sequence[Mapping[str, Any]]) -> dict[int, list[float]]:
-    """Return the normal quantiles of residuals, by their number."""
-    return {count: normal_quantiles(count) for count in {t["drawn_quantiles"] for t in traces}}
-
-
-def _sorts_as(quantity: Mapping[str, Any]) -> float | None:
-    """Return the number by which a quantity is sorted: value or limit, or None without any."""
-    low, high = quantity["low"], quantity["high"]
-    found = quantity["value"] if low is not None and high is not None else low or high
-    return None if found is None else float(f"{found:.6g}")
+def _assumed(found: Mapping[str, Any]) -> str:
+    """Return what a trace assumes as YAML, without its name, so that it is said once of several."""
+    assumed = dict(found["assumed"])
+    assumed["measurement"] = {**assumed["measurement"]}
+    assumed["measurement"].pop("file", None)
+    dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+    text: str = yaml.dump(assumed, Dumper=dumper, sort_keys=False, allow_unicode=True)
+    return text

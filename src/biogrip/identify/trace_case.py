@@ -1,11 +1,32 @@
-"""A recorded trace and the case that it is identified as."""
+"""A recorded trace and the case that it is identified as, with search ranges that follow from it.
 
-from dataclasses import dataclass
+Torque over rotation is the scale of stiffness at the jaws, and load over deformation that of other
+instruments. A spring changes the trace by less than its noise if it is softer by more than the
+ratio of the trace to the noise, over all readings, or if it turns by less than what all readings
+together resolve. A damper is as stiff as c/t after a time t, which is between the shortest sampling
+interval and the duration; so is a springpot, with a power of t.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.genome import GeneRange
+from biogrip.physics.protocol import largest_load
+from biogrip.physics.whitening import estimate_noise
 from biogrip.records.traces import Measurements
+from biogrip.stages import recording
 from biogrip.study.study import Case
+from biogrip.traces.recognised import Recognised
+
+# Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
+_CLEAREST, _MARGIN = 1e5, 10.0
+_LEAST, _MOST = -16, 18
 
 
 @dataclass(frozen=True)
@@ -18,19 +39,77 @@ class TraceCase:
     """The trace."""
     problem: CaseProblem
     """Assumptions of its fit, with the standard deviations of its readings if they are known."""
-    names_models: bool
-    """True if the config names the sample models to compare."""
+    given: Mapping[str, Any]
+    """Blocks of the config that the user has set, see `Asked.given`."""
 
     @property
     def readings(self) -> tuple[Array, Array]:
         """Times and rotations, (n_samples,) each."""
         return self.recorded.time_s, self.recorded.rotation_rad[0]
 
+    @property
+    def names_models(self) -> bool:
+        """True if the user names the sample models to compare."""
+        return "models" in (self.given.get("model_selection") or {})
+
     def is_like(self, other: "TraceCase") -> bool:
         """Return True if the model, the budget of fits and the confidence are the same."""
-        own, others = self.case, other.case
         return (
             self.problem.searched == other.problem.searched
-            and own.confidence == others.confidence
-            and own.least_squares == others.least_squares
+            and self.case.confidence == other.case.confidence
+            and self.case.least_squares == other.case.least_squares
         )
+
+
+def read_trace(
+    file: Path, case: Case, given: Mapping[str, Any], show: Callable[[str], None]
+) -> TraceCase:
+    """Read a trace as a case; `show` is given a table of what is recognised in an unusual file.
+
+    A `BiogripError` has file, line and column, if the trace cannot be used.
+    """
+
+    def show_unusual(form: Recognised) -> None:
+        if not form.is_usual(case.columns):
+            show(form.in_words(file))
+
+    trace = recording.read_checked(file, case.gripper, case.problem, case.columns, show_unusual)
+    ranges = ranges_of(case.problem.weighted(trace.sd_rad), trace.time_s, trace.rotation_rad[0])
+    for name in given.get("search_range") or {}:
+        ranges.pop(name, None)
+    block = replace(case.block, search_range=replace(case.block.search_range, **ranges))
+    case = replace(case, block=block)
+    trace = recording.with_fitted_onset(trace, case.problem)
+    return TraceCase(case, trace, case.problem.weighted(trace.sd_rad), given)
+
+
+def ranges_of(
+    case_problem: CaseProblem, time_s: Array, rotation_rad: Array
+) -> dict[str, GeneRange]:
+    """Compute search ranges of springs and dampers from the scales of a trace, (n_samples,).
+
+    The problem has the noise, if it is known. Ranges are by name, without that of exponents.
+    """
+    turned = rotation_rad - np.mean(rotation_rad) if case_problem.offset else rotation_rad
+    noise_rad = case_problem.sd_rad
+    if noise_rad is None:
+        own = case_problem.noise_rad or estimate_noise(rotation_rad)
+        noise_rad = np.full(len(turned), own)
+    turn_rad = float(np.max(np.abs(turned)))
+    ratios = np.linalg.norm([turned / noise_rad, turn_rad / noise_rad], axis=1)
+    softer, stiffer = _MARGIN * np.clip(ratios, 1.0, _CLEAREST)
+    torque_Nm = abs(largest_load(case_problem.phases))
+    stiffness = torque_Nm / (case_problem.gripper.lever_m**2 * turn_rad)
+    if case_problem.instrument.deforms:
+        stiffness = turn_rad / torque_Nm
+    low, high = stiffness / softer, stiffness * stiffer
+    short_s, long_s = float(np.min(np.diff(time_s))), float(np.ptp(time_s))
+    dampers = _decades(low * short_s, high * long_s)
+    springpots = _decades(low * min(short_s, 1.0), high * max(long_s, 1.0))
+    return {"k": springpots, "k_p": _decades(low, high), "c": dampers, "c_p": dampers}
+
+
+def _decades(low: float, high: float) -> GeneRange:
+    ends = int(np.floor(np.log10(low))), int(np.ceil(np.log10(high)))
+    least, most = (min(max(end, _LEAST), _MOST) for end in ends)
+    return GeneRange((least, most), (1, 9))

@@ -1,6 +1,7 @@
 """Results of identification as plain text for a terminal."""
 
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -14,6 +15,8 @@ from biogrip.judging.verdicts import (
     NOT_DETERMINED,
 )
 from biogrip.records.identifications import FIT_REJECTED
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.records.verdicts import FIT_REJECTED
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
 
@@ -27,7 +30,7 @@ _COLOURS = {
 
 
 def in_words(found: Mapping[str, Any]) -> str:
-    """Return the result of `identify_trace` for one trace as plain text."""
+    """Return the result of one trace as plain text."""
     width = max(len(item["quantity"]) for item in found["quantities"])
     lines = [
         f"{visible(found['trace'])}: fit {found['fit']}",
@@ -43,13 +46,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines += one_sided_in_words([found])
     lines += [found["limits"]] if found["fit"] != REJECTED else []
     lines += [trade["words"] for trade in found["trades"]]
-    lines += fixed_in_words(found)
-    if "onset_s" in found:
-        lines.append(f"The protocol starts at {found['onset_s']:.4g} s of the clock, as fitted.")
-    if "offset_rad" in found:
-        lines.append(f"Offset of the instrument: {in_unit(found['offset_rad'], found)}")
-    if "drift_rad_per_s" in found:
-        lines.append(f"Drift of the instrument: {in_unit(found['drift_rad_per_s'], found)}/s")
+    lines += fitted_in_words(found)
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
@@ -72,6 +69,18 @@ def in_unit(value: float, found: Mapping[str, Any]) -> str:
     return f"{value:.3g} {found['reads']['unit']}".rstrip()
 
 
+def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
+    """Return lines on fixed parameters, and on onset, offset and drift as far as fitted."""
+    lines = fixed_in_words(found)
+    if "onset_s" in found:
+        lines.append(f"The protocol starts at {found['onset_s']:.4g} s of the clock, as fitted.")
+    if "offset_rad" in found:
+        lines.append(f"Offset of the instrument: {in_unit(found['offset_rad'], found)}")
+    if "drift_rad_per_s" in found:
+        lines.append(f"Drift of the instrument: {in_unit(found['drift_rad_per_s'], found)}/s")
+    return lines
+
+
 def fixed_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return a line on fixed parameters, or none."""
     return [f"Fixed: {', '.join(found['fixed'])}."] if "fixed" in found else []
@@ -92,34 +101,25 @@ def for_a_paper(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     """
     if found["fit"] != OK:
         return []
-    return [
-        (_for_a_paper(each, found["confidence"]), _in_latex(each, found["confidence"]))
-        for each in found["quantities"]
-        if each["low"] is not None and each["high"] is not None
-    ]
+    pairs = []
+    for each in found["quantities"]:
+        if each["low"] is None or each["high"] is None:
+            continue
+        name, unit, level = each["quantity"], each["unit"], f"{100 * found['confidence']:g}"
+        numbers = [f"{each[key]:.3g}" for key in ("value", "low", "high")]
+        value, low, high = numbers
+        text = f"{name} = {f'{value} {unit}'.rstrip()} ({level} % profile-likelihood interval "
+        text += f"{low} to {high}, n = 1 trace)"
+        value, low, high = (re.sub(r"e([+-]\d+)", _power_in_latex, each) for each in numbers)
+        unit = rf"\,\mathrm{{{unit.replace(' ', chr(92) + ',')}}}" if unit else ""
+        latex = rf"${each['symbol'].replace('$', '')} = {value}{unit}$ ({level}\,\% "
+        latex += rf"profile-likelihood interval ${low}$ to ${high}$, $n = 1$ trace)"
+        pairs.append((text, latex))
+    return pairs
 
 
-def _for_a_paper(found: Mapping[str, Any], confidence: float) -> str:
-    unit = f" {found['unit']}" if found["unit"] else ""
-    return (
-        f"{found['quantity']} = {found['value']:.3g}{unit} ({100 * confidence:g} % "
-        f"profile-likelihood interval {found['low']:.3g} to {found['high']:.3g}, n = 1 trace)"
-    )
-
-
-def _in_latex(found: Mapping[str, Any], confidence: float) -> str:
-    value, low, high = (_number_in_latex(found[name]) for name in ("value", "low", "high"))
-    unit = rf"\,\mathrm{{{found['unit'].replace(' ', chr(92) + ',')}}}" if found["unit"] else ""
-    symbol = found["symbol"].replace("$", "")
-    return (
-        rf"${symbol} = {value}{unit}$ ({100 * confidence:g}\,\% profile-likelihood interval "
-        rf"${low}$ to ${high}$, $n = 1$ trace)"
-    )
-
-
-def _number_in_latex(value: float) -> str:
-    digits, _, exponent = f"{value:.3g}".partition("e")
-    return rf"{digits} \times 10^{{{int(exponent)}}}" if exponent else digits
+def _power_in_latex(exponent: re.Match[str]) -> str:
+    return rf" \times 10^{{{int(exponent[1])}}}"
 
 
 def further_notes(found: Mapping[str, Any]) -> list[str]:
@@ -131,11 +131,16 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
     """Return several traces as a table with one row per trace, followed by refused traces."""
     lines = []
     if found:
-        labels = labels_of(found)
-        rows = [[visible(each["trace"]), each["fit"], *_cells(each, labels)] for each in found]
-        units = {q["quantity"]: q["unit"] for each in found for q in each["quantities"]}
-        header = ["trace", "fit", *(with_unit(label, units[label]) for label in labels)]
-        lines.append(aligned(rows, header))
+        columns = columns_of(found)
+        rows = []
+        for each in found:
+            cells = {
+                q["quantity"]: _coloured(limits_in_short(q), q["verdict"])
+                for q in each["quantities"]
+            }
+            own = (cells.get(label, "") for label in columns)
+            rows.append([visible(each["trace"]), each["fit"], *own])
+        lines.append(aligned(rows, ["trace", "fit", *columns.values()]))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)
@@ -170,36 +175,20 @@ def _provided(found: Mapping[str, Any]) -> list[str]:
     return [f"Sums hold provided {q['provided']}." for q in found["quantities"] if q["provided"]]
 
 
-def labels_of(found: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return the labels of all quantities of several traces, each once."""
-    return list(dict.fromkeys(q["quantity"] for each in found for q in each["quantities"]))
+def columns_of(found: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+    """Return the labels of all quantities of several traces, and these with their units."""
+    every = [item for each in found for item in each["quantities"]]
+    return {item["quantity"]: with_unit(item["quantity"], item["unit"]) for item in every}
 
 
 def taken_for_granted(found: Mapping[str, Any]) -> str:
     """Return a sentence naming defaults (gripper, protocol) that the user did not replace."""
-    phases = ", ".join(_phase(phase) for phase in found["assumed"]["protocol"]["phases"])
-    said = {
-        "gripper": "the default study's gripper",
-        "protocol": f"the default study's protocol ({phases})",
-    }
-    words = " and ".join(said[name] for name in found["by_default"])
-    return f"Assumed: {words}; yours are given with --config."
-
-
-def _phase(phase: Mapping[str, Any]) -> str:
-    torque = phase.get("torque_Nm")
-    what = f"{torque:g} N m" if isinstance(torque, float) else "as there"
-    return f"{phase['duration_s']:g} s at {what}"
-
-
-def _cells(found: Mapping[str, Any], labels: Sequence[str]) -> list[str]:
-    by_label = {q["quantity"]: q for q in found["quantities"]}
-    return [
-        _coloured(limits_in_short(by_label[label]), by_label[label]["verdict"])
-        if label in by_label
-        else ""
-        for label in labels
-    ]
+    said = [f"the default study's {name}" for name in found["by_default"]]
+    if "protocol" in found["by_default"]:
+        phases = found["assumed"]["protocol"]["phases"]
+        held = (f"{phase['duration_s']:g} s at {phase['torque_Nm']:g} N m" for phase in phases)
+        said[-1] += f" ({', '.join(held)})"
+    return f"Assumed: {' and '.join(said)}; yours are given with --config."
 
 
 def limits_in_short(quantity: Mapping[str, Any]) -> str:

@@ -1,0 +1,303 @@
+"""Other fits that are held against that of a trace: sample models, an offset and a drift.
+
+Several sample models are fitted with the noise model of the trace's fit, and ranked by AIC and BIC;
+with fixed parameters and with the nonlinear model, which takes minutes, none are. If the own model
+fits better than it was diagnosed, the trace is diagnosed again.
+
+An offset and a drift that the user did not declare are fitted along. The test is a likelihood
+ratio: if neither is in the trace, the decrease of chi^2 follows a chi-squared distribution with as
+many degrees of freedom as terms are added (Wilks 1938).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtrc
+
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.methods import identifier
+from biogrip.fit.multi_start import fit_from
+from biogrip.fit.nested_fits import (
+    FittedModel,
+    advice,
+    asks_for_more,
+    fit_models,
+    is_within,
+    preferred_simpler,
+    ranked,
+)
+from biogrip.fit.problem import Identification, Problem, Progress
+from biogrip.fit.trace_fit import TraceFit, fit_traces
+from biogrip.identify.trace_case import TraceCase
+from biogrip.judging.diagnosis import Diagnosis, diagnose, diagnose_all
+from biogrip.judging.doubts import DOUBT, FALSE_ALARM, HARMLESS, REJECTED, REJECTION, Note, one_in
+from biogrip.judging.likelihood import MISSED, compute_fall
+from biogrip.judging.verdicts import Finding
+from biogrip.physics.drift import drift_is_flow
+from biogrip.physics.models import CANDIDATES, as_richer, contained
+from biogrip.physics.noise import stream
+from biogrip.physics.springpot import LONGEST_S
+
+_MOST_SAMPLES = 50_000
+# Each of the others would take half a second to five; they are tried where the config names them.
+_POWER_LAWS = ["fractional_kelvin_voigt", "fractional_maxwell"]
+
+
+@dataclass(frozen=True)
+class FittedModels:
+    """Best fits of sample models to a trace."""
+
+    chosen: str
+    """Sample model that the trace was identified with."""
+    tried: list[FittedModel] = field(default_factory=list)
+    """Rank of each model."""
+    answers: dict[str, Identification] = field(default_factory=dict)
+    """Fit of each by its name, in the same order."""
+
+    def data(self, findings: Sequence[Finding] | None) -> dict[str, Any]:
+        """Return one row per model, and advice in words, as plain data.
+
+        Findings are those on the quantities of the chosen model; None if its fit is rejected.
+        Advice is then only another model that may be the reason.
+        """
+        if not self.tried:
+            return {"models": [], "advice": None}
+        rows = [
+            {
+                "model": each.candidate,
+                "title": each.model.title,
+                "parameters": len(each.model.names),
+                "misfit_rad": each.misfit_rad,
+                "vanished": _vanished(each.candidate, self.answers[each.candidate]),
+                "converged": self.answers[each.candidate].converged,
+                "delta_aic": each.delta_aic,
+                "delta_bic": each.delta_bic,
+            }
+            for each in self.tried
+        ]
+        words = advice(self.tried, self.chosen)
+        if findings is not None:
+            return {"models": rows, "advice": f"{words} {self._compared(findings)}".rstrip()}
+        more = asks_for_more(self.tried, self.chosen)
+        return {"models": rows, "advice": words if more else None}
+
+    def _compared(self, findings: Sequence[Finding]) -> str:
+        """Return a sentence on where a preferred simpler model's values are, if it is nested."""
+        simpler = preferred_simpler(self.tried, self.chosen)
+        bounded = [each for each in findings if each.is_bounded]
+        if simpler is None or simpler not in contained(self.chosen) or not bounded:
+            return ""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = np.log(as_richer(self.chosen, simpler, self.answers[simpler].parameters))
+            outside = [
+                f"{each.quantity.label}, {np.exp(each.quantity.log(x)):.3g} {each.quantity.unit}"
+                for each in bounded
+                if not each.allows(x)
+            ]
+        if not outside:
+            return "Its values lie within the limits."
+        return f"Outside the limits lies its {' and its '.join(outside)}."
+
+
+def _vanished(candidate: str, answer: Identification) -> list[str]:
+    """Name the elements that vanish in the best fit: parameters that are zero or infinite."""
+    gone = (answer.parameters == 0) | np.isinf(answer.parameters)
+    elements = zip(CANDIDATES[candidate].model.parameters, gone, strict=True)
+    return [each.name for each, is_gone in elements if is_gone and each.kind != "exponent"]
+
+
+def models_tried(
+    traces: Sequence[TraceCase], fits: Sequence[TraceFit], diagnoses: Sequence[Diagnosis]
+) -> list[FittedModels]:
+    """Fit several sample models to each trace; the traces have the same chosen model and budget.
+
+    Best fits so far are among the starts.
+    """
+    chosen, budget = traces[0].case.sample.candidate, traces[0].case.least_squares
+    candidates = [_candidates(*pair) for pair in zip(traces, fits, strict=True)]
+    every = [FittedModels(chosen) for _ in traces]
+    for names in filter(None, dict.fromkeys(candidates)):
+        which = [index for index, own in enumerate(candidates) if own == names]
+        problems = {
+            name: [
+                traces[index].problem.for_model(fits[index].problem, CANDIDATES[name].model)
+                for index in which
+            ]
+            for name in names
+        }
+        cases = [traces[index].case for index in which]
+        streams = {
+            name: [stream(own.study.study_seed, own.name, 0, f"model {name}") for own in cases]
+            for name in names
+        }
+        near = {chosen: np.array([diagnoses[index].likelihood.best for index in which])}
+        found = fit_models(problems, budget, streams, lambda: None, near=near)
+        for place, index in enumerate(which):
+            answers = {name: found[name][place] for name in names}
+            misfits = [answer.misfit_rad for answer in answers.values()]
+            samples = fits[index].problem.residuals.samples
+            every[index] = FittedModels(chosen, ranked(names, misfits, samples), answers)
+    return every
+
+
+def _candidates(trace: TraceCase, fit: TraceFit) -> tuple[str, ...]:
+    """Return the names of the models to fit to a trace, none if nothing is compared."""
+    if trace.problem.nonlinear or trace.problem.fixed:
+        return ()
+    # With very many samples the dozens of modes of a springpot would take gigabytes.
+    few = fit.problem.residuals.samples <= _MOST_SAMPLES
+    valid = trace.problem.torque.end_s <= LONGEST_S
+    others = _POWER_LAWS if few and valid and not trace.names_models else []
+    names = tuple(dict.fromkeys((*trace.case.models, *others)))
+    return names if len(names) > 1 else ()
+
+
+def judge_again(
+    trace: TraceCase, fit: TraceFit, diagnosis: Diagnosis, models: FittedModels
+) -> tuple[Diagnosis, list[Note]]:
+    """Diagnose a trace again if its own model was fitted better, within the search range, since.
+
+    Return the new diagnosis, or the one so far, and a note if the lower chi^2 is outside the range.
+    """
+    own = models.answers.get(models.chosen)
+    if own is None or (increase := diagnosis.likelihood.increase(own.misfit_rad)) > -MISSED:
+        return diagnosis, []
+    if is_within(own.parameters, fit.problem):
+        searched, noise_rad = fit.problem.residuals.model, trace.problem.noise_rad
+        confidence = trace.case.confidence
+        again = diagnose(fit.problem, searched, own, confidence=confidence, noise_rad=noise_rad)
+        return again, []
+    gone = _vanished(models.chosen, own)
+    where = f", without {' and '.join(gone)}" if gone else ""
+    text = (
+        f"Outside the search range{where}, the model fits better: χ² is lower by {-increase:.3g}. "
+        "The limits hold for samples within the range."
+    )
+    return diagnosis, [Note(DOUBT, text)]
+
+
+def second_opinions(
+    traces: Sequence[TraceCase], diagnoses: Sequence[Diagnosis], progress: Progress
+) -> list[list[Note]]:
+    """Fit an offset and a drift along, and warn if chi^2 falls more than by chance (`FALSE_ALARM`).
+
+    Traces have the same model, budget and confidence. Each gets at most one note; with a rejected
+    fit, only if that with both terms is not rejected. None are tried if both are declared already,
+    if the model is nonlinear, or if the noise model is coloured, which fits both unless they are
+    refused.
+    """
+    notes: list[list[Note]] = [[] for _ in traces]
+    tried = [index for index, trace in enumerate(traces) if _may_have_more(trace.problem)]
+    if not tried:
+        return notes
+    some = [traces[index] for index in tried]
+    also = [replace(trace.problem, offset=True, drift=True) for trace in some]
+    fits = _fitted(some, also, [diagnoses[index] for index in tried], progress)
+    better = []
+    for index, fit in zip(tried, fits, strict=True):
+        fall, chance = _decrease(traces[index].problem, diagnoses[index], fit)
+        if chance < FALSE_ALARM:
+            better.append((index, fit, fall, chance))
+    others = diagnose_all(
+        [fit.problem for _, fit, *_ in better],
+        also[0].searched,
+        [fit.found for _, fit, *_ in better],
+        confidence=traces[0].case.confidence,
+        noise_rad=[traces[index].problem.noise_rad for index, *_ in better],
+    )
+    for (index, _, *decrease), other in zip(better, others, strict=True):
+        rejected = diagnoses[index].status == REJECTED
+        if not (rejected and other.status == REJECTED):
+            notes[index].append(_note(traces[index], diagnoses[index], other, *decrease))
+    return notes
+
+
+def _may_have_more(problem: CaseProblem) -> bool:
+    both = problem.offset and problem.drift
+    return not (both or problem.nonlinear or problem.coloured)
+
+
+def _fitted(
+    traces: Sequence[TraceCase],
+    also: Sequence[CaseProblem],
+    diagnoses: Sequence[Diagnosis],
+    progress: Progress,
+) -> list[TraceFit]:
+    """Fit traces with offset and drift, from random points and from the fits without these."""
+    least_squares = identifier("least_squares", traces[0].case.method("least_squares"))
+
+    def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
+        cases = [traces[index].case for index in which]
+        rngs = [stream(case.study.study_seed, case.name, 0, "instrument") for case in cases]
+        return least_squares(problems, rngs, progress)
+
+    fits = fit_traces(also, [trace.readings for trace in traces], find)
+    # The fit without offset and drift is a start as well: with them, chi^2 cannot be higher.
+    starts = np.array([diagnosis.likelihood.best for diagnosis in diagnoses])
+    again = fit_from([fit.problem for fit in fits], starts)
+    for own, fit in enumerate(fits):
+        both = fit.found, fit.found.at(again, own)
+        # Last bits do not decide.
+        fits[own] = replace(fit, found=min(both, key=lambda each: np.float32(each.misfit_rad)))
+    return fits
+
+
+def _decrease(problem: CaseProblem, diagnosis: Diagnosis, fit: TraceFit) -> tuple[float, float]:
+    """Return the decrease of chi^2 by an offset and a drift, and the probability of as much."""
+    likelihood = diagnosis.likelihood
+    fall = compute_fall(
+        fit.problem.residuals.samples,
+        likelihood.misfit_rad,
+        fit.found.misfit_rad,
+        likelihood.noise_rad if problem.noise_rad is not None else None,
+    )
+    added = 2 - problem.offset - problem.drift
+    return fall, float(chdtrc(added, max(fall, 0.0)))
+
+
+def _note(
+    trace: TraceCase, diagnosis: Diagnosis, other: Diagnosis, fall: float, chance: float
+) -> Note:
+    """Return the warning, with the verdicts that an offset and a drift would change."""
+    case_problem, rejected = trace.problem, diagnosis.status == REJECTED
+    changed = [
+        f"{after.quantity.label} would be {after.words().removeprefix('determined: ')}"
+        for before, after in zip(diagnosis.findings, other.findings, strict=True)
+        if _differ(before, after)
+    ]
+    changes = "with them it is not rejected" if rejected else "; ".join(changed)
+    better = (
+        "explain the trace far better "
+        f"(χ² falls by {fall:.3g}; by chance it would {one_in(chance)} traces)"
+    )
+    controlled = case_problem.instrument.controlled.name
+    or_flows = (
+        f" Or the sample flows: as long as the {controlled} is constant, a drift and a damper "
+        "without a spring give the same line."
+    )
+    if case_problem.instrument.deforms:
+        or_flows = ""
+    if not case_problem.drift and drift_is_flow(case_problem.torque, trace.recorded.time_s):
+        text = (
+            f"A constant and a line in time, fitted along, {better}: the instrument drifts, or the "
+            f"sample flows. Under this {controlled} both give the same line, and the trace cannot "
+            f"tell which it is: a {controlled} that changes would."
+        )
+    else:
+        text = (
+            f"An offset and a drift of the instrument, fitted along, {better}: "
+            f"{changes or 'no verdict changes'}. If the instrument may drift, identify the trace "
+            f"with --offset --drift.{or_flows}"
+        )
+    weight = DOUBT if changed else HARMLESS
+    return Note(REJECTION if rejected else weight, text)
+
+
+def _differ(before: Finding, after: Finding) -> bool:
+    """Return True if verdicts differ, or the estimate moved out of the earlier interval."""
+    if before.verdict != after.verdict:
+        return True
+    low, high = before.low or 0.0, before.high or np.inf
+    return bool(before.is_bounded and not low <= after.value <= high)

@@ -1,0 +1,343 @@
+"""What is asked of recorded traces, and the study of one case that each of them is.
+
+A setting is a key of the config with a value. Over the default study lies the user's config, over
+that the options of the command, and over these the cells of a table of traces. All are checked as
+a config is; messages name the file and line, the option, or the row of the table.
+
+What is read tells the instrument. What is controlled comes from the protocol or, from 0 to the end
+of the trace, from ``--hold``; where a compliance or a modulus is read, that is 1.
+"""
+
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from biogrip.errors import BiogripError, nearest
+from biogrip.identify.outputs import COLUMNS
+from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
+from biogrip.physics.models import CANDIDATES
+from biogrip.study.load import load_study, read_configs
+from biogrip.study.measurement_block import READINGS, MeasurementBlock
+from biogrip.study.messages import checked, schema_of
+from biogrip.study.source import (
+    KeyPath,
+    Source,
+    default_config,
+    keys_in,
+    overlaid,
+    scalar_problem,
+)
+from biogrip.study.study import Case
+from biogrip.terminal import visible
+from biogrip.traces.columns import listed, place
+from biogrip.traces.recordings import read_recording
+
+MODEL = "generalized_maxwell"
+"""Sample model of traces of which nothing says another."""
+
+FILE = "file"
+"""The column that every table of traces has."""
+
+HOLD = ("--hold",)
+"""Path of the only setting that is no key: what is controlled from 0 to the end of the trace."""
+
+# Of each group, the key that is set last replaces the others.
+_ONE_OF: Sequence[Sequence[tuple[str, ...]]] = (
+    [("measurement", "start_s"), ("measurement", "fit_start")],
+    [("measurement", name) for name in READINGS],
+    [HOLD, ("protocol",)],
+)
+_MOST_SHOWN = 10
+_SEPARATORS = ",;\t"
+_OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
+_HEAD_BYTES = 100_000
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A key of the config, and the value that an option or a cell of a table gives it."""
+
+    by: str
+    """The option or the table, for messages."""
+    path: tuple[str, ...]
+    """The key."""
+    value: Any
+    """Plain value, not yet checked."""
+    line: int | None = None
+    """Line of the table."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A recorded trace, and what is said of it."""
+
+    trace: Path
+    """CSV file."""
+    config: Path | None = None
+    """YAML file laid over the default study: gripper, protocol, search range, ..."""
+    settings: tuple[Setting, ...] = ()
+    """Settings laid over the config, the later over the earlier."""
+    place: str = "TRACE"
+    """Row of a table that lists the trace, for messages."""
+    copied: Mapping[str, str] = field(default_factory=dict)
+    """Other cells of that row, by column."""
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """Blocks of the user's: those of the config, and over them the settings."""
+        blocks = read_configs([self.config] if self.config else [])
+        for setting in self.settings:
+            blocks = _laid_over(blocks, setting)
+        return blocks
+
+
+def value_of(text: str) -> Any:
+    """Read the value of a key as YAML; refuse what YAML reads otherwise than it looks."""
+    try:
+        node = yaml.compose(text, yaml.SafeLoader)
+        problem = scalar_problem(node) if isinstance(node, yaml.ScalarNode) else None
+        value = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError) as error:
+        problem = f"not valid YAML: {' '.join(str(error).split())}."
+    if problem:
+        raise BiogripError(problem)
+    return value
+
+
+def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
+    """Return the blocks with a setting, and without what it replaces."""
+    path, value = setting.path, deepcopy(setting.value)
+    for group in _ONE_OF:
+        if any(path[: len(key)] == key for key in group):
+            for *above, name in (key for key in group if path[: len(key)] != key):
+                block = blocks.get(above[0]) if above else blocks
+                if isinstance(block, dict):
+                    block.pop(name, None)
+    # A candidate's name says its branches, too.
+    sample = CANDIDATES.get(str(value)) if path == ("sample", "model") else None
+    if sample:
+        path, value = ("sample",), {"model": sample.name, "branches": sample.branches}
+    for part in reversed(path):
+        value = {part: value}
+    found: dict[str, Any] = overlaid(blocks, value)
+    return found
+
+
+def case_of(asked: Asked) -> Case:
+    """Return the case that a trace is, before its readings are looked at.
+
+    A `BiogripError` has option, row, or file, line and key, if settings or config cannot be used.
+    """
+    files = [default_config(), *([asked.config] if asked.config else [])]
+    below = read_configs(files)
+    given = asked.given
+    merged = _with_instrument(overlaid(below, given), given, asked.trace)
+    # Cases and a table of the config are meant for the workflow.
+    for name in ("only", "traces"):
+        merged.pop(name, None)
+    name = re.sub(r"[^A-Za-z0-9_-]", "_", asked.trace.stem)[:60]
+    case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
+    merged["cases"] = {case: {"sample": overlaid({"model": MODEL}, merged.pop("sample", {}))}}
+    sources = [_source(setting, below, merged, case) for setting in asked.settings]
+    try:
+        study = load_study(merged, files, over=sources)
+    except BiogripError as error:
+        _, *problems = str(error).replace(f"cases.{case}.", "").split("\n")
+        raise BiogripError("\n".join(problems)) from error
+    return study.cases[case]
+
+
+def _source(
+    setting: Setting, below: Mapping[str, Any], merged: Mapping[str, Any], case: str
+) -> Source:
+    """Return the keys that a setting is to be named for: its own, and blocks that it adds."""
+    path: KeyPath = setting.path
+    value = setting.value
+    if path == HOLD:
+        path, value = ("protocol",), merged["protocol"]
+    elif path[0] == "sample":
+        path = ("cases", case, *path)
+    known = set(keys_in(below))
+    above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
+    return setting.by, dict.fromkeys([*above, path, *keys_in(value, path)], setting.line)
+
+
+def _with_instrument(
+    merged: dict[str, Any], given: Mapping[str, Any], trace: Path
+) -> dict[str, Any]:
+    """Return the blocks with the trace's file, its instrument, and a protocol of that."""
+    level = merged.pop(HOLD[0], None)
+    if not isinstance(merged["measurement"], dict):
+        return merged
+    instrument = _instrument(merged, given)
+    usual = {"time": "time_s", instrument.read.name: instrument.read.column}
+    measurement = usual | merged["measurement"] | {"file": str(trace)}
+    kind = given.get("instrument", instrument.kind)
+    found = {**merged, "instrument": kind, "measurement": measurement}
+    if level is None:
+        if "protocol" in given or instrument.has_jaws:
+            return found
+        if not instrument.relative:
+            controlled = instrument.controlled
+            unit = f" in {controlled.unit}" if controlled.unit else ""
+            raise BiogripError(
+                f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, or a "
+                "protocol in --config."
+            )
+        level = 1.0
+    duration_s = _duration_s(trace, measurement)
+    phase = {"duration_s": duration_s, instrument.controlled.column: level}
+    return {**found, "protocol": {"phases": [phase]}}
+
+
+def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrument:
+    """Return the instrument by the reading that is named, or by kind and protocol."""
+    for name in INSTRUMENTS:
+        if name in merged["measurement"]:
+            return INSTRUMENTS[name]
+    kind = given.get("instrument", GRIPPER.kind)
+    some = [each for each in INSTRUMENTS.values() if each.kind == kind] or [GRIPPER]
+    keys = {path[-1] for path in keys_in(merged.get("protocol"))}
+    return next((each for each in some if each.controlled.column in keys), some[0])
+
+
+def _duration_s(trace: Path, measurement: Mapping[str, Any]) -> float:
+    """Return the time from the start of the protocol to the end of a trace."""
+    block = checked(MeasurementBlock, schema_of(MeasurementBlock).with_numbers(measurement))[0]
+    if block is None:
+        return 1.0
+    try:
+        time_s = read_recording(trace, block.columns).time_s
+    except BiogripError:
+        # Whoever uses the trace reads it again, and says what is wrong with it.
+        return 1.0
+    lasts = float(time_s[-1]) - (block.start_s or min(float(time_s[0]), 0.0))
+    return lasts if lasts > 0 else 1.0
+
+
+def check_settings(traces: Sequence[Asked]) -> None:
+    """Refuse settings that cannot be used, of all traces at once, before anything is fitted.
+
+    So are traces of different quantities. A `BiogripError` has the first few problems.
+    """
+    read: dict[str, str] = {}
+    problems: dict[str, None] = {}
+    first = None
+    for own in traces:
+        key = repr([(setting.path, setting.value) for setting in own.settings])
+        if key not in read:
+            read[key] = ""
+            try:
+                read[key] = case_of(own).instrument.read.name
+            except BiogripError as error:
+                problems |= dict.fromkeys(str(error).split("\n"))
+                continue
+        first = first or (own, read[key])
+        if read[key] not in ("", first[1]):
+            text = f"{own.place}: found a reading of {read[key]}, but a reading of {first[1]} of "
+            text += f"{visible(first[0].trace)}; allowed is one quantity read for all traces of a "
+            problems[f"{text}command."] = None
+    _refuse([*problems])
+
+
+def _refuse(problems: Sequence[str]) -> None:
+    """Raise an error with the first few problems, if there are any."""
+    more = [f"... and {len(problems) - _MOST_SHOWN} more."] if problems[_MOST_SHOWN:] else []
+    if problems:
+        raise BiogripError("\n".join([*problems[:_MOST_SHOWN], *more]))
+
+
+def is_table(path: Path) -> bool:
+    """Return True if the first line of a file is a header with a column `file`."""
+    with path.open("rb") as stream:
+        first = stream.readline(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
+    # Another spelling, as File, is a table, too, whose reader says what is wrong.
+    names = [name.strip(' "\r\n').lower() for name in re.split(f"[{_SEPARATORS}]", first)]
+    return FILE in names
+
+
+def read_table(
+    path: Path, config: Path | None = None, options: Sequence[Setting] = ()
+) -> list[Asked]:
+    """Read the traces of a table with config and options of the command; settings are not checked.
+
+    The table is text in UTF-8: `.tsv` is separated by tabs, another by what its header has. A
+    `BiogripError` has line and column of the first few problems: text that is no table, values that
+    are no YAML, a trace twice.
+    """
+    header, *rows = _cells(path)
+    if FILE not in header:
+        raise BiogripError(
+            f"{place(path, 1)}: found no column '{FILE}' among {listed(header)}; allowed is one."
+            f"{nearest(FILE, header)}"
+        )
+    problems = list(_name_problems(path, header))
+    found, lines = [], dict[str, int]()
+    for line, row in enumerate(rows, 2):
+        if not any(row):
+            continue
+        by_name = dict(zip(header, row, strict=True))
+        trace = path.parent / by_name.pop(FILE)
+        # Resolved, so that links to one file are found.
+        before = lines.setdefault(os.path.realpath(trace), line)
+        if trace == path.parent:
+            problems.append(f"{place(path, line, FILE)}: found nothing, allowed is a trace.")
+        elif before != line:
+            text = f"found '{visible(trace)}' again, as on line {before}; allowed is each"
+            problems.append(f"{place(path, line, FILE)}: {text} trace once.")
+        settings = list(options)
+        for name, cell in by_name.items():
+            if "." in name and cell:
+                try:
+                    value = value_of(cell)
+                    settings.append(Setting(visible(path), tuple(name.split(".")), value, line))
+                except BiogripError as error:
+                    problems.append(f"{place(path, line, name)}: {error}")
+        copied = {name: cell for name, cell in by_name.items() if name and "." not in name}
+        found.append(Asked(trace, config, tuple(settings), place(path, line), copied))
+    if not found:
+        problems.append(f"{place(path)}: found no traces, allowed is a row for each.")
+    _refuse(problems)
+    return found
+
+
+def _cells(path: Path) -> list[list[str]]:
+    """Return the header and all rows as text, empty where a row is shorter."""
+    # Imported here: loading pandas takes long.
+    import pandas as pd
+
+    try:
+        with path.open(encoding="utf-8-sig") as stream:
+            header = stream.readline()
+        frame = pd.read_csv(
+            path,
+            sep="\t" if path.suffix == ".tsv" else max(_SEPARATORS, key=header.count),
+            header=None,
+            dtype=str,
+            keep_default_na=False,
+            skip_blank_lines=False,
+            skipinitialspace=True,
+            encoding="utf-8-sig",
+        )
+    except (OSError, ValueError) as error:
+        found = " ".join(str(error).split())
+        raise BiogripError(f"{place(path)}: cannot be read as a table: {found}.") from error
+    return [[str(cell).strip() for cell in row] for row in frame.fillna("").to_numpy()]
+
+
+def _name_problems(path: Path, header: Sequence[str]) -> Iterator[str]:
+    """Find names that stand twice, or would be taken for results."""
+    for number, name in enumerate(header):
+        text = ""
+        if name and name in header[:number]:
+            text = "stands twice; allowed is each name once."
+        elif name in COLUMNS or _OF_RESULTS.fullmatch(name):
+            text = "is a column of the results; allowed is another name."
+        if text:
+            yield f"{place(path, 1, name)}: {text}"

@@ -1,0 +1,50 @@
+"""`biogrip identify` in this process: loading it takes as long as what it does to a bad trace."""
+
+import json
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.cli import main
+
+FEW = """
+least_squares: {candidates: 100, starts: 4}
+model_selection: {models: [damper, maxwell]}
+"""
+"""A config with few starts, and few models to compare, where that is not looked at."""
+
+
+def identify(*arguments: str | Path) -> tuple[int, str, str]:
+    """Status of the command, what it says, and what it complains of."""
+    with redirect_stdout(StringIO()) as said, redirect_stderr(StringIO()) as complained:
+        status = main(["identify", *map(str, arguments)])
+    return status, said.getvalue(), complained.getvalue()
+
+
+def identified(
+    folder: Path, trace: Path, *options: str | Path, config: str = FEW
+) -> dict[str, Any]:
+    """Content of the JSON file."""
+    (folder / "config.yaml").write_text(config)
+    given = ("--config", folder / "config.yaml", "--output", folder / "found.json")
+    status, _, complained = identify(trace, *given, *options)
+    assert status == 0, complained
+    found: dict[str, Any] = json.loads((folder / "found.json").read_text())
+    return found
+
+
+def by_quantity(found: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Findings by their labels."""
+    return {item["quantity"]: item for item in found["quantities"]}
+
+
+def write_trace(
+    path: Path, times: Array, values: Array, header: str = "time_s,rotation_rad"
+) -> Path:
+    """Write a trace as CSV, and return its path."""
+    np.savetxt(path, np.c_[times, values], "%.9g", ",", header=header, comments="")
+    return path
