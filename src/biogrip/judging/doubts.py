@@ -1,8 +1,12 @@
-"""Status of a fit: ok, doubtful or rejected, by the notes on it.
+"""Notes on a fit, their weights, and the tests of its residuals that give reasons for them.
 
-Tests of whether the residuals of a fit are white noise, with their results in words.
-
-Misfit that looks like noise: correlated for too long, or in one stretch of the trace only.
+The heaviest note decides the status of a fit: ok, doubtful or rejected (`compute_status`).
+Residuals are tested for white noise, each test at the level `FALSE_ALARM`: correlation of
+neighbours, else the cumulative periodogram; means over stretches; number of outliers. Noise that
+grows with the rotation is told first, and the other tests are of what it leaves. A noise model
+may itself be misfit (`find_slow_misfit`): if it is correlated for too long. A misfit may be noise
+(`has_fast_noise`, `has_uneven_noise`): if it is correlated for a short time, or if the noise
+differs from one part of the trace to another.
 """
 
 from collections.abc import Iterator, Sequence
@@ -70,16 +74,15 @@ def doubts_about_noise(
 
     Parameters
     ----------
-    residual : (n_samples,)
-        Residuals of the fit.
-    growth : (n_samples,)
-        Growth of the noise with the rotation, see `compute_growth`. All other tests are of what
-        it leaves.
+    residual, growth : (n_samples,)
+        Residuals of the fit, and growth of the noise with the rotation, see `compute_growth`.
     instrument
         The instrument, for its words.
     rounding_rad
         Step of the readings.
     """
+    from scipy.special import ndtr, pdtrc
+
     read, wrong = instrument.read.name, instrument.suspects()
     many = f"{read}s" if instrument.has_jaws else "readings"
     if np.ptp(growth):
@@ -111,7 +114,8 @@ def doubts_about_noise(
             "model lacks, perhaps a drift of the instrument: the intervals are too narrow."
         )
     far = int(np.count_nonzero(outliers_of(residual, rounding_rad)))
-    chance = _chance_of_far(far, len(residual))
+    # Poisson's distribution of their number in Gaussian noise.
+    chance = float(pdtrc(far - 1, 2 * len(residual) * ndtr(-FAR))) if far else 1.0
     if chance < FALSE_ALARM:
         yield (
             f"Beyond {FAR:g} standard deviations from the samples around: "
@@ -168,13 +172,6 @@ def uneven(residual: Array) -> float:
     return float(kolmogorov(np.sqrt(len(power)) * np.max(np.abs(reached - shares))))
 
 
-def _chance_of_far(far: int, samples: int) -> float:
-    """Return the probability of as many outliers in Gaussian noise, by Poisson's distribution."""
-    from scipy.special import ndtr, pdtrc
-
-    return float(pdtrc(far - 1, 2 * samples * ndtr(-FAR))) if far else 1.0
-
-
 # Autocorrelated noise with most of the variance, and slower than this share of the trace, is
 # misfit. It may be misfit if it has a noticeable share and lasts for longer.
 _MOST, _SLOW, _NOTICEABLE, _LONG = 0.5, 0.02, 1 / 3, 0.2
@@ -212,8 +209,7 @@ def find_slow_misfit(
 def has_fast_noise(residuals: Residuals, log_parameters: Array) -> bool:
     """Return True if what a fit leaves is stationary noise that is correlated for a short time.
 
-    False also where that is not estimated: of very many readings, and of residuals that are white
-    already.
+    That is not estimated of more than `MOST_SAMPLES` readings, nor of residuals that are white.
     """
     time_s = residuals.sampling_s
     if residuals.coloured or len(time_s) > MOST_SAMPLES:
@@ -228,17 +224,10 @@ def has_fast_noise(residuals: Residuals, log_parameters: Array) -> bool:
 
 
 def has_uneven_noise(residual: Array, rounding_rad: float) -> bool:
-    """Return True if what a fit leaves is as large as the scatter around it, where that differs.
+    """Return True if what a fit leaves, (n_samples,), is as large as a scatter that differs.
 
     So it is where an instrument averages for longer and longer, or settles at first. A misfit of
     the model is smooth, and larger than the scatter of neighbours wherever it is.
-
-    Parameters
-    ----------
-    residual : (n_samples,)
-        What the fit leaves.
-    rounding_rad
-        Step of the readings.
     """
     count = min(_SLOW_STRETCHES, len(residual) // _IN_A_STRETCH)
     if count < _FEWEST_STRETCHES:
