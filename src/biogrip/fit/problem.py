@@ -1,7 +1,4 @@
-"""The result that every identification method returns.
-
-The identification problem: a trace, a sample model and the search range.
-"""
+"""The identification problem of one trace, and the result that every method returns."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -65,7 +65,7 @@ def identify(
         traces = [recorded.rotation_rad[seed] for seed in group]
         rngs = [stream(case.study.study_seed, case.name, seed, method) for seed in group]
         start = time.process_time()
-        problems = [case_problem.of(recorded.time_s, trace) for trace in traces]
+        problems = case_problem.of_each(recorded.time_s, traces)
         answers = identified(problems, rngs, progress.within)
         cpu_s = (time.process_time() - start) / len(group)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
@@ -139,7 +139,8 @@ def _rows(
     progress = Progress(f"{case.name}, models", len(case.models) * len(seeds))
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in case.models}
     for group in groups(seeds):
-        traces = [case_problem.of(recorded.time_s, recorded.rotation_rad[seed]) for seed in group]
+        rotations = (recorded.rotation_rad[seed] for seed in group)
+        traces = case_problem.of_each(recorded.time_s, rotations)
         models = {name: sample.model for name, sample in case.models.items()}
         found = fit_models(
             {

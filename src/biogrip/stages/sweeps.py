@@ -51,7 +51,7 @@ def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, 
             traces = [
                 add_noise(rotation, interpretation.noise, rng, time_s) for rng in streams["noise"]
             ]
-            problems = [case_problem.of(time_s, trace) for trace in traces]
+            problems = case_problem.of_each(time_s, traces)
             found = identify_many(problems, interpretation.genetic, streams["genetic"])
             for seed, trace, answer in zip(seeds, traces, found, strict=True):
                 names = case_problem.searched.names
