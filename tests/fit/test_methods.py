@@ -149,12 +149,6 @@ def test_offset_and_drift_are_fitted_along() -> None:
             assert c + c_p == pytest.approx(10.0, rel=0.03)
 
 
-def test_the_methods_that_the_study_relies_on_promise_what_it_needs() -> None:
-    """A promise withdrawn would leave the tests above without anything to test."""
-    assert {"genetic_refined", "least_squares"} <= set(SURE) <= set(EXACT)
-    assert "differential_evolution" in EXACT
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_a_method_is_named_like_its_module_and_its_files(method: str) -> None:
     assert METHODS[method].name == method

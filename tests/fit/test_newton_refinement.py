@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from biogrip import library
-from biogrip.arrays import Array, IntArray
-from biogrip.fit.levenberg_marquardt import Minima
-from biogrip.fit.local_fits import FINE, PRIOR_WIDTH, LocalFits
-from biogrip.fit.multi_start import fit_from, refine_optima
+from biogrip.arrays import Array
+from biogrip.fit.local_fits import PRIOR_WIDTH, LocalFits
+from biogrip.fit.multi_start import fit_from
 from biogrip.fit.problem import Problem
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
@@ -42,13 +41,6 @@ def noisy(model: SampleModel, count: int) -> list[tuple[Problem, Array]]:
         trace = trace + noise_rad * rng.normal(size=len(TIMES))
         problems.append((posed_for(model, TIMES, trace), sample))
     return problems
-
-
-def found_in(problem: Problem) -> tuple[LocalFits, Minima, IntArray]:
-    """Optima that fits from anywhere lead to, and of which trace they are."""
-    fits, trace = LocalFits([problem]), np.zeros(5, dtype=np.int64)
-    starts = np.random.default_rng(2).uniform(problem.low, problem.high, (5, len(problem.low)))
-    return fits, fits.fitted(starts, trace, FINE), trace
 
 
 def cost(problem: Problem, x: Array) -> tuple[float, float]:
@@ -101,21 +93,6 @@ def test_parameters_are_those_of_the_misfit_told(draw: int) -> None:
     assert np.ptp(chi2) < 0.1
     # The model that made the trace is a special case of the one that is fitted.
     assert max(chi2) < np.sum(noise**2) / NOISE_RAD**2
-
-
-@pytest.mark.parametrize("name", MODELS_SETTLED)
-@pytest.mark.nightly
-def test_settling_never_makes_a_fit_worse(name: str) -> None:
-    """And the misfit told is that of the parameters told."""
-    for case_problem, _ in noisy(MODELS_SETTLED[name], 6):
-        fits, found, trace = found_in(case_problem)
-        best = refine_optima(fits, found, trace)
-        for x, ahead, told in zip(found.x, best.x, best.misfit_rad, strict=True):
-            (before, _), (after, misfit_rad) = cost(case_problem, x), cost(case_problem, ahead)
-            assert after <= before + rounding(case_problem, before)
-            assert told == pytest.approx(
-                misfit_rad, rel=1e-9, abs=4e-15 * case_problem.residuals.peak_rad
-            )
 
 
 @pytest.mark.parametrize("name", MODELS_SETTLED)

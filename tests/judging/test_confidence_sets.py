@@ -7,14 +7,13 @@ import pytest
 
 from biogrip.arrays import Array, IntArray
 from biogrip.judging.constrained_fits import ConstrainedFits
-from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.limits import find_limits
 from biogrip.judging.profiles import Points, Profile, compute_profiles, find_gaps
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import Finding
 from biogrip.stages.intervals import refitted, shown_of
 from tests.helpers.limits import likelihood_for
-from tests.helpers.problems import MODEL, problem, run
+from tests.helpers.problems import MODEL
 
 QUANTITIES = parameters_and_sum(MODEL)
 
@@ -59,18 +58,6 @@ def test_no_limit_is_said_only_of_what_has_none() -> None:
     assert said[0] == "not determined: the trace sets no limit within the search range"
     assert said[1].startswith("not determined: towards an end of the search range the fit is worse")
     assert said[1].endswith("and a limit takes 10.8)")
-
-
-def test_values_are_held_against_limits_and_gaps() -> None:
-    values = np.linspace(-5, 5, 101)
-    gaps = find_gaps(values, parabolas(values), 1.0)
-    finding = Finding(
-        QUANTITIES[4], Profile(values, parabolas(values), 2.0, -3.0, None, np.zeros(4), gaps), 0.1
-    )
-    # c + c_p, of which one may vanish.
-    for log_sum, inside in ((-3.1, False), (-2.0, True), (0.0, False), (9.0, True)):
-        x = np.array([0.0, 0.0, log_sum, -np.inf])
-        assert finding.allows(x) == inside
 
 
 class Parabolas(ConstrainedFits):
@@ -118,18 +105,3 @@ def test_limits_tell_of_an_optimum_that_was_missed() -> None:
         assert one.verdict == other.verdict == "determined"
         assert one.low == pytest.approx(other.low, rel=1e-5)
         assert one.high == pytest.approx(other.high, rel=1e-5)
-
-
-def test_what_is_counted_is_what_users_are_shown() -> None:
-    likelihoods = [likelihood_for("liquid_drop_1", seed) for seed in (4,)]
-    for seed, shown in zip((4,), shown_of(likelihoods, QUANTITIES, 0.95), strict=True):
-        case_problem = problem("liquid_drop_1", seed, rate_Hz=10.0)
-        told = diagnose(
-            case_problem, MODEL, run("least_squares", case_problem, seed), confidence=0.95
-        )
-        for mine, finding in zip(shown, told.findings, strict=True):
-            assert mine.verdict == finding.verdict
-            ours = np.array([mine.low, mine.high], dtype=float)
-            theirs = np.array([finding.low, finding.high], dtype=float)
-            # Batches end their fits at other steps: a hundredth of a standard deviation.
-            np.testing.assert_allclose(ours, theirs, rtol=5e-3)

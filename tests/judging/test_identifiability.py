@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biogrip.identify.words import limits_in_short
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.fisher import bound, covariance
 from biogrip.judging.likelihood import Likelihood, make_likelihood
@@ -25,7 +24,6 @@ from biogrip.judging.verdicts import (
 )
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
-from biogrip.records.verdicts import diagnosis_data, exact_data
 from tests.helpers.problems import GRIPPER, MODEL, SAMPLES, TORQUE, clean, posed_for, problem, run
 
 DAMPER = MODELS["damper"]
@@ -163,21 +161,6 @@ def test_a_bare_damper_is_known_from_one_side_by_a_spring_it_hides() -> None:
     assert c.words().startswith("determined: 10 N s/m (")
 
 
-def test_known_noise_scales_the_limits() -> None:
-    case_problem = problem("endothelial_cell", 1)
-    found = run("least_squares", case_problem)
-    best = np.log(found.parameters)
-    k_p = parameters_and_sum(MODEL)[1]
-    widths = []
-    for noise in (None, 2 * found.misfit_rad):
-        likelihood = make_likelihood(
-            case_problem, best, found.misfit_rad, confidence=0.95, noise_rad=noise
-        )
-        ((limits,),) = find_limits([likelihood], [k_p])[0]
-        widths.append(np.ptp(limits))
-    assert widths[1] / widths[0] == pytest.approx(2.0, rel=0.02)
-
-
 def test_a_wrong_model_is_doubted() -> None:
 
     times, response = clean("endothelial_cell")
@@ -226,20 +209,6 @@ def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:
     assert max(lowest) < likelihood.certainty
     assert np.ptp(lowest) < 0.5
     assert compute_valley(likelihood, MODELS["maxwell"]) == (None, None)
-
-
-def test_what_is_said_is_rounded_once() -> None:
-    """To five digits it would be 1.165, of which three are 1.17: files keep more."""
-    diagnosis, _ = told("endothelial_cell")
-    first = diagnosis.findings[0]
-    profile = replace(first.profile, low=0.0, best=math.log(1.1), high=math.log(1.164998))
-    close = replace(diagnosis, findings=[replace(first, profile=profile)])
-    (item,) = exact_data(close)["quantities"]
-    assert item["in_words"] == "determined: 1.1 N/m (1 to 1.16)"
-    assert limits_in_short(item) == "1.1 (1 to 1.16)"
-    assert diagnosis_data(close)["quantities"][0]["high"] == 1.164998
-    wide = replace(first, profile=replace(profile, low=math.log(0.1), high=math.log(40.0)))
-    assert wide.words() == "determined only within a factor of 20: 1.1 N/m (0.1 to 40)"
 
 
 @pytest.mark.nightly
