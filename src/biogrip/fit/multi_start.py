@@ -185,10 +185,8 @@ def best_of_starts(
 
     Parameters
     ----------
-    problems
-        One problem per trace.
-    starts
-        Log-parameters for each trace, (n_starts, n_parameters).
+    problems, starts
+        One problem per trace, and its starts, log-parameters (n_starts, n_parameters).
     before
         First row of the history of each trace: parameters, lowest and median misfit, and
         evaluations before the first fit.
@@ -277,13 +275,9 @@ def _fit_alike(
 
 
 def screened(misfit: Callable[[Array], Array], candidates: Array) -> tuple[Array, Array]:
-    """Sort log-parameters by misfit, leaving out those without a response.
+    """Sort log-parameters, (n, n_parameters), by misfit, leaving out those without a response.
 
-    Returns
-    -------
-    candidates : (n, n_parameters)
-        Best first; equals, in single precision, in their given order.
-    misfit_rad : (n,)
+    Equals, in single precision, keep their order. Returns the misfits in rad, (n,), as well.
     """
     values = misfit(np.exp(candidates))
     order = np.argsort(values.astype(np.float32), kind="stable")

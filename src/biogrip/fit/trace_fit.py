@@ -37,19 +37,11 @@ def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Arra
     and has the amplitude of an error of three standard uncertainties. Without it limits would be
     too narrow where the noise is far below the square.
 
-    Parameters
-    ----------
-    case_problem
-        Assumptions of the identification.
-    time_s : (n_times,)
-        Ascending times.
-    parameters : (n_parameters,)
-        Searched parameters, SI units.
-
     Returns
     -------
     (2 n_properties, n_times)
-        Changes in rad of first order, a row for each uncertain property, then those of second.
+        Changes in rad of first order, a row for each uncertain property, then those of second, at
+        ascending times and with the searched parameters (n_parameters,).
 
     References
     ----------
@@ -164,14 +156,8 @@ def fit_traces(
 ) -> list[TraceFit]:
     """Fit each of several traces as `trace_fit` does, and those with plain noise together.
 
-    Parameters
-    ----------
-    case_problems
-        Assumptions of the identification of each trace.
-    traces
-        Times and rotations of each.
-    find
-        Function that finds the global optima of problems of given traces.
+    `find` finds the global optima of the problems of given traces. A trace is its times and
+    rotations, and has assumptions of its own.
     """
     plain = [trace for trace, case_problem in enumerate(case_problems) if case_problem.plain]
     # Traces with the same rows are fitted together.

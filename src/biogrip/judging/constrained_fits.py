@@ -35,12 +35,9 @@ class QuantityConstraint:
 
     Parameters
     ----------
-    quantities
-        Quantities that may be held.
-    which : (n,)
-        Index of the quantity that each fit holds.
-    targets : (n,)
-        Logarithm of its value, within the quantity's range.
+    quantities, which, targets
+        Quantities that may be held; index of the one that each fit holds, (n,), and the logarithm
+        of its value, within the quantity's range, (n,).
     low, high : (n, n_parameters)
         Bounds of the log-parameters of each fit.
     longest_s

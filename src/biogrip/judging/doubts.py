@@ -134,8 +134,7 @@ def wandering(residual: Array) -> float:
 
     The statistic is the sum of n_i m_i^2 / sigma^2 over stretches of n_i readings and mean
     m_i, with a degree of freedom each; a fit only lowers it. The test detects parts of the
-    spectrum below some ten periods a trace, however small they are beside the noise of
-    single readings. The residual is that of `doubts_about_noise`.
+    spectrum below some ten periods a trace, however small they are beside single readings' noise.
     """
     from scipy.special import chdtrc
 
@@ -152,7 +151,7 @@ def uneven(residual: Array) -> float:
 
     The statistic is the largest distance between the cumulative periodogram and a straight
     line, with Kolmogorov's distribution. The test detects noise with a correlation time of some
-    readings and too small a share to correlate neighbours. `residual` as in `doubts_about_noise`.
+    readings and too small a share to correlate neighbours.
 
     References
     ----------

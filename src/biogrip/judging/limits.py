@@ -58,10 +58,9 @@ def crossings(
         The traces and quantities.
     brackets
         Intervals to search; lower fits that are found at outer ends replace theirs, in place.
-    tolerance
-        Of the fits, see `biogrip.fit.local_fits`.
-    accuracy
-        Of the square root of the increase of chi^2.
+    tolerance, accuracy
+        Tolerance of the fits, see `biogrip.fit.local_fits`; and accuracy of the square root of
+        the increase of chi^2.
 
     Returns
     -------
