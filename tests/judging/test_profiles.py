@@ -86,20 +86,6 @@ def test_points_are_moved_to_where_quantities_are_held(form: str, alike: bool) -
         QuantityConstraint(quantities, which, targets + 20, *bounds, 400.0).started(x)
 
 
-@pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1"])
-def test_a_held_parameter_is_a_known_parameter(case: str) -> None:
-    """Against SciPy's fit of a model in which the parameter is fixed."""
-    (likelihood,) = likelihoods(case, 1)
-    problem, fits = likelihood.problem, ConstrainedFits([likelihood], PARAMETERS)
-    which = np.repeat(np.arange(4), 3)
-    targets = likelihood.best[which] + np.tile([-1.5, -0.3, 0.7], 4)
-    targets = np.clip(targets, problem.low[which], problem.high[which])
-    increases, x = fits.at(which, targets, fits.best[which], FINE)
-    for index, target, increase, point in zip(which, targets, increases, x, strict=True):
-        alone = rest_fitted(likelihood, [int(index)], [float(target)], point)
-        assert increase == pytest.approx(alone, abs=2e-3, rel=1e-5)
-
-
 def test_limits_do_not_depend_on_the_batch() -> None:
     """Byte for byte, in any order, of one or several experiments."""
     each = [*likelihoods("endothelial_cell", 2), *likelihoods("liquid_drop_2", 1)]

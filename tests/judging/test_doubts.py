@@ -1,5 +1,6 @@
-"""Tests of white noise: how often they are wrong, and what they see."""
+"""Tests of residuals: how often they are wrong, what they see, and what is misfit."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,9 +8,25 @@ import pytest
 from scipy.stats import kstest
 
 from biogrip.arrays import Array
-from biogrip.judging.doubts import FALSE_ALARM, doubts_about_noise, uneven
+from biogrip.judging.diagnosis import diagnose
+from biogrip.judging.doubts import (
+    DOUBT,
+    DOUBTFUL,
+    FALSE_ALARM,
+    REJECTED,
+    REJECTION,
+    compute_status,
+    doubts_about_noise,
+    find_slow_misfit,
+    uneven,
+)
 from biogrip.physics.instruments import GRIPPER
-from biogrip.physics.noise import AR1, Noise, Outliers, add_noise
+from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.noise import AR1, Noise, Outliers, add_noise, draw_ornstein_uhlenbeck
+from biogrip.physics.protocol import torque_history
+from biogrip.physics.whitening import NoiseModel
+from tests.helpers.default import STUDY
+from tests.helpers.problems import MODEL, SAMPLES, clean, posed_for, run
 
 TIMES: Array = np.linspace(0, 400, 4001)
 SAME = np.ones(4001)
@@ -65,3 +82,48 @@ def test_noise_that_grows_is_said_and_nothing_else() -> None:
     )
     (said,) = doubts_about_noise(residual, growth, instrument=GRIPPER)
     assert "The noise grows with the rotation: it is 14 times as large" in said
+
+
+CASE = "endothelial_cell"
+
+
+@pytest.mark.parametrize(
+    ("share", "time_s", "weight"),
+    [
+        (0.6, 10.0, REJECTION),
+        (0.6, 7.0, None),
+        (0.4, 100.0, DOUBT),
+        (0.4, 70.0, None),
+        (0.3, 400.0, None),
+    ],
+)
+def test_share_and_time_decide(share: float, time_s: float, weight: str | None) -> None:
+    note = find_slow_misfit(NoiseModel(share, time_s, 0.0), 400.0, instrument=GRIPPER)
+    assert (note and note.weight) == weight
+
+
+def _status(times: Array, trace: Array) -> str:
+    problem = posed_for(MODEL, times, trace)
+    found = run("least_squares", problem)
+    return compute_status(diagnose(problem, MODEL, found, confidence=0.95).notes)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.nightly
+def test_a_filter_makes_a_fit_doubtful_and_a_late_step_wrong(seed: int) -> None:
+    """Both have misfits far above the scatter of neighbouring readings."""
+    times, response = clean(CASE)
+    rng = np.random.default_rng([seed, 40])
+    sigma = 0.02 * float(np.max(response))
+    filtered = sigma * draw_ornstein_uhlenbeck(times, np.ones(1), np.array([1 / 3.0]), rng)
+    assert _status(times, response + filtered) == DOUBTFUL
+    network = MODEL.network([[SAMPLES[CASE][name] for name in MODEL.names]])
+    first, second = STUDY.phases
+    late = torque_history(
+        (
+            replace(first, duration_s=first.duration_s + 10),
+            replace(second, duration_s=second.duration_s - 10),
+        )
+    )
+    other = rotation(step_response(STUDY.gripper, network), late, times)[0]
+    assert _status(times, other + 0.2 * sigma * rng.standard_normal(len(times))) == REJECTED
