@@ -154,7 +154,7 @@ class CaseProblem:
         return [self.of(time_s, trace, model, condensed=rows) for trace in traces]
 
     def condensed(self, time_s: Array) -> Condensed:
-        """Condense the readings at ascending times in white noise, known to a scale."""
+        """Condense the readings at ascending times, weighted if `sd_rad` is known."""
         if self.sd_rad is not None:
             return self.in_noise(time_s, None, np.zeros((0, len(time_s))))
         return self._condense(time_s, self.nuisance(time_s))
