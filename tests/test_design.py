@@ -149,7 +149,7 @@ def test_simulated_fits_scatter_as_the_bounds_say() -> None:
     exact = simulate(problem, {**problem.fixed, **true}, found.times_s)
     rng = np.random.default_rng(3)
     traces = exact + one.noise * rng.standard_normal((200, len(exact)))
-    posed = [problem.of(found.times_s, trace) for trace in traces]
+    posed = problem.of_each(found.times_s, traces)
     fits = fit_from(posed, np.tile(np.log(one.parameters[0]), (200, 1)))
     scatter = np.std(fits.x, axis=0, ddof=1)
     assert scatter == pytest.approx(found.bounds[0], rel=0.2)

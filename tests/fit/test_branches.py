@@ -10,7 +10,6 @@ from biogrip.fit.methods import METHODS, identifier
 from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.likelihood import Likelihood, make_likelihood
-from biogrip.judging.limits import find_limits
 from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.physics.linear import rotation, step_response
@@ -44,19 +43,7 @@ def assert_in_order(model: SampleModel, parameters: np.ndarray) -> None:
     assert np.all(np.diff(times, axis=-1) >= 0)
 
 
-@pytest.mark.parametrize("branches", [2, 3, 4])
-@pytest.mark.nightly
-def test_least_squares_counts_branches_as_they_relax(branches: int) -> None:
-    model = Sample("generalized_maxwell", branches).model
-    dampers = np.geomspace(3.0, 3e3, branches)[::-1]
-    truth = dict(zip(model.names, (*np.ones(branches + 1), *dampers, 0.1), strict=True))
-    found = identified("least_squares", problems(model, truth, 8, 1e-3))
-    for answer in found:
-        assert_in_order(model, answer.parameters)
-        assert_in_order(model, answer.history.best_parameters)
-
-
-@pytest.mark.parametrize("method", [name for name in METHODS if name != "least_squares"])
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.nightly
 def test_every_method_counts_branches_as_they_relax(method: str) -> None:
     """Of a population some half would come out the other way round."""
@@ -115,14 +102,6 @@ def test_intervals_are_those_of_one_branch() -> None:
                 assert found.high is not None
                 truth = SAMPLE[quantity.label]
                 assert truth / 2 < np.exp(found.low) < truth < np.exp(found.high) < 2 * truth
-
-
-def test_profiles_end_where_limits_are_near_the_optimum() -> None:
-    quantities = parameters_and_sum(TWO)[:2]
-    near = find_limits(likelihoods(), quantities)[0]
-    for limits, profiles in zip(near, compute_profiles(likelihoods(), quantities), strict=True):
-        ends = np.array([(found.low, found.high) for found in profiles], dtype=float)
-        np.testing.assert_allclose(ends, limits, rtol=0, atol=2e-3)
 
 
 def test_the_truth_is_counted_in_the_same_order() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array
 from biogrip.fit import genetic, genetic_refined
 from biogrip.fit.genetic import GeneticSettings, cross, evolve_many, mutate, select
 from biogrip.fit.genome import GeneRange, make_genome
@@ -16,7 +16,7 @@ from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.noise import rms
 from biogrip.physics.sample_model import with_fixed
 from tests.helpers.plain_genetic import identified
-from tests.helpers.problems import case_problem, clean, problem
+from tests.helpers.problems import SAMPLES, case_problem, clean, problem
 
 PAPER = GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 20, 40, 200)
 SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)
@@ -58,27 +58,10 @@ def test_finds_the_bottom_of_a_bowl() -> None:
     np.testing.assert_allclose(np.log10(answer.parameters), BOWL, atol=1e-12)
 
 
-def test_stops_after_twenty_generations_without_progress_but_not_before_forty() -> None:
-    answer = run()
-    best = answer.history.best_misfit
-    assert answer.stop_reason == "stalled"
-    assert answer.generations >= 40
-    assert best[-1] == best[-21]
-    if answer.generations > 40:
-        assert best[-21] < best[-22]
-    assert run(replace(PAPER, min_generations=90)).generations >= 90
-    limited = run(replace(PAPER, min_generations=5, max_generations=15))
-    assert (limited.generations, limited.stop_reason) == (15, "generation limit")
-
-
-def crossed(settings: GeneticSettings, seed: int) -> IntArray:
-    """Children, (n_children, 12), of parents whose genes all are the number of the parent."""
-    parents = np.repeat(np.arange(250)[:, None], 12, axis=1)
-    return cross(parents[None], settings, [np.random.default_rng(seed)])[0]
-
-
 def test_children_are_cut_and_swapped_parents() -> None:
-    children = crossed(PAPER, 3)
+    # All genes are the number of the parent.
+    parents = np.repeat(np.arange(250)[:, None], 12, axis=1)
+    (children,) = cross(parents[None], PAPER, [np.random.default_rng(3)])
     assert children.shape == (250, 12)
     mothers, fathers = children[:, 0], children[:, -1]
     # Disjoint pairs, both children: every parent opens one child and closes one.
@@ -89,13 +72,6 @@ def test_children_are_cut_and_swapped_parents() -> None:
     )
     assert set(cuts) == set(range(1, 12))
     np.testing.assert_array_equal(cuts[:125], cuts[125:])
-
-
-def test_rank_mating_prefers_the_best() -> None:
-    children = crossed(replace(PAPER, mating="rank", population=20_250), 4)
-    count = np.bincount(children[:, 0], minlength=250)
-    expected = 20_000 * np.arange(250, 0, -1) / (250 * 251 / 2)
-    assert np.abs(count[:50].sum() - expected[:50].sum()) < 5 * np.sqrt(expected[:50].sum())
 
 
 def test_half_of_the_children_have_one_gene_redrawn() -> None:
@@ -126,24 +102,6 @@ def test_the_best_are_selected_and_the_lowest_genes_of_equals(digits: int) -> No
         np.testing.assert_array_equal(values[population], ranking[population, order])
 
 
-def test_mutation_waits_for_its_generation() -> None:
-    """Before it, crossover cannot make a gene value that the first population lacks."""
-    seen: list[set[tuple[int, int]]] = []
-
-    def spying(parameters: Array) -> Array:
-        exponent = np.floor(np.log10(parameters) + 1e-9).astype(int) + 1
-        digits = np.rint(parameters / 10.0 ** (exponent - 2)).astype(int)
-        genes = np.stack((exponent, digits // 10, digits % 10), axis=2).reshape(len(parameters), 12)
-        seen.append({(gene, value) for row in genes for gene, value in enumerate(row)})
-        return bowl(parameters)
-
-    few = replace(PAPER, population=10, survivors=5, max_generations=60, min_generations=60)
-    run(few, misfit=spying)
-    first, before, after = seen[0], set.union(*seen[1:20]), set.union(*seen[20:])
-    assert before <= first
-    assert not after <= first
-
-
 def test_survivors_that_mutate_are_evaluated_again_and_the_best_is_kept() -> None:
     counted = []
 
@@ -162,26 +120,14 @@ def test_survivors_that_mutate_are_evaluated_again_and_the_best_is_kept() -> Non
     assert not np.array_equal(answer.history.best_misfit, children_only.history.best_misfit)
 
 
-def test_last_bits_of_the_misfit_do_not_matter() -> None:
-    """A misfit wrong by 1e-13, far more than processors differ, takes the same way."""
-    misfit, jitter = problem("endothelial_cell", 6).misfit, np.random.default_rng(7)
-
-    def disturbed(parameters: Array) -> Array:
-        exact = misfit(parameters)
-        return exact * (1 + 1e-13 * jitter.standard_normal(len(exact)))
-
-    for seed in range(3):
-        calm, shaken = (run(seed=seed, misfit=each) for each in (misfit, disturbed))
-        np.testing.assert_array_equal(calm.history.best_parameters, shaken.history.best_parameters)
-
-
 def test_about_four_runs_in_ten_find_the_basin_of_table_5() -> None:
     """What the algorithm as printed is worth: neither nothing nor certainty.
 
     60 runs at a true share of 0.42 give 25, with a standard deviation of 3.8.
     """
     posed = problem("endothelial_cell", 6, rate_Hz=10.0)
-    floor = 1.02 * rms(posed.residuals._rotation_rad - clean("endothelial_cell", 10.0)[1])
+    truth = np.log([SAMPLES["endothelial_cell"][name] for name in MAXWELL.names])
+    floor = 1.02 * rms(posed.residuals.left(truth))
     rngs = [np.random.default_rng([8, seed]) for seed in range(60)]
     answers = genetic.identify_many([posed] * 60, PAPER, rngs)
     good = [answer for answer in answers if answer.misfit_rad <= floor]

@@ -1,4 +1,4 @@
-"""A model never fits worse than one that it contains, whatever the search range."""
+"""A model never fits worse than one that it contains; and what is said of it beside others."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit.least_squares import LeastSquaresSettings
-from biogrip.fit.nested_fits import fit_models, is_within
+from biogrip.fit.nested_fits import advice, fit_models, is_within, ranked
 from biogrip.fit.problem import Identification, Problem
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import CANDIDATES, MODELS, contained
@@ -90,3 +90,23 @@ def test_elements_vanish_where_the_range_does_not_reach() -> None:
     for answer in without:
         assert not is_within(answer.parameters, problems["liquid_drop"][0])
         np.testing.assert_array_equal(answer.history.best_parameters[-1], answer.parameters)
+
+
+READINGS = 1000
+
+
+@pytest.mark.parametrize(
+    ("gained", "said"),
+    [
+        # chi-squared by which four parameters, and the others, fit better than a spring's one.
+        ({"generalized_maxwell": 103.0, "liquid_drop": 102.0}, "is richer than the trace asks for"),
+        ({"generalized_maxwell": 50.0, "fractional_maxwell": 400.0}, "is not adequate: fractional"),
+        ({"generalized_maxwell": 50.0, "generalized_maxwell_2": 90.0}, "is not adequate: "),
+        ({"generalized_maxwell": 50.0, "burgers": 90.0}, "suits the trace less well: Burgers"),
+        ({"generalized_maxwell": 90.0, "burgers": 89.0}, "none of the 2 models tried suits"),
+    ],
+)
+def test_the_sentence_is_that_of_the_numbers(gained: dict[str, float], said: str) -> None:
+    misfits = [float(np.exp(-gain / (2 * READINGS))) for gain in gained.values()]
+    tried = ranked(list(gained), misfits, READINGS)
+    assert said in advice(tried, "generalized_maxwell")

@@ -1,10 +1,15 @@
-"""The colour of noise: its likelihood against matrices of all samples, and how well it is known."""
+"""Noise of residuals: its likelihood against dense matrices, its growth, and outliers."""
 
 import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.fit.noise_model_fit import NoiseModelLikelihood, _logarithms
+from biogrip.fit.noise_model_fit import (
+    NoiseModelLikelihood,
+    _logarithms,
+    compute_growth,
+    outliers_of,
+)
 from biogrip.physics.noise import AR1, Flicker, Noise, add_noise
 from biogrip.physics.whitening import NoiseModel, Whitening
 from tests.physics.test_whitening import correlation
@@ -32,26 +37,22 @@ def restricted(
     )
 
 
-def test_the_likelihood_is_that_of_what_no_direction_reaches() -> None:
+@pytest.mark.parametrize(
+    ("colours", "growing"),
+    [
+        ([(0.3, 5.0, 0.2), (0.9, 1.0, 0.05), (0.01, 100.0, 0.6)], None),
+        ([(0.3, 5.0, 0.2, 0.4), (0.01, 100.0, 0.6, 0.3899)], np.linspace(0.1, 2.0, 200)),
+    ],
+)
+def test_the_likelihood_is_that_of_dense_matrices(
+    colours: list[tuple[float, ...]], growing: Array | None
+) -> None:
     """Differences between colours, less the prior on the share of 1/f noise; twelve digits are
     there, and the condition of the matrices takes four."""
     left = np.random.default_rng(1).standard_normal(200)
-    likelihood = NoiseModelLikelihood(TIMES, left, DIRECTIONS)
-    colours = [NoiseModel(0.3, 5.0, 0.2), NoiseModel(0.9, 1.0, 0.05), NoiseModel(0.01, 100.0, 0.6)]
-    found, expected = [], []
-    for noise_model in colours:
-        x = _logarithms(noise_model)
-        found.append(likelihood._deviance(x) + x[2])
-        expected.append(restricted(TIMES, DIRECTIONS, left, noise_model))
-    np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-8)
-
-
-def test_the_likelihood_of_noise_that_grows_is_that_of_dense_matrices() -> None:
-    left, growing = np.random.default_rng(1).standard_normal(200), np.linspace(0.1, 2.0, 200)
     likelihood = NoiseModelLikelihood(TIMES, left, DIRECTIONS, growing)
-    colours = [NoiseModel(0.3, 5.0, 0.2, 0.4), NoiseModel(0.01, 100.0, 0.6, 0.3899)]
     found, expected = [], []
-    for noise_model in colours:
+    for noise_model in (NoiseModel(*shares) for shares in colours):
         x = _logarithms(noise_model)
         found.append(likelihood._deviance(x) + x[2])
         expected.append(restricted(TIMES, DIRECTIONS, left, noise_model, growing))
@@ -108,14 +109,14 @@ def test_colours_are_found(noise: Noise, expected: tuple[float, float]) -> None:
 def test_degrees_of_freedom_are_those_of_the_variances_that_come_out() -> None:
     """The logarithm of a chi-squared variable with f degrees of freedom has a variance of some 2/f.
 
-    Of the variance of a slope in noise that relaxes, over twenty traces; the variance of
-    logarithms is known to 32 %, and Satterthwaite's formula is of first order.
+    Of the variance of a slope in noise that relaxes, over twelve traces; the variance of
+    logarithms is known to 41 %, and Satterthwaite's formula is of first order.
     """
     times = np.arange(400.0)
     noise = Noise("gaussian", 1.0, "peak", ar1=AR1(0.6, 8.0))
     direction = (times / 400)[None]
     logs, freedoms = [], []
-    for seed in range(20):
+    for seed in range(12):
         trace = add_noise(np.ones(400), noise, np.random.default_rng([seed, 6]), times)
         likelihood = NoiseModelLikelihood(times, trace, np.vstack((direction, np.ones(400))))
         noise_model = likelihood.best()
@@ -125,3 +126,58 @@ def test_degrees_of_freedom_are_those_of_the_variances_that_come_out() -> None:
         scaled = direction / np.exp(likelihood._log_scale(x))
         freedoms.append(likelihood.freedom(noise_model, scaled, np.ones((1, 400)) / 20))
     assert 0.4 < np.median(freedoms) / (2 / np.var(logs)) < 2.5
+
+
+ROTATION = np.geomspace(0.004, 1.0, 400)
+
+
+def test_noise_that_is_the_same_everywhere_seldom_grows() -> None:
+    """Of 1000 traces 3 or so seem to grow, and at most four standard deviations more."""
+    rng = np.random.default_rng(0)
+    grown = sum(
+        bool(np.ptp(compute_growth(rng.standard_normal(400), ROTATION))) for _ in range(1000)
+    )
+    assert grown <= 3 + 4 * np.sqrt(3)
+
+
+@pytest.mark.parametrize("floor", [0.0, 0.1])
+def test_the_shape_is_that_of_the_noise(floor: float) -> None:
+    """To a quarter of it; four hundred samples, a tenth of them outliers, tell no more."""
+    rng, deviations = np.random.default_rng(1), np.hypot(floor, ROTATION)
+    residual = deviations * rng.standard_normal(400)
+    residual[::10] *= 20
+    growth = compute_growth(residual, ROTATION)
+    assert np.mean(growth**2) == pytest.approx(1.0)
+    shape = deviations / np.sqrt(np.mean(deviations**2))
+    np.testing.assert_allclose(growth, shape, rtol=0.25)
+
+
+def test_outliers_are_judged_by_the_noise_around_them() -> None:
+    rng = np.random.default_rng(2)
+    residual = ROTATION * rng.standard_normal(400)
+    residual[[40, 350]] = 10 * ROTATION[[40, 350]]
+    assert np.count_nonzero(outliers_of(residual)) > 40
+    growth = compute_growth(residual, ROTATION)
+    np.testing.assert_array_equal(np.flatnonzero(outliers_of(residual / growth)), [40, 350])
+
+
+def test_a_first_reading_without_rotation_does_not_make_its_noise_vanish() -> None:
+    """It has a floor of noise, as all have: 1 % of what the largest rotations have."""
+    rotation = np.concatenate(([0.0], ROTATION))
+    for seed in range(20):
+        noise = np.random.default_rng(seed).standard_normal(401)
+        residual = np.hypot(0.01, rotation) * noise
+        even = residual / compute_growth(residual, rotation)
+        assert np.abs(even[0]) < 10 * np.sqrt(np.mean(even[1:] ** 2))
+
+
+@pytest.mark.parametrize("index", [0, -1])
+def test_outliers_are_seen_at_the_ends(index: int) -> None:
+    residual = np.random.default_rng(3).standard_normal(400)
+    residual[index] = 50.0
+    assert outliers_of(residual)[index]
+
+
+def test_what_does_not_vary_does_not_grow() -> None:
+    np.testing.assert_array_equal(compute_growth(np.zeros(50), np.arange(50.0)), 1.0)
+    np.testing.assert_array_equal(compute_growth(np.arange(50.0) % 7, np.zeros(50)), 1.0)

@@ -20,7 +20,6 @@ from tests.helpers.problems import (
     case_problem,
     identified,
     posed_for,
-    run,
 )
 
 SOLID, LIQUID = MODELS["fractional_kelvin_voigt"], MODELS["fractional_maxwell"]
@@ -86,14 +85,3 @@ def test_the_model_that_made_a_trace_is_preferred(made_by: str, truth: list[floa
         assert best.candidate == made_by
         # Of as many parameters the others are far behind: no matter of chance.
         assert sorted(each.delta_aic for each in tried)[1] > 5
-
-
-@pytest.mark.nightly
-def test_the_genetic_algorithm_finds_exponents_too() -> None:
-    """Two digits of each parameter; none encodes an exponent of one or more."""
-    clean = response(SOLID, [0.3, 10.0, 0.4])
-    noise = 0.03 * clean.max() * np.random.default_rng(1).normal(size=len(TIMES))
-    found = run("genetic", posed_for(SOLID, TIMES, clean + noise))
-    assert found.parameters[2] == pytest.approx(0.4, abs=0.1)
-    assert found.misfit_rad < 1.1 * np.sqrt(np.mean(noise**2))
-    assert np.all(found.history.best_parameters[:, 2] < 1)

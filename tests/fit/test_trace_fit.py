@@ -12,7 +12,7 @@ from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.multi_start import identify_from
 from biogrip.fit.noise_model_fit import FAR, outliers_of
 from biogrip.fit.problem import Identification, Problem
-from biogrip.fit.trace_fit import gripper_functions, trace_fit
+from biogrip.fit.trace_fit import trace_fit
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, Outliers, add_noise
 from biogrip.physics.simulation import simulated_rotation
@@ -49,14 +49,6 @@ def test_white_noise_and_a_known_gripper_leave_the_fit_as_it_is() -> None:
     assert fit.noise_model is None
     assert not fit.outliers.any()
     assert fit.notes() == []
-
-
-def test_an_uncertain_inertia_changes_nothing_that_is_fitted() -> None:
-    arms = {"left": {"inertia_kgm2": 0.05 * POSED.gripper.left.inertia_kgm2}}
-    case_problem = replace(POSED, uncertainty=arms)
-    assert case_problem.plain
-    assert case_problem.uncertain_keys == []
-    assert gripper_functions(case_problem, TIMES, np.exp(TRUTH)).shape == (0, len(TIMES))
 
 
 def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
@@ -152,18 +144,11 @@ def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
     assert fit.noise_data()["proportional"] > 0.9  # type: ignore[index, operator]
 
 
-@pytest.mark.parametrize(
-    ("offset", "said"),
-    [
-        (True, "an offset of the instrument is fitted along, and the intervals allow"),
-        (False, "; the intervals allow for all of it"),
-    ],
-)
-def test_a_drift_is_fitted_only_where_it_is_wanted(offset: bool, said: str) -> None:
-    case_problem = replace(POSED, coloured=True, offset=offset)
+def test_what_is_fitted_along_is_said() -> None:
+    case_problem = replace(POSED, coloured=True, offset=True)
     fit = trace_fit(case_problem, TIMES, noisy(Noise("gaussian", 0.02, "peak")), find)
-    assert fit.problem.residuals.free == len(TIMES) - offset
-    assert said in fit.notes()[0]
+    assert fit.problem.residuals.free == len(TIMES) - 1
+    assert "an offset of the instrument is fitted along, and the intervals" in fit.notes()[0]
 
 
 def test_too_many_samples_for_a_colour_are_refused() -> None:

@@ -21,7 +21,6 @@ from tests.helpers.problems import GRIPPER, MODEL, TORQUE, identified, of_case, 
 from tests.helpers.scipy_fits import scipy_fit
 
 PARAMETERS = parameters_and_sum(MODEL)
-COMBINATIONS = find_combinations(MODEL, [0, 1, 2])
 
 
 def likelihoods(case: str, count: int) -> list[Likelihood]:
@@ -87,79 +86,17 @@ def test_points_are_moved_to_where_quantities_are_held(form: str, alike: bool) -
         QuantityConstraint(quantities, which, targets + 20, *bounds, 400.0).started(x)
 
 
-def test_held_values_are_attained_to_rounding() -> None:
-    (likelihood,) = likelihoods("endothelial_cell", 1)
-    quantities = [*PARAMETERS, *COMBINATIONS]
-    fits = ConstrainedFits([likelihood], quantities)
-    which = np.repeat(np.arange(len(quantities)), 5)
-    targets = fits.at_best[which] + np.tile([-1.0, -0.1, 0.01, 0.1, 1.0], len(quantities))
-    increases, x = fits.at(which, targets, fits.best[which], FINE)
-    assert np.all(increases > -1e-3)
-    assert np.max(np.abs(values(quantities, which, x) - targets)) < 1e-9
-
-
-@pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1"])
-def test_a_held_parameter_is_a_known_parameter(case: str) -> None:
-    """Against SciPy's fit of a model in which the parameter is fixed."""
-    (likelihood,) = likelihoods(case, 1)
-    problem, fits = likelihood.problem, ConstrainedFits([likelihood], PARAMETERS)
-    which = np.repeat(np.arange(4), 3)
-    targets = likelihood.best[which] + np.tile([-1.5, -0.3, 0.7], 4)
-    targets = np.clip(targets, problem.low[which], problem.high[which])
-    increases, x = fits.at(which, targets, fits.best[which], FINE)
-    for index, target, increase, point in zip(which, targets, increases, x, strict=True):
-        alone = rest_fitted(likelihood, [int(index)], [float(target)], point)
-        assert increase == pytest.approx(alone, abs=2e-3, rel=1e-5)
-
-
-def test_limits_are_where_the_rise_equals_the_threshold() -> None:
-    each = likelihoods("liquid_drop_2", 3)
-    quantities = labelled("k", "c_p", "c + c_p")
-    limits = find_limits(each, quantities)[0]
-    fits = ConstrainedFits(each, quantities)
-    ends = limits.reshape(-1, 2)
-    profile, side = np.nonzero(np.isfinite(ends))
-    increases, _ = fits.at(profile, ends[profile, side], fits.best[profile], FINE)
-    threshold = np.repeat([likelihood.threshold for likelihood in each], len(quantities))[profile]
-    np.testing.assert_allclose(np.sqrt(increases), np.sqrt(threshold), rtol=0, atol=3e-3)
-    # Determined are k and the sum; c_p is bounded from above only.
-    assert np.all(np.isfinite(limits[:, [0, 2]]))
-    assert np.all(np.isnan(limits[:, 1, 0]))
-    at_best = fits.at_best.reshape(3, 3)[:, [0, 2]]
-    assert np.all(limits[:, [0, 2], 0] < at_best)
-    assert np.all(limits[:, [0, 2], 1] > at_best)
-
-
 def test_limits_do_not_depend_on_the_batch() -> None:
-    each, quantities = likelihoods("endothelial_cell", 4), labelled("k", "c + c_p")
-    together = find_limits(each, quantities)[0]
-    for chosen in ([2], [3, 0], [1, 3, 2]):
-        apart = find_limits([each[index] for index in chosen], quantities)[0]
-        np.testing.assert_array_equal(apart, together[chosen])
-
-
-@pytest.mark.nightly
-def test_traces_of_any_experiments_are_judged_as_each_alone() -> None:
-    """Byte for byte, in their order; and whose optimum was missed is told by its place."""
-    cell, drop = likelihoods("endothelial_cell", 2), likelihoods("liquid_drop_2", 2)
-    away = drop[1].best + np.array([0.3, 0.0, 0.06, 0.0])
-    misfit_rad = float(drop[1].problem.misfit(np.exp(away)[None])[0])
-    drop[1] = replace(drop[1], best=away, misfit_rad=misfit_rad)
-    mixed, quantities = [drop[0], cell[0], cell[1], drop[1]], labelled("k", "c + c_p")
-    limits, missed = find_limits(mixed, quantities)
-    assert list(missed) == [3]
-    for own, likelihood in zip(limits, mixed, strict=True):
-        (alone,), _ = find_limits([likelihood], quantities)
-        np.testing.assert_array_equal(alone, own)
-    for own, likelihood in zip(
-        compute_profiles(mixed, quantities, smooth=False), mixed, strict=True
-    ):
-        (profiles,) = compute_profiles([likelihood], quantities, smooth=False)
-        for one, other in zip(own, profiles, strict=True):
-            assert (one.low, one.high, one.best) == (other.low, other.high, other.best)
-            np.testing.assert_array_equal(one.increases, other.increases)
-            np.testing.assert_array_equal(one.log_values, other.log_values)
-    assert compute_profiles([], quantities) == []
+    """Byte for byte, in any order, of one or several experiments."""
+    each = [*likelihoods("endothelial_cell", 2), *likelihoods("liquid_drop_2", 1)]
+    quantities = labelled("k", "c + c_p")
+    together, profiles = find_limits(each, quantities)[0], compute_profiles(each, quantities)
+    for chosen in ([2], [1, 0], [1, 2]):
+        some = [each[index] for index in chosen]
+        np.testing.assert_array_equal(find_limits(some, quantities)[0], together[chosen])
+    (alone,) = compute_profiles(each[2:], quantities)
+    for one, other in zip(alone, profiles[2], strict=True):
+        np.testing.assert_array_equal(one.increases, other.increases)
 
 
 @pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1"])

@@ -1,6 +1,6 @@
 """Assumptions of the identification that all traces of a case share."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,9 +20,6 @@ from biogrip.physics.models import Sample
 from biogrip.physics.protocol import Phase, TorqueHistory, torque_history
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.physics.whitening import WEIGHTED, NoiseModel, Whitening
-
-SharedRows = dict[Hashable, Condensed]
-"""Condensed rows by all that they depend on."""
 
 NOT_FITTED = "inertia_kgm2"
 """Key of an arm that fits leave out, and its uncertainty with it."""
@@ -63,7 +60,6 @@ class CaseProblem:
     ``gripper`` itself; and ``share`` of the ``torque``."""
     fit_start: bool = False
     """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
-    _condensed: "SharedRows" = field(default_factory=dict, init=False, compare=False)
 
     @cached_property
     def torque(self) -> TorqueHistory:
@@ -80,20 +76,16 @@ class CaseProblem:
         """Sample model without the fixed parameters."""
         return with_fixed(self.model, self.fixed)
 
-    def searched_for(self, *others: SampleModel) -> "CaseProblem":
-        """Return a copy that keeps only the search ranges of its model and of `others`."""
-        chosen = {p.range_name for model in (self.model, *others) for p in model.parameters}
-        return replace(self, ranges={n: r for n, r in self.ranges.items() if n in chosen})
-
     def to_identify(self, *others: SampleModel) -> "CaseProblem":
-        """Return a copy without noise model, gripper uncertainty and unused search ranges."""
-        return replace(self.searched_for(*others), coloured=False, uncertainty={})
+        """Leave out noise model, gripper uncertainty, and ranges neither it nor `others` use."""
+        chosen = {p.range_name for model in (self.model, *others) for p in model.parameters}
+        ranges = {name: genes for name, genes in self.ranges.items() if name in chosen}
+        return replace(self, ranges=ranges, coloured=False, uncertainty={})
 
     def weighted(self, sd_rad: Array | None) -> "CaseProblem":
-        """Return a copy for a trace whose readings have known standard deviations, or itself.
+        """Divide the readings of a trace by their standard deviations, if these are known.
 
-        Readings are divided by them, so that the noise becomes white; its standard deviation is
-        then their root mean square.
+        The noise becomes white, with their root mean square as its standard deviation.
         """
         if sd_rad is None:
             return self
@@ -115,7 +107,7 @@ class CaseProblem:
         return not self.coloured and not self.uncertain_keys
 
     def calibrated(self, files: Sequence[Path]) -> "CaseProblem":
-        """Return a copy with the arms of the first calibration file (YAML), if there is one.
+        """Take the arms of the first calibration file (YAML), if there is one.
 
         Raises
         ------
@@ -134,21 +126,11 @@ class CaseProblem:
         model: SampleModel | None = None,
         noise_rad: float | None = None,
         condensed: Condensed | None = None,
-        shared: SharedRows | None = None,
     ) -> Problem:
-        """Set up the problem of a trace.
+        """Pose the problem of a trace.
 
-        `model`, `noise_rad`, and `condensed` from `in_noise` replace those of the case; `shared`,
-        rows of several cases, which are added to, those that the traces of this case share.
+        `model`, `noise_rad`, and `condensed` from `in_noise` replace those of the case.
         """
-        noise_rad = noise_rad or self.noise_rad
-        if condensed is None:
-            # Shared by all traces of a case: condensing takes as long as some fifty responses.
-            rows = self._condensed if shared is None else shared
-            sampled = (*self._sets_rows, time_s.tobytes())
-            if sampled not in rows:
-                rows[sampled] = self._condense_weighted(time_s)
-            condensed = rows[sampled]
         return make_problem(
             self.gripper,
             model or self.searched,
@@ -156,29 +138,32 @@ class CaseProblem:
             time_s,
             rotation_rad,
             self.ranges,
-            condensed,
-            noise_rad=noise_rad,
+            self.condensed(time_s) if condensed is None else condensed,
+            noise_rad=noise_rad or self.noise_rad,
             instrument=self.instrument,
         )
 
-    @property
-    def _sets_rows(self) -> tuple[Hashable, ...]:
-        """All that condensed rows depend on but the sampling times."""
-        sd = None if self.sd_rad is None else self.sd_rad.tobytes()
-        return (
-            self.gripper,
-            self.phases,
-            self.instrument,
-            self.nonlinear,
-            self.offset,
-            self.drift,
-            sd,
-        )
+    def of_each(
+        self, time_s: Array, traces: Iterable[Array], model: SampleModel | None = None
+    ) -> list[Problem]:
+        """Pose the problems of traces with the same times, which are then fitted together.
 
-    def _condense_weighted(self, time_s: Array) -> Condensed:
+        Rows are condensed once, for that takes as long as some fifty responses.
+        """
+        rows = self.condensed(time_s)
+        return [self.of(time_s, trace, model, condensed=rows) for trace in traces]
+
+    def condensed(self, time_s: Array) -> Condensed:
+        """Condense the readings at ascending times, weighted if `sd_rad` is known."""
         if self.sd_rad is not None:
             return self.in_noise(time_s, None, np.zeros((0, len(time_s))))
         return self._condense(time_s, self.nuisance(time_s))
+
+    def sets_condensed(self, time_s: Array) -> tuple[Hashable, ...]:
+        """Return all that these condensed rows depend on."""
+        sd = None if self.sd_rad is None else self.sd_rad.tobytes()
+        held = self.phases, self.instrument, self.nonlinear, self.offset, self.drift
+        return *held, sd, time_s.tobytes()
 
     def for_model(self, problem: Problem, model: SampleModel) -> Problem:
         """Return one of its problems posed for another model; both share tables of the trace."""

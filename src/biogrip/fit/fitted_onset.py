@@ -71,9 +71,7 @@ class OnsetFits:
 
     def at(self, onset_s: float, near: Array) -> OnsetFit:
         """Fit the sample for an onset by a local fit from log-parameters, (n_parameters,)."""
-        # A copy, since problems keep the rows of all times that they were posed for.
-        case_problem = replace(self._case_problem)
-        problem = case_problem.of(self._time_s - onset_s, self._rotation_rad)
+        problem = self._case_problem.of(self._time_s - onset_s, self._rotation_rad)
         fit = fit_from([problem], near)
         return OnsetFit(onset_s, fit.x[0], float(fit.misfit_rad[0]))
 

@@ -132,7 +132,7 @@ class Genome:
         The number of the last genes comes first, as for `numpy.lexsort`. There are several where
         one, a double, would not be exact.
         """
-        numbers = (chromosomes - self.low) @ self._weights
+        numbers = (chromosomes - self.low.astype(chromosomes.dtype)) @ self._weights
         return [numbers[..., column] for column in range(numbers.shape[-1])]
 
     @cached_property

@@ -137,10 +137,9 @@ def minimize(
     ----------
     objective
         Function that returns the normal equations.
-    starts : (n, n_parameters)
-        Logarithms, within bounds and on the constraint; steps are limited in e-folds.
-    low, high : (n, n_parameters)
-        Bounds; equal bounds fix a parameter.
+    starts, low, high : (n, n_parameters)
+        Logarithms, on the constraint and within bounds; equal bounds fix a parameter. Steps are
+        limited in e-folds.
     tolerance
         Stop when the actual and the predicted relative decrease of the sum are below this.
     constraint

@@ -1,14 +1,10 @@
-"""The identifiers that there are: what is said of each, and nothing of how it works.
+"""The identification methods, and measures of their success.
 
 Each method is a module of this package, named like the method. It has the class of its settings,
 whose fields are the keys of its config block (`biogrip.keys`), and a function
 ``identify_many(problems, settings, rngs, progress)``, which returns an `Identification` of each
 trace, to the bit as if it were alone. Ranges and traces are the problems', the budget of each is
 in the settings, its generator is its only source of randomness, and progress is told of all.
-
-A method by its name, as what works with it calls it.
-
-Measures of success: misfits of identifications compared with one another and with noise.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -116,15 +112,7 @@ Identify = Callable[
 
 
 def identifier(name: str, settings: object) -> Identify:
-    """Load a method with its settings.
-
-    Parameters
-    ----------
-    name
-        One of `biogrip.fit.methods.METHODS`.
-    settings
-        Its block, or what puts its blocks together.
-    """
+    """Load a method of `METHODS` with its settings: its block, or what puts several together."""
     module = import_module(f"{__package__}.{name}")
 
     def identify(
@@ -160,15 +148,9 @@ def typical(found: pd.DataFrame) -> pd.Series:
 def chi_square_increase(found: pd.DataFrame, samples: int) -> Array:
     """Return the increase of each identification's chi^2 over the lowest of its trace, (n,).
 
+    Identifications of one case by all methods are given, and the number of readings in a trace.
     The lowest is that of any method, or that of the true parameters where these are
     known; the best fit of a few parameters lies below the latter.
-
-    Parameters
-    ----------
-    found
-        Identifications of one case by all methods.
-    samples
-        Number of readings in a trace.
     """
     misfit = found["misfit"]
     lowest = misfit.groupby(found["seed"]).transform("min")

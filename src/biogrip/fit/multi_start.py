@@ -1,22 +1,15 @@
-"""Newton refinement of optima to their last digits.
+"""Multi-start least squares: the best of several local fits, for many traces at once [1]_.
 
-Descents compare sums of squares, and so find an optimum to half the digits. Its vanishing
-gradient locates it to all of them. Gauss-Newton steps need not converge there: for an
-element too weak to be seen, second derivatives of the residuals decide how the gradient
-changes. So the steps are Newton's. The first are damped, and compared on condensed rows.
-Each of the last is compared, on all readings, with the point before it, and kept only if
-it fits no worse.
-
-Multi-start least squares: the best of several local fits, for many traces at once.
-
-The result of a trace does not depend, to the last bit, on the other traces.
+Fits from all starts are rough; the best few are continued to their optima, and the best of these
+is refined by Newton steps to its last digits (`refine_optima`). The result of a trace does not
+depend, to the last bit, on the other traces.
 
 References
 ----------
-.. [1] J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., Springer, 2006, section
-   3.4: Newton's method with the moduli of the curvatures.
 .. [1] A. Raue et al., Lessons learned from quantitative dynamical modeling in systems biology,
    PLoS ONE 8 (2013), e74335: local fits from many starts.
+.. [2] J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., Springer, 2006, section
+   3.4: Newton's method with the moduli of the curvatures.
 """
 
 from bisect import insort
@@ -50,7 +43,13 @@ _ROUNDING = 1e-15
 
 
 def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
-    """Refine optima by Newton steps until they are stationary to the last digits.
+    """Refine optima by Newton steps until they are stationary to the last digits [2]_.
+
+    Descents compare sums of squares, and so find an optimum to half the digits. Its vanishing
+    gradient locates it to all of them. Gauss-Newton steps need not converge there: for an element
+    too weak to be seen, second derivatives of the residuals decide how the gradient changes. So
+    the steps are Newton's. The first are damped, and compared on condensed rows. Each of the last
+    is compared, on all readings, with the point before it, and kept only if it fits no worse.
 
     Parameters
     ----------
@@ -186,10 +185,8 @@ def best_of_starts(
 
     Parameters
     ----------
-    problems
-        One problem per trace.
-    starts
-        Log-parameters for each trace, (n_starts, n_parameters).
+    problems, starts
+        One problem per trace, and its starts, log-parameters (n_starts, n_parameters).
     before
         First row of the history of each trace: parameters, lowest and median misfit, and
         evaluations before the first fit.
@@ -252,17 +249,7 @@ def identify_from(problem: Problem, start: Array) -> Identification:
 def fit_from(problems: Sequence[Problem], starts: Array) -> Minima:
     """Fit every trace from one starting point, and refine the optima by Newton steps.
 
-    Parameters
-    ----------
-    problems
-        One problem a trace.
-    starts : (n_parameters,) or (n_traces, n_parameters)
-        Log-parameters.
-
-    Returns
-    -------
-    Minima
-        The optimum of every trace.
+    Starts are log-parameters, (n_parameters,) or (n_traces, n_parameters).
     """
     return _fit_alike(problems, starts, refine_optima, FINE)
 
@@ -288,13 +275,9 @@ def _fit_alike(
 
 
 def screened(misfit: Callable[[Array], Array], candidates: Array) -> tuple[Array, Array]:
-    """Sort log-parameters by misfit, leaving out those without a response.
+    """Sort log-parameters, (n, n_parameters), by misfit, leaving out those without a response.
 
-    Returns
-    -------
-    candidates : (n, n_parameters)
-        Best first; equals, in single precision, in their given order.
-    misfit_rad : (n,)
+    Equals, in single precision, keep their order. Returns the misfits in rad, (n,), as well.
     """
     values = misfit(np.exp(candidates))
     order = np.argsort(values.astype(np.float32), kind="stable")

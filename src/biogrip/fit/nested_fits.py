@@ -1,11 +1,12 @@
-"""Fits of nested sample models to the same traces: none fits worse than a model nested in it.
+"""Fits of nested sample models to the same traces, and the choice of the simplest adequate one.
 
-Each model is fitted from starts of its own and from the optima of the models nested in it.
-If one of these still fits better, because its optimum lies outside the richer model's search
-range, its optimum is the richer model's result, with elements that have vanished
-(`biogrip.physics.models`).
+Each model is fitted from starts of its own and from the optima of the models nested in it, so that
+none fits worse than a model nested in it. If one of these still fits better, because its optimum
+lies outside the richer model's search range, its optimum is the richer model's result, with
+elements that have vanished (`biogrip.physics.models`).
 
-Choice of the simplest adequate sample model by information criteria.
+Models are compared by the information criteria AIC [1]_ and BIC [2]_; differences in BIC below
+`WORTH_A_MENTION` prefer none [3]_.
 
 References
 ----------
@@ -266,13 +267,8 @@ def aic_and_bic(
 ) -> tuple[Array, Array]:
     """Compute AIC and BIC for Gaussian noise of unknown standard deviation.
 
-    AIC = n ln(misfit^2) + 2 (p + 1) and BIC = n ln(misfit^2) + (p + 1) ln n, the
-    noise being one parameter more.
-
-    Parameters
-    ----------
-    misfit_rad, samples, parameters
-        RMS misfit of the best fit, n and p; of any one shape.
+    AIC = n ln(misfit^2) + 2 (p + 1) and BIC = n ln(misfit^2) + (p + 1) ln n, the noise being one
+    parameter more; of RMS misfits of best fits, n samples and p parameters, of any one shape.
     """
     counted = np.asarray(parameters) + 1
     square = np.asarray(samples) * 2 * np.log(misfit_rad)
@@ -292,10 +288,15 @@ def ranked(
     ]
 
 
+def _own_and_best(tried: Sequence[FittedModel], chosen: str) -> tuple[FittedModel, FittedModel]:
+    """Return the chosen model and the one of lowest BIC."""
+    own = next(each for each in tried if each.candidate == chosen)
+    return own, min(tried, key=lambda each: each.delta_bic)
+
+
 def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
     """Return the candidate that BIC prefers, if it is simpler and fits about as well; else None."""
-    own = next(each for each in tried if each.candidate == chosen)
-    best = min(tried, key=lambda each: each.delta_bic)
+    own, best = _own_and_best(tried, chosen)
     more = len(own.model.names) - len(best.model.names)
     # Difference of n ln(misfit^2), which leaves the number of parameters aside.
     worse = own.delta_aic - best.delta_aic - 2 * more
@@ -305,23 +306,13 @@ def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
 
 def asks_for_more(tried: Sequence[FittedModel], chosen: str) -> bool:
     """Return True if BIC prefers another model that is no simpler than the chosen one."""
-    own = next(each for each in tried if each.candidate == chosen)
-    best = min(tried, key=lambda each: each.delta_bic)
+    own, best = _own_and_best(tried, chosen)
     return own.delta_bic >= WORTH_A_MENTION and len(best.model.names) >= len(own.model.names)
 
 
 def advice(tried: Sequence[FittedModel], chosen: str) -> str:
-    """State in a sentence whether BIC prefers another model to the chosen one.
-
-    Parameters
-    ----------
-    tried
-        All models tried, the chosen one among them.
-    chosen
-        Name of the chosen one.
-    """
-    own = next(each for each in tried if each.candidate == chosen)
-    best = min(tried, key=lambda each: each.delta_bic)
+    """State in a sentence whether BIC prefers another of the models tried to the chosen one."""
+    own, best = _own_and_best(tried, chosen)
     title = own.model.title[0].upper() + own.model.title[1:]
     if own.delta_bic < WORTH_A_MENTION:
         return f"{title}: none of the {len(tried)} models tried suits the trace better."

@@ -1,18 +1,18 @@
-"""Outliers: readings of a trace with far more noise than the others.
+"""Noise of a trace, estimated from the residuals of its fit.
 
-Noise that grows with the rotation: a test for it, and its standard deviation.
+Outliers are readings with far more noise than those around (`outliers_of`).
 
-The test ranks the sizes of residuals against those of the rotation, so that outliers count no
-more than other readings [1]_. The standard deviation is that of two independent parts, one the
-same everywhere and one proportional to the rotation. Their shares are those of highest
-likelihood under Student's t distribution, which bounds the influence of outliers [2]_.
+Noise may grow with the rotation (`compute_growth`). A test ranks the sizes of residuals against
+those of the rotation, so that outliers count no more than other readings [1]_. The standard
+deviation is then that of two independent parts, one the same everywhere and one proportional to
+the rotation, with the shares of highest likelihood under Student's t distribution, which bounds
+the influence of outliers [2]_.
 
-Autocorrelation of the noise of a trace, estimated by restricted maximum likelihood (REML).
-
-The residuals of a fit have less noise than the trace, most of all at low frequencies,
-where parameters, offset and drift absorb noise. The restricted likelihood is that of
-the part that none of them can absorb, which removes the bias [1]_. A prior keeps the share
-of 1/f noise from vanishing, as it often would by chance alone [2]_.
+Autocorrelation is estimated by restricted maximum likelihood (`NoiseModelLikelihood`). Residuals
+have less noise than the trace, most of all at low frequencies, where parameters, offset and drift
+absorb it. The restricted likelihood is that of the part that none of them can absorb, which
+removes the bias [3]_. A prior keeps the share of 1/f noise from vanishing, as it often would by
+chance alone [4]_.
 
 References
 ----------
@@ -20,11 +20,15 @@ References
    of Psychology 15 (1904), 72-101.
 .. [2] K. L. Lange, R. J. A. Little and J. M. G. Taylor, Robust statistical modeling using the t
    distribution, Journal of the American Statistical Association 84 (1989), 881-896.
-.. [1] H. D. Patterson and R. Thompson, Recovery of inter-block information when block sizes are
+.. [3] H. D. Patterson and R. Thompson, Recovery of inter-block information when block sizes are
    unequal, Biometrika 58 (1971), 545-554.
-.. [2] Y. Chung, S. Rabe-Hesketh, V. Dorie, A. Gelman and J. Liu, A nondegenerate penalized
+.. [4] Y. Chung, S. Rabe-Hesketh, V. Dorie, A. Gelman and J. Liu, A nondegenerate penalized
    likelihood estimator for variance parameters in multilevel models, Psychometrika 78 (2013),
    685-709: a gamma prior of shape 2 on a standard deviation.
+.. [5] F. R. Hampel, The influence curve and its role in robust estimation, Journal of the
+   American Statistical Association 69 (1974), 383-393.
+.. [6] F. E. Satterthwaite, An approximate distribution of estimates of variance components,
+   Biometrics Bulletin 2 (1946), 110-114.
 """
 
 import numpy as np
@@ -43,7 +47,10 @@ _AROUND = 11
 
 
 def outliers_of(residual: Array, rounding_rad: float = 0.0) -> BoolArray:
-    """Find outliers among residuals by a Hampel filter [1]_.
+    """Find outliers among residuals by a Hampel filter [5]_, (n_samples,).
+
+    They are further than `FAR` from the median of the eleven residuals around, in standard
+    deviations estimated from the median of all such distances.
 
     Parameters
     ----------
@@ -51,18 +58,6 @@ def outliers_of(residual: Array, rounding_rad: float = 0.0) -> BoolArray:
         Residuals of a fit, over the noise's standard deviation where that is not the same.
     rounding_rad
         Step of the readings: a reading on the next step is no outlier.
-
-    Returns
-    -------
-    (n_samples,)
-        True where a residual is further than `FAR` from the median of eleven, in standard
-        deviations estimated from the median of all such distances, and no less than those of
-        rounding errors.
-
-    References
-    ----------
-    .. [1] F. R. Hampel, The influence curve and its role in robust estimation, Journal of the
-       American Statistical Association 69 (1974), 383-393.
     """
     apart = measure_distances(residual)
     # One residual in eleven is that median itself.
@@ -89,19 +84,9 @@ _TAILS, _GROWTH_LEAST, _GROWTH_MOST = 4.0, -9.0, 20.0
 
 
 def compute_growth(residual: Array, rotation_rad: Array) -> Array:
-    """Compute how the noise grows with the rotation.
+    """Compute how the noise grows with the rotation of a fit, (n_samples,), from its residuals.
 
-    Parameters
-    ----------
-    residual : (n_samples,)
-        Residuals of a fit.
-    rotation_rad : (n_samples,)
-        Rotation of the fit.
-
-    Returns
-    -------
-    (n_samples,)
-        Standard deviation of the noise over its root mean square; ones if it does not grow.
+    Returns its standard deviation over its root mean square; ones if it does not grow.
     """
     from scipy.optimize import minimize_scalar
 
@@ -196,7 +181,7 @@ class NoiseModelLikelihood:
         """Compute the degrees of freedom of the least known variance of a parameter.
 
         They are those of a chi-squared variable whose relative spread is that of the
-        variance, given the uncertainty of the noise model (Satterthwaite [1]_).
+        variance, given the uncertainty of the noise model (Satterthwaite [6]_).
 
         Parameters
         ----------
@@ -206,11 +191,6 @@ class NoiseModelLikelihood:
             Derivatives by the log-parameters, over the noise's standard deviation.
         nuisance : (n_functions, n_samples)
             Nuisance functions of the instrument.
-
-        References
-        ----------
-        .. [1] F. E. Satterthwaite, An approximate distribution of estimates of variance
-           components, Biometrics Bulletin 2 (1946), 110-114.
         """
 
         def variances(x: Array) -> Array:

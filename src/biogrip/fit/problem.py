@@ -1,7 +1,4 @@
-"""The result that every identification method returns.
-
-The identification problem: a trace, a sample model and the search range.
-"""
+"""The identification problem of one trace, and the result that every method returns."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -139,8 +136,8 @@ def make_problem(
 
     Parameters
     ----------
-    gripper, model, torque
-        Gripper, sample model and torques of the simulated responses.
+    gripper, model, torque, instrument
+        Gripper, sample model and torques of the simulated responses; instrument, for its words.
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
     ranges
@@ -149,8 +146,6 @@ def make_problem(
         Condensed rows of the protocol and times; traces that are fitted together share them.
     noise_rad
         Standard deviation of the noise, if it is known.
-    instrument
-        The instrument, for its words.
     """
     residuals = Residuals(
         gripper,

@@ -1,13 +1,11 @@
-"""Effect of the gripper's calibration uncertainty on a rotation.
+"""Identification of one trace together with its noise model and an uncertain gripper.
 
-Identification of one trace together with its noise model and an uncertain gripper.
-
-If the noise is white and the gripper known, this is one global fit. Otherwise the best fit,
-the autocorrelation of its residuals and the effect of the gripper's uncertainty are
-computed in turn, until none of them changes.
+If the noise is white and the gripper known, this is one global fit. Otherwise outliers are struck.
+Then the best fit, the autocorrelation of its residuals and the effect of the gripper's uncertainty
+are computed in turn, until none of them changes.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,10 +13,11 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
 from biogrip.errors import BiogripError
-from biogrip.fit.case_problem import NOT_FITTED, CaseProblem, SharedRows
+from biogrip.fit.case_problem import NOT_FITTED, CaseProblem
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
 from biogrip.fit.problem import Identification, Problem
+from biogrip.physics.condensed import Condensed
 from biogrip.physics.drift import drift_is_flow
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import TorqueHistory
@@ -38,19 +37,11 @@ def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Arra
     and has the amplitude of an error of three standard uncertainties. Without it limits would be
     too narrow where the noise is far below the square.
 
-    Parameters
-    ----------
-    case_problem
-        Assumptions of the identification.
-    time_s : (n_times,)
-        Ascending times.
-    parameters : (n_parameters,)
-        Searched parameters, SI units.
-
     Returns
     -------
     (2 n_properties, n_times)
-        Changes in rad of first order, a row for each uncertain property, then those of second.
+        Changes in rad of first order, a row for each uncertain property, then those of second, at
+        ascending times and with the searched parameters (n_parameters,).
 
     References
     ----------
@@ -165,18 +156,19 @@ def fit_traces(
 ) -> list[TraceFit]:
     """Fit each of several traces as `trace_fit` does, and those with plain noise together.
 
-    Parameters
-    ----------
-    case_problems
-        Assumptions of the identification of each trace.
-    traces
-        Times and rotations of each.
-    find
-        Function that finds the global optima of problems of given traces.
+    `find` finds the global optima of the problems of given traces. A trace is its times and
+    rotations, and has assumptions of its own.
     """
     plain = [trace for trace, case_problem in enumerate(case_problems) if case_problem.plain]
-    shared: SharedRows = {}
-    problems = [case_problems[trace].of(*traces[trace], shared=shared) for trace in plain]
+    # Traces with the same rows are fitted together.
+    rows: dict[Hashable, Condensed] = {}
+    problems = []
+    for trace in plain:
+        case_problem, (time_s, rotation_rad) = case_problems[trace], traces[trace]
+        key = case_problem.sets_condensed(time_s)
+        if key not in rows:
+            rows[key] = case_problem.condensed(time_s)
+        problems.append(case_problem.of(time_s, rotation_rad, condensed=rows[key]))
     optima = find(problems, plain) if plain else []
     found = {
         trace: TraceFit(problem, optimum, None, np.zeros(len(traces[trace][0]), dtype=bool))

@@ -1,12 +1,9 @@
-"""Constraints that hold quantities exactly at given values, in many fits at once.
+"""Increase of chi^2 with a quantity held at a value, for many traces and quantities at once.
 
-One member of a quantity, a parameter in it, is eliminated: it follows from the others
-and the value (generalized reduced gradients [1]_). The dominant member is eliminated,
-chosen anew at every step among those that are not at a bound: any other would move far
-in a small step. A stiff penalty residual instead would be violated, the more the better
-the trace determines the quantity.
-
-Increase of chi^2 with a quantity held at a value, for many traces and quantities at once.
+One member of a quantity, a parameter in it, is eliminated: it follows from the others and the value
+(generalized reduced gradients [1]_). The dominant member is eliminated, chosen anew at every step
+among those that are not at a bound: any other would move far in a small step. A stiff penalty
+residual instead would be violated, the more the better the trace determines the quantity.
 
 References
 ----------
@@ -38,12 +35,9 @@ class QuantityConstraint:
 
     Parameters
     ----------
-    quantities
-        Quantities that may be held.
-    which : (n,)
-        Index of the quantity that each fit holds.
-    targets : (n,)
-        Logarithm of its value, within the quantity's range.
+    quantities, which, targets
+        Quantities that may be held; index of the one that each fit holds, (n,), and the logarithm
+        of its value, within the quantity's range, (n,).
     low, high : (n, n_parameters)
         Bounds of the log-parameters of each fit.
     longest_s
@@ -256,10 +250,9 @@ class ConstrainedFits:
 
         Parameters
         ----------
-        profile : (n,)
-            Index of the profile: the trace that is fitted and the quantity that is held.
-        targets : (n,)
-            Logarithms at which the quantities are held, within their ranges.
+        profile, targets : (n,)
+            Index of the profile: the trace that is fitted and the quantity that is held; and the
+            logarithm at which it is held, within its range.
         near : (n, n_parameters)
             Starts, log-parameters; moved onto the constraint.
         tolerance
@@ -277,21 +270,16 @@ class ConstrainedFits:
         last_s = self._residuals.duration_s
         constraint = QuantityConstraint(self.quantities, which, targets, low, high, last_s)
         found = self._fits.fitted(near, trace, tolerance, constraint=constraint)
-        return self._increases(found, trace) + constraint.price(found.x) * self._ratio[
-            trace
-        ], found.x
+        price = constraint.price(found.x) * self._ratio[trace]
+        return self._increases(found, trace) + price, found.x
 
     def from_each(
         self, profile: IntArray, targets: Array, starts: Array, tolerance: float
     ) -> tuple[Array, Array]:
         """Fit as `at` does, each from several starts, (n_starts, n, n_parameters).
 
-        Returns
-        -------
-        increases : (n_starts, n)
-            Increase of chi^2 from each start.
-        log_parameters : (n, n_parameters)
-            Those of the lowest increase.
+        Returns the increases from each start, (n_starts, n), and the log-parameters of the lowest,
+        (n, n_parameters).
         """
         count, near = len(starts), np.concatenate(starts)
         increases, x = self.at(np.tile(profile, count), np.tile(targets, count), near, tolerance)
@@ -299,14 +287,10 @@ class ConstrainedFits:
         return increases, x.reshape(starts.shape)[np.argmin(increases, axis=0), range(len(profile))]
 
     def with_fixed(self, x: Array, fixed: BoolArray, tolerance: float) -> tuple[Array, Array]:
-        """Fit the first trace with some parameters fixed; tolerance and results as in `at`.
+        """Fit the first trace with some parameters fixed; tolerance and results are as in `at`.
 
-        Parameters
-        ----------
-        x : (n, n_parameters)
-            Starts, log-parameters.
-        fixed : (n_parameters,)
-            True for parameters fixed at their start, within the search range or not.
+        Starts are log-parameters, (n, n_parameters); the mask is true, (n_parameters,), for those
+        fixed at their start, within the search range or not.
         """
         trace = np.zeros(len(x), dtype=np.int64)
         low, high = (np.where(fixed, x, end[0]) for end in (self._fits.low, self._fits.high))

@@ -1,6 +1,14 @@
-"""Parameters that a fit leaves at an end of their search range, though chi^2 falls beyond it.
+"""Diagnosis of one trace: best fit, a verdict on every quantity, and doubts about the result.
 
-Diagnosis of one trace: best fit, a verdict on every quantity, and doubts about the result.
+Quantities are profiled (`compute_findings`), and combinations of those not determined. If a profile
+comes below the optimum, all is done again from there. Then notes are taken, in this order:
+
+1. A confidence set in parts is harmless.
+2. A parameter at an end of its search range, with chi^2 lower beyond it, rejects the fit.
+3. Residuals that are not white noise (`biogrip.judging.doubts`) make it doubtful; a misfit above
+   the noise of neighbouring readings rejects it, unless it looks like noise.
+4. Jaws that would have to pull are harmless.
+5. A fit that has not converged is doubtful, and so are arms that ring.
 """
 
 from collections.abc import Iterator, Sequence
@@ -35,43 +43,6 @@ from biogrip.physics.whitening import estimate_noise
 _NOTICEABLE = 9.0
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
 _WIDER, _BEYOND, _AT_END = np.log(1e3), 1.0, 1e-9
-
-
-def note_range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
-    """Yield a note for each parameter that the data push beyond an end of its search range.
-
-    The fit is repeated from beyond the end, with a wider range for this parameter. If the element
-    may as well vanish, chi^2 does not fall, and no note is due.
-
-    Parameters
-    ----------
-    likelihood
-        Best fit and noise.
-    model
-        The model that was searched.
-    """
-    problem, x = likelihood.problem, likelihood.best
-    for index, parameter in enumerate(model.parameters):
-        for end, outward, word in ((problem.low, -1.0, "lower"), (problem.high, 1.0, "upper")):
-            # An exponent at its upper end is that of a damper: there is nothing beyond.
-            bounded = outward > 0 and np.isfinite(parameter.below)
-            if bounded or abs(x[index] - end[index]) > _AT_END:
-                continue
-            start, low, high = x.copy(), problem.low.copy(), problem.high.copy()
-            start[index] += outward * _BEYOND
-            (low if outward < 0 else high)[index] += outward * _WIDER
-            wider = descend_from([replace(problem, low=low, high=high)], start)
-            if likelihood.increase(float(wider.misfit_rad[0])) < -_NOTICEABLE:
-                unit = f" {parameter.unit}" if parameter.unit else ""
-                yield Note(
-                    REJECTION,
-                    f"{parameter.name} is at the {word} end of its search range, "
-                    f"{np.exp(end[index]):.3g}{unit}, and beyond it the trace fits better: widen "
-                    f"search_range.{parameter.name} in the config, or check the set-up. Until "
-                    "then nothing is determined.",
-                )
-
-
 # A misfit larger than the scatter of neighbouring readings by this factor is not noise.
 _TOO_MUCH = 1.2
 # A misfit below these shares of the noise and of the peak is that of a trace without noise.
@@ -126,8 +97,7 @@ def diagnose_all(
 ) -> list[Diagnosis]:
     """Judge the identification of each of several traces by profile likelihoods.
 
-    If a profile comes below the optimum, the optimum was not the global one, and the trace
-    is judged again from the lower one. No diagnosis depends on the other traces.
+    No diagnosis depends on the other traces.
 
     Parameters
     ----------
@@ -152,10 +122,10 @@ def diagnose_all(
             )
             for trace in left
         ]
-        findings = compute_findings(likelihoods, parameters_and_sum(model))
-        trades = find_trade_offs(likelihoods, model, findings)
-        for place, trace in enumerate(left):
-            judged = Diagnosis(likelihoods[place], findings[place], trades[place], None, [])
+        every = compute_findings(likelihoods, parameters_and_sum(model))
+        for trace, likelihood, findings in zip(left, likelihoods, every, strict=True):
+            trades = find_trade_offs(likelihood, model, findings)
+            judged = Diagnosis(likelihood, findings, trades, None, [])
             lower = _lower_optimum(judged, best[trace])
             if lower is None:
                 done[trace] = _with_notes(judged, model, converged=best[trace].converged)
@@ -188,18 +158,44 @@ def _with_notes(judged: Diagnosis, model: SampleModel, *, converged: bool) -> Di
         for finding in findings
         if finding.gaps
     ]
-    notes += [*note_range_ends(likelihood, model), *_noise(likelihood)]
+    notes += [*_range_ends(likelihood, model), *_noise(likelihood)]
     notes += _pulling(grip, residuals.duration_s)
     if not converged:
-        notes.append(
-            Note(
-                DOUBT,
-                "The fit has not converged to its last digits: further Newton steps increase "
-                "chi-squared. Rely on its verdicts, not on its digits.",
-            )
+        text = (
+            "The fit has not converged to its last digits: further Newton steps increase "
+            "chi-squared. Rely on its verdicts, not on its digits."
         )
+        notes.append(Note(DOUBT, text))
     notes += _ringing(judged, rejected=compute_status(notes) == REJECTED)
     return replace(judged, grip=grip, notes=notes)
+
+
+def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
+    """Yield a note for each parameter that the data push beyond an end of its search range.
+
+    The fit is repeated from beyond the end, with a wider range for this parameter. If the element
+    may as well vanish, chi^2 does not fall, and no note is due.
+    """
+    problem, x = likelihood.problem, likelihood.best
+    for index, parameter in enumerate(model.parameters):
+        for end, outward, word in ((problem.low, -1.0, "lower"), (problem.high, 1.0, "upper")):
+            # An exponent at its upper end is that of a damper: there is nothing beyond.
+            bounded = outward > 0 and np.isfinite(parameter.below)
+            if bounded or abs(x[index] - end[index]) > _AT_END:
+                continue
+            start, low, high = x.copy(), problem.low.copy(), problem.high.copy()
+            start[index] += outward * _BEYOND
+            (low if outward < 0 else high)[index] += outward * _WIDER
+            wider = descend_from([replace(problem, low=low, high=high)], start)
+            if likelihood.increase(float(wider.misfit_rad[0])) < -_NOTICEABLE:
+                unit = f" {parameter.unit}" if parameter.unit else ""
+                yield Note(
+                    REJECTION,
+                    f"{parameter.name} is at the {word} end of its search range, "
+                    f"{np.exp(end[index]):.3g}{unit}, and beyond it the trace fits better: widen "
+                    f"search_range.{parameter.name} in the config, or check the set-up. Until "
+                    "then nothing is determined.",
+                )
 
 
 def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
@@ -251,9 +247,8 @@ def _noise(likelihood: Likelihood) -> Iterator[Note]:
         return
     residual = residuals.left(likelihood.best)
     growth = compute_growth(residual, residuals.rotation(likelihood.best))
-    doubts = list(
-        doubts_about_noise(residual, growth, residuals.instrument, residuals.rounding_rad)
-    )
+    rounding_rad = residuals.rounding_rad
+    doubts = list(doubts_about_noise(residual, growth, residuals.instrument, rounding_rad))
     yield from (Note(DOUBT, doubt) for doubt in doubts)
     if doubts and not residuals.coloured:
         yield Note(
@@ -270,8 +265,8 @@ def _noise(likelihood: Likelihood) -> Iterator[Note]:
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
     scale, even = residuals.noise_scale_rad, residual / growth
     if np.ptp(growth):
-        scale = max(scale, estimate_noise(even, residuals.rounding_rad))
-    bulk = even[~outliers_of(even, residuals.rounding_rad)]
+        scale = max(scale, estimate_noise(even, rounding_rad))
+    bulk = even[~outliers_of(even, rounding_rad)]
     bulk_rad = float(np.sqrt(np.mean(bulk**2)))
     if bulk_rad > _TOO_MUCH * scale:
         yield _misfit(likelihood, bulk_rad / scale, residual)

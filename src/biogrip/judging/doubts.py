@@ -1,8 +1,12 @@
-"""Status of a fit: ok, doubtful or rejected, by the notes on it.
+"""Notes on a fit, their weights, and the tests of its residuals that give reasons for them.
 
-Tests of whether the residuals of a fit are white noise, with their results in words.
-
-Misfit that looks like noise: correlated for too long, or in one stretch of the trace only.
+The heaviest note decides the status of a fit: ok, doubtful or rejected (`compute_status`).
+Residuals are tested for white noise, each test at the level `FALSE_ALARM`: correlation of
+neighbours, else the cumulative periodogram; means over stretches; number of outliers. Noise that
+grows with the rotation is told first, and the other tests are of what it leaves. A noise model
+may itself be misfit (`find_slow_misfit`): if it is correlated for too long. A misfit may be noise
+(`has_fast_noise`, `has_uneven_noise`): if it is correlated for a short time, or if the noise
+differs from one part of the trace to another.
 """
 
 from collections.abc import Iterator, Sequence
@@ -70,16 +74,15 @@ def doubts_about_noise(
 
     Parameters
     ----------
-    residual : (n_samples,)
-        Residuals of the fit.
-    growth : (n_samples,)
-        Growth of the noise with the rotation, see `compute_growth`. All other tests are of what
-        it leaves.
+    residual, growth : (n_samples,)
+        Residuals of the fit, and growth of the noise with the rotation, see `compute_growth`.
     instrument
         The instrument, for its words.
     rounding_rad
         Step of the readings.
     """
+    from scipy.special import ndtr, pdtrc
+
     read, wrong = instrument.read.name, instrument.suspects()
     many = f"{read}s" if instrument.has_jaws else "readings"
     if np.ptp(growth):
@@ -111,7 +114,8 @@ def doubts_about_noise(
             "model lacks, perhaps a drift of the instrument: the intervals are too narrow."
         )
     far = int(np.count_nonzero(outliers_of(residual, rounding_rad)))
-    chance = _chance_of_far(far, len(residual))
+    # Poisson's distribution of their number in Gaussian noise.
+    chance = float(pdtrc(far - 1, 2 * len(residual) * ndtr(-FAR))) if far else 1.0
     if chance < FALSE_ALARM:
         yield (
             f"Beyond {FAR:g} standard deviations from the samples around: "
@@ -130,8 +134,7 @@ def wandering(residual: Array) -> float:
 
     The statistic is the sum of n_i m_i^2 / sigma^2 over stretches of n_i readings and mean
     m_i, with a degree of freedom each; a fit only lowers it. The test detects parts of the
-    spectrum below some ten periods a trace, however small they are beside the noise of
-    single readings. The residual is that of `doubts_about_noise`.
+    spectrum below some ten periods a trace, however small they are beside single readings' noise.
     """
     from scipy.special import chdtrc
 
@@ -148,7 +151,7 @@ def uneven(residual: Array) -> float:
 
     The statistic is the largest distance between the cumulative periodogram and a straight
     line, with Kolmogorov's distribution. The test detects noise with a correlation time of some
-    readings and too small a share to correlate neighbours. `residual` as in `doubts_about_noise`.
+    readings and too small a share to correlate neighbours.
 
     References
     ----------
@@ -166,13 +169,6 @@ def uneven(residual: Array) -> float:
     reached = np.cumsum(power)[:-1] / np.sum(power)
     shares = np.arange(1, len(power)) / len(power)
     return float(kolmogorov(np.sqrt(len(power)) * np.max(np.abs(reached - shares))))
-
-
-def _chance_of_far(far: int, samples: int) -> float:
-    """Return the probability of as many outliers in Gaussian noise, by Poisson's distribution."""
-    from scipy.special import ndtr, pdtrc
-
-    return float(pdtrc(far - 1, 2 * samples * ndtr(-FAR))) if far else 1.0
 
 
 # Autocorrelated noise with most of the variance, and slower than this share of the trace, is
@@ -212,8 +208,7 @@ def find_slow_misfit(
 def has_fast_noise(residuals: Residuals, log_parameters: Array) -> bool:
     """Return True if what a fit leaves is stationary noise that is correlated for a short time.
 
-    False also where that is not estimated: of very many readings, and of residuals that are white
-    already.
+    That is not estimated of more than `MOST_SAMPLES` readings, nor of residuals that are white.
     """
     time_s = residuals.sampling_s
     if residuals.coloured or len(time_s) > MOST_SAMPLES:
@@ -228,17 +223,10 @@ def has_fast_noise(residuals: Residuals, log_parameters: Array) -> bool:
 
 
 def has_uneven_noise(residual: Array, rounding_rad: float) -> bool:
-    """Return True if what a fit leaves is as large as the scatter around it, where that differs.
+    """Return True if what a fit leaves, (n_samples,), is as large as a scatter that differs.
 
     So it is where an instrument averages for longer and longer, or settles at first. A misfit of
     the model is smooth, and larger than the scatter of neighbours wherever it is.
-
-    Parameters
-    ----------
-    residual : (n_samples,)
-        What the fit leaves.
-    rounding_rad
-        Step of the readings.
     """
     count = min(_SLOW_STRETCHES, len(residual) // _IN_A_STRETCH)
     if count < _FEWEST_STRETCHES:

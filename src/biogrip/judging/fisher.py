@@ -1,6 +1,4 @@
-"""Fisher information and Cramer-Rao bounds of the parameters of a trace.
-
-Cramer-Rao bounds of a simulated case, computed at its true parameters.
+"""Fisher information and Cramér-Rao bounds of the parameters of a trace [1]_, [2]_.
 
 References
 ----------
@@ -30,9 +28,9 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
     """Compute the first-order covariance of log-parameters estimated by least squares.
 
     With the same Gaussian noise everywhere, it is the inverse of the Fisher
-    information J J^T / sigma^2: the Cramer-Rao bound, which no unbiased
+    information J J^T / sigma^2: the Cramér-Rao bound, which no unbiased
     estimator undercuts. With noise that changes along the trace, it is the
-    covariance of unweighted least squares, A J diag(sigma^2) J^T A with
+    covariance of unweighted least squares [3]_, A J diag(sigma^2) J^T A with
     A = (J J^T)^-1, and no longer a bound.
 
     A parameter whose standard deviation exceeds one e-fold even with all others known
@@ -92,14 +90,12 @@ DETERMINED_PERCENT = 100.0
 def bounds_percent(
     problem: CaseProblem, noise: Noise, parameters: Mapping[str, float], time_s: Array
 ) -> list[tuple[Quantity, float]]:
-    """Compute the Cramer-Rao bounds of all identified quantities of a case with its noise.
+    """Compute the Cramér-Rao bounds of all identified quantities of a case with its noise.
 
     Parameters
     ----------
-    problem
-        Assumptions of the identification.
-    noise
-        Noise that is added to the rotation.
+    problem, noise
+        Assumptions of the identification, and noise that is added to the rotation.
     parameters
         Parameters at which the bounds are computed, SI units. A parameter of zero comes
         out as undetermined, for its logarithm has no effect on the trace.
@@ -109,9 +105,7 @@ def bounds_percent(
     Returns
     -------
     list of (Quantity, float)
-        Every parameter, and the sum of the exchangeable ones, each with 100
-        times the standard deviation of its logarithm; see
-        `biogrip.judging.fisher`. Without noise there are none: NaN.
+        Each with 100 times the standard deviation of its logarithm; NaN without noise.
     """
     model = problem.searched
     quantities = parameters_and_sum(model)
@@ -128,17 +122,11 @@ def bounds_percent(
 
 
 def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:
-    """Return the best and the worst determined quantity of several points.
+    """Return the best and the worst determined quantity of several points, by label.
 
-    Quantities count if their bound is below `DETERMINED_PERCENT` at half of the points or more.
-    Parts of a sum do not count beside it: a first-order bound does not show that they trade
-    against each other far from their values.
-
-    Parameters
-    ----------
-    bounds
-        Labels of quantities, and their bounds in percent at the points; NaN, without
-        noise, does not count.
+    Quantities count if their bound in percent, not NaN, is below `DETERMINED_PERCENT` at half of
+    the points or more. Parts of a sum do not count beside it: a first-order bound does not show
+    that they trade against each other far from their values.
     """
     percents: dict[str, list[float]] = {}
     for label, percent in bounds:

@@ -1,8 +1,9 @@
 """Noise and thresholds that define the profile likelihoods of a trace.
 
-The increase of chi^2 is that of the sum of squares over its minimum, in units of the
-noise's variance. A quantity has a confidence limit where the increase equals the
-threshold.
+The increase of chi^2 is that of the sum of squares over its minimum, in units of the noise's
+variance. A quantity has a confidence limit where the increase equals a threshold: a quantile of
+chi-squared with one degree of freedom if the noise is known, of F if it is estimated [1]_. It has
+none unless the increase at the end of the search range reaches the quantile at `CERTAIN`.
 
 References
 ----------
@@ -43,14 +44,11 @@ class Likelihood:
     noise_rad: float
     """Standard deviation of the noise, known or estimated from the residual."""
     threshold: float
-    """Increase of chi^2 at the confidence limits: a quantile of chi-squared with one degree of
-    freedom if the noise is known, of F if its variance or autocorrelation is estimated. It is that
-    of an interval with two ends. A single limit is one of these ends, and holds with more than the
-    confidence."""
+    """Increase of chi^2 at the confidence limits. It is that of an interval with two ends: a single
+    limit is one of these ends, and holds with more than the confidence."""
     certainty: float
-    """Increase that a profile must reach at an end of the range to have a limit on that side: the
-    quantile at `CERTAIN`. A profile that levels off between `threshold` and `certainty` would have
-    a limit by chance of the noise alone."""
+    """Increase that a profile must reach at an end of the range to have a limit on that side. A
+    profile that levels off between `threshold` and this would have a limit by chance alone."""
     freedom: float = inf
     """Degrees of freedom of the noise's estimated variance; infinite if the noise is known."""
 
@@ -92,15 +90,14 @@ def make_likelihood(
     noise_rad
         Standard deviation of the noise if it is known.
     """
-    levels = (confidence, CERTAIN)
-    freedom = inf
+    from scipy.special import fdtri
+
+    levels, freedom = (confidence, CERTAIN), inf
     if noise_rad is not None:
         threshold, certainty = (NormalDist().inv_cdf((1 + level) / 2) ** 2 for level in levels)
     else:
         left = problem.residuals.free - len(best)
         noise_rad = misfit_rad * float(np.sqrt(problem.residuals.samples / left))
-        from scipy.special import fdtri
-
         freedom = float(min(left, problem.residuals.freedom))
         threshold, certainty = fdtri(1, freedom, levels)
     return Likelihood(
@@ -111,16 +108,9 @@ def make_likelihood(
 def compute_fall(
     samples: int, before_rad: float, after_rad: float, noise_rad: float | None = None
 ) -> float:
-    """Compute the decrease of chi^2, i.e. twice the increase of the log-likelihood.
+    """Compute the decrease of chi^2, twice the increase of log-likelihood, between RMS residuals.
 
-    Parameters
-    ----------
-    samples
-        Number of samples.
-    before_rad, after_rad
-        RMS residuals of the worse and of the better fit.
-    noise_rad
-        Standard deviation of the noise, if known; otherwise each fit's misfit estimates it.
+    If the standard deviation of the noise is not known, each fit's misfit estimates it.
     """
     if noise_rad is not None:
         return samples * (before_rad**2 - after_rad**2) / noise_rad**2

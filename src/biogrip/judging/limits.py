@@ -1,12 +1,12 @@
-"""Root finding for the values at which profiles cross their thresholds, many at once.
+"""Confidence limits of the optimum's own basin, for all quantities of many traces at once.
 
-The Illinois rule [1]_ is applied to the square root of the increase of chi^2, which is
-nearly linear in the quantity's logarithm: a few fits suffice.
+From the optimum a quantity is moved outwards in doubling steps, with all else fitted from the last
+point, until chi^2 has increased by more than the threshold; then `crossings` finds the limit. If
+the basin leads into a lower one, the limits are those of both. The limits of a trace do not depend,
+to the last bit, on the other traces.
 
-Confidence limits of the optimum's own basin, for all quantities of many traces at once.
-
-The limits of a trace do not depend, to the last bit, on the other traces. If the
-optimum's basin leads into a lower one, the limits are those of both basins.
+Crossings are found by the Illinois rule [1]_, applied to the square root of the increase of chi^2,
+which is nearly linear in the quantity's logarithm: a few fits suffice.
 
 References
 ----------
@@ -58,10 +58,9 @@ def crossings(
         The traces and quantities.
     brackets
         Intervals to search; lower fits that are found at outer ends replace theirs, in place.
-    tolerance
-        Of the fits, see `biogrip.fit.local_fits`.
-    accuracy
-        Of the square root of the increase of chi^2.
+    tolerance, accuracy
+        Tolerance of the fits, see `biogrip.fit.local_fits`; and accuracy of the square root of
+        the increase of chi^2.
 
     Returns
     -------
@@ -128,13 +127,6 @@ def find_limits(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
 ) -> tuple[Array, dict[int, Array]]:
     """Find the confidence limits of quantities by profile likelihood, and optima that were missed.
-
-    Parameters
-    ----------
-    likelihoods
-        One per trace, of one or several experiments.
-    quantities
-        Quantities whose limits are computed.
 
     Returns
     -------

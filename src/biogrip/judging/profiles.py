@@ -1,11 +1,10 @@
-"""Points of profiles, fitted from one another, and added where drawings need more of them.
+"""Profile likelihood: minimum of chi^2 over all parameters against one quantity [1]_, [2]_.
 
-Profile likelihood: minimum of chi^2 over all parameters as a function of one quantity.
-
-All quantities of many traces are profiled at once. All points are fitted from the
-optimum, then from the fits of both neighbours, again and again where these have
-improved: a basin found anywhere in a profile is followed both ways. The confidence
-limits are the outermost: values between them may be excluded, too, which gaps tell.
+All quantities of many traces are profiled at once, over their whole search ranges. All points are
+fitted from the optimum, then from the fits of both neighbours, again and again where these have
+improved: a basin found anywhere in a profile is followed both ways. Where a profile exceeds the
+certainty at an end, its limit is where it crosses the threshold. The limits are the outermost:
+values between them may be excluded, too, which gaps tell.
 
 References
 ----------
@@ -114,10 +113,7 @@ class Points:
     def smooth(self, limits: Array) -> None:
         """Add points for drawing: the limits, then midpoints of neighbours that are far apart.
 
-        Parameters
-        ----------
-        limits : (n_profiles, 2)
-            Logarithms of the quantity, within the profiles; NaN where there is none.
+        Limits are (n_profiles, 2), logarithms within the profiles; NaN where there is none.
         """
         profile, side = np.nonzero(np.isfinite(limits))
         values = limits[profile, side]
@@ -179,21 +175,9 @@ class Profile:
 def compute_profiles(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Profile]]:
-    """Compute profile likelihoods over the whole ranges of quantities, and confidence limits.
+    """Compute profile likelihoods and confidence limits of quantities, by trace and quantity.
 
-    Parameters
-    ----------
-    likelihoods
-        One per trace.
-    quantities
-        Quantities that are profiled.
-    smooth
-        True to add as many points as a drawing needs.
-
-    Returns
-    -------
-    list of list of Profile
-        By trace, then by quantity.
+    If `smooth` is true, profiles have as many points as a drawing needs.
     """
     found: dict[int, list[Profile]] = {}
     count = len(quantities)
@@ -264,19 +248,9 @@ def _limits(points: Points) -> Array:
 def find_gaps(
     log_values: Array, increases: Array, threshold: float
 ) -> tuple[tuple[float, float], ...]:
-    """Find the stretches of a profile above the threshold that lie between points below it.
+    """Find the stretches of a profile above the threshold, between points below it.
 
-    Parameters
-    ----------
-    log_values, increases : (n_points,)
-        A profile.
-    threshold
-        Increase of chi^2 at the limits.
-
-    Returns
-    -------
-    tuple of (float, float)
-        Both ends of each, interpolated linearly in the square root of the increase.
+    Their ends are interpolated linearly in the square root of the increase.
     """
     inside = np.flatnonzero(increases < threshold).tolist()
     found = []

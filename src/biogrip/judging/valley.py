@@ -28,13 +28,6 @@ def compute_valley(
 ) -> tuple[dict[str, Any] | None, Array | None]:
     """Compute the increase of chi^2 over two exchangeable parameters, with the others fitted.
 
-    Parameters
-    ----------
-    likelihood
-        Best fit and noise.
-    model
-        The model whose parameters were searched.
-
     Returns
     -------
     dict or None

@@ -1,4 +1,10 @@
-"""Verdicts on quantities: determined, bounded on one side, or not determined by a trace."""
+"""Verdicts on quantities: determined, bounded on one side, or not determined by a trace.
+
+The verdict is which of the two confidence limits a quantity's profile has (`Profile.low`, `high`):
+both, one, or none. A profile has a limit on a side if it exceeds `Likelihood.certainty` (99.9 %) at
+that end of the search range; the limit is where it crosses `Likelihood.threshold` (95 %, or the
+confidence asked for). `Finding.words` has the words of each.
+"""
 
 import math
 from collections.abc import Sequence
@@ -81,34 +87,30 @@ class Finding:
 
     def words(self) -> str:
         """Return the verdict in words, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
-        but = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in self.gaps)
-        words = self._limits_in_words() + (f", except {but}{self._unit}" if but else "")
-        provided = self.quantity.provided
-        return (
-            f"{words}, provided {provided}"
-            if provided and self.verdict != NOT_DETERMINED
-            else words
-        )
+        words, unit = self._limits_in_words(), self._unit
+        if self.gaps:
+            but = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in self.gaps)
+            words += f", except {but}{unit}"
+        if self.quantity.provided and self.is_bounded:
+            words += f", provided {self.quantity.provided}"
+        return words
 
     def _limits_in_words(self) -> str:
-        unit = self._unit
-        if self.verdict == DETERMINED:
-            assert self.low is not None
-            assert self.high is not None
-            factor = math.sqrt(self.high / self.low)
+        low, high, unit = self.low, self.high, self._unit
+        if low is not None and high is not None:
+            factor = math.sqrt(high / low)
             how = f" only within a factor of {factor:.2g}" if factor > WIDE else ""
-            return f"determined{how}: {self.value:.3g}{unit} ({self.low:.3g} to {self.high:.3g})"
-        if self.verdict == BOUNDED_BELOW:
-            return f"only bounded below: at least {self.low:.2g}{unit}"
-        if self.verdict == BOUNDED_ABOVE:
-            return f"only bounded above: at most {self.high:.2g}{unit}"
-        certainty = self.profile.certainty
-        if certainty is None:
+            return f"determined{how}: {self.value:.3g}{unit} ({low:.3g} to {high:.3g})"
+        if low is not None:
+            return f"only bounded below: at least {low:.2g}{unit}"
+        if high is not None:
+            return f"only bounded above: at most {high:.2g}{unit}"
+        if self.profile.certainty is None:
             return "not determined: the trace sets no limit within the search range"
         increase = max(self.profile.increases[[0, -1]])
         return (
             "not determined: towards an end of the search range the fit is worse, but not clearly "
-            f"(χ² is higher by {increase:.2g}, and a limit takes {certainty:.3g})"
+            f"(χ² is higher by {increase:.2g}, and a limit takes {self.profile.certainty:.3g})"
         )
 
     @property
@@ -143,83 +145,42 @@ def compute_findings(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
 ) -> list[list[Finding]]:
     """Profile quantities in each of several traces, and reach a verdict on each of them."""
-    return [
-        [
-            Finding(quantity, profile, likelihood.deviation(quantity))
-            for quantity, profile in zip(quantities, profiles, strict=True)
-        ]
-        for likelihood, profiles in zip(
-            likelihoods, compute_profiles(likelihoods, quantities), strict=True
-        )
-    ]
+    found = []
+    every = compute_profiles(likelihoods, quantities)
+    for likelihood, profiles in zip(likelihoods, every, strict=True):
+        deviations = map(likelihood.deviation, quantities)
+        found.append(list(map(Finding, quantities, profiles, deviations)))
+    return found
 
 
 def find_trade_offs(
-    likelihoods: Sequence[Likelihood], model: SampleModel, findings: Sequence[list[Finding]]
-) -> list[list[Trade]]:
+    likelihood: Likelihood, model: SampleModel, findings: Sequence[Finding]
+) -> list[Trade]:
     """Find determined combinations of parameters that are not determined themselves.
 
-    Parameters
-    ----------
-    likelihoods
-        One per trace.
-    model
-        Their model.
-    findings
-        Findings of each trace.
-
-    Returns
-    -------
-    list of list of Trade
-        By trace.
+    Combinations among the findings come first. Of other pairs of undetermined parameters, the
+    combination known best to first order is profiled, if it is worth a look.
     """
-    pairs = zip(likelihoods, findings, strict=True)
-    candidates = [_pairs_that_may_trade(*pair, model) for pair in pairs]
-    # Traces with the same combination are profiled together.
-    traces: dict[Quantity, list[int]] = {}
-    for trace, (_, of_pairs) in enumerate(candidates):
-        for quantity in of_pairs.values():
-            traces.setdefault(quantity, []).append(trace)
-    profiled = {
-        (trace, quantity): finding
-        for quantity, own in traces.items()
-        for trace, (finding,) in zip(
-            own, compute_findings([likelihoods[t] for t in own], [quantity]), strict=True
-        )
-    }
-    names = [parameter.name for parameter in model.parameters]
-    return [
-        [
-            Trade(tuple(names[index] for index in members), finding)
-            for members, finding in (
-                *known.items(),
-                *((pair, profiled[trace, quantity]) for pair, quantity in of_pairs.items()),
-            )
-            if finding.verdict == DETERMINED
-        ]
-        for trace, (known, of_pairs) in enumerate(candidates)
-    ]
-
-
-def _pairs_that_may_trade(
-    likelihood: Likelihood, findings: Sequence[Finding], model: SampleModel
-) -> tuple[dict[tuple[int, ...], Finding], dict[tuple[int, ...], Quantity]]:
-    """Return combinations of undetermined parameters: those profiled, and others worth a look."""
-    open_ones = [
+    left = [
         finding.quantity.members[0]
         for finding in findings
         if len(finding.quantity.members) == 1 and finding.verdict != DETERMINED
     ]
-    known: dict[tuple[int, ...], Finding] = {}
+    found: list[tuple[Sequence[int], Finding]] = []
     for finding in findings:
-        members = tuple(index for index in finding.quantity.members if index in open_ones)
+        members = [index for index in finding.quantity.members if index in left]
         if len(members) > 1:
-            known[members] = finding
-            open_ones = [index for index in open_ones if index not in members]
-    others: dict[tuple[int, ...], Quantity] = {}
-    for pair in combinations(open_ones, 2):
+            found.append((members, finding))
+            left = [index for index in left if index not in members]
+    for pair in combinations(left, 2):
         candidates = find_combinations(model, list(pair))
         deviations = [likelihood.deviation(quantity) for quantity in candidates]
         if min(deviations, default=np.inf) < _WORTH_A_LOOK:
-            others[pair] = candidates[int(np.argmin(deviations))]
-    return known, others
+            best = candidates[int(np.argmin(deviations))]
+            ((finding,),) = compute_findings([likelihood], [best])
+            found.append((pair, finding))
+    return [
+        Trade(tuple(model.parameters[index].name for index in members), finding)
+        for members, finding in found
+        if finding.verdict == DETERMINED
+    ]

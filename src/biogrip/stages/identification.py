@@ -61,7 +61,7 @@ def identify(
         traces = [recorded.rotation_rad[seed] for seed in group]
         rngs = [stream(case.study.study_seed, case.name, seed, method) for seed in group]
         start = time.process_time()
-        problems = [case_problem.of(recorded.time_s, trace) for trace in traces]
+        problems = case_problem.of_each(recorded.time_s, traces)
         answers = identified(problems, rngs, progress.within)
         cpu_s = (time.process_time() - start) / len(group)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
@@ -117,7 +117,8 @@ def fit(
     progress = Progress(f"{case.name}, models", len(models) * len(seeds))
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
     for group in groups(seeds):
-        traces = [problem.of(recorded.time_s, recorded.rotation_rad[seed]) for seed in group]
+        rotations = (recorded.rotation_rad[seed] for seed in group)
+        traces = problem.of_each(recorded.time_s, rotations)
         found = fit_models(
             {
                 name: [problem.for_model(trace, model) for trace in traces]

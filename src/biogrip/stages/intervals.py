@@ -81,7 +81,7 @@ def _rows(
             likelihoods, limits = _fitted(case, case_problem, group, time_s, traces, quantities)
             known = np.tile(truth, (len(group), 1))
             if len(informed):
-                simpler = [case_problem.of(time_s, trace, rest_known) for trace in traces]
+                simpler = case_problem.of_each(time_s, traces, rest_known)
                 known[:, informed] = fit_from(simpler, truth[informed]).x
             for index, seed in enumerate(group):
                 with_limits = dict(zip(selected, limits[index], strict=True))
@@ -143,7 +143,7 @@ def _optima(
 ) -> Iterator[tuple[Problem, Identification]]:
     """Yield problems and fits of traces, fitted together if their noise is white."""
     if case_problem.plain:
-        problems = [case_problem.of(time_s, trace) for trace in traces]
+        problems = case_problem.of_each(time_s, traces)
         identify = identifier("least_squares", case.least_squares)
         yield from zip(problems, identify(problems, rngs, silent), strict=True)
         return

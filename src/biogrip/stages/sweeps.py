@@ -182,7 +182,7 @@ def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, 
                 for purpose in ("noise", "genetic")
             )
             traces = [add_noise(rotation, interpretation.noise, rng, time_s) for rng in noises]
-            problems = [case_problem.of(time_s, trace) for trace in traces]
+            problems = case_problem.of_each(time_s, traces)
             answers = identify_many(problems, interpretation.genetic, searches)
             for seed, trace, answer in zip(seeds, traces, answers, strict=True):
                 names = case_problem.searched.names
