@@ -234,8 +234,8 @@ def _problem(case: Case, first: Case) -> str | None:
         return "measurement.noise: allowed is white noise, of a share of the peak or a level_rad."
     if measured.fits_offset or measured.fits_drift:
         return "measurement: found an offset or drift to be fitted along, allowed is neither."
-    if case.nonlinear_target or case.problem.nonlinear:
-        return "models: found nonlinear, allowed is linear."
+    if case.nonlinear_target:
+        return "models.target: found nonlinear, allowed is linear."
     return None
 
 

@@ -57,11 +57,10 @@ def condensed_of(
     *,
     offset: bool = False,
     drift: bool = False,
-    nonlinear: bool = False,
 ) -> Condensed:
     """Rows that stand for the samples of any trace at these times."""
     nuisance = nuisance_basis(time_s, offset=offset, drift=drift)
-    return Condensed(torque, time_s, nuisance, nonlinear=nonlinear)
+    return Condensed(torque, time_s, nuisance)
 
 
 def problem_alone(
@@ -111,11 +110,9 @@ def case_problem(
     count: int,
     model: SampleModel = MODEL,
     level: float = 0.1,
-    *,
-    nonlinear: bool = False,
 ) -> list[Problem]:
     """Problems that share everything but the noise."""
-    condensed = condensed_of(TORQUE, times, nonlinear=nonlinear)
+    condensed = condensed_of(TORQUE, times)
     noise = Noise("gaussian", level, "peak")
     traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
     return [

@@ -73,31 +73,14 @@ def test_a_clean_trace_leaves_no_residual(gripper: Gripper) -> None:
     assert np.linalg.norm(condensed_rows(exact, x)[0]) < 1e-10 * np.linalg.norm(clean)
 
 
-@pytest.mark.parametrize("times", TIMES)
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_the_nonlinear_model_is_condensed_along(
-    gripper: Gripper, protocol: str, times: str
-) -> None:
-    torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES[times]
-    condensed = condensed_of(torque, time_s, offset=True, drift=True, nonlinear=True)
-    model, x = MODELS["liquid_drop"], np.log([9.5, 0.3, 10.0])
-    assert_alike(
-        Residuals(
-            gripper, model, torque, time_s, noise(len(time_s)), condensed, instrument=GRIPPER
-        ),
-        x,
-    )
-
-
-@pytest.mark.parametrize("nonlinear", [False, True])
 @pytest.mark.parametrize("times", DENSE)
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_too_many_nodes_have_a_row_each(
-    gripper: Gripper, protocol: str, times: str, nonlinear: bool, monkeypatch: pytest.MonkeyPatch
+    gripper: Gripper, protocol: str, times: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("biogrip.physics.condensed.MOST_NODES", 10)
     torque, time_s = torque_history(PROTOCOLS[protocol]), DENSE[times]
-    condensed = condensed_of(torque, time_s, offset=True, nonlinear=nonlinear)
+    condensed = condensed_of(torque, time_s, offset=True)
     assert not condensed.reduced
     residuals = Residuals(
         gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed, instrument=GRIPPER

@@ -15,7 +15,7 @@ from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import Load, Phase, TorqueHistory, hold, load, torque_history
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.sample_model import Network, SampleModel
-from biogrip.physics.sensitivity import rotations_and_sensitivities
+from biogrip.physics.sensitivity import linear_responses
 from biogrip.physics.simulation import simulated_rotation
 from tests.helpers.power_law import inverted
 
@@ -110,9 +110,7 @@ def test_derivatives_are_those_of_finite_differences(model: SampleModel, deforms
     logs = np.log([model.example])
 
     def rows(at: Array) -> Array:
-        return rotations_and_sensitivities(
-            NO_ARMS, model, history, times, np.exp(at), nonlinear=False
-        )[0]
+        return linear_responses(NO_ARMS, model, history, times, np.exp(at))[0]
 
     found = rows(logs)
     assert found[0] == pytest.approx(simulated(example(model), history, times), rel=1e-12)

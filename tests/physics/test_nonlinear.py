@@ -13,8 +13,6 @@ from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.nonlinear import (
-    COARSE,
-    FINE,
     correction,
     nonlinear_rotation,
 )
@@ -147,9 +145,7 @@ def test_against_radau(case: int) -> None:
     torques = [(200.0, 1.6e-9 * factor, 1.6e-9 * factor), (400.0, *(2 * [0.32e-9 * factor]))]
     network, torque = generalized_maxwell(sample), steps_of(torques)
     linear = step_response(gripper, network, inertia=False)
-    ours = (
-        rotation(linear, torque, TIMES)[0] + correction(gripper, network, torque, FINE).at(TIMES)[0]
-    )
+    ours = rotation(linear, torque, TIMES)[0] + correction(gripper, network, torque).at(TIMES)[0]
     peak = float(np.abs(ours).max())
     expected = symmetric_radau(
         gripper, sample, [(end, tau) for end, tau, *_ in torques], TIMES, peak
@@ -176,7 +172,7 @@ def test_unequal_arms_against_radau(case: int, equal_torques: bool) -> None:
         torques = [(end, left, left) for end, left, _ in torques]
     network, torque = generalized_maxwell(sample), steps_of(torques)
     linear = step_response(gripper, network, symmetric=False, inertia=False, both_arms=True)
-    found = correction(gripper, network, torque, FINE)
+    found = correction(gripper, network, torque)
     both = radau(gripper, sample, torques, TIMES)
     peak = max(np.abs(phi).max() for phi in both)
     for arm, expected in enumerate(both):
@@ -223,7 +219,7 @@ def test_energy_balance_closes() -> None:
     ramp, swing = Load(0.0, 2e-9), Load(2e-8, 0.0, 0.0, (Harmonic(8e-9, 1.5, -math.pi / 2),))
     torque = torque_history((Phase(10.0, ramp, ramp), Phase(10.0, swing, swing), hold(10.0, 5e-9)))
     network = generalized_maxwell(sample)
-    found = correction(gripper, network, torque, FINE)
+    found = correction(gripper, network, torque)
     linear = step_response(gripper, network, inertia=False)
 
     n = 24
@@ -276,18 +272,10 @@ def test_the_correction_is_of_second_order(gripper: Gripper) -> None:
     sizes = []
     for factor in (0.1, 1.0):
         torque = steps_of([(200.0, *(2 * [1.6e-9 * factor])), (400.0, *(2 * [0.32e-9 * factor]))])
-        sizes.append(np.abs(correction(gripper, network, torque, FINE).at(TIMES)).max(axis=1))
+        sizes.append(np.abs(correction(gripper, network, torque).at(TIMES)).max(axis=1))
     # The third order is a thousandth of it at these rotations.
     visible = sizes[0] > 1e-15
     np.testing.assert_allclose((sizes[1] / sizes[0])[visible], 100, rtol=2e-2)
-
-
-def test_what_a_population_is_given_is_far_below_the_noise(gripper: Gripper) -> None:
-    network = generalized_maxwell(random_samples(300, 9))
-    torque = steps_of([(200.0, 1.6e-9, 1.6e-9), (400.0, 0.32e-9, 0.32e-9)])
-    fine, coarse = (correction(gripper, network, torque, a).at(TIMES) for a in (FINE, COARSE))
-    peak = np.abs(rotation(step_response(gripper, network), torque, TIMES)).max(axis=1)
-    assert np.max(np.abs(fine - coarse).max(axis=1) / peak) < 1e-6
 
 
 def test_rotation_of_a_tip_against_50_digits(gripper: Gripper) -> None:

@@ -12,7 +12,6 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.nonlinear import nonlinear_rotation
 from biogrip.physics.protocol import TorqueHistory, torque_history
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.sample_model import SampleModel, with_fixed
@@ -114,24 +113,6 @@ def _check(gripper: Gripper, model: SampleModel, protocol: str, sample: Array) -
         # Extrapolated: h^4 = 1e-12, and rounding 1e-16 / h = 1e-13; derivatives cancel some more.
         exact = (4 * pairs[1] - pairs[0]) / 3
         assert np.max(np.abs(slopes[index] - exact)) < 1e-9 * np.abs(phi).max()
-
-
-def test_nonlinear_sensitivity_is_that_of_the_nonlinear_model(
-    gripper: Gripper, steps: TorqueHistory
-) -> None:
-    model, sample = MODELS["generalized_maxwell"], np.array([1.0, 0.05, 10.0, 0.5])
-    phi, slopes = rotation_and_sensitivity(gripper, model, steps, TIMES, sample, nonlinear=True)
-    exact = nonlinear_rotation(gripper, model.network(sample), steps, TIMES)[0]
-    # The population's mesh is coarse: 1e-6 of the peak (see test_nonlinear).
-    assert np.max(np.abs(phi - exact)[1:]) < 3e-6 * exact.max()
-    for index in range(4):
-        h = 1e-3 * np.eye(4)[index]
-        ahead, behind = (
-            nonlinear_rotation(gripper, model.network(sample * np.exp(s)), steps, TIMES)[0]
-            for s in (h, -h)
-        )
-        difference = (ahead - behind) / 2e-3
-        assert np.max(np.abs(slopes[index] - difference)[1:]) < 1e-5 * exact.max()
 
 
 @pytest.mark.parametrize(("offset", "drift"), [(True, False), (False, True), (True, True)])

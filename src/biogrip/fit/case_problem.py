@@ -44,8 +44,6 @@ class CaseProblem:
     """Parameters that are known, by name."""
     instrument: Instrument
     """What is held and read; other than a gripper, it has `NO_ARMS`."""
-    nonlinear: bool = False
-    """True to simulate the nonlinear model."""
     offset: bool = False
     """True if the instrument may have added a constant."""
     drift: bool = False
@@ -165,15 +163,7 @@ class CaseProblem:
     def _sets_rows(self) -> tuple[Hashable, ...]:
         """All that condensed rows depend on but the sampling times."""
         sd = None if self.sd_rad is None else self.sd_rad.tobytes()
-        return (
-            self.gripper,
-            self.phases,
-            self.instrument,
-            self.nonlinear,
-            self.offset,
-            self.drift,
-            sd,
-        )
+        return (self.gripper, self.phases, self.instrument, self.offset, self.drift, sd)
 
     def _condense_weighted(self, time_s: Array) -> Condensed:
         if self.sd_rad is not None:
@@ -223,7 +213,7 @@ class CaseProblem:
     def _condense(
         self, time_s: Array, basis: Array, whitening: Whitening | None = None
     ) -> Condensed:
-        return Condensed(self.torque, time_s, basis, nonlinear=self.nonlinear, whitening=whitening)
+        return Condensed(self.torque, time_s, basis, whitening=whitening)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""

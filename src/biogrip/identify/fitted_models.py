@@ -123,8 +123,7 @@ def models_tried(
 ) -> list[FittedModels]:
     """Fit several sample models to each trace with the noise model of its fit.
 
-    None are fitted with fixed parameters, with the nonlinear model, which takes minutes, or if
-    there is only one model.
+    None are fitted with fixed parameters, or if there is only one model.
 
     Parameters
     ----------
@@ -145,7 +144,7 @@ def models_tried(
 
 def _candidates(trace: TraceCase, fit: TraceFit) -> tuple[str, ...]:
     """Return the names of the models to fit to a trace, none if nothing is compared."""
-    if trace.problem.nonlinear or trace.problem.fixed:
+    if trace.problem.fixed:
         return ()
     # With very many samples the dozens of modes of a springpot would take gigabytes.
     few = fit.problem.residuals.samples <= _MOST_SAMPLES

@@ -383,7 +383,7 @@ def _instrument(
     time_s, measured = recorded.time_s, recorded.rotation_rad[0]
     network = case_problem.searched.network(parameters)
     simulated = simulated_rotation(
-        case_problem.gripper, network, case_problem.torque, time_s, nonlinear=case_problem.nonlinear
+        case_problem.gripper, network, case_problem.torque, time_s, nonlinear=False
     )[0]
     basis = case_problem.nuisance(time_s)
     added = within(basis, measured - simulated, case_problem.sd_rad)

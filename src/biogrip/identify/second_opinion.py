@@ -42,8 +42,8 @@ def second_opinions(
     -------
     list of list of Note
         By trace, at most one; with a rejected fit, only if that with both terms is not. None if
-        both are declared already, if the model is nonlinear, or if the noise model is coloured,
-        which fits both unless they are refused.
+        both are declared already, or if the noise model is coloured, which fits
+        both unless they are refused.
     """
     notes: list[list[Note]] = [[] for _ in traces]
     tried = [index for index, trace in enumerate(traces) if _may_have_more(trace.problem)]
@@ -81,7 +81,7 @@ class _Decrease:
 
 def _may_have_more(case_problem: CaseProblem) -> bool:
     both = case_problem.offset and case_problem.drift
-    return not (both or case_problem.nonlinear or case_problem.coloured)
+    return not (both or case_problem.coloured)
 
 
 def _fitted(

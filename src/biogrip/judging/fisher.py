@@ -119,7 +119,7 @@ def bounds_percent(
         return [(q, math.nan) for q in quantities]
     values = np.array([parameters[name] for name in model.names])
     rotation, sensitivity = rotation_and_sensitivity(
-        problem.gripper, model, problem.torque, time_s, values, nonlinear=problem.nonlinear
+        problem.gripper, model, problem.torque, time_s, values
     )
     sigma = standard_deviation(rotation, noise)
     with np.errstate(divide="ignore"):

@@ -42,7 +42,6 @@ from biogrip.arrays import Array, IntArray
 from biogrip.physics.drift import without
 from biogrip.physics.mode_growth import compute_growth
 from biogrip.physics.mode_rows import ModeRows
-from biogrip.physics.nonlinear import COARSE, STAGES, mesh, mesh_functions
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.whitening import Whitening
 
@@ -76,27 +75,18 @@ class _Piece:
 class DenseSamples:
     """Rows with the products of all readings, for any smooth functions of time.
 
-    Functions are smooth between changes of the torque, and may be less so at further edges,
-    (n_edges,). Sampling times, (n_samples,), ascend. Only if `dense` may nodes replace readings;
-    otherwise each reading is a node.
+    Functions are smooth between changes of the torque. Sampling times, (n_samples,), ascend. Only
+    if `dense` may nodes replace readings; otherwise each reading is a node.
     """
 
-    def __init__(
-        self,
-        torque: TorqueHistory,
-        time_s: Array,
-        further_edges_s: Array | None = None,
-        *,
-        dense: bool = True,
-    ) -> None:
+    def __init__(self, torque: TorqueHistory, time_s: Array, *, dense: bool = True) -> None:
         self._all_s = time_s
         self._kept: dict[tuple[int, int], list[tuple[slice, Array]]] = {}
         starts = [start for start, *_ in (*torque.jumps, *torque.swings)]
         self._starts_s = np.unique([-np.inf, *starts])
         omega = torque.omega_rad_per_s
         self._longest_s = 2 * np.pi / omega.max() if len(omega) else np.inf
-        edges = starts if further_edges_s is None else [*starts, *further_edges_s]
-        bounds = np.unique(np.concatenate(([0], time_s.searchsorted(edges), [len(time_s)])))
+        bounds = np.unique(np.concatenate(([0], time_s.searchsorted(starts), [len(time_s)])))
         divided = (p for ends in pairwise(bounds) for p in self._divided(*ends))
         self._pieces = _joined(divided) if dense else [_Piece(0, len(time_s), None)]
         self.time_s = np.concatenate([self._nodes(piece) for piece in self._pieces])
@@ -215,8 +205,6 @@ MOST_NODES = 50_000
 _SPACING = 0.25
 # Slowest rate times T, and fastest rate times the shortest sampling interval.
 _SLOWEST, _FASTEST = 1e-6, 1e3
-# Most values of a correction: a mesh that follows a sinusoid of the torque may have thousands.
-_MOST_FUNCTIONS = 1000
 # Directions with a smaller relative singular value are rounding errors.
 _RANK = 1e-14
 
@@ -232,8 +220,6 @@ class Condensed:
         Ascending sampling times.
     nuisance : (n_functions, n_samples)
         Functions projected out of trace and responses, see `nuisance_basis`, `with_uncertain`.
-    nonlinear
-        True if rows must also represent corrections by the nonlinear model.
     whitening
         Transformation that whitens noise and projects nuisance out; None for white noise.
     """
@@ -244,11 +230,9 @@ class Condensed:
         time_s: Array,
         nuisance: Array,
         *,
-        nonlinear: bool = False,
         whitening: Whitening | None = None,
     ) -> None:
         self.nuisance = nuisance if whitening is None else whitening.nuisance
-        self.nonlinear = nonlinear
         self._whitening = whitening
         self._torque = torque
         self._all_s = time_s
@@ -259,7 +243,6 @@ class Condensed:
             self._torque,
             self._all_s - change_s,
             self.nuisance,
-            nonlinear=self.nonlinear,
             whitening=self._whitening,
         )
 
@@ -277,8 +260,7 @@ class Condensed:
     @cached_property
     def reduced(self) -> bool:
         """True if rows are fewer than nodes."""
-        functions = len(self._edges_s) * (STAGES + 1)
-        return len(self.dense.time_s) <= MOST_NODES and functions <= _MOST_FUNCTIONS
+        return len(self.dense.time_s) <= MOST_NODES
 
     def of_trace(self, rotation_rad: Array) -> Array:
         """Return rows of a trace without nuisance, (n_rows,); no response reaches the last."""
@@ -326,26 +308,7 @@ class Condensed:
         """Nodes that replace the readings."""
         # Whitened functions are not smooth: each reading is a node.
         dense = self._whitening is None
-        return DenseSamples(self._torque, self._all_s, self._edges_s, dense=dense)
-
-    @cached_property
-    def _edges_s(self) -> Array:
-        """Edges of the mesh of a correction, if there is one."""
-        return mesh(self._torque, COARSE) if self.nonlinear else np.zeros(0)
-
-    @cached_property
-    def _corrections(self) -> Array:
-        """Rows of the nodes of a basis of corrections, (n_functions, n_nodes)."""
-        if not self.nonlinear:
-            return np.zeros((0, len(self.dense.time_s)))
-        functions = mesh_functions(self._edges_s, self.dense.time_s)
-        return self.dense.rows_of_values(functions)
-
-    @cached_property
-    def of_corrections(self) -> Array:
-        """Matrix that turns values of a `Correction`, from its left, into rows."""
-        rows = self._cleared_rows(self._corrections) @ self._basis
-        return np.pad(rows, ((0, 0), (0, 1)))
+        return DenseSamples(self._torque, self._all_s, dense=dense)
 
     @cached_property
     def _nuisance_rows(self) -> Array:
@@ -367,10 +330,7 @@ class Condensed:
         size = np.linalg.norm(growth, axis=2, keepdims=True)
         size[size == 0] = 1.0
         family = np.concatenate((growth / size, rates[:, None] * slope / size))
-        weights = np.linalg.norm(self._corrections, axis=1)
-        projected = self._corrections[weights > 0] / weights[weights > 0, None]
-        family = np.concatenate((family.reshape(-1, len(time_s)), projected))
-        basis, triangle = np.linalg.qr(family.T)
+        basis, triangle = np.linalg.qr(family.reshape(-1, len(time_s)).T)
         turned, share, _ = np.linalg.svd(triangle)
         return basis @ turned[:, share > _RANK * share[0]]
 

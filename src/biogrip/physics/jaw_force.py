@@ -35,7 +35,7 @@ from biogrip.physics.linear import (
     transfer_functions,
 )
 from biogrip.physics.many_branches import modes_of_many
-from biogrip.physics.nonlinear import FINE, computed_correction
+from biogrip.physics.nonlinear import computed_correction
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.sample_model import MOST_BRANCHES, Network
 
@@ -109,7 +109,7 @@ def jaw_force(
     if nonlinear:
         # Arms with inertia have not moved yet at the instant of a step.
         instants = np.nextafter(time_s, -np.inf) if inertia else time_s
-        more = computed_correction(gripper, network, torque, FINE).force_at(instants)
+        more = computed_correction(gripper, network, torque).force_at(instants)
         force += np.where(instants < 0, 0, more)
     return force
 

@@ -13,21 +13,15 @@ from biogrip.physics.drift import taken_out
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.jaw_force import Grip, compute_grip
-from biogrip.physics.linear import LEFT
 from biogrip.physics.modes import compute_protocol_modes
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.sample_model import Network, SampleModel
-from biogrip.physics.sensitivity import (
-    corrections,
-    differences,
-    linear_responses,
-    rotations_and_sensitivities,
-)
+from biogrip.physics.sensitivity import linear_responses
 from biogrip.physics.simulation import Ring, elapsed_s, find_ring, ring, ringing_s, while_ringing
 from biogrip.physics.whitening import estimate_noise, measure_rounding
 
-# Most numbers in the rows that are formed at once, and samples whose corrections are.
-_AT_ONCE, _FEW_AT_ONCE = 100_000, 50
+# Most numbers in the rows that are formed at once.
+_AT_ONCE = 100_000
 # Most readings whose derivatives are formed: more would double the memory.
 _SAMPLES_AT_ONCE = 100_000
 
@@ -42,8 +36,8 @@ class Residuals:
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
     condensed
-        Rows for the protocol and the sampling times; specify nonlinearity, nuisance
-        functions and noise model. Residuals are white.
+        Rows for the protocol and the sampling times; specify nuisance functions
+        and noise model. Residuals are white.
     noise_rad
         Standard deviation of the noise; by default estimated from neighbouring readings.
     instrument
@@ -67,7 +61,6 @@ class Residuals:
         self.model = model
         self._torque = torque
         self._time_s = time_s
-        self.nonlinear = condensed.nonlinear
         self._condensed = condensed
         self._rotation_rad = condensed.cleared(rotation_rad)
         self.rounding_rad = measure_rounding(rotation_rad)
@@ -94,7 +87,7 @@ class Residuals:
         if not self.instrument.has_jaws:
             return None
         network = self.model.network(np.exp(log_parameters))
-        return compute_grip(self._gripper, network, self._torque, nonlinear=self.nonlinear)
+        return compute_grip(self._gripper, network, self._torque, nonlinear=False)
 
     def ring(self, network: Network, noise_rad: float) -> Ring | None:
         """Return what noise of this size lets be seen of the arms' ringing on a sample, if any.
@@ -235,16 +228,9 @@ class Residuals:
         Returns
         -------
         (n, 1 + n_parameters, n_rows)
-            In rad; first the response, then its derivatives by the log-parameters. NaN where
-            the nonlinear model has no response. Without `slopes`, (n, 1, n_rows).
+            In rad; first the response, then its derivatives by the log-parameters. Without
+            `slopes`, (n, 1, n_rows).
         """
-        rows = self.condensed_linear(log_parameters, slopes=slopes)
-        if self.nonlinear:
-            rows = rows + self.condensed_corrections(log_parameters, slopes=slopes)
-        return rows
-
-    def condensed_linear(self, log_parameters: Array, *, slopes: bool = True) -> Array:
-        """Compute the part of `condensed_responses` that the linear model gives."""
         gripper, model, torque = self._gripper, self.model, self._torque
         parameters, condensed = np.exp(log_parameters), self._condensed
         if not condensed.reduced:
@@ -254,27 +240,6 @@ class Residuals:
             return condensed.rows(rotations)
         modes = compute_protocol_modes(gripper, model, torque, parameters, slopes=slopes)
         return condensed.of_modes(modes)
-
-    def condensed_corrections(self, log_parameters: Array, *, slopes: bool = True) -> Array:
-        """Compute the nonlinear minus the linear part of `condensed_responses`."""
-        # About as many modes at once for either kind of model.
-        few = _FEW_AT_ONCE // 10 if self.model.power_law else _FEW_AT_ONCE
-        every = (log_parameters[some] for some in parts(len(log_parameters), few))
-        return np.concatenate([self._corrections(some, slopes) for some in every])
-
-    def _corrections(self, log_parameters: Array, slopes: bool) -> Array:
-        found = corrections(
-            self._gripper, self.model, self._torque, np.exp(log_parameters), slopes=slopes
-        )
-        condensed = self._condensed
-        if not condensed.reduced:
-            values = np.where(found.converged[:, None], found.at(condensed.time_s), np.nan)
-            values = values.reshape(len(log_parameters), -1, len(condensed.time_s))
-            return condensed.rows(differences(values))
-        values = np.where(found.converged[:, None, None], found.values_rad[:, LEFT], np.nan)
-        # One product per sample: the order of its sums does not depend on the number of samples.
-        shape = len(log_parameters), -1, len(condensed.of_corrections)
-        return differences(values.reshape(shape)) @ condensed.of_corrections
 
     def condensed_misfit(self, parameters: Array) -> Array:
         """Compute RMS misfits of a population, (n,) in rad, each independent of the others.
@@ -290,13 +255,12 @@ class Residuals:
             responses = self.condensed_responses(np.log(parameters[some]), slopes=False)[:, 0]
             rows = responses - self.condensed_trace
             misfit[some] = np.sqrt(np.einsum("nr,nr->n", rows, rows) / self.samples)
-        return np.where(np.isnan(misfit), np.inf, misfit)
+        return misfit
 
     @property
     def plain(self) -> bool:
-        """True for the linear model without nuisance functions and whitening."""
-        condensed = self._condensed
-        return not (condensed.coloured or len(condensed.nuisance) or self.nonlinear)
+        """True without nuisance functions and whitening."""
+        return not (self._condensed.coloured or len(self._condensed.nuisance))
 
     def shares_responses(self, other: "Residuals") -> bool:
         """Return True if `other` differs in its trace and noise only, so that responses agree."""
@@ -304,11 +268,5 @@ class Residuals:
         return alike and (self._gripper, self.model) == (other._gripper, other.model)
 
     def _simulated(self, log_parameters: Array, time_s: Array) -> Array:
-        return rotations_and_sensitivities(
-            self._gripper,
-            self.model,
-            self._torque,
-            time_s,
-            np.exp(log_parameters),
-            nonlinear=self.nonlinear,
-        )
+        parameters = np.exp(log_parameters)
+        return linear_responses(self._gripper, self.model, self._torque, time_s, parameters)
