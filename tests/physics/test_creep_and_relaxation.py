@@ -12,10 +12,10 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS
+from biogrip.physics.modes import linear_responses
 from biogrip.physics.protocol import Load, Phase, TorqueHistory, hold, load, torque_history
-from biogrip.physics.residuals import Residuals
+from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import Network, SampleModel
-from biogrip.physics.sensitivity import linear_responses
 from biogrip.physics.simulation import simulated_rotation
 from tests.helpers.power_law import inverted
 
@@ -134,7 +134,8 @@ def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
         len(times)
     )
     condensed = Condensed(history, times, np.zeros((0, len(times))))
-    residuals = Residuals(NO_ARMS, model, history, times, trace, condensed, instrument=GRIPPER)
+    given = Trace(times, trace, condensed)
+    residuals = Residuals(NO_ARMS, model, history, given, instrument=GRIPPER)
     # Exponents stay below one.
     moved = [parameter.kind != "exponent" for parameter in model.parameters]
     logs = np.log([model.example]) + np.linspace(-0.3, 0.4, 5)[:, None] * moved

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.physics import modes
 from biogrip.physics import residuals as of_residuals
-from biogrip.physics import sensitivity
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.drift import nuisance_basis, with_uncertain, within, without
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.modes import rotation_and_sensitivity
 from biogrip.physics.protocol import TorqueHistory, torque_history
-from biogrip.physics.residuals import Residuals
+from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.physics.sensitivity import rotation_and_sensitivity
 from tests.helpers.responses import (
     MODEL_PARAMETERS,
     PROTOCOLS,
@@ -65,7 +65,7 @@ def test_many_samples_are_looked_at_in_parts(
     torque, model = torque_history(PROTOCOLS[protocol]), MODELS["generalized_maxwell"]
     time_s = np.linspace(0, torque.end_s, 1001)
     whole = rotation_and_sensitivity(gripper, model, torque, time_s, sample)
-    monkeypatch.setattr(sensitivity, "_AT_ONCE", 90)
+    monkeypatch.setattr(modes, "_TIMES_TOGETHER", 90)
     parts = rotation_and_sensitivity(gripper, model, torque, time_s, sample)
     for one, other in zip(whole, parts, strict=True):
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-14 * np.abs(whole[0]).max())
@@ -139,7 +139,7 @@ def test_residuals_do_not_see_what_the_instrument_added(
     basis = nuisance_basis(times, offset=True, drift=True)
     condensed = Condensed(steps, times, basis)
     plain, shifted = (
-        Residuals(gripper, model, steps, times, trace + added, condensed, instrument=GRIPPER)
+        Residuals(gripper, model, steps, Trace(times, trace + added, condensed), instrument=GRIPPER)
         for added in (0.0, 5e-3 + 1e-5 * times)
     )
     np.testing.assert_allclose(plain(x)[0], shifted(x)[0], atol=1e-15)
@@ -157,8 +157,8 @@ def test_the_gradient_of_many_samples_is_summed_in_parts(
     basis = with_uncertain(
         nuisance_basis(times, offset=True, drift=False), 0.1 * np.sin(times / 30)[None]
     )
-    condensed = Condensed(steps, times, basis)
-    residuals = Residuals(gripper, model, steps, times, trace, condensed, instrument=GRIPPER)
+    given = Trace(times, trace, Condensed(steps, times, basis))
+    residuals = Residuals(gripper, model, steps, given, instrument=GRIPPER)
     residual, slopes = residuals(x)
     np.testing.assert_array_equal(residuals.left(x), residual)
     for at_once in (1000, 90):

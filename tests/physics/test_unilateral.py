@@ -28,9 +28,8 @@ from biogrip.physics.protocol import (
     torque_at,
     torque_history,
 )
-from biogrip.physics.unilateral import UnilateralResponse, smooth_pieces, unilateral_response
+from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
 from tests.helpers.responses import random_samples
-from tests.physics.test_protocols import EDGES, TORQUE
 
 # Slow arms, which an integrator can follow through contact and flight.
 SLOW = Arm(1e-14, 4e-8, 4.4e-7)
@@ -257,13 +256,3 @@ def test_ends_do_not_depend_on_when_one_looks(gripper: Gripper) -> None:
     np.testing.assert_array_equal(whole.rotation_rad[:, ::37], some.rotation_rad)
     assert whole.parted_s == some.parted_s
     assert len(whole.parted_s) > 3
-
-
-def test_pieces_of_a_protocol_are_its_torque() -> None:
-    """A ramp, sinusoids, and what squares of voltages make of them."""
-    pieces = smooth_pieces(TORQUE)
-    assert [start for start, _, _ in pieces] == EDGES[:-1].tolist()
-    for start, length, forcing in pieces:
-        elapsed = np.linspace(0, length, 50, endpoint=False)
-        expected = torque_at(TORQUE, start + elapsed)
-        np.testing.assert_allclose(forcing.at(elapsed)[0], expected, rtol=0, atol=1e-21)

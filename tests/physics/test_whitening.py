@@ -7,6 +7,7 @@ from scipy.linalg import cholesky, solve_triangular
 from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.drift import nuisance_basis, with_uncertain, without
+from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import flicker_rates
 from biogrip.physics.protocol import sample_times
 from biogrip.physics.whitening import WEIGHTED, NoiseModel, Whitening
@@ -106,7 +107,7 @@ def test_few_rows_stand_for_all_whitened_samples(rate_Hz: float) -> None:
     x = np.log([sample[name] for name in MODEL.names])
     residual, slopes = plain(x)
     residual, slopes = whitening(residual), whitening(slopes)
-    simulated = plain._simulated(x[None], condensed.time_s)[0]
+    simulated = linear_responses(plain.gripper, MODEL, TORQUE, condensed.time_s, np.exp(x)[None])[0]
     response, sensitivity = simulated[0], simulated[1:]
     rows = response @ condensed.to_rows - condensed.of_trace(whitening(trace))
     of_slopes = sensitivity @ condensed.to_rows

@@ -19,8 +19,8 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.judging.quantities import Quantity, parameters_and_sum
+from biogrip.physics.modes import rotation_and_sensitivity
 from biogrip.physics.noise import Noise, standard_deviation
-from biogrip.physics.sensitivity import rotation_and_sensitivity
 
 # Members with a smaller share in a sum are neglected, whatever their uncertainty.
 _NEGLIGIBLE = 1e-2

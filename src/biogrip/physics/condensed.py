@@ -1,31 +1,28 @@
-"""Nodes that replace dense readings in sums of products of smooth functions.
+"""Condensed least squares: a few rows with the sum of squares of all readings.
 
-After a change of torque, modes of all rates respond; later, only slow ones remain. On a
-piece of time twice as far from the last change at its end as at its start, a response
-is a polynomial of degree 19 to 1e-15 of its peak, whatever the rate: with
-e^(-rho (3 + s)), |s| <= 1, Chebyshev coefficients fall like 5.8^-n. Earlier changes are
-further away, and a sinusoid of the torque is a polynomial as well on a piece of a
-period. So a piece with thousands of readings needs twenty nodes, and sums of products
-over its readings follow from one small matrix, which is summed up block by block. If
-readings are few, they are the nodes.
+First, nodes replace dense readings in sums of products of smooth functions (`DenseSamples`). After
+a change of torque, modes of all rates respond; later, only slow ones remain. On a piece of time
+twice as far from the last change at its end as at its start, a response is a polynomial of degree
+19 to 1e-15 of its peak, whatever the rate: with e^(-rho (3 + s)), |s| <= 1, Chebyshev coefficients
+fall like 5.8^-n [1]_. Earlier changes are further away, and a sinusoid of the torque is a
+polynomial as well on a piece of a period. So a piece with thousands of readings needs twenty nodes,
+and sums of products over its readings follow from one small matrix, which is summed up block by
+block. If readings are few, they are the nodes.
 
-Condensed least squares: a few rows with the sum of squares of all readings.
-
-The linear rotation of any sample is a weighted sum of the responses of modes to the
-protocol, g(t; r). Over all rates r these nearly span a space of some fifty dimensions
-only, in which a function is determined by its values at as many well-chosen times. So
-a response is simulated at those times, and a square matrix turns its values into rows
-with the sum of squares, and the gradients, of the residuals at all readings. Dense
-readings are first replaced by nodes (`biogrip.physics.condensed`). If nodes are too
-many, every node has a row of its own.
+Second, a few times replace the nodes (`Condensed`). The linear rotation of any sample is a weighted
+sum of the responses of modes to the protocol, g(t; r). Over all rates r these nearly span a space
+of some fifty dimensions only, in which a function is determined by its values at as many
+well-chosen times [2]_, [3]_. So a response is simulated at those times, and a square matrix turns
+its values into rows with the sum of squares, and the gradients, of the residuals at all readings.
+If nodes are too many, every node has a row of its own.
 
 References
 ----------
 .. [1] L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapter 8:
    how fast Chebyshev's coefficients of analytic functions fall.
-.. [1] P. Businger and G. H. Golub, Linear least squares solutions by Householder
+.. [2] P. Businger and G. H. Golub, Linear least squares solutions by Householder
    transformations, Numerische Mathematik 7 (1965), 269-276: QR with column pivoting.
-.. [2] Z. Drmač and S. Gugercin, A new selection operator for the discrete empirical
+.. [3] Z. Drmač and S. Gugercin, A new selection operator for the discrete empirical
    interpolation method, SIAM Journal on Scientific Computing 38 (2016), A631-A648: points of
    interpolation chosen by it.
 """
@@ -40,9 +37,9 @@ from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array, IntArray
 from biogrip.physics.drift import without
-from biogrip.physics.mode_growth import compute_growth
-from biogrip.physics.mode_rows import ModeRows
+from biogrip.physics.mode_responses import mode_responses
 from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.rate_tables import ModeRows
 from biogrip.physics.whitening import Whitening
 
 _NODES = 20
@@ -57,6 +54,16 @@ _FEWEST, _LARGEST_CONDITION = 256, 100.0
 _AT_ONCE = 16_384
 # Most readings whose polynomials are kept for the next trace.
 _MOST_KEPT = 100_000
+
+MOST_NODES = 50_000
+"""Most nodes that are condensed further: with more, it would take gigabytes."""
+
+# Spacing of rates in log(1 - T r), T the last time: far closer than modes can be resolved.
+_SPACING = 0.25
+# Slowest rate times T, and fastest rate times the shortest sampling interval.
+_SLOWEST, _FASTEST = 1e-6, 1e3
+# Directions with a smaller relative singular value are rounding errors.
+_RANK = 1e-14
 
 
 @dataclass(frozen=True)
@@ -198,17 +205,6 @@ def _joined(pieces: Iterator[_Piece]) -> list[_Piece]:
     return joined
 
 
-MOST_NODES = 50_000
-"""Most nodes that are condensed further: with more, it would take gigabytes."""
-
-# Spacing of rates in log(1 - T r), T the last time: far closer than modes can be resolved.
-_SPACING = 0.25
-# Slowest rate times T, and fastest rate times the shortest sampling interval.
-_SLOWEST, _FASTEST = 1e-6, 1e3
-# Directions with a smaller relative singular value are rounding errors.
-_RANK = 1e-14
-
-
 class Condensed:
     """Condensed rows that replace the readings of any trace of a protocol in least squares.
 
@@ -234,14 +230,14 @@ class Condensed:
     ) -> None:
         self.nuisance = nuisance if whitening is None else whitening.nuisance
         self._whitening = whitening
-        self._torque = torque
-        self._all_s = time_s
+        self.torque = torque
+        self.all_s = time_s
 
     def later(self, change_s: float) -> "Condensed":
         """Return rows for a protocol that starts later by some s; noise and nuisance stay."""
         return Condensed(
-            self._torque,
-            self._all_s - change_s,
+            self.torque,
+            self.all_s - change_s,
             self.nuisance,
             whitening=self._whitening,
         )
@@ -298,17 +294,17 @@ class Condensed:
     @cached_property
     def of_modes(self) -> ModeRows:
         """Function from modes of many samples to rows of their responses."""
-        events_s = [start for start, *_ in (*self._torque.jumps, *self._torque.swings)]
+        events_s = [start for start, *_ in (*self.torque.jumps, *self.torque.swings)]
         elapsed = np.subtract.outer(self.time_s, events_s)
         shortest_s = float(np.min(elapsed, where=elapsed > 0, initial=self.time_s[-1]))
-        return ModeRows(self._torque, self.time_s, self.to_rows, shortest_s)
+        return ModeRows(self.torque, self.time_s, self.to_rows, shortest_s)
 
     @cached_property
     def dense(self) -> DenseSamples:
         """Nodes that replace the readings."""
         # Whitened functions are not smooth: each reading is a node.
         dense = self._whitening is None
-        return DenseSamples(self._torque, self._all_s, dense=dense)
+        return DenseSamples(self.torque, self.all_s, dense=dense)
 
     @cached_property
     def _nuisance_rows(self) -> Array:
@@ -319,13 +315,13 @@ class Condensed:
     @cached_property
     def _span(self) -> Array:
         """Orthonormal rows of the nodes that span all responses, (n_nodes, n_rows)."""
-        end_s, time_s = self._all_s[-1], self.dense.time_s
-        shortest_s = np.diff(self._all_s).min()
+        end_s, time_s = self.all_s[-1], self.dense.time_s
+        shortest_s = np.diff(self.all_s).min()
         last = np.log1p(_FASTEST * end_s / shortest_s)
         rates = -np.expm1(np.append(_SLOWEST, np.arange(_SPACING, last, _SPACING))) / end_s
         growth, slope = (
             self.dense.rows_of_values(of[0])
-            for of in compute_growth(rates[None], self._torque, time_s)
+            for of in mode_responses(rates[None], self.torque, time_s)
         )
         size = np.linalg.norm(growth, axis=2, keepdims=True)
         size[size == 0] = 1.0
