@@ -84,24 +84,6 @@ def test_responses_to_ramps_and_sinusoids_are_inverse_laplace_transforms(
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.max(np.abs(expected)))
 
 
-@pytest.mark.parametrize("model", [m for m in MODELS.values() if not m.power_law])
-def test_moduli_and_compliances_have_the_limits_of_their_networks(model: SampleModel) -> None:
-    network = example(model)
-    ends = np.array([1e-9, 1e9])
-    held = torque_history((hold(2e9, 1.0),)), torque_history((hold(2e9, 1.0),), deforms=True)
-    creep, modulus = (simulated(network, history, ends) for history in held)
-    at_once, at_rest = network.k_p[0] + network.k[0].sum(), network.k_p[0]
-    assert modulus[0] == pytest.approx(at_once, rel=1e-7)
-    assert modulus[1] == pytest.approx(at_rest, rel=1e-6, abs=1e-12)
-    if network.c_p[0] > 0:
-        assert creep[0] == pytest.approx(1e-9 / network.c_p[0], rel=1e-2)
-    else:
-        assert creep[0] == pytest.approx(1 / at_once, rel=1e-6)
-    viscosity = network.c_p[0] + network.c[0].sum()
-    settled = 1 / at_rest if at_rest else 1e9 / viscosity
-    assert creep[1] == pytest.approx(settled, rel=1e-6)
-
-
 @DRIVEN
 @EVERY_MODEL
 def test_derivatives_are_those_of_finite_differences(model: SampleModel, deforms: bool) -> None:

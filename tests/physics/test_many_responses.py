@@ -6,7 +6,7 @@ import pytest
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.modes import rotation_and_sensitivity
+from biogrip.physics.modes import linear_responses
 from biogrip.physics.protocol import torque_history
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel
@@ -39,10 +39,9 @@ def test_rows_and_slopes_are_those_of_one_at_a_time(
     assert np.all(np.abs(alone - found[:, :1]) <= 1e-12 * peaks)
     condensed = residuals.trace.condensed
     given = residuals.gripper, residuals.model, residuals.torque, condensed.time_s
-    for rows, point in zip(found, x, strict=True):
+    for rows, point in zip(found, np.exp(x), strict=True):
         # From what the response is at few times.
-        single = rotation_and_sensitivity(*given, np.exp(point))
-        rotation, slopes = (condensed.rows(values) for values in single)
+        rotation, *slopes = condensed.rows(linear_responses(*given, point[None])[0])
         peak = np.abs(rotation).max()
         np.testing.assert_allclose(rows[0], rotation, rtol=0, atol=1e-10 * peak)
         np.testing.assert_allclose(rows[1:], slopes, rtol=0, atol=1e-9 * peak)

@@ -126,12 +126,3 @@ def test_parameters_that_are_not_numbers_have_no_misfit(
 ) -> None:
     misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, np.ones(4001))
     assert np.isnan(misfit(np.vstack((TRUTH, np.full(4, np.nan))))).tolist() == [False, True]
-
-
-def test_a_perfect_fit_is_zero_up_to_cancellation(gripper: Gripper, steps: TorqueHistory) -> None:
-    """Without noise the sums cancel to sqrt(eps) of the signal."""
-    time_s = np.arange(4001) / 10
-    response = step_response(gripper, MODEL.network(TRUTH), inertia=False)
-    trace = rotation(response, steps, time_s)[0]
-    misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, trace)
-    assert misfit(TRUTH[None, :])[0] < 1e-7 * trace.max()

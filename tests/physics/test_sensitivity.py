@@ -12,7 +12,7 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.modes import rotation_and_sensitivity
+from biogrip.physics.modes import linear_responses
 from biogrip.physics.protocol import TorqueHistory, torque_history
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
@@ -32,9 +32,8 @@ INERTIA = 5 * 3.1e-8 / np.where(TIMES < 200, TIMES, TIMES - 200) ** 2
 def test_against_50_digits(gripper: Gripper, steps: TorqueHistory) -> None:
     """Central differences with a step of 1e-4 of a solution with 50 digits, extrapolated."""
     for sample in random_samples(6, seed=5):
-        _, slopes = rotation_and_sensitivity(
-            gripper, MODELS["generalized_maxwell"], steps, TIMES, sample
-        )
+        model = MODELS["generalized_maxwell"]
+        slopes = linear_responses(gripper, model, steps, TIMES, sample[None])[0, 1:]
         peak = np.abs(rotation_50_digits(gripper, sample, steps, TIMES)).max()
         for index in range(4):
             coarse, fine = (
@@ -64,15 +63,11 @@ def test_many_samples_are_looked_at_in_parts(
     (sample,) = random_samples(1, seed=8)
     torque, model = torque_history(PROTOCOLS[protocol]), MODELS["generalized_maxwell"]
     time_s = np.linspace(0, torque.end_s, 1001)
-    whole = rotation_and_sensitivity(gripper, model, torque, time_s, sample)
+    given = gripper, model, torque, time_s, sample[None]
+    whole = linear_responses(*given)[0]
     monkeypatch.setattr(modes, "_TIMES_TOGETHER", 90)
-    parts = rotation_and_sensitivity(gripper, model, torque, time_s, sample)
-    for one, other in zip(whole, parts, strict=True):
-        np.testing.assert_allclose(other, one, rtol=0, atol=1e-14 * np.abs(whole[0]).max())
-
-
-def test_every_model_is_covered() -> None:
-    assert set(MODEL_PARAMETERS) == set(MODELS)
+    parts = linear_responses(*given)[0]
+    np.testing.assert_allclose(parts, whole, rtol=0, atol=1e-14 * np.abs(whole[0]).max())
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
@@ -95,7 +90,7 @@ def test_two_branches_and_a_known_parameter(gripper: Gripper) -> None:
 
 def _check(gripper: Gripper, model: SampleModel, protocol: str, sample: Array) -> None:
     torque = torque_history(PROTOCOLS[protocol])
-    phi, slopes = rotation_and_sensitivity(gripper, model, torque, TIMES, sample)
+    phi, *slopes = linear_responses(gripper, model, torque, TIMES, sample[None])[0]
 
     def simulated(parameters: Array) -> Array:
         response = step_response(

@@ -6,10 +6,10 @@ from scipy.linalg import cholesky, solve_triangular
 
 from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.drift import nuisance_basis, with_uncertain, without
+from biogrip.physics.drift import drift_is_flow, nuisance_basis, with_uncertain, without
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import flicker_rates
-from biogrip.physics.protocol import sample_times
+from biogrip.physics.protocol import hold, sample_times, torque_history
 from biogrip.physics.whitening import WEIGHTED, NoiseModel, Whitening
 from tests.helpers.problems import MODEL, SAMPLES, TORQUE, posed_for
 
@@ -114,3 +114,16 @@ def test_few_rows_stand_for_all_whitened_samples(rate_Hz: float) -> None:
     assert rows @ rows == pytest.approx(residual @ residual, rel=1e-10)
     np.testing.assert_allclose(of_slopes @ rows, slopes @ residual, rtol=1e-7, atol=1e-12)
     np.testing.assert_allclose(of_slopes @ of_slopes.T, slopes @ slopes.T, rtol=1e-9)
+
+
+SAMPLED = np.linspace(0.0, 100.0, 201)
+
+
+def test_under_a_constant_torque_a_drift_is_flow() -> None:
+    assert drift_is_flow(torque_history((hold(100.0, 1e-9),)), SAMPLED)
+
+
+def test_where_the_torque_changes_it_is_not() -> None:
+    torque = torque_history((hold(50.0, 1e-9), hold(50.0, 0.2e-9)))
+    assert not drift_is_flow(torque, SAMPLED)
+    assert drift_is_flow(torque, SAMPLED[:100])

@@ -68,15 +68,14 @@ _RANK = 1e-14
 
 @dataclass(frozen=True)
 class _Piece:
-    """Readings from `first` up to `stop`, and the matrix that relates them to their nodes.
-
-    With Legendre polynomials at the readings Q R, Q orthonormal, the triangle is R^T; it is
-    None where readings are nodes.
-    """
+    """Readings from `first` up to `stop`, and their nodes."""
 
     first: int
     stop: int
-    triangle: Array | None
+    nodes_s: Array
+    """Times of the nodes, (n_nodes,)."""
+    triangle: Array | None = None
+    """R^T of Legendre polynomials Q R at the readings, Q orthonormal; None if these are nodes."""
 
 
 class DenseSamples:
@@ -94,9 +93,10 @@ class DenseSamples:
         omega = torque.omega_rad_per_s
         self._longest_s = 2 * np.pi / omega.max() if len(omega) else np.inf
         bounds = np.unique(np.concatenate(([0], time_s.searchsorted(starts), [len(time_s)])))
-        divided = (p for ends in pairwise(bounds) for p in self._divided(*ends))
-        self._pieces = _joined(divided) if dense else [_Piece(0, len(time_s), None)]
-        self.time_s = np.concatenate([self._nodes(piece) for piece in self._pieces])
+        self._pieces = [_Piece(0, len(time_s), time_s)]
+        if dense:
+            self._pieces = [piece for ends in pairwise(bounds) for piece in self._divided(*ends)]
+        self.time_s = np.concatenate([piece.nodes_s for piece in self._pieces])
         """Times of the nodes, (n_nodes,), ascending."""
 
     def rows_of_values(self, values: Array) -> Array:
@@ -114,7 +114,7 @@ class DenseSamples:
         """Apply a function of node values and triangle to each piece that has a triangle."""
         turned, start = np.copy(values), 0
         for piece in self._pieces:
-            here = slice(start, start + self._count(piece))
+            here = slice(start, start + len(piece.nodes_s))
             start = here.stop
             if piece.triangle is not None:
                 turned[..., here] = turn(values[..., here], piece.triangle)
@@ -150,7 +150,7 @@ class DenseSamples:
     def _divided(self, first: int, stop: int) -> Iterator[_Piece]:
         """Halve pieces that are not smooth, or not dense all over, down to few readings."""
         if stop - first < _FEWEST:
-            yield _Piece(first, stop, None)
+            yield _Piece(first, stop, self._all_s[first:stop])
             return
         start, end = self._all_s[first], self._all_s[stop - 1]
         elapsed = start - self._starts_s[self._starts_s.searchsorted(start, side="right") - 1]
@@ -161,8 +161,8 @@ class DenseSamples:
             size = np.sqrt(np.diagonal(gram))
             shares = np.linalg.eigvalsh(gram / (size[:, None] * size))
             if shares[-1] <= _LARGEST_CONDITION * shares[0]:
-                triangle = np.asarray(np.linalg.cholesky(gram), np.float64)
-                yield _Piece(first, stop, triangle)
+                nodes_s = 0.5 * (start + end) + 0.5 * (end - start) * _PLACES
+                yield _Piece(first, stop, nodes_s, np.asarray(np.linalg.cholesky(gram), float))
                 return
         half = first + int(np.searchsorted(self._all_s[first:stop], 0.5 * (start + end)))
         yield from self._divided(first, half)
@@ -182,27 +182,6 @@ class DenseSamples:
             block = slice(here, min(here + _AT_ONCE, stop))
             place = (2 * self._all_s[block] - start - end) / (end - start)
             yield block, legendre.legvander(place, _DEGREE)
-
-    def _nodes(self, piece: _Piece) -> Array:
-        if piece.triangle is None:
-            return self._all_s[piece.first : piece.stop]
-        start, end = self._all_s[piece.first], self._all_s[piece.stop - 1]
-        return 0.5 * (start + end) + 0.5 * (end - start) * _PLACES
-
-    @staticmethod
-    def _count(piece: _Piece) -> int:
-        return piece.stop - piece.first if piece.triangle is None else _NODES
-
-
-def _joined(pieces: Iterator[_Piece]) -> list[_Piece]:
-    """Join neighbouring pieces whose readings are nodes."""
-    joined: list[_Piece] = []
-    for piece in pieces:
-        if joined and joined[-1].triangle is None and piece.triangle is None:
-            joined[-1] = _Piece(joined[-1].first, piece.stop, None)
-        else:
-            joined.append(piece)
-    return joined
 
 
 class Condensed:

@@ -102,22 +102,6 @@ def _superpose(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
     return rows
 
 
-def rotation_and_sensitivity(
-    gripper: Gripper, model: SampleModel, torque: TorqueHistory, time_s: Array, parameters: Array
-) -> tuple[Array, Array]:
-    """Compute what `linear_responses` does for one sample, (n_parameters,).
-
-    Returns
-    -------
-    rotation : (n_times,)
-        In rad.
-    sensitivity : (n_parameters, n_times)
-        In rad.
-    """
-    rows = linear_responses(gripper, model, torque, time_s, parameters[None])[0]
-    return rows[0], rows[1:]
-
-
 def compute_modes(
     gripper: Gripper,
     model: SampleModel,

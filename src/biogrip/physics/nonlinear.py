@@ -33,7 +33,6 @@ from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
 from biogrip.physics.linear import (
     LEFT,
-    RIGHT,
     StepResponse,
     is_symmetric,
     rotation,
@@ -69,6 +68,15 @@ class Correction:
     converged: np.ndarray
     """True if the sweeps converged, (n,)."""
 
+    def checked(self) -> "Correction":
+        """Return itself, or raise an error if the sweeps of some sample did not converge."""
+        if not np.all(self.converged):
+            raise BiogripError(
+                "the nonlinear response could not be computed: the torque closes the arms so far "
+                "that they lose their lever on the sample. Allowed are smaller torques."
+            )
+        return self
+
     def at(self, time_s: Array, arm: int = LEFT) -> Array:
         """Evaluate nonlinear minus linear rotation in rad at ascending times, (n, n_times)."""
         own = self.values_rad[:, min(arm, self.values_rad.shape[1] - 1)]
@@ -79,25 +87,18 @@ class Correction:
         return self._interpolated(self.force_N, time_s)
 
     def _interpolated(self, values: Array, time_s: Array) -> Array:
-        parts = [
-            values[:, element] @ np.ascontiguousarray(on_piece)
-            for element, on_piece in enumerate(_interpolation(self.edges_s, time_s))
-            if on_piece.shape[1]
-        ]
-        return np.concatenate(parts, axis=1)
-
-
-def _interpolation(edges_s: Array, time_s: Array) -> list[Array]:
-    """Return each element's polynomials at the times within, (_STAGES + 1, n_times_within)."""
-    cuts = np.searchsorted(time_s, edges_s[1:-1], side="left")
-    starts, lengths = (
-        np.repeat(of_elements, np.diff(cuts, prepend=0, append=len(time_s)))
-        for of_elements in (edges_s[:-1], np.diff(edges_s))
-    )
-    points = np.concatenate(([0.0], _radau()[0]))
-    functions = _polynomials(points, (time_s - starts) / lengths)
-    functions[:, time_s < edges_s[0]] = 0.0
-    return np.split(functions, cuts, axis=1)
+        edges_s = self.edges_s
+        cuts = np.searchsorted(time_s, edges_s[1:-1], side="left")
+        starts, lengths = (
+            np.repeat(of_elements, np.diff(cuts, prepend=0, append=len(time_s)))
+            for of_elements in (edges_s[:-1], np.diff(edges_s))
+        )
+        points = np.concatenate(([0.0], _radau()[0]))
+        functions = _polynomials(points, (time_s - starts) / lengths)
+        functions[:, time_s < edges_s[0]] = 0.0
+        on_elements = enumerate(np.split(functions, cuts, axis=1))
+        found = [values[:, e] @ np.ascontiguousarray(own) for e, own in on_elements if own.size]
+        return np.concatenate(found, axis=1)
 
 
 def nonlinear_rotation(
@@ -110,26 +111,9 @@ def nonlinear_rotation(
     BiogripError
         If the torque closes the arms beyond what the model describes.
     """
-    found = computed_correction(gripper, network, torque)
-    linear = step_response(gripper, network, symmetric=torque.symmetric, both_arms=arm == RIGHT)
+    found = correction(gripper, network, torque).checked()
+    linear = step_response(gripper, network, symmetric=torque.symmetric)
     return rotation(linear, torque, time_s, arm) + found.at(time_s, arm)
-
-
-def computed_correction(gripper: Gripper, network: Network, torque: TorqueHistory) -> Correction:
-    """Compute `correction`, and raise an error if it has not converged.
-
-    Raises
-    ------
-    BiogripError
-        If the torque closes the arms beyond what the model describes.
-    """
-    found = correction(gripper, network, torque)
-    if not np.all(found.converged):
-        raise BiogripError(
-            "the nonlinear response could not be computed: the torque closes the arms so far "
-            "that they lose their lever on the sample. Allowed are smaller torques."
-        )
-    return found
 
 
 def correction(
@@ -146,9 +130,7 @@ def correction(
     """
     symmetric = is_symmetric(gripper, torque)
     arms = [gripper.left] if symmetric else [gripper.left, gripper.right]
-    response = step_response(
-        gripper, network, symmetric=symmetric, inertia=False, both_arms=not symmetric
-    )
+    response = step_response(gripper, network, symmetric=symmetric, inertia=False)
     edges = _mesh(torque)
     modes = _Modes(response, np.diff(edges))
     nodes = _nodes(edges)
@@ -251,7 +233,9 @@ class _Modes:
         self._carry = self._inverse @ ones
         self._gain = lengths_s[:, None, None] * (self._inverse @ a)
         self._rates = response.rates[:, None, :, None, None]
-        self._residues = response.weights * response.rates[:, None, None, :]
+        # Of one drive, one arm stands for both.
+        alone = response.weights[:, : response.weights.shape[2]]
+        self._residues = alone * response.rates[:, None, None, :]
 
     def respond(self, load: Array, which: IntArray) -> tuple[Array, Array]:
         """Compute rotations and rates of arms at nodes, (n, n_arms, n_elements, _STAGES) each.

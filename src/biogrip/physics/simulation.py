@@ -24,7 +24,7 @@ def simulated_rotation(
 ) -> Array:
     """Simulate the closing rotation of the left arm in rad, with inertia, (n, n_times).
 
-    By the nonlinear model, corrected eqs. (1)-(3), which has the errors of `computed_correction`,
+    By the nonlinear model, corrected eqs. (1)-(3), which has the errors of `nonlinear_rotation`,
     or the linear one, (4)-(6), at ascending times.
     """
     if nonlinear:
@@ -45,7 +45,7 @@ def simulated_shortening(
         turns = (nonlinear_rotation(gripper, network, torque, time_s, a) for a in (LEFT, RIGHT))
         left, right = (displacement_of_tip(gripper, turn) for turn in turns)
         return left + right
-    response = step_response(gripper, network, symmetric=torque.symmetric, both_arms=True)
+    response = step_response(gripper, network, symmetric=torque.symmetric)
     both = rotation(response, torque, time_s, LEFT) + rotation(response, torque, time_s, RIGHT)
     return gripper.lever_m * both
 

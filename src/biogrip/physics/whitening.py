@@ -1,13 +1,10 @@
-"""Noise of a trace, estimated without a model, and the rounding of its readings.
+"""The noise of a trace: its size, estimated without a model, and its colour, whitened.
 
-Whitening of autocorrelated noise, for generalised least squares.
-
-The autocorrelation is that of white noise plus exponentials of the time between two
-readings (Ornstein-Uhlenbeck processes): one of any relaxation time, and a geometric
-series of them for 1/f noise. White noise may have a part that grows with the rotation.
-The Cholesky factor L of its matrix C is computed, and
-solved with, in linear time [1]_. Residuals r become L^-1 r, which are white and on
-average as large as r. Least squares of these are generalised least squares [2]_.
+The autocorrelation is that of white noise plus exponentials of the time between two readings
+(Ornstein-Uhlenbeck processes): one of any relaxation time, and a geometric series of them for 1/f
+noise. White noise may have a part that grows with the rotation. The Cholesky factor L of its matrix
+C is computed, and solved with, in linear time [1]_. Residuals r become L^-1 r, which are white and
+on average as large as r. Least squares of these are generalised least squares [2]_.
 
 References
 ----------
