@@ -215,7 +215,7 @@ def has_fast_noise(residuals: Residuals, log_parameters: Array) -> bool:
     False also where that is not estimated: of very many readings, and of residuals that are white
     already.
     """
-    time_s = residuals.sampling_s
+    time_s = residuals.trace.time_s
     if residuals.coloured or len(time_s) > MOST_SAMPLES:
         return False
     residual, sensitivity = residuals(log_parameters)

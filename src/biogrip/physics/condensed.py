@@ -28,7 +28,7 @@ References
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -184,53 +184,39 @@ class DenseSamples:
             yield block, legendre.legvander(place, _DEGREE)
 
 
+@dataclass(frozen=True, eq=False)
 class Condensed:
-    """Condensed rows that replace the readings of any trace of a protocol in least squares.
+    """Condensed rows that replace the readings of any trace of a protocol in least squares."""
 
-    Parameters
-    ----------
-    torque
-        The protocol.
-    time_s : (n_samples,)
-        Ascending sampling times.
-    nuisance : (n_functions, n_samples)
-        Functions projected out of trace and responses, see `nuisance_basis`, `with_uncertain`.
-    whitening
-        Transformation that whitens noise and projects nuisance out; None for white noise.
-    """
+    torque: TorqueHistory
+    """The protocol."""
+    all_s: Array
+    """Ascending sampling times, (n_samples,)."""
+    functions: Array
+    """Functions projected out of trace and responses, (n_functions, n_samples), if noise is white;
+    see `nuisance_basis`, `with_uncertain`."""
+    whitening: Whitening | None = None
+    """Transformation that whitens noise and projects nuisance out; None for white noise."""
 
-    def __init__(
-        self,
-        torque: TorqueHistory,
-        time_s: Array,
-        nuisance: Array,
-        *,
-        whitening: Whitening | None = None,
-    ) -> None:
-        self.nuisance = nuisance if whitening is None else whitening.nuisance
-        self._whitening = whitening
-        self.torque = torque
-        self.all_s = time_s
+    @property
+    def nuisance(self) -> Array:
+        """Functions that are projected out, (n_functions, n_samples)."""
+        return self.functions if self.whitening is None else self.whitening.nuisance
 
     def later(self, change_s: float) -> "Condensed":
         """Return rows for a protocol that starts later by some s; noise and nuisance stay."""
-        return Condensed(
-            self.torque,
-            self.all_s - change_s,
-            self.nuisance,
-            whitening=self._whitening,
-        )
+        return replace(self, all_s=self.all_s - change_s)
 
     def cleared(self, rows: Array) -> Array:
         """Project nuisance out of functions of time, (..., n_samples), and whiten noise."""
-        if self._whitening is not None:
-            return self._whitening(rows)
+        if self.whitening is not None:
+            return self.whitening(rows)
         return without(self.nuisance, rows)
 
     @property
     def coloured(self) -> bool:
         """True if the noise is whitened."""
-        return self._whitening is not None
+        return self.whitening is not None
 
     @cached_property
     def reduced(self) -> bool:
@@ -282,7 +268,7 @@ class Condensed:
     def dense(self) -> DenseSamples:
         """Nodes that replace the readings."""
         # Whitened functions are not smooth: each reading is a node.
-        dense = self._whitening is None
+        dense = self.whitening is None
         return DenseSamples(self.torque, self.all_s, dense=dense)
 
     @cached_property
@@ -326,6 +312,6 @@ class Condensed:
 
     def _cleared_rows(self, rows: Array) -> Array:
         """Project out nuisance and whiten as `cleared` does, with rows of the nodes."""
-        if self._whitening is not None:
-            return self._whitening(rows)
+        if self.whitening is not None:
+            return self.whitening(rows)
         return without(self._nuisance_rows, rows)

@@ -73,7 +73,10 @@ def modes_of_many(
     else:
         rates = np.ascontiguousarray(-zeros.values.T)
         numerators = arms.forces(zeros) if force else arms.rotations(zeros)[0]
-        weights = -numerators / impedance.steepness(zeros)
+        x, steepness = zeros.values, np.zeros_like(zeros.pole)
+        for weight, rate in zip(impedance.weights, impedance.rates, strict=True):
+            steepness += weight * (x / zeros.from_pole(rate)) ** 2
+        weights = -numerators / steepness
     drives = slice(1 if symmetric else 2)
     static, weights = (np.moveaxis(of[:, drives], -1, 0) for of in (static, weights))
     return np.ascontiguousarray(static), rates, np.ascontiguousarray(weights)
@@ -141,14 +144,6 @@ class _Impedance:
     """Zero and the r_j, ascending, (1 + n_rates, n)."""
     level: NDArray[Any]
     """B, (n,)."""
-
-    def steepness(self, zeros: Zeros) -> Array:
-        """Return S of each mode, (n_modes, n)."""
-        x = zeros.values
-        total = np.zeros_like(x)
-        for weight, rate in zip(self.weights, self.rates, strict=True):
-            total += weight * (x / zeros.from_pole(rate)) ** 2
-        return total
 
 
 class _Arms:

@@ -15,14 +15,13 @@ References
 """
 
 from collections.abc import Callable, Sequence
-from functools import cache
 from itertools import permutations
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from biogrip.arrays import Array, ComplexArray, parts
+from biogrip.arrays import Array, parts
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import LEFT, evaluate, poles, slope_at_poles, transfer_functions
 from biogrip.physics.many_branches import modes_with_slopes
@@ -161,15 +160,9 @@ def _complex_step_network(
     if not slopes:
         return model.network(parameters), 0
     count = parameters.shape[1]
-    return model.network((parameters * _complex_steps(count)[:, None]).reshape(-1, count)), count
-
-
-@cache
-def _complex_steps(count: int) -> ComplexArray:
-    """Return factors: ones in the first row, and one complex-step parameter in each other row."""
-    tilts = np.ones((count + 1, count), dtype=np.complex128)
-    tilts[1:].imag = _COMPLEX_STEP * np.eye(count)
-    return tilts
+    factors = np.ones((count + 1, 1, count), dtype=np.complex128)
+    factors[1:, 0].imag = _COMPLEX_STEP * np.eye(count)
+    return model.network((parameters * factors).reshape(-1, count)), count
 
 
 def _split_complex_step(values: NDArray[Any], count: int) -> tuple[Array, Array]:

@@ -107,22 +107,9 @@ class Noise(Block):
 def add_noise(
     rotation_rad: Array, noise: Noise, rng: np.random.Generator, time_s: Array | None = None
 ) -> Array:
-    """Return a noisy copy of a trace.
+    """Return a noisy copy of a trace, (n_samples,).
 
-    Parameters
-    ----------
-    rotation_rad : (n_samples,)
-        Noise-free rotation.
-    noise
-        Noise to add.
-    rng
-        Random generator.
-    time_s : (n_samples,), optional
-        Ascending sampling times, required unless the noise is white.
-
-    Returns
-    -------
-    (n_samples,)
+    Ascending sampling times, (n_samples,), are required unless the noise is white.
 
     Raises
     ------

@@ -94,11 +94,6 @@ class Residuals:
         return self.samples - taken_out(self.trace.condensed.nuisance)
 
     @property
-    def sampling_s(self) -> Array:
-        """Ascending sampling times, (n_samples,)."""
-        return self.trace.time_s
-
-    @property
     def duration_s(self) -> float:
         """Time of the last reading."""
         return float(self.trace.time_s[-1])

@@ -243,7 +243,7 @@ class _System:
         side = np.sqrt(k_p) * np.concatenate((tips, np.zeros(n)))
         self._touching = _Modes(
             np.vstack((spring_rows, side, branches)),
-            _block(_coupled(self._c, b * b * c_p), np.sqrt(c)),
+            _coupled(self._c, b * b * c_p, np.sqrt(c)),
         )
         self._arms = _Modes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
         self._has_damper = bool(c_p > 0)
@@ -302,16 +302,16 @@ class _System:
         return lambda elapsed_s: to_all @ dampers.at(elapsed_s)
 
 
-def _coupled(arms: Array, shared: float) -> Array:
-    """Return the Cholesky factor of diag(c_2, c_4) + w (1, 1)(1, 1)^T without cancellation."""
+def _coupled(arms: Array, shared: float, diagonal: Array) -> Array:
+    """Return the Cholesky factor of diag(c_2, c_4) + w (1, 1)(1, 1)^T, and roots beside it.
+
+    Written without cancellation.
+    """
     c_2, c_4 = arms
     first = np.sqrt(c_2 + shared)
-    return np.array([[first, 0], [shared / first, np.sqrt(c_4 + shared * c_2 / (c_2 + shared))]])
-
-
-def _block(corner: Array, diagonal: Array) -> Array:
-    whole = np.diag(np.concatenate(([0.0, 0.0], diagonal)))
-    whole[:2, :2] = corner
+    second = np.sqrt(c_4 + shared * c_2 / (c_2 + shared))
+    whole = np.diag(np.concatenate(([first, second], diagonal)))
+    whole[1, 0] = shared / first
     return whole
 
 

@@ -39,12 +39,8 @@ def estimate_noise(rotation_rad: Array, rounding_rad: float | None = None) -> fl
     the same, it is their mean square without the largest, and no less than the rounding errors'
     [1]_. Of a trace without noise the estimate is tiny.
 
-    Parameters
-    ----------
-    rotation_rad : (n_samples,)
-        Trace, or what a fit leaves of it.
-    rounding_rad
-        Step of the readings; by default that of `rotation_rad`.
+    The trace is (n_samples,), or what a fit leaves of it; the step of its readings is by default
+    measured.
 
     References
     ----------
