@@ -47,14 +47,11 @@ def test_rows_and_slopes_are_those_of_one_at_a_time(
         np.testing.assert_allclose(rows[1:], slopes, rtol=0, atol=1e-9 * peak)
 
 
-@pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
 @pytest.mark.parametrize("name", [*MODEL_PARAMETERS, "two branches"])
-def test_rows_do_not_depend_on_who_else_is_there(
-    request: pytest.FixtureRequest, arms: str, name: str
-) -> None:
+def test_rows_do_not_depend_on_who_else_is_there(either_gripper: Gripper, name: str) -> None:
     """Byte for byte, for any subset in any order, down to a single one."""
     model = (MODELS | TWO_BRANCHES)[name]
-    residuals = posed(request.getfixturevalue(arms), model, "steps")
+    residuals = posed(either_gripper, model, "steps")
     low, high = log_range(model)
     x = np.random.default_rng(3).uniform(low, high, (40, len(low)))
     together = residuals.condensed_responses(x)

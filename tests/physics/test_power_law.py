@@ -5,16 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
-from biogrip.arrays import Array
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.jaw_force import jaw_force_response
 from biogrip.physics.linear import LEFT, RIGHT, StepResponse, rotation, step_response
 from biogrip.physics.many_branches import modes_of_many
 from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.models import MODELS
-from biogrip.physics.nonlinear import nonlinear_rotation
 from biogrip.physics.protocol import TorqueHistory, hold, torque_history
 from biogrip.physics.sample_model import Network
 from tests.helpers.power_law import rotations, springpot
@@ -43,14 +40,14 @@ def test_the_paper_s_gripper_and_protocol_against_inversion(
 
 
 @pytest.mark.parametrize(("model", "sample"), SAMPLES)
-@pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
 def test_arms_driven_differently_against_inversion(
-    request: pytest.FixtureRequest, arms: str, model: str, sample: list[float]
+    either_gripper: Gripper, model: str, sample: list[float]
 ) -> None:
-    given: Gripper = request.getfixturevalue(arms)
     torque = torque_history((hold(200.0, 1.6e-9, 1.0e-9), hold(200.0, 0.3e-9, 0.5e-9)))
-    exact = rotations(given, by_hand(model, sample), torque, NEAR[::2], inertia=False)
-    response = step_response(given, MODELS[model].network(sample), symmetric=False, inertia=False)
+    exact = rotations(either_gripper, by_hand(model, sample), torque, NEAR[::2], inertia=False)
+    response = step_response(
+        either_gripper, MODELS[model].network(sample), symmetric=False, inertia=False
+    )
     for arm in (LEFT, RIGHT):
         ours = rotation(response, torque, NEAR[::2], arm)[0]
         np.testing.assert_allclose(ours, exact[arm], rtol=0, atol=1e-6 * np.abs(exact).max())
@@ -132,30 +129,3 @@ def test_equal_branches_add_up(gripper: Gripper, steps: TorqueHistory) -> None:
             for network in (many, few)
         )
         np.testing.assert_allclose(ours, theirs, rtol=1e-5)
-
-
-def test_the_nonlinear_model_of_a_power_law_sample_against_radau(gripper: Gripper) -> None:
-    """Corrected eqs. (1)-(3) with all branches as states, by SciPy; soft, so that angles count."""
-    network = MODELS["fractional_kelvin_voigt"].network([0.02, 0.1, 0.35])
-    k_p, c_p, k, rates = network.k_p[0], network.c_p[0], network.k[0], (network.k / network.c)[0]
-    arm, hat = gripper.left, np.radians(gripper.reference_angle_deg)
-    torque = torque_history((hold(200.0, TAU),))
-
-    def slope(_: float, state: Array) -> Array:
-        phi, dampers = state[0], state[1:]
-        u = 2 * gripper.arm_length_m * np.sin(hat - phi / 2) * np.sin(phi / 2)
-        b = gripper.arm_length_m * np.sin(hat - phi)
-        rest = TAU - arm.stiffness_Nm_per_rad * phi - b * (k_p * 2 * u + k @ (2 * u - dampers))
-        phi_rate = rest / (arm.damping_Nms_per_rad + 2 * c_p * b * b)
-        return np.concatenate(([phi_rate], rates * (2 * u - dampers)))
-
-    linear = rotation(step_response(gripper, network), torque, NEAR[:5])[0]
-    scale = 1e-11 * linear.max()
-    atol = np.concatenate(([scale], np.full(len(k), scale * gripper.arm_length_m)))
-    solved = solve_ivp(
-        slope, (0, 200), np.zeros(1 + len(k)), "Radau", NEAR[:5], rtol=1e-8, atol=atol
-    )
-    ours = nonlinear_rotation(gripper, network, torque, NEAR[:5])[0]
-    assert np.max(np.abs(ours - linear)) > 1e-4 * linear.max()
-    # Radau's own error, after some thousand steps of 1e-8 at most.
-    np.testing.assert_allclose(ours, solved.y[0], rtol=1e-6)

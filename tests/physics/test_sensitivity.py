@@ -72,13 +72,10 @@ def test_many_samples_are_looked_at_in_parts(
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize("name", MODEL_PARAMETERS)
-@pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
-def test_against_differences(
-    request: pytest.FixtureRequest, arms: str, name: str, protocol: str
-) -> None:
+def test_against_differences(either_gripper: Gripper, name: str, protocol: str) -> None:
     """Every model, equal and unequal arms, every kind of load."""
     model = Sample(name).model
-    _check(request.getfixturevalue(arms), model, protocol, np.array(MODEL_PARAMETERS[name]))
+    _check(either_gripper, model, protocol, np.array(MODEL_PARAMETERS[name]))
 
 
 def test_two_branches_and_a_known_parameter(gripper: Gripper) -> None:

@@ -134,20 +134,6 @@ def test_against_lsoda_with_events(
     assert np.all(ours.jaw_force_N[~ours.touching] == 0)
 
 
-def test_contact_lost_and_regained(gripper: Gripper) -> None:
-    """A drop is left when the torque drops, does not move, and is met when it rises again."""
-    torque = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9), hold(200.0, 2e-9)))
-    time_s = np.array([100.0, 199.9, 200.1, 399.9, 400.1, 600.0])
-    found = unilateral_response(gripper, generalized_maxwell([9.5, 1e-4, 10, 1e-4]), torque, time_s)
-    assert found.touching.tolist() == [True, True, False, False, True, True]
-    assert (len(found.parted_s), len(found.met_s)) == (1, 1)
-    assert 200 <= found.parted_s[0] < 200.001
-    assert 400 < found.met_s[0] < 400.001
-    # Meanwhile the arms stand where their hinges hold the second torque.
-    np.testing.assert_allclose(found.rotation_rad[:, 2:4], 0.32e-9 / 4.4e-7, rtol=1e-12)
-    np.testing.assert_allclose(found.shortening_m[2], found.shortening_m[3], rtol=3e-3)
-
-
 def test_a_sample_that_recovers_meets_the_jaws_by_itself(gripper: Gripper) -> None:
     torque = torque_history((hold(200.0, 1.6e-9), hold(400.0, 0.32e-9)))
     found = unilateral_response(gripper, kelvin_voigt([0.05, 5.0]), torque, np.array([600.0]))

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cholesky
 
 from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.drift import drift_is_flow, nuisance_basis, with_uncertain, without
+from biogrip.physics.drift import drift_is_flow, nuisance_basis
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import flicker_rates
 from biogrip.physics.protocol import hold, sample_times, torque_history
@@ -83,15 +83,6 @@ def test_nuisance_and_what_is_uncertain_are_parts_of_the_noise() -> None:
     white = whitening(rows)
     np.testing.assert_allclose(white @ white.T, expected, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(whitening(nuisance), 0, atol=1e-12)
-
-
-def test_what_is_uncertain_beside_white_noise_is_a_part_of_it() -> None:
-    functions = np.random.default_rng(4).standard_normal((2, 50))
-    root = cholesky(np.eye(50) + functions.T @ functions, lower=True)
-    rows = np.random.default_rng(5).standard_normal((3, 50))
-    left = without(with_uncertain(np.zeros((0, 50)), functions), rows)
-    expected = solve_triangular(root, rows.T, lower=True)
-    np.testing.assert_allclose(left @ left.T, expected.T @ expected, rtol=1e-10)
 
 
 @pytest.mark.parametrize("rate_Hz", [1.0, 10.0])

@@ -26,11 +26,6 @@ class Harmonic:
     omega_rad_per_s: float
     phase_rad: float
 
-    @property
-    def frequency_Hz(self) -> float:
-        """Frequency in Hz."""
-        return self.omega_rad_per_s / (2 * math.pi)
-
 
 @dataclass(frozen=True)
 class Load:
