@@ -19,7 +19,7 @@ from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.misfit import Misfit, make_misfit
 from biogrip.physics.noise import add_noise, rms
 from biogrip.physics.protocol import TorqueHistory, sample_times, torque_history
-from biogrip.physics.residuals import Residuals
+from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel
 from biogrip.study.load import load_study
 from biogrip.study.study import Case
@@ -68,9 +68,9 @@ class NoisyTrace:
 
     def misfit(self) -> Misfit:
         """Return the study's misfit of a population against the trace."""
-        given = self.steps, self.time_s, self.trace_rad
-        residuals = Residuals(self.gripper, self.model, *given, _condensed(), instrument=GRIPPER)
-        return make_misfit(residuals, self.gripper, *given)
+        trace = Trace(self.time_s, self.trace_rad, _condensed())
+        residuals = Residuals(self.gripper, self.model, self.steps, trace, instrument=GRIPPER)
+        return make_misfit(residuals)
 
     def problem(self) -> Problem:
         """Pose the identification as the study does."""

@@ -131,7 +131,6 @@ def test_a_rejected_fit_says_only_why(tmp_path: Path, noise_model: str) -> None:
     lines = trace.read_text().splitlines()
     trace.write_text("\n".join([*lines[:300], "149.6,", *lines[300:]]) + "\n")
     status, said, data = identified(trace, "--noise-model", noise_model, config=config)
-    # A failure it is with --strict alone.
     assert (status, f"{trace}: fit rejected" in said.splitlines()) == (0, True)
     assert data["fit"] == REJECTED
     heavy = [note["text"] for note in data["notes"] if note["weight"] == REJECTION]

@@ -58,14 +58,9 @@ def test_what_is_simulated_by_the_nonlinear_model_is_not_what_the_linear_one_giv
     gripper = library.Gripper(1.5e-3, 60.0, ARM, ARM)
     protocol = (library.hold(200.0, 1.6e-8), library.hold(200.0, 3.2e-9))
     sample = {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 1e-3}
+    experiment = library.set_up(gripper, protocol, library.Sample("generalized_maxwell"))
     linear, nonlinear = (
-        library.simulate(
-            library.set_up(
-                gripper, protocol, library.Sample("generalized_maxwell"), nonlinear=nonlinear
-            ),
-            sample,
-            TIMES,
-        )
+        library.simulate(experiment, sample, TIMES, nonlinear=nonlinear)
         for nonlinear in (False, True)
     )
     ends = [(200.0, 1.6e-8), (400.0, 3.2e-9)]

@@ -93,7 +93,6 @@ RAMP = (Phase(30.0, load(30.0, 0.0, 1e-9), load(30.0, 0.0, 1e-9)), hold(30.0, 0.
     [
         ("generalized_maxwell", (29.0, 6.0, 100.0, 20.0), {}),
         ("generalized_maxwell", (29.0, 6.0, 100.0, 20.0), {"offset": True, "drift": True}),
-        ("generalized_maxwell", (29.0, 6.0, 100.0, 20.0), {"nonlinear": True}),
         ("fractional_kelvin_voigt", None, {}),
     ],
 )

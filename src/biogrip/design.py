@@ -24,10 +24,9 @@ from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs, write_text
 from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.physics.jaw_force import compute_grip, jaw_force_response
-from biogrip.physics.modes import Modes, compute_protocol_modes
+from biogrip.physics.modes import Modes, compute_modes, linear_responses
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.protocol import Burst, Phase, Sampling, hold, largest_load, torque_history
-from biogrip.physics.sensitivity import linear_responses
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.study.config import DesignBlock
 from biogrip.study.load import load_study, read_configs
@@ -73,7 +72,7 @@ class Plausible:
         """Modes of the responses, with derivatives by the log-parameters."""
         unit = torque_history((hold(1.0, 1.0),), deforms=self.case.instrument.deforms)
         problem = self.case.problem
-        return compute_protocol_modes(problem.gripper, problem.searched, unit, self.parameters)
+        return compute_modes(problem.gripper, problem.searched, unit, self.parameters)
 
     @cached_property
     def forces(self) -> list[tuple[float, Array, Array]]:
@@ -233,8 +232,8 @@ def _problem(case: Case, first: Case) -> str | None:
         return "measurement.noise: allowed is white noise, of a share of the peak or a level_rad."
     if measured.fits_offset or measured.fits_drift:
         return "measurement: found an offset or drift to be fitted along, allowed is neither."
-    if case.nonlinear_target or case.problem.nonlinear:
-        return "models: found nonlinear, allowed is linear."
+    if case.nonlinear_target:
+        return "models.target: found nonlinear, allowed is linear."
     return None
 
 

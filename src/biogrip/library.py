@@ -43,7 +43,6 @@ def set_up(
     *,
     ranges: Mapping[str, GeneRange] | None = None,
     fixed: Mapping[str, float] | None = None,
-    nonlinear: bool = False,
 ) -> CaseProblem:
     """Return an experiment: instrument, protocol and sample model, with search ranges.
 
@@ -60,8 +59,6 @@ def set_up(
         Search ranges by name; by default those of the default study.
     fixed
         Fixed parameters by name, SI units.
-    nonlinear
-        If true, use the nonlinear equations.
     """
     instrument = gripper if isinstance(gripper, Instrument) else GRIPPER
     return CaseProblem(
@@ -71,11 +68,16 @@ def set_up(
         replace(sample, per_area=instrument.per_area),
         dict(fixed or {}),
         instrument,
-        nonlinear=nonlinear,
     )
 
 
-def simulate(experiment: CaseProblem, parameters: Mapping[str, float], time_s: Array) -> Array:
+def simulate(
+    experiment: CaseProblem,
+    parameters: Mapping[str, float],
+    time_s: Array,
+    *,
+    nonlinear: bool = False,
+) -> Array:
     """Simulate what the instrument reads without noise: of a gripper, the left arm's rotation.
 
     Parameters
@@ -86,6 +88,8 @@ def simulate(experiment: CaseProblem, parameters: Mapping[str, float], time_s: A
         Parameters of the sample by name, SI units.
     time_s : (n_samples,)
         Sampling times, ascending.
+    nonlinear
+        If true, use the nonlinear equations; fits use the linear ones.
 
     Returns
     -------
@@ -93,7 +97,6 @@ def simulate(experiment: CaseProblem, parameters: Mapping[str, float], time_s: A
         In SI units; of a rotation, rad.
     """
     network, torque = experiment.model.sample(parameters), experiment.torque
-    nonlinear = experiment.nonlinear
     return simulated_rotation(experiment.gripper, network, torque, time_s, nonlinear=nonlinear)[0]
 
 

@@ -91,9 +91,9 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
             counted[0] += 1
             return super().__call__(x)
 
-        def condensed_linear(self, x: Array, *, slopes: bool = True) -> Array:
+        def condensed_responses(self, x: Array, *, slopes: bool = True) -> Array:
             counted[0] += len(x)
-            return super().condensed_linear(x, slopes=slopes)
+            return super().condensed_responses(x, slopes=slopes)
 
     watch_writes = Problem(
         misfit, Counting(), case_problem.genome, case_problem.low, case_problem.high

@@ -52,7 +52,7 @@ def assert_of_one_point(
         network = CANDIDATES[name].model.network([answer.parameters for answer in answers])
         rotations = rotation(step_response(GRIPPER, network, inertia=False), TORQUE, times)
         for problem, answer, own in zip(problems[name], answers, rotations, strict=True):
-            misfit = np.sqrt(np.mean((own - problem.residuals._rotation_rad) ** 2))
+            misfit = np.sqrt(np.mean((own - problem.residuals.trace.cleared_rad) ** 2))
             assert answer.misfit_rad == pytest.approx(misfit, rel=1e-9)
 
 

@@ -6,14 +6,11 @@ References
    for Numerical Methods in Engineering 60 (2004), 979-993: the fixed Talbot method.
 """
 
-import math
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from flint import acb, arb, ctx
-from scipy.integrate import quad
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Arm, Gripper
@@ -34,27 +31,6 @@ def mittag_leffler(a: float, b: float, x: float) -> float:
             if k > x ** (1 / a) / a and abs(term) < arb(10) ** -30 * abs(total):
                 return float(total.mid())
             k, power = k + 1, -power * x_
-
-
-def one_minus_mittag_leffler(a: float, x: float) -> float:
-    """1 - E_a(-x), for any x, by its spectrum: int K(r) (1 - e^(-r t)) dr with t^a = x."""
-    if x ** (1 / a) < 30:
-        return x * mittag_leffler(a, 1 + a, x)
-    log_t, cosine = math.log(x) / a, math.cos(math.pi * a)
-
-    def share(u: float) -> float:
-        # dr/r of the spectrum, symmetric in log r; from e^4 on the exponential is below rounding.
-        faded = -math.expm1(-math.exp(min(u + log_t, 4.0)))
-        return faded / (2 * math.cosh(a * u) + 2 * cosine)
-
-    # Where (1 - e^(-r t)) turns, where the spectrum peaks, and far from both.
-    turn, far = -log_t, 70 / a
-    edges = sorted({-far - abs(turn), turn - 5, turn, turn + 5, -1.0, 0.0, 1.0, far})
-    # The whole is between a half and one, times pi over the sine: twelve digits are left.
-    parts = [
-        quad(share, *ends, epsabs=1e-14, epsrel=1e-12, limit=400)[0] for ends in pairwise(edges)
-    ]
-    return math.sin(math.pi * a) / math.pi * math.fsum(parts)
 
 
 def inverted(transform: Impedance, t: float) -> float:

@@ -57,11 +57,10 @@ def condensed_of(
     *,
     offset: bool = False,
     drift: bool = False,
-    nonlinear: bool = False,
 ) -> Condensed:
     """Rows that stand for the samples of any trace at these times."""
     nuisance = nuisance_basis(time_s, offset=offset, drift=drift)
-    return Condensed(torque, time_s, nuisance, nonlinear=nonlinear)
+    return Condensed(torque, time_s, nuisance)
 
 
 def problem_alone(

@@ -41,16 +41,6 @@ def test_operating_points_of_the_paper(torque_Nm: float, printed_V: float) -> No
     assert abs(float(voltage(TABLE_2, torque_Nm)) - printed_V) < 0.75
 
 
-def test_torque_is_the_slope_of_the_stored_energy() -> None:
-    """Eq. (8): tau = d(C V^2 / 2)/dtheta, by central difference."""
-    step, volts = 1e-3, 16.3
-    overlap_rad = np.array([0.02 - step, 0.02 + step])
-    # Eq. (7): the capacitance is in proportion to the overlap.
-    stored = 0.5 * capacitance_slope(TABLE_2) * overlap_rad * volts**2
-    slope = np.diff(stored)[0] / (2 * step)
-    assert float(torque(TABLE_2, volts)) == pytest.approx(slope, rel=1e-12)
-
-
 def test_voltage_inverts_torque() -> None:
     volts = np.linspace(0, 100, 11)
     np.testing.assert_allclose(voltage(TABLE_2, torque(TABLE_2, volts)), volts, rtol=1e-14)

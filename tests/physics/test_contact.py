@@ -5,7 +5,15 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.physics.actuator import torque
-from biogrip.physics.contact import contact
+from biogrip.physics.contact import (
+    apparent_modulus,
+    contact,
+    drag_of_arm,
+    drag_of_sample,
+    fringing_of_comb,
+    mass_of_sample,
+    rolling_of_contact,
+)
 from biogrip.physics.gripper import Gripper, displacement_of_tip, rotation_of_tip
 from tests.physics.test_actuator import TABLE_2
 
@@ -62,3 +70,48 @@ def test_a_tip_goes_where_its_rotation_takes_it(gripper: Gripper) -> None:
         1.5e-3 * (math.cos(math.radians(75) - t) - math.cos(math.radians(75))) for t in turns
     ]
     np.testing.assert_allclose(there[1:], coordinates[1:], rtol=1e-11)
+
+
+def test_fringing_against_charges_on_two_strips() -> None:
+    """Line charges on strips at +-1/2 V, unknown at as many points as the voltage is given."""
+    h, g, n = TABLE_2.thickness_m / TABLE_2.finger_gap_m, 1.0, 300
+    # Narrow towards the edges, where charge gathers.
+    edges = 0.5 * h * np.cos(np.linspace(math.pi, 0, n + 1))
+    middle, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+    apart = np.abs(middle[:, None] - middle)
+    with np.errstate(divide="ignore"):
+        own = np.where(apart > 0, np.log(apart), np.log(width / 2) - 1)
+    potential = (0.5 * np.log(apart**2 + g**2) - own) / (2 * math.pi)
+    charge = np.linalg.solve(potential, np.full(n, 0.5)).sum()
+    # Palmer's terms are the first two of a series; n segments give three digits.
+    assert 1 + fringing_of_comb(TABLE_2) == pytest.approx(charge * g / h, rel=5e-3)
+
+
+def test_drag_of_an_arm_is_summed_along_it(gripper: Gripper) -> None:
+    x = np.linspace(0, 1.5e-3, 10_001)
+    per_length = 4 * math.pi * 1e-3 / (math.log(1.5e-3 / 40e-6) + 0.84)
+    expected = np.trapezoid(per_length * x * x, x)
+    assert drag_of_arm(gripper, 40e-6) == pytest.approx(expected, rel=1e-7)
+
+
+def test_small_things(gripper: Gripper) -> None:
+    assert drag_of_sample(120e-6) == pytest.approx(6 * math.pi * 1e-3 * 60e-6)
+    assert mass_of_sample(100e-6) == pytest.approx(1e3 * 4 / 3 * math.pi * (50e-6) ** 3)
+    # A wheel of 60 um that turns by 3 mrad, on an arm of 1.5 mm.
+    assert rolling_of_contact(gripper, 120e-6, 3e-3) == pytest.approx(60e-6 * 3e-3 / 1.5e-3)
+
+
+@pytest.mark.parametrize(("size_m", "strain"), [(30e-6, 0.02), (120e-6, 0.1)])
+def test_against_the_pressure_in_the_contact(size_m: float, strain: float) -> None:
+    """Hertz' pressure p_0 sqrt(1 - r^2/a^2) with p_0 = 2 E* a/(pi R), summed over the contact."""
+    modulus, radius, indentation = 1234.0, size_m / 2, strain * size_m / 2
+    effective = modulus / (1 - 0.5**2)
+    a = math.sqrt(radius * indentation)
+    p_0 = 2 * effective * a / (math.pi * radius)
+    force = 2 / 3 * p_0 * math.pi * a**2
+    assert apparent_modulus(force, strain * size_m, size_m) == pytest.approx(modulus, rel=1e-12)
+
+
+def test_a_compressible_sphere_is_of_a_stiffer_material() -> None:
+    ours = (apparent_modulus(1e-6, 1e-6, 50e-6, nu) for nu in (0.5, 0.0))
+    assert next(ours) == pytest.approx(0.75 * next(ours))

@@ -12,10 +12,10 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS
+from biogrip.physics.modes import linear_responses
 from biogrip.physics.protocol import Load, Phase, TorqueHistory, hold, load, torque_history
-from biogrip.physics.residuals import Residuals
+from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import Network, SampleModel
-from biogrip.physics.sensitivity import rotations_and_sensitivities
 from biogrip.physics.simulation import simulated_rotation
 from tests.helpers.power_law import inverted
 
@@ -84,24 +84,6 @@ def test_responses_to_ramps_and_sinusoids_are_inverse_laplace_transforms(
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.max(np.abs(expected)))
 
 
-@pytest.mark.parametrize("model", [m for m in MODELS.values() if not m.power_law])
-def test_moduli_and_compliances_have_the_limits_of_their_networks(model: SampleModel) -> None:
-    network = example(model)
-    ends = np.array([1e-9, 1e9])
-    held = torque_history((hold(2e9, 1.0),)), torque_history((hold(2e9, 1.0),), deforms=True)
-    creep, modulus = (simulated(network, history, ends) for history in held)
-    at_once, at_rest = network.k_p[0] + network.k[0].sum(), network.k_p[0]
-    assert modulus[0] == pytest.approx(at_once, rel=1e-7)
-    assert modulus[1] == pytest.approx(at_rest, rel=1e-6, abs=1e-12)
-    if network.c_p[0] > 0:
-        assert creep[0] == pytest.approx(1e-9 / network.c_p[0], rel=1e-2)
-    else:
-        assert creep[0] == pytest.approx(1 / at_once, rel=1e-6)
-    viscosity = network.c_p[0] + network.c[0].sum()
-    settled = 1 / at_rest if at_rest else 1e9 / viscosity
-    assert creep[1] == pytest.approx(settled, rel=1e-6)
-
-
 @DRIVEN
 @EVERY_MODEL
 def test_derivatives_are_those_of_finite_differences(model: SampleModel, deforms: bool) -> None:
@@ -110,9 +92,7 @@ def test_derivatives_are_those_of_finite_differences(model: SampleModel, deforms
     logs = np.log([model.example])
 
     def rows(at: Array) -> Array:
-        return rotations_and_sensitivities(
-            NO_ARMS, model, history, times, np.exp(at), nonlinear=False
-        )[0]
+        return linear_responses(NO_ARMS, model, history, times, np.exp(at))[0]
 
     found = rows(logs)
     assert found[0] == pytest.approx(simulated(example(model), history, times), rel=1e-12)
@@ -136,7 +116,8 @@ def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
         len(times)
     )
     condensed = Condensed(history, times, np.zeros((0, len(times))))
-    residuals = Residuals(NO_ARMS, model, history, times, trace, condensed, instrument=GRIPPER)
+    given = Trace(times, trace, condensed)
+    residuals = Residuals(NO_ARMS, model, history, given, instrument=GRIPPER)
     # Exponents stay below one.
     moved = [parameter.kind != "exponent" for parameter in model.parameters]
     logs = np.log([model.example]) + np.linspace(-0.3, 0.4, 5)[:, None] * moved

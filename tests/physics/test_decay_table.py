@@ -6,7 +6,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics.misfit import _power_sums
-from biogrip.physics.mode_rows import DecayTable
+from biogrip.physics.rate_tables import DecayTable
 
 RNG = np.random.default_rng(0)
 TRACES = {

@@ -176,22 +176,6 @@ def test_creep_is_a_mittag_leffler_function(model: str, seed: int) -> None:
     np.testing.assert_allclose(turned / 1e-9 * 2 * gripper.lever_m**2, expected, rtol=1e-6)
 
 
-@pytest.mark.parametrize(("model", "seed"), SAMPLES[::2])
-def test_derivatives_are_those_of_mittag_leffler_functions(model: str, seed: int) -> None:
-    """By complex step, against differences of closed forms; h^2 and rounding/h are below 1e-7.
-
-    The derivative by an exponent has the factor ln t.
-    """
-    sample, h = drawn(model, seed), 1e-4
-    for index in range(len(sample)):
-        tilted = sample * (1 + 1e-30j * (np.arange(len(sample)) == index))
-        ours = modulus(MODELS[model].network(tilted)).imag / 1e-30
-        ends = [sample * np.exp(way * h * (np.arange(len(sample)) == index)) for way in (1, -1)]
-        above, below = (np.array([MODULI[model](t, *end) for t in TIMES]) for end in ends)
-        away = np.abs(ours - (above - below) / (2 * h))
-        assert np.max(away / scale(model, sample) / (1 + np.abs(np.log(TIMES)))) < 1e-6
-
-
 @pytest.mark.parametrize("model", list(IMPEDANCES))
 @pytest.mark.parametrize("end", [1e-9, 1 - 1e-9])
 def test_springpots_become_springs_and_dampers(model: str, end: float) -> None:

@@ -24,12 +24,9 @@ def worst_error(gripper: Gripper, torque: TorqueHistory, samples: Array) -> floa
     return float(np.max(np.abs(ours - exact) / np.abs(exact).max(axis=1, keepdims=True)))
 
 
-@pytest.mark.parametrize("chunk", range(3))
-def test_equal_arms_over_the_whole_search_range(
-    gripper: Gripper, steps: TorqueHistory, chunk: int
-) -> None:
+def test_equal_arms_over_the_whole_search_range(gripper: Gripper, steps: TorqueHistory) -> None:
     """Every weight is a quotient of sums of positive terms; rounding is all that is left."""
-    assert worst_error(gripper, steps, random_samples(100, 300 + chunk)) < 1e-11
+    assert worst_error(gripper, steps, random_samples(150, 300)) < 1e-11
 
 
 def test_unequal_arms_and_torques(unequal_gripper: Gripper, steps: TorqueHistory) -> None:
@@ -56,7 +53,7 @@ def test_the_arms_equation_closes_under_ramps_and_sinusoids(
     )
 
 
-@pytest.mark.parametrize("case", range(12))
+@pytest.mark.parametrize("case", range(8))
 def test_nonlinear_against_radau(case: int) -> None:
     rng = np.random.default_rng([52, case])
     gripper = Gripper(1.5e-3, rng.uniform(40, 90), ARM, ARM)
@@ -107,18 +104,6 @@ def test_what_is_left_in_the_end(gripper: Gripper) -> None:
     slow = liquid.rates.real.max()
     assert late[1] / late[0] == pytest.approx(np.exp(1000 * slow), rel=1e-12)
     assert 0 < late[1] < 1e-14
-
-
-def test_jaws_press_while_the_torque_is_held(gripper: Gripper) -> None:
-    """Without inertia nothing overshoots: a first step presses every sample, ever less."""
-    torque = torque_history((hold(400.0, 1.6e-9),))
-    network = generalized_maxwell(random_samples(1000, 14))
-    force = jaw_force(
-        gripper, network, torque, np.geomspace(1e-3, 400, 60), nonlinear=False, inertia=False
-    )
-    peak = force.max(axis=1, keepdims=True)
-    assert np.all(force > -1e-12 * peak)
-    assert np.all(np.diff(force, axis=1) < 1e-12 * peak)
 
 
 def test_no_force_before_anything_moves(gripper: Gripper, steps: TorqueHistory) -> None:

@@ -22,12 +22,13 @@ from biogrip.physics.protocol import (
     Load,
     Phase,
     TorqueHistory,
+    hold,
+    sample_times,
     torque_at,
     torque_history,
 )
 from biogrip.study.experiment_blocks import PhaseBlock, ProtocolBlock
 from tests.helpers.problems import problem_alone
-from tests.helpers.responses import random_samples
 from tests.physics.test_actuator import TABLE_2
 
 PROTOCOL = ProtocolBlock(
@@ -123,25 +124,6 @@ def test_phi_functions_against_50_digits() -> None:
                 assert ours == pytest.approx(float(exact), rel=1e-13)
 
 
-@pytest.mark.parametrize("nonlinear", [False, True])
-def test_misfits_agree_where_both_ways_apply(gripper: Gripper, nonlinear: bool) -> None:
-    """Rows that stand for all samples are the slower way, for any protocol, sampling and model."""
-    model, torque = (
-        MODELS["generalized_maxwell"],
-        torque_history((Phase(40.0, Load(1e-9), Load(1e-9)),)),
-    )
-    time_s = np.linspace(0, 40, 201)
-    trace = 1e-5 * np.random.default_rng(0).standard_normal(201)
-    samples = random_samples(64, 21)
-    case_problem = problem_alone(gripper, model, torque, time_s, trace, nonlinear=nonlinear)
-    by_rows = case_problem.residuals.condensed_misfit(samples)
-    series = SeriesMisfit(gripper, model, torque, 0.2, trace)(samples)
-    # The nonlinear model differs by 1e-3 of the rotation at the very most here.
-    np.testing.assert_allclose(by_rows, series, rtol=5e-3 if nonlinear else 1e-9)
-    if nonlinear:
-        assert np.max(np.abs(by_rows / series - 1)) > 1e-8
-
-
 def test_the_fastest_way_is_chosen(gripper: Gripper) -> None:
     model, uniform = MODELS["maxwell"], np.arange(0, 41, 2.0)
     steps = torque_history((Phase(40.0, Load(1e-9), Load(1e-9)),))
@@ -160,5 +142,25 @@ def test_the_fastest_way_is_chosen(gripper: Gripper) -> None:
     assert not needs_no_response(steps, np.sqrt(uniform))
     assert not needs_no_response(ramp, uniform)
     assert not needs_no_response(swings, uniform)
-    for assumed in ({"nonlinear": True}, {"offset": True}):
-        assert not needs_no_response(steps, uniform, **assumed)
+    assert not needs_no_response(steps, uniform, offset=True)
+
+
+PAPER = (hold(200.0, 1.6e-9), hold(200.0, 0.32e-9))
+
+
+def test_steps_add_up_to_the_torque() -> None:
+    steps = torque_history(PAPER)
+    np.testing.assert_array_equal(steps.time_s, [0.0, 200.0])
+    np.testing.assert_allclose(np.cumsum(steps.left[:, 0]), [1.6e-9, 0.32e-9], rtol=1e-15)
+    assert steps.symmetric
+
+
+def test_torque_at_a_step_is_the_one_after_it() -> None:
+    torque = torque_at(torque_history(PAPER), [-1.0, 0.0, 199.9, 200.0, 400.0])
+    np.testing.assert_allclose(torque, [0.0, 1.6e-9, 1.6e-9, 0.32e-9, 0.32e-9], rtol=1e-12)
+
+
+def test_rounding_does_not_lose_the_last_sample() -> None:
+    """0.3 s at 10 Hz: 0.3 * 10 is 2.9999999999999996 in doubles."""
+    assert len(sample_times(0.1 + 0.2, 10.0)) == 4
+    assert len(sample_times(0.3, 10.0)) == 4

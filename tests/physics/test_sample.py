@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import rotation, sample_polynomials, step_response
@@ -112,16 +111,3 @@ def test_fixing_a_parameter_leaves_the_others(gripper: Gripper, steps: TorqueHis
     theirs = response_of(gripper, steps, model.network([35.0, 12.3, 299.9, 1e-3]))
     np.testing.assert_array_equal(ours, theirs)
     assert with_fixed(model, {}) is model
-
-
-def test_the_printed_equation_6_runs_away_and_the_corrected_one_relaxes() -> None:
-    """With both tips held, eq. (6) as printed reads -k x + c x' = 0; balance needs +k x."""
-    k, c, start = 35.0, 299.9, 1e-9
-    for sign in (+1, -1):
-        solved = solve_ivp(
-            lambda _, x, sign=sign: sign * k / c * x, (0, 20), [start], rtol=1e-9, atol=0
-        )
-        assert solved.y[0, -1] == pytest.approx(start * np.exp(sign * k / c * 20), rel=1e-6)
-    # The library's sample has the relaxing pole, -k/c, alone: strain it, hold it, watch the force.
-    _, q = sample_polynomials(generalized_maxwell([k, 12.3, c, 1e-3]))
-    np.testing.assert_allclose(-q[0, 0] / q[1, 0], -k / c, rtol=1e-15)

@@ -4,19 +4,18 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.physics import modes
 from biogrip.physics import residuals as of_residuals
-from biogrip.physics import sensitivity
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.drift import nuisance_basis, with_uncertain, within, without
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.nonlinear import nonlinear_rotation
+from biogrip.physics.modes import linear_responses
 from biogrip.physics.protocol import TorqueHistory, torque_history
-from biogrip.physics.residuals import Residuals
+from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.physics.sensitivity import rotation_and_sensitivity
 from tests.helpers.responses import (
     MODEL_PARAMETERS,
     PROTOCOLS,
@@ -33,9 +32,8 @@ INERTIA = 5 * 3.1e-8 / np.where(TIMES < 200, TIMES, TIMES - 200) ** 2
 def test_against_50_digits(gripper: Gripper, steps: TorqueHistory) -> None:
     """Central differences with a step of 1e-4 of a solution with 50 digits, extrapolated."""
     for sample in random_samples(6, seed=5):
-        _, slopes = rotation_and_sensitivity(
-            gripper, MODELS["generalized_maxwell"], steps, TIMES, sample
-        )
+        model = MODELS["generalized_maxwell"]
+        slopes = linear_responses(gripper, model, steps, TIMES, sample[None])[0, 1:]
         peak = np.abs(rotation_50_digits(gripper, sample, steps, TIMES)).max()
         for index in range(4):
             coarse, fine = (
@@ -65,26 +63,19 @@ def test_many_samples_are_looked_at_in_parts(
     (sample,) = random_samples(1, seed=8)
     torque, model = torque_history(PROTOCOLS[protocol]), MODELS["generalized_maxwell"]
     time_s = np.linspace(0, torque.end_s, 1001)
-    whole = rotation_and_sensitivity(gripper, model, torque, time_s, sample)
-    monkeypatch.setattr(sensitivity, "_AT_ONCE", 90)
-    parts = rotation_and_sensitivity(gripper, model, torque, time_s, sample)
-    for one, other in zip(whole, parts, strict=True):
-        np.testing.assert_allclose(other, one, rtol=0, atol=1e-14 * np.abs(whole[0]).max())
-
-
-def test_every_model_is_covered() -> None:
-    assert set(MODEL_PARAMETERS) == set(MODELS)
+    given = gripper, model, torque, time_s, sample[None]
+    whole = linear_responses(*given)[0]
+    monkeypatch.setattr(modes, "_TIMES_TOGETHER", 90)
+    parts = linear_responses(*given)[0]
+    np.testing.assert_allclose(parts, whole, rtol=0, atol=1e-14 * np.abs(whole[0]).max())
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize("name", MODEL_PARAMETERS)
-@pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
-def test_against_differences(
-    request: pytest.FixtureRequest, arms: str, name: str, protocol: str
-) -> None:
+def test_against_differences(either_gripper: Gripper, name: str, protocol: str) -> None:
     """Every model, equal and unequal arms, every kind of load."""
     model = Sample(name).model
-    _check(request.getfixturevalue(arms), model, protocol, np.array(MODEL_PARAMETERS[name]))
+    _check(either_gripper, model, protocol, np.array(MODEL_PARAMETERS[name]))
 
 
 def test_two_branches_and_a_known_parameter(gripper: Gripper) -> None:
@@ -96,7 +87,7 @@ def test_two_branches_and_a_known_parameter(gripper: Gripper) -> None:
 
 def _check(gripper: Gripper, model: SampleModel, protocol: str, sample: Array) -> None:
     torque = torque_history(PROTOCOLS[protocol])
-    phi, slopes = rotation_and_sensitivity(gripper, model, torque, TIMES, sample)
+    phi, *slopes = linear_responses(gripper, model, torque, TIMES, sample[None])[0]
 
     def simulated(parameters: Array) -> Array:
         response = step_response(
@@ -114,24 +105,6 @@ def _check(gripper: Gripper, model: SampleModel, protocol: str, sample: Array) -
         # Extrapolated: h^4 = 1e-12, and rounding 1e-16 / h = 1e-13; derivatives cancel some more.
         exact = (4 * pairs[1] - pairs[0]) / 3
         assert np.max(np.abs(slopes[index] - exact)) < 1e-9 * np.abs(phi).max()
-
-
-def test_nonlinear_sensitivity_is_that_of_the_nonlinear_model(
-    gripper: Gripper, steps: TorqueHistory
-) -> None:
-    model, sample = MODELS["generalized_maxwell"], np.array([1.0, 0.05, 10.0, 0.5])
-    phi, slopes = rotation_and_sensitivity(gripper, model, steps, TIMES, sample, nonlinear=True)
-    exact = nonlinear_rotation(gripper, model.network(sample), steps, TIMES)[0]
-    # The population's mesh is coarse: 1e-6 of the peak (see test_nonlinear).
-    assert np.max(np.abs(phi - exact)[1:]) < 3e-6 * exact.max()
-    for index in range(4):
-        h = 1e-3 * np.eye(4)[index]
-        ahead, behind = (
-            nonlinear_rotation(gripper, model.network(sample * np.exp(s)), steps, TIMES)[0]
-            for s in (h, -h)
-        )
-        difference = (ahead - behind) / 2e-3
-        assert np.max(np.abs(slopes[index] - difference)[1:]) < 1e-5 * exact.max()
 
 
 @pytest.mark.parametrize(("offset", "drift"), [(True, False), (False, True), (True, True)])
@@ -158,7 +131,7 @@ def test_residuals_do_not_see_what_the_instrument_added(
     basis = nuisance_basis(times, offset=True, drift=True)
     condensed = Condensed(steps, times, basis)
     plain, shifted = (
-        Residuals(gripper, model, steps, times, trace + added, condensed, instrument=GRIPPER)
+        Residuals(gripper, model, steps, Trace(times, trace + added, condensed), instrument=GRIPPER)
         for added in (0.0, 5e-3 + 1e-5 * times)
     )
     np.testing.assert_allclose(plain(x)[0], shifted(x)[0], atol=1e-15)
@@ -176,8 +149,8 @@ def test_the_gradient_of_many_samples_is_summed_in_parts(
     basis = with_uncertain(
         nuisance_basis(times, offset=True, drift=False), 0.1 * np.sin(times / 30)[None]
     )
-    condensed = Condensed(steps, times, basis)
-    residuals = Residuals(gripper, model, steps, times, trace, condensed, instrument=GRIPPER)
+    given = Trace(times, trace, Condensed(steps, times, basis))
+    residuals = Residuals(gripper, model, steps, given, instrument=GRIPPER)
     residual, slopes = residuals(x)
     np.testing.assert_array_equal(residuals.left(x), residual)
     for at_once in (1000, 90):

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cholesky
 
 from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.drift import nuisance_basis, with_uncertain, without
+from biogrip.physics.drift import drift_is_flow, nuisance_basis
+from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import flicker_rates
-from biogrip.physics.protocol import sample_times
+from biogrip.physics.protocol import hold, sample_times, torque_history
 from biogrip.physics.whitening import WEIGHTED, NoiseModel, Whitening
 from tests.helpers.problems import MODEL, SAMPLES, TORQUE, posed_for
 
@@ -84,15 +85,6 @@ def test_nuisance_and_what_is_uncertain_are_parts_of_the_noise() -> None:
     np.testing.assert_allclose(whitening(nuisance), 0, atol=1e-12)
 
 
-def test_what_is_uncertain_beside_white_noise_is_a_part_of_it() -> None:
-    functions = np.random.default_rng(4).standard_normal((2, 50))
-    root = cholesky(np.eye(50) + functions.T @ functions, lower=True)
-    rows = np.random.default_rng(5).standard_normal((3, 50))
-    left = without(with_uncertain(np.zeros((0, 50)), functions), rows)
-    expected = solve_triangular(root, rows.T, lower=True)
-    np.testing.assert_allclose(left @ left.T, expected.T @ expected, rtol=1e-10)
-
-
 @pytest.mark.parametrize("rate_Hz", [1.0, 10.0])
 def test_few_rows_stand_for_all_whitened_samples(rate_Hz: float) -> None:
     """To 1e-10 of the trace's, as without a colour (test_condensed.py)."""
@@ -106,10 +98,23 @@ def test_few_rows_stand_for_all_whitened_samples(rate_Hz: float) -> None:
     x = np.log([sample[name] for name in MODEL.names])
     residual, slopes = plain(x)
     residual, slopes = whitening(residual), whitening(slopes)
-    simulated = plain._simulated(x[None], condensed.time_s)[0]
+    simulated = linear_responses(plain.gripper, MODEL, TORQUE, condensed.time_s, np.exp(x)[None])[0]
     response, sensitivity = simulated[0], simulated[1:]
     rows = response @ condensed.to_rows - condensed.of_trace(whitening(trace))
     of_slopes = sensitivity @ condensed.to_rows
     assert rows @ rows == pytest.approx(residual @ residual, rel=1e-10)
     np.testing.assert_allclose(of_slopes @ rows, slopes @ residual, rtol=1e-7, atol=1e-12)
     np.testing.assert_allclose(of_slopes @ of_slopes.T, slopes @ slopes.T, rtol=1e-9)
+
+
+SAMPLED = np.linspace(0.0, 100.0, 201)
+
+
+def test_under_a_constant_torque_a_drift_is_flow() -> None:
+    assert drift_is_flow(torque_history((hold(100.0, 1e-9),)), SAMPLED)
+
+
+def test_where_the_torque_changes_it_is_not() -> None:
+    torque = torque_history((hold(50.0, 1e-9), hold(50.0, 0.2e-9)))
+    assert not drift_is_flow(torque, SAMPLED)
+    assert drift_is_flow(torque, SAMPLED[:100])

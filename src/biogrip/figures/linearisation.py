@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from biogrip.figures.style import BLUE, PAGE_IN, TARGET, figure, panel
 from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.nonlinear import FINE, correction
+from biogrip.physics.nonlinear import correction
 from biogrip.physics.protocol import torque_history
 from biogrip.records.identifications import DIFFERENCES
 from biogrip.stages.model_difference import network_of, scaled
@@ -60,7 +60,7 @@ def _difference(axes: Axes, case: Case) -> None:
     time_s = np.linspace(0, torque.end_s, 1001)
     response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
     linear = rotation(response, torque, time_s)[0]
-    difference = correction(gripper, network, torque, FINE).at(time_s)[0]
+    difference = correction(gripper, network, torque).at(time_s)[0]
     axes.plot(time_s, 1e3 * difference, color=BLUE)
     axes.axhline(0, color=TARGET, linewidth=0.6)
     axes.set(xlabel="time (s)", ylabel="nonlinear - linear rotation (mrad)")

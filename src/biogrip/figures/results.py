@@ -68,7 +68,7 @@ def fit_of(
     """Return the trace of a seed, and the response of parameters with nuisance terms fitted."""
     network = problem.model.sample(parameters)
     simulated = simulated_rotation(
-        problem.gripper, network, problem.torque, recorded.time_s, nonlinear=problem.nonlinear
+        problem.gripper, network, problem.torque, recorded.time_s, nonlinear=False
     )[0]
     measured = recorded.rotation_rad[seed]
     nuisance = problem.nuisance(recorded.time_s)

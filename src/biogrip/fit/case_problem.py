@@ -41,8 +41,6 @@ class CaseProblem:
     """Parameters that are known, by name."""
     instrument: Instrument
     """What is held and read; other than a gripper, it has `NO_ARMS`."""
-    nonlinear: bool = False
-    """True to simulate the nonlinear model."""
     offset: bool = False
     """True if the instrument may have added a constant."""
     drift: bool = False
@@ -162,7 +160,7 @@ class CaseProblem:
     def sets_condensed(self, time_s: Array) -> tuple[Hashable, ...]:
         """Return all that these condensed rows depend on."""
         sd = None if self.sd_rad is None else self.sd_rad.tobytes()
-        held = self.phases, self.instrument, self.nonlinear, self.offset, self.drift
+        held = self.phases, self.instrument, self.offset, self.drift
         return *held, sd, time_s.tobytes()
 
     def for_model(self, problem: Problem, model: SampleModel) -> Problem:
@@ -208,7 +206,7 @@ class CaseProblem:
     def _condense(
         self, time_s: Array, basis: Array, whitening: Whitening | None = None
     ) -> Condensed:
-        return Condensed(self.torque, time_s, basis, nonlinear=self.nonlinear, whitening=whitening)
+        return Condensed(self.torque, time_s, basis, whitening=whitening)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""

@@ -58,7 +58,7 @@ class OnsetFits:
     """
 
     def __init__(self, case_problem: CaseProblem, time_s: Array, rotation_rad: Array) -> None:
-        self._case_problem = replace(case_problem.to_identify(), nonlinear=False)
+        self._case_problem = case_problem.to_identify()
         self._time_s, self._rotation_rad = time_s, rotation_rad
         self.interval_s = float(np.median(np.diff(time_s)))
 

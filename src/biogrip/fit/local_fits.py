@@ -5,7 +5,7 @@ are computed as one array. The result of a fit does not depend, to the last bit,
 fits.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -13,7 +13,6 @@ import numpy as np
 from biogrip.arrays import Array, IntArray, parts
 from biogrip.fit.levenberg_marquardt import Constraint, Minima, Normal, minimize
 from biogrip.fit.problem import Problem
-from biogrip.fit.refreshed_fits import minimize_with_refreshes
 
 PRIOR_WIDTH = 100.0
 """Standard deviation, in e-folds, of the Gaussian prior about the middle of each range.
@@ -92,7 +91,14 @@ class LocalFits:
         trace : (n,)
             Index of the trace that each point is compared with.
         """
-        return self._in_parts(self._residuals.condensed_responses, x, trace)
+        size = max(1, _AT_ONCE // (self._traces.shape[1] * (1 + x.shape[1])))
+        if len(x) <= size:
+            return self._normal_of(self._residuals.condensed_responses(x), x, trace)
+        normals = []
+        for some in parts(len(x), size):
+            rows = self._residuals.condensed_responses(x[some])
+            normals.append(self._normal_of(rows, x[some], trace[some]))
+        return Normal.joined(normals)
 
     def curved(self, x: Array, trace: IntArray) -> Normal:
         """Return normal equations with the full Hessian in place of its Gauss-Newton part.
@@ -135,19 +141,6 @@ class LocalFits:
             np.empty((*x.shape, 0)),
             misfit_rad,
         )
-
-    def _in_parts(
-        self, rows_of: Callable[..., Array], x: Array, trace: IntArray, *beside: Array
-    ) -> Normal:
-        """Return normal equations, with the rows of a limited number of fits formed at a time."""
-        size = max(1, _AT_ONCE // (self._traces.shape[1] * (1 + x.shape[1])))
-        if len(x) <= size:
-            return self._normal_of(rows_of(x, *beside), x, trace)
-        normals = []
-        for some in parts(len(x), size):
-            rows = rows_of(x[some], *(row[some] for row in beside))
-            normals.append(self._normal_of(rows, x[some], trace[some]))
-        return Normal.joined(normals)
 
     def _normal_of(self, rows: Array, x: Array, trace: IntArray) -> Normal:
         """Return normal equations from rows of responses; infinite where there is no response."""
@@ -199,19 +192,8 @@ class LocalFits:
         if constraint is not None:
             starts = constraint.started(starts)
 
-        def rows_of(x: Array, correction: Array | None = None) -> Array:
-            rows = self._residuals.condensed_linear(x)
-            if correction is not None:
-                rows += correction
-            return rows
-
-        def objective(x: Array, fit: IntArray, *correction: Array) -> Normal:
-            normal = self._in_parts(rows_of, x, trace[fit], *correction)
+        def objective(x: Array, fit: IntArray) -> Normal:
+            normal = self.normal(x, trace[fit])
             return normal if constraint is None else constraint.added(normal, x, fit)
 
-        if self._residuals.nonlinear:
-            correction = self._residuals.condensed_corrections
-            return minimize_with_refreshes(
-                objective, correction, starts, low, high, tolerance, constraint
-            )
         return minimize(objective, starts, low, high, tolerance, constraint)

@@ -13,7 +13,7 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.misfit import Misfit, make_misfit
 from biogrip.physics.protocol import TorqueHistory
-from biogrip.physics.residuals import Residuals
+from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel
 
 Progress = Callable[[int, float], None]
@@ -147,18 +147,9 @@ def make_problem(
     noise_rad
         Standard deviation of the noise, if it is known.
     """
-    residuals = Residuals(
-        gripper,
-        model,
-        torque,
-        time_s,
-        rotation_rad,
-        condensed,
-        noise_rad=noise_rad,
-        instrument=instrument,
-    )
-    misfit = make_misfit(residuals, gripper, torque, time_s, rotation_rad)
-    return searched(misfit, residuals, ranges)
+    trace = Trace(time_s, rotation_rad, condensed, noise_rad)
+    residuals = Residuals(gripper, model, torque, trace, instrument=instrument)
+    return searched(make_misfit(residuals), residuals, ranges)
 
 
 def searched(misfit: Misfit, residuals: Residuals, ranges: Mapping[str, GeneRange]) -> Problem:

@@ -51,8 +51,7 @@ def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Arra
     network = case_problem.searched.network(parameters)
 
     def simulated(gripper: Gripper, torque: TorqueHistory) -> Array:
-        nonlinear = case_problem.nonlinear
-        return simulated_rotation(gripper, network, torque, time_s, nonlinear=nonlinear)[0]
+        return simulated_rotation(gripper, network, torque, time_s, nonlinear=False)[0]
 
     pairs = [(simulated(*above), simulated(*below)) for above, below in _pairs(case_problem)]
     if not pairs:

@@ -306,7 +306,7 @@ def _fitted_along(
     time_s, measured = recorded.time_s, recorded.rotation_rad[0]
     network = problem.searched.network(parameters)
     simulated = simulated_rotation(
-        problem.gripper, network, problem.torque, time_s, nonlinear=problem.nonlinear
+        problem.gripper, network, problem.torque, time_s, nonlinear=False
     )[0]
     added = within(problem.nuisance(time_s), measured - simulated, problem.sd_rad)
     slope = float((added[-1] - added[0]) / (time_s[-1] - time_s[0]))

@@ -1,8 +1,7 @@
 """Other fits that are held against that of a trace: sample models, an offset and a drift.
 
 Several sample models are fitted with the noise model of the trace's fit, and ranked by AIC and BIC;
-with fixed parameters and with the nonlinear model, which takes minutes, none are. If the own model
-fits better than it was diagnosed, the trace is diagnosed again.
+with fixed parameters none are. If the own model fits better than it was diagnosed, the trace is diagnosed again.
 
 An offset and a drift that the user did not declare are fitted along. The test is a likelihood
 ratio: if neither is in the trace, the decrease of chi^2 follows a chi-squared distribution with as
@@ -144,7 +143,7 @@ def models_tried(
 
 def _candidates(trace: TraceCase, fit: TraceFit) -> tuple[str, ...]:
     """Return the names of the models to fit to a trace, none if nothing is compared."""
-    if trace.problem.nonlinear or trace.problem.fixed:
+    if trace.problem.fixed:
         return ()
     # With very many samples the dozens of modes of a springpot would take gigabytes.
     few = fit.problem.residuals.samples <= _MOST_SAMPLES
@@ -185,8 +184,7 @@ def second_opinions(
 
     Traces have the same model, budget and confidence. Each gets at most one note; with a rejected
     fit, only if that with both terms is not rejected. None are tried if both are declared already,
-    if the model is nonlinear, or if the noise model is coloured, which fits both unless they are
-    refused.
+    or if the noise model is coloured, which fits both unless they are refused.
     """
     notes: list[list[Note]] = [[] for _ in traces]
     tried = [index for index, trace in enumerate(traces) if _may_have_more(trace.problem)]
@@ -216,7 +214,7 @@ def second_opinions(
 
 def _may_have_more(problem: CaseProblem) -> bool:
     both = problem.offset and problem.drift
-    return not (both or problem.nonlinear or problem.coloured)
+    return not (both or problem.coloured)
 
 
 def _fitted(

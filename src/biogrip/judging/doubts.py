@@ -210,7 +210,7 @@ def has_fast_noise(residuals: Residuals, log_parameters: Array) -> bool:
 
     That is not estimated of more than `MOST_SAMPLES` readings, nor of residuals that are white.
     """
-    time_s = residuals.sampling_s
+    time_s = residuals.trace.time_s
     if residuals.coloured or len(time_s) > MOST_SAMPLES:
         return False
     residual, sensitivity = residuals(log_parameters)

@@ -17,8 +17,8 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.judging.quantities import Quantity, parameters_and_sum
+from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import Noise, standard_deviation
-from biogrip.physics.sensitivity import rotation_and_sensitivity
 
 # Members with a smaller share in a sum are neglected, whatever their uncertainty.
 _NEGLIGIBLE = 1e-2
@@ -112,13 +112,13 @@ def bounds_percent(
     if noise.absent:
         return [(q, math.nan) for q in quantities]
     values = np.array([parameters[name] for name in model.names])
-    rotation, sensitivity = rotation_and_sensitivity(
-        problem.gripper, model, problem.torque, time_s, values, nonlinear=problem.nonlinear
-    )
+    rotation, *sensitivity = linear_responses(
+        problem.gripper, model, problem.torque, time_s, values[None]
+    )[0]
     sigma = standard_deviation(rotation, noise)
     with np.errstate(divide="ignore"):
         logarithms = np.log(values)
-    return [(q, 100 * bound(sensitivity, sigma, logarithms, q)) for q in quantities]
+    return [(q, 100 * bound(np.array(sensitivity), sigma, logarithms, q)) for q in quantities]
 
 
 def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:

@@ -1,6 +1,6 @@
-"""A calibrated gripper as a file: a config block that can be laid over a study.
+"""No-load calibration: an arm's inertia, damping and stiffness from its free motion (section 2).
 
-No-load calibration: an arm's inertia, damping and stiffness from its free motion (section 2).
+A calibrated gripper is written as a config block that can be laid over a study.
 
 References
 ----------

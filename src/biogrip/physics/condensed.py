@@ -1,37 +1,34 @@
-"""Nodes that replace dense readings in sums of products of smooth functions.
+"""Condensed least squares: a few rows with the sum of squares of all readings.
 
-After a change of torque, modes of all rates respond; later, only slow ones remain. On a
-piece of time twice as far from the last change at its end as at its start, a response
-is a polynomial of degree 19 to 1e-15 of its peak, whatever the rate: with
-e^(-rho (3 + s)), |s| <= 1, Chebyshev coefficients fall like 5.8^-n. Earlier changes are
-further away, and a sinusoid of the torque is a polynomial as well on a piece of a
-period. So a piece with thousands of readings needs twenty nodes, and sums of products
-over its readings follow from one small matrix, which is summed up block by block. If
-readings are few, they are the nodes.
+First, nodes replace dense readings in sums of products of smooth functions (`DenseSamples`). After
+a change of torque, modes of all rates respond; later, only slow ones remain. On a piece of time
+twice as far from the last change at its end as at its start, a response is a polynomial of degree
+19 to 1e-15 of its peak, whatever the rate: with e^(-rho (3 + s)), |s| <= 1, Chebyshev coefficients
+fall like 5.8^-n [1]_. Earlier changes are further away, and a sinusoid of the torque is a
+polynomial as well on a piece of a period. So a piece with thousands of readings needs twenty nodes,
+and sums of products over its readings follow from one small matrix, which is summed up block by
+block. If readings are few, they are the nodes.
 
-Condensed least squares: a few rows with the sum of squares of all readings.
-
-The linear rotation of any sample is a weighted sum of the responses of modes to the
-protocol, g(t; r). Over all rates r these nearly span a space of some fifty dimensions
-only, in which a function is determined by its values at as many well-chosen times. So
-a response is simulated at those times, and a square matrix turns its values into rows
-with the sum of squares, and the gradients, of the residuals at all readings. Dense
-readings are first replaced by nodes (`biogrip.physics.condensed`). If nodes are too
-many, every node has a row of its own.
+Second, a few times replace the nodes (`Condensed`). The linear rotation of any sample is a weighted
+sum of the responses of modes to the protocol, g(t; r). Over all rates r these nearly span a space
+of some fifty dimensions only, in which a function is determined by its values at as many
+well-chosen times [2]_, [3]_. So a response is simulated at those times, and a square matrix turns
+its values into rows with the sum of squares, and the gradients, of the residuals at all readings.
+If nodes are too many, every node has a row of its own.
 
 References
 ----------
 .. [1] L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapter 8:
    how fast Chebyshev's coefficients of analytic functions fall.
-.. [1] P. Businger and G. H. Golub, Linear least squares solutions by Householder
+.. [2] P. Businger and G. H. Golub, Linear least squares solutions by Householder
    transformations, Numerische Mathematik 7 (1965), 269-276: QR with column pivoting.
-.. [2] Z. Drmač and S. Gugercin, A new selection operator for the discrete empirical
+.. [3] Z. Drmač and S. Gugercin, A new selection operator for the discrete empirical
    interpolation method, SIAM Journal on Scientific Computing 38 (2016), A631-A648: points of
    interpolation chosen by it.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -40,10 +37,9 @@ from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array, IntArray
 from biogrip.physics.drift import without
-from biogrip.physics.mode_growth import compute_growth
-from biogrip.physics.mode_rows import ModeRows
-from biogrip.physics.nonlinear import COARSE, STAGES, mesh, mesh_functions
+from biogrip.physics.mode_responses import mode_responses
 from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.rate_tables import ModeRows
 from biogrip.physics.whitening import Whitening
 
 _NODES = 20
@@ -59,47 +55,48 @@ _AT_ONCE = 16_384
 # Most readings whose polynomials are kept for the next trace.
 _MOST_KEPT = 100_000
 
+MOST_NODES = 50_000
+"""Most nodes that are condensed further: with more, it would take gigabytes."""
+
+# Spacing of rates in log(1 - T r), T the last time: far closer than modes can be resolved.
+_SPACING = 0.25
+# Slowest rate times T, and fastest rate times the shortest sampling interval.
+_SLOWEST, _FASTEST = 1e-6, 1e3
+# Directions with a smaller relative singular value are rounding errors.
+_RANK = 1e-14
+
 
 @dataclass(frozen=True)
 class _Piece:
-    """Readings from `first` up to `stop`, and the matrix that relates them to their nodes.
-
-    With Legendre polynomials at the readings Q R, Q orthonormal, the triangle is R^T; it is
-    None where readings are nodes.
-    """
+    """Readings from `first` up to `stop`, and their nodes."""
 
     first: int
     stop: int
-    triangle: Array | None
+    nodes_s: Array
+    """Times of the nodes, (n_nodes,)."""
+    triangle: Array | None = None
+    """R^T of Legendre polynomials Q R at the readings, Q orthonormal; None if these are nodes."""
 
 
 class DenseSamples:
     """Rows with the products of all readings, for any smooth functions of time.
 
-    Functions are smooth between changes of the torque, and may be less so at further edges,
-    (n_edges,). Sampling times, (n_samples,), ascend. Only if `dense` may nodes replace readings;
-    otherwise each reading is a node.
+    Functions are smooth between changes of the torque. Sampling times, (n_samples,), ascend. Only
+    if `dense` may nodes replace readings; otherwise each reading is a node.
     """
 
-    def __init__(
-        self,
-        torque: TorqueHistory,
-        time_s: Array,
-        further_edges_s: Array | None = None,
-        *,
-        dense: bool = True,
-    ) -> None:
+    def __init__(self, torque: TorqueHistory, time_s: Array, *, dense: bool = True) -> None:
         self._all_s = time_s
         self._kept: dict[tuple[int, int], list[tuple[slice, Array]]] = {}
         starts = [start for start, *_ in (*torque.jumps, *torque.swings)]
         self._starts_s = np.unique([-np.inf, *starts])
         omega = torque.omega_rad_per_s
         self._longest_s = 2 * np.pi / omega.max() if len(omega) else np.inf
-        edges = starts if further_edges_s is None else [*starts, *further_edges_s]
-        bounds = np.unique(np.concatenate(([0], time_s.searchsorted(edges), [len(time_s)])))
-        divided = (p for ends in pairwise(bounds) for p in self._divided(*ends))
-        self._pieces = _joined(divided) if dense else [_Piece(0, len(time_s), None)]
-        self.time_s = np.concatenate([self._nodes(piece) for piece in self._pieces])
+        bounds = np.unique(np.concatenate(([0], time_s.searchsorted(starts), [len(time_s)])))
+        self._pieces = [_Piece(0, len(time_s), time_s)]
+        if dense:
+            self._pieces = [piece for ends in pairwise(bounds) for piece in self._divided(*ends)]
+        self.time_s = np.concatenate([piece.nodes_s for piece in self._pieces])
         """Times of the nodes, (n_nodes,), ascending."""
 
     def rows_of_values(self, values: Array) -> Array:
@@ -117,7 +114,7 @@ class DenseSamples:
         """Apply a function of node values and triangle to each piece that has a triangle."""
         turned, start = np.copy(values), 0
         for piece in self._pieces:
-            here = slice(start, start + self._count(piece))
+            here = slice(start, start + len(piece.nodes_s))
             start = here.stop
             if piece.triangle is not None:
                 turned[..., here] = turn(values[..., here], piece.triangle)
@@ -153,7 +150,7 @@ class DenseSamples:
     def _divided(self, first: int, stop: int) -> Iterator[_Piece]:
         """Halve pieces that are not smooth, or not dense all over, down to few readings."""
         if stop - first < _FEWEST:
-            yield _Piece(first, stop, None)
+            yield _Piece(first, stop, self._all_s[first:stop])
             return
         start, end = self._all_s[first], self._all_s[stop - 1]
         elapsed = start - self._starts_s[self._starts_s.searchsorted(start, side="right") - 1]
@@ -164,8 +161,8 @@ class DenseSamples:
             size = np.sqrt(np.diagonal(gram))
             shares = np.linalg.eigvalsh(gram / (size[:, None] * size))
             if shares[-1] <= _LARGEST_CONDITION * shares[0]:
-                triangle = np.asarray(np.linalg.cholesky(gram), np.float64)
-                yield _Piece(first, stop, triangle)
+                nodes_s = 0.5 * (start + end) + 0.5 * (end - start) * _PLACES
+                yield _Piece(first, stop, nodes_s, np.asarray(np.linalg.cholesky(gram), float))
                 return
         half = first + int(np.searchsorted(self._all_s[first:stop], 0.5 * (start + end)))
         yield from self._divided(first, half)
@@ -186,99 +183,45 @@ class DenseSamples:
             place = (2 * self._all_s[block] - start - end) / (end - start)
             yield block, legendre.legvander(place, _DEGREE)
 
-    def _nodes(self, piece: _Piece) -> Array:
-        if piece.triangle is None:
-            return self._all_s[piece.first : piece.stop]
-        start, end = self._all_s[piece.first], self._all_s[piece.stop - 1]
-        return 0.5 * (start + end) + 0.5 * (end - start) * _PLACES
 
-    @staticmethod
-    def _count(piece: _Piece) -> int:
-        return piece.stop - piece.first if piece.triangle is None else _NODES
-
-
-def _joined(pieces: Iterator[_Piece]) -> list[_Piece]:
-    """Join neighbouring pieces whose readings are nodes."""
-    joined: list[_Piece] = []
-    for piece in pieces:
-        if joined and joined[-1].triangle is None and piece.triangle is None:
-            joined[-1] = _Piece(joined[-1].first, piece.stop, None)
-        else:
-            joined.append(piece)
-    return joined
-
-
-MOST_NODES = 50_000
-"""Most nodes that are condensed further: with more, it would take gigabytes."""
-
-# Spacing of rates in log(1 - T r), T the last time: far closer than modes can be resolved.
-_SPACING = 0.25
-# Slowest rate times T, and fastest rate times the shortest sampling interval.
-_SLOWEST, _FASTEST = 1e-6, 1e3
-# Most values of a correction: a mesh that follows a sinusoid of the torque may have thousands.
-_MOST_FUNCTIONS = 1000
-# Directions with a smaller relative singular value are rounding errors.
-_RANK = 1e-14
-
-
+@dataclass(frozen=True, eq=False)
 class Condensed:
-    """Condensed rows that replace the readings of any trace of a protocol in least squares.
+    """Condensed rows that replace the readings of any trace of a protocol in least squares."""
 
-    Parameters
-    ----------
-    torque
-        The protocol.
-    time_s : (n_samples,)
-        Ascending sampling times.
-    nuisance : (n_functions, n_samples)
-        Functions projected out of trace and responses, see `nuisance_basis`, `with_uncertain`.
-    nonlinear
-        True if rows must also represent corrections by the nonlinear model.
-    whitening
-        Transformation that whitens noise and projects nuisance out; None for white noise.
-    """
+    torque: TorqueHistory
+    """The protocol."""
+    all_s: Array
+    """Ascending sampling times, (n_samples,)."""
+    functions: Array
+    """Functions projected out of trace and responses, (n_functions, n_samples), if noise is white;
+    see `nuisance_basis`, `with_uncertain`."""
+    whitening: Whitening | None = None
+    """Transformation that whitens noise and projects nuisance out; None for white noise."""
 
-    def __init__(
-        self,
-        torque: TorqueHistory,
-        time_s: Array,
-        nuisance: Array,
-        *,
-        nonlinear: bool = False,
-        whitening: Whitening | None = None,
-    ) -> None:
-        self.nuisance = nuisance if whitening is None else whitening.nuisance
-        self.nonlinear = nonlinear
-        self._whitening = whitening
-        self._torque = torque
-        self._all_s = time_s
+    @property
+    def nuisance(self) -> Array:
+        """Functions that are projected out, (n_functions, n_samples)."""
+        return self.functions if self.whitening is None else self.whitening.nuisance
 
     def later(self, change_s: float) -> "Condensed":
         """Return rows for a protocol that starts later by some s; noise and nuisance stay."""
-        return Condensed(
-            self._torque,
-            self._all_s - change_s,
-            self.nuisance,
-            nonlinear=self.nonlinear,
-            whitening=self._whitening,
-        )
+        return replace(self, all_s=self.all_s - change_s)
 
     def cleared(self, rows: Array) -> Array:
         """Project nuisance out of functions of time, (..., n_samples), and whiten noise."""
-        if self._whitening is not None:
-            return self._whitening(rows)
+        if self.whitening is not None:
+            return self.whitening(rows)
         return without(self.nuisance, rows)
 
     @property
     def coloured(self) -> bool:
         """True if the noise is whitened."""
-        return self._whitening is not None
+        return self.whitening is not None
 
     @cached_property
     def reduced(self) -> bool:
         """True if rows are fewer than nodes."""
-        functions = len(self._edges_s) * (STAGES + 1)
-        return len(self.dense.time_s) <= MOST_NODES and functions <= _MOST_FUNCTIONS
+        return len(self.dense.time_s) <= MOST_NODES
 
     def of_trace(self, rotation_rad: Array) -> Array:
         """Return rows of a trace without nuisance, (n_rows,); no response reaches the last."""
@@ -316,36 +259,17 @@ class Condensed:
     @cached_property
     def of_modes(self) -> ModeRows:
         """Function from modes of many samples to rows of their responses."""
-        events_s = [start for start, *_ in (*self._torque.jumps, *self._torque.swings)]
+        events_s = [start for start, *_ in (*self.torque.jumps, *self.torque.swings)]
         elapsed = np.subtract.outer(self.time_s, events_s)
         shortest_s = float(np.min(elapsed, where=elapsed > 0, initial=self.time_s[-1]))
-        return ModeRows(self._torque, self.time_s, self.to_rows, shortest_s)
+        return ModeRows(self.torque, self.time_s, self.to_rows, shortest_s)
 
     @cached_property
     def dense(self) -> DenseSamples:
         """Nodes that replace the readings."""
         # Whitened functions are not smooth: each reading is a node.
-        dense = self._whitening is None
-        return DenseSamples(self._torque, self._all_s, self._edges_s, dense=dense)
-
-    @cached_property
-    def _edges_s(self) -> Array:
-        """Edges of the mesh of a correction, if there is one."""
-        return mesh(self._torque, COARSE) if self.nonlinear else np.zeros(0)
-
-    @cached_property
-    def _corrections(self) -> Array:
-        """Rows of the nodes of a basis of corrections, (n_functions, n_nodes)."""
-        if not self.nonlinear:
-            return np.zeros((0, len(self.dense.time_s)))
-        functions = mesh_functions(self._edges_s, self.dense.time_s)
-        return self.dense.rows_of_values(functions)
-
-    @cached_property
-    def of_corrections(self) -> Array:
-        """Matrix that turns values of a `Correction`, from its left, into rows."""
-        rows = self._cleared_rows(self._corrections) @ self._basis
-        return np.pad(rows, ((0, 0), (0, 1)))
+        dense = self.whitening is None
+        return DenseSamples(self.torque, self.all_s, dense=dense)
 
     @cached_property
     def _nuisance_rows(self) -> Array:
@@ -356,21 +280,18 @@ class Condensed:
     @cached_property
     def _span(self) -> Array:
         """Orthonormal rows of the nodes that span all responses, (n_nodes, n_rows)."""
-        end_s, time_s = self._all_s[-1], self.dense.time_s
-        shortest_s = np.diff(self._all_s).min()
+        end_s, time_s = self.all_s[-1], self.dense.time_s
+        shortest_s = np.diff(self.all_s).min()
         last = np.log1p(_FASTEST * end_s / shortest_s)
         rates = -np.expm1(np.append(_SLOWEST, np.arange(_SPACING, last, _SPACING))) / end_s
         growth, slope = (
             self.dense.rows_of_values(of[0])
-            for of in compute_growth(rates[None], self._torque, time_s)
+            for of in mode_responses(rates[None], self.torque, time_s)
         )
         size = np.linalg.norm(growth, axis=2, keepdims=True)
         size[size == 0] = 1.0
         family = np.concatenate((growth / size, rates[:, None] * slope / size))
-        weights = np.linalg.norm(self._corrections, axis=1)
-        projected = self._corrections[weights > 0] / weights[weights > 0, None]
-        family = np.concatenate((family.reshape(-1, len(time_s)), projected))
-        basis, triangle = np.linalg.qr(family.T)
+        basis, triangle = np.linalg.qr(family.reshape(-1, len(time_s)).T)
         turned, share, _ = np.linalg.svd(triangle)
         return basis @ turned[:, share > _RANK * share[0]]
 
@@ -391,6 +312,6 @@ class Condensed:
 
     def _cleared_rows(self, rows: Array) -> Array:
         """Project out nuisance and whiten as `cleared` does, with rows of the nodes."""
-        if self._whitening is not None:
-            return self._whitening(rows)
+        if self.whitening is not None:
+            return self.whitening(rows)
         return without(self._nuisance_rows, rows)

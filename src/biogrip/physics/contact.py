@@ -1,21 +1,16 @@
-"""Closing of the arms from their neutral configuration onto a sample (section 2).
+"""The sample between the jaws: closing onto it (section 2), its modulus, and neglected effects.
 
-Estimates of effects that the model of the gripper neglects.
-
-Apparent Young's modulus of a spherical sample from force and shortening (Hertz).
-
-Biologists compare moduli, in Pa; springs and dampers, in N/m and N s/m, belong to one
-sample and its size. A contact model relates them. Here it is Hertz's: a sphere of an
-incompressible elastic material between two flat rigid jaws that do not stick, each of
-which indents it by half the shortening,
+Biologists compare moduli, in Pa; springs and dampers, in N/m and N s/m, belong to one sample and
+its size. Hertz's contact model relates them: a sphere of an incompressible elastic material between
+two flat rigid jaws that do not stick, each of which indents it by half the shortening,
 
     F = 4/3 E/(1 - nu^2) R^(1/2) (delta/2)^(3/2)
 
-(K. L. Johnson, Contact Mechanics, 1985, section 4.2). A cell in suspension and a drop
-are round, and the jaws are flat and far stiffer; a cylinder's E = F L/(A delta) would
-need an area that is rarely measured. The force grows faster than the shortening, so a
-spring has another modulus at every shortening: the modulus is called apparent, and is
-given with its shortening. Hertz's theory is one of small strains.
+(K. L. Johnson, Contact Mechanics, 1985, section 4.2). A cell in suspension and a drop are round,
+and the jaws are flat and far stiffer; a cylinder's E = F L/(A delta) would need an area that is
+rarely measured. The force grows faster than the shortening, so a spring has another modulus at
+every shortening: the modulus is called apparent, and is given with its shortening. Hertz's theory
+is one of small strains.
 """
 
 import math

@@ -1,11 +1,8 @@
 """Nuisance functions that an instrument adds to the rotation: an offset and a linear drift.
 
-Their amplitudes are linear parameters and are not searched: their span is projected out
-of trace and responses alike, which is the same as fitting them (variable projection)
-[1]_. Functions whose amplitude has a known standard deviation are projected out in part
-[2]_.
-
-Flow of a sample, beside a drift of the instrument.
+Their amplitudes are linear parameters and are not searched: their span is projected out of trace
+and responses alike, which is the same as fitting them (variable projection) [1]_. Functions whose
+amplitude has a known standard deviation are projected out in part [2]_.
 
 References
 ----------

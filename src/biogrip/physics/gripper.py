@@ -1,7 +1,4 @@
-"""The two gripper arms and the lever with which they squeeze the sample (Table 1).
-
-The linkage: rotation of an arm and displacement of its tip.
-"""
+"""The two gripper arms and the lever with which they squeeze the sample (Table 1)."""
 
 import math
 from collections.abc import Iterator

@@ -1,13 +1,9 @@
-"""Declaration of an instrument: what it holds, what it reads, and its words for both.
+"""What an instrument controls, what it reads, and its words for both.
 
-Creep: a load is held, and what a sample yields is read; micropipettes, stretchers, rheometers.
-
-A sample under the force F is displaced by x, with F(s) = [k_p + c_p s + ...] x(s); under a stress
-it is strained, and its springs and dampers are in Pa and Pa s.
-
-Relaxation: a deformation is held, and the load that is left is read; AFM dwells, rheometers.
-
-The instruments that there are, by what they read.
+A gripper controls a torque. Creep controls a load and reads what a sample yields: micropipettes,
+stretchers, rheometers. A sample under the force F is displaced by x, F(s) = [k_p + c_p s + ...]
+x(s); under a stress it is strained, and its springs and dampers are in Pa and Pa s. Relaxation
+controls a deformation and reads the load that is left: AFM dwells, rheometers.
 """
 
 import math
@@ -17,7 +13,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity that an instrument holds or reads."""
+    """A quantity that an instrument controls or reads."""
 
     name: str
     """Name in messages, in the config, and of the option for its column."""
@@ -47,22 +43,22 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Instrument:
-    """What an instrument holds and reads."""
+    """What an instrument controls and reads."""
 
     kind: str
     """`gripper`, `creep` or `relaxation`."""
     controlled: Quantity
-    """What the protocol holds."""
+    """What the protocol sets."""
     read: Quantity
     """What a trace is of."""
     per_area: bool = False
     """True if stiffness is a modulus, in Pa."""
     relative: bool = False
-    """True if what is read is divided by the largest value that is held."""
+    """True if what is read is divided by the largest controlled value."""
 
     @property
     def deforms(self) -> bool:
-        """True if a deformation is held and a load is read."""
+        """True if a deformation is controlled and a load is read."""
         return self.kind == "relaxation"
 
     def suspects(self, article: str = "the ", *, unit: bool = False) -> str:
@@ -85,7 +81,7 @@ ROTATION = Quantity(
     "closing rotation",
 )
 GRIPPER = Instrument("gripper", TORQUE, ROTATION)
-"""The gripper holds a torque, and the closing rotation of its left arm is read."""
+"""Its read rotation is the closing one of its left arm."""
 
 STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "mPa": 1e-3}
 """Units of stresses and moduli."""
@@ -96,30 +92,23 @@ STRESS = Quantity("stress", "Pa", STRESS_UNITS)
 STRAIN = Quantity("strain", "", {"1": 1.0, "%": 1e-2})
 
 
-_PER_STRESS = {f"1/{unit}": 1 / size for unit, size in STRESS_UNITS.items()}
-
-COMPLIANCE = Quantity("compliance", "1/Pa", _PER_STRESS)
-
-CREEP = (
-    Instrument("creep", FORCE, DISPLACEMENT),
-    Instrument("creep", STRESS, STRAIN, per_area=True),
-    Instrument("creep", STRESS, COMPLIANCE, per_area=True, relative=True),
+COMPLIANCE = Quantity(
+    "compliance", "1/Pa", {f"1/{unit}": 1 / size for unit, size in STRESS_UNITS.items()}
 )
-"""What may be held and read."""
-
 
 MODULUS = Quantity("modulus", "Pa", STRESS_UNITS)
 
-RELAXATION = (
-    Instrument("relaxation", DISPLACEMENT, FORCE),
-    Instrument("relaxation", STRAIN, STRESS, per_area=True),
-    Instrument("relaxation", STRAIN, MODULUS, per_area=True, relative=True),
-)
-"""What may be held and read."""
-
-
 INSTRUMENTS: dict[str, Instrument] = {
-    instrument.read.name: instrument for instrument in (GRIPPER, *CREEP, *RELAXATION)
+    instrument.read.name: instrument
+    for instrument in (
+        GRIPPER,
+        Instrument("creep", FORCE, DISPLACEMENT),
+        Instrument("creep", STRESS, STRAIN, per_area=True),
+        Instrument("creep", STRESS, COMPLIANCE, per_area=True, relative=True),
+        Instrument("relaxation", DISPLACEMENT, FORCE),
+        Instrument("relaxation", STRAIN, STRESS, per_area=True),
+        Instrument("relaxation", STRAIN, MODULUS, per_area=True, relative=True),
+    )
 }
 """Instruments by the name of the quantity that they read."""
 
@@ -127,7 +116,7 @@ KINDS = tuple(dict.fromkeys(instrument.kind for instrument in INSTRUMENTS.values
 """Values of the config key `instrument`."""
 
 CONTROLLED = tuple(dict.fromkeys(instrument.controlled for instrument in INSTRUMENTS.values()))
-"""Quantities that protocols hold."""
+"""Quantities that protocols set."""
 
 
 def of_kind(kind: str) -> list[Instrument]:

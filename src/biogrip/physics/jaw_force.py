@@ -4,17 +4,14 @@ In the linear model it is a rational function of the torques like the rotations,
 
     F = [b P (Z_2 + Z_4) tau_2 - b P Z_2 (tau_2 - tau_4)] / D
 
-(with equal arms and torques 2 b P tau / (Z Q + 2 b^2 P)), so its modes have the
-rates of the rotations and weights of their own. The arm's equation gives it too,
-b F = tau - Z phi, but where a liquid has given way that is a difference of nearly
-equal torques; here the constant and every mode are products of what is positive,
-and late in a phase only what is left of the slow modes is summed.
+(with equal arms and torques 2 b P tau / (Z Q + 2 b^2 P)), so its modes have the rates of the
+rotations and weights of their own. The arm's equation gives it too, b F = tau - Z phi, but where a
+liquid has given way that is a difference of nearly equal torques; here the constant and every mode
+are products of what is positive, and late in a phase only what is left of the slow modes is summed.
 
 In the nonlinear model, the arm's equation, divided by its lever, gives
-F - F_linear = g - (c u' + k u)/b_0^2 with g the load and u the correction. All of
-them are of second order, so that again no large terms cancel.
-
-Largest and lowest force of the jaws on a sample, which is negative if they have to pull.
+F - F_linear = g - (c u' + k u)/b_0^2 with g the load and u the correction of
+`biogrip.physics.nonlinear`. All of them are of second order: again no large terms cancel.
 """
 
 from dataclasses import dataclass
@@ -35,7 +32,7 @@ from biogrip.physics.linear import (
     transfer_functions,
 )
 from biogrip.physics.many_branches import modes_of_many
-from biogrip.physics.nonlinear import FINE, computed_correction
+from biogrip.physics.nonlinear import correction
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.sample_model import MOST_BRANCHES, Network
 
@@ -109,7 +106,7 @@ def jaw_force(
     if nonlinear:
         # Arms with inertia have not moved yet at the instant of a step.
         instants = np.nextafter(time_s, -np.inf) if inertia else time_s
-        more = computed_correction(gripper, network, torque, FINE).force_at(instants)
+        more = correction(gripper, network, torque).checked().force_at(instants)
         force += np.where(instants < 0, 0, more)
     return force
 

@@ -53,12 +53,7 @@ def is_symmetric(gripper: Gripper, torque: TorqueHistory) -> bool:
 
 
 def step_response(
-    gripper: Gripper,
-    network: Network,
-    *,
-    symmetric: bool = True,
-    inertia: bool = True,
-    both_arms: bool = False,
+    gripper: Gripper, network: Network, *, symmetric: bool = True, inertia: bool = True
 ) -> StepResponse:
     """Solve the linear model for n samples at once (corrected eqs. 4-6).
 
@@ -73,28 +68,15 @@ def step_response(
     inertia
         True to include inertia: arms ring for milliseconds. Without inertia, all rates are
         real and negative.
-    both_arms
-        True to compute the right arm's rotation, too.
     """
     if network.k.shape[1] > MOST_BRANCHES:
-        static, rates, weights = modes_of_many(
-            gripper, network, symmetric=symmetric, inertia=inertia
-        )
-        arms = slice(2 if both_arms else 1)
-        return StepResponse(static[:, arms], rates, weights[:, arms])
-    transfer = transfer_functions(
-        gripper, network, symmetric=symmetric, inertia=inertia, both_arms=both_arms
-    )
+        return StepResponse(*modes_of_many(gripper, network, symmetric=symmetric, inertia=inertia))
+    transfer = transfer_functions(gripper, network, symmetric=symmetric, inertia=inertia)
     return partial_fractions(*transfer, real=not inertia)
 
 
 def transfer_functions(
-    gripper: Gripper,
-    network: Network,
-    *,
-    symmetric: bool,
-    inertia: bool = False,
-    both_arms: bool = False,
+    gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool = False
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return rotation over torque as quotients of polynomials in s; see `step_response`.
 
@@ -102,25 +84,24 @@ def transfer_functions(
 
     Returns
     -------
-    numerators : (n_arms, n_drives, n, terms)
-        One for each drive and arm, in ascending powers.
+    numerators : (2, n_drives, n, terms)
+        One for each arm and drive, in ascending powers.
     denominator : (n, terms)
         Their common denominator.
     """
     p, q = sample_polynomials(network)
     z_2, z_4 = (arm_polynomial(arm, inertia) for arm in (gripper.left, gripper.right))
     coupled = gripper.lever_m**2 * p
-    arms, drives = 2 if both_arms else 1, 1 if symmetric else 2
     if symmetric and gripper.left == gripper.right:
         denominator = add(multiply(z_2, q), 2 * coupled)
-        return q[None, None].repeat(arms, axis=0).swapaxes(2, 3), denominator.T
+        return q[None, None].repeat(2, axis=0).swapaxes(2, 3), denominator.T
     left, right = multiply(z_4, q), multiply(z_2, q)
     padded = add(coupled, np.zeros_like(left))
     numerators = np.array([[left, padded], [right, -add(right, coupled)]])
     denominator = add(
         multiply(multiply(z_2, z_4), q), gripper.lever_m**2 * multiply(p, add(z_2, z_4))
     )
-    return numerators[:arms, :drives].swapaxes(2, 3), denominator.T
+    return numerators[:, : 1 if symmetric else 2].swapaxes(2, 3), denominator.T
 
 
 def rotation(

@@ -1,7 +1,7 @@
-"""The linear model without inertia, for samples of dozens of Maxwell branches.
+"""The linear model for samples of dozens of Maxwell branches, such as springpots.
 
-Polynomials of such a degree are numerically useless. But the arms, seen from the sample,
-have the impedance Z = Z_2 Z_4 / (Z_2 + Z_4), which is that of a spring, a damper and one
+Polynomials of such a degree are numerically useless. But without inertia the arms, seen from the
+sample, have the impedance Z = Z_2 Z_4 / (Z_2 + Z_4), which is that of a spring, a damper and one
 Maxwell branch. So with the sample's
 
     H = Z + b^2 G = A + B s + sum_j K_j s / (s + r_j)
@@ -11,22 +11,19 @@ is a sum of poles again, and the rates x of the modes interlace with the r_j
 
     phi_2 = [Z_4/(Z_2 + Z_4) tau_2 + b^2 G/(Z_2 + Z_4) (tau_2 - tau_4)] / H,
 
-of phi_4 and of the jaw force follow from the arms alone. A mode of N/H has the weight
--N/S with S = A + sum_j K_j x^2/(x - r_j)^2, a sum of positive terms. Equal arms that are
-driven alike need no branch of theirs: then 2 phi = tau/H.
+of phi_4 and of the jaw force follow from the arms alone. A mode of N/H has the weight -N/S with
+S = A + sum_j K_j x^2/(x - r_j)^2, a sum of positive terms. Equal arms that are driven alike need no
+branch of theirs: then 2 phi = tau/H.
 
-The linear model with inertia, for samples of dozens of Maxwell branches.
-
-With inertia the denominator of both rotations is
+With inertia, which targets have, the denominator of both rotations is
 
     E = Z + 2 b^2 G    or    E = Z_2 Z_4 + (Z_2 + Z_4) b^2 G
 
-for arms that move alike, or do not. Times the product of all s + r_j it is a polynomial,
-whose roots the iteration of `biogrip.physics.roots` finds. The iteration only needs the
-quotient of the polynomial and its derivative, a sum over the branches. A root is kept as
-its distance from the nearest branch, so that it has all digits where a branch is weak.
-Starts are the rates without inertia, and the ringing of arms on a sample whose Maxwell
-dampers are rigid.
+for arms that move alike, or do not. Times the product of all s + r_j it is a polynomial, whose
+roots the iteration of `biogrip.physics.roots` finds. The iteration only needs the quotient of the
+polynomial and its derivative, a sum over the branches. A root is kept as its distance from the
+nearest branch, so that it has all digits where a branch is weak. Starts are the rates without
+inertia, and the ringing of arms on a sample whose Maxwell dampers are rigid.
 """
 
 from dataclasses import dataclass, replace
@@ -43,10 +40,102 @@ from biogrip.physics.sample_model import Network
 
 # Least difference of the arms: the branch of equal arms has no effect, but a mode.
 _LEAST_DIFFERENCE = 1e-30
+# Factor that moves starts off the real axis, which no iteration from a real start would leave.
+_ASIDE = 1 + 1e-3j
+_ROUNDING = 1e-15
+
+
+def modes_of_many(
+    gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool, force: bool = False
+) -> tuple[Array, NDArray[Any], NDArray[Any]]:
+    """Compute step responses of both arms, or of the jaw force: constants, rates and weights.
+
+    Arguments are those of `step_response`, with n samples of more than `MOST_BRANCHES` branches;
+    with `force`, the jaw force in N takes the place of the arms' rotations.
+
+    Returns
+    -------
+    static : (n, n_arms, n_drives)
+        In rad (N) per N m.
+    rates : (n, n_modes)
+    weights : (n, n_arms, n_drives, n_modes)
+        In rad (N) per N m.
+    """
+    network = separated(network)
+    arms = _Arms(gripper, alike=symmetric and gripper.left == gripper.right)
+    impedance = arms.with_sample(network)
+    zeros = interlaced_zeros(impedance.weights, impedance.rates, impedance.level)
+    static = arms.forces_at_rest(network) if force else arms.rotations_at_rest(network)
+    if inertia:
+        found = _Ringing(gripper, network, zeros, alike=arms.alike)
+        rates: NDArray[Any] = found.rates
+        weights: NDArray[Any] = found.forces() if force else found.rotations()
+    else:
+        rates = np.ascontiguousarray(-zeros.values.T)
+        numerators = arms.forces(zeros) if force else arms.rotations(zeros)[0]
+        x, steepness = zeros.values, np.zeros_like(zeros.pole)
+        for weight, rate in zip(impedance.weights, impedance.rates, strict=True):
+            steepness += weight * (x / zeros.from_pole(rate)) ** 2
+        weights = -numerators / steepness
+    drives = slice(1 if symmetric else 2)
+    static, weights = (np.moveaxis(of[:, drives], -1, 0) for of in (static, weights))
+    return np.ascontiguousarray(static), rates, np.ascontiguousarray(weights)
+
+
+def modes_with_slopes(
+    gripper: Gripper, network: Network, tilt: float, count: int, *, symmetric: bool
+) -> tuple[Array, Array, Array, Array]:
+    """Compute rates and weights of the left arm, with derivatives by the log-parameters.
+
+    With H(x; p) = 0 at a rate, dx = (sum_j dK_j/(x - r_j) + ...) / (S/x^2); S and N follow. The
+    network has n samples, and after them the same with each of `count` parameters tilted into the
+    complex plane by the share `tilt`.
+
+    Returns
+    -------
+    rates : (n_modes, n)
+    weights : (n_drives, n_modes, n)
+    rate_slopes : (n_parameters, n_modes, n)
+    weight_slopes : (n_parameters, n_drives, n_modes, n)
+    """
+    arms = _Arms(gripper, alike=symmetric and gripper.left == gripper.right)
+    given = arms.with_sample(separated(network))
+    parts = [
+        of.reshape(*of.shape[:-1], count + 1, -1)
+        for of in (given.weights, given.rates, given.level)
+    ]
+    impedance = _Impedance(*(of[..., 0, :].real for of in parts))
+    # (n_parameters, n) of every weight and rate, and of the level.
+    d_weights, d_rates, d_level = (of[..., 1:, :].imag / tilt for of in parts)
+    zeros = interlaced_zeros(impedance.weights, impedance.rates, impedance.level)
+    x = zeros.values
+    moved = np.zeros((count, *x.shape)) - d_level[:, None]
+    steepness = np.zeros_like(x)
+    branches = list(zip(impedance.weights, impedance.rates, d_weights, d_rates, strict=True))
+    for weight, rate, d_weight, d_rate in branches:
+        inverse = 1 / zeros.from_pole(rate)
+        steepness += weight * (x * inverse) ** 2
+        moved += d_weight[:, None] * inverse
+        if np.any(d_rate):
+            moved += (weight * d_rate)[:, None] * (inverse * inverse)
+    moved *= x * x / steepness
+    steepening = np.zeros_like(moved)
+    for weight, rate, d_weight, d_rate in branches:
+        inverse = 1 / zeros.from_pole(rate)
+        ratio = x * inverse
+        away = 2 * weight * rate * ratio * inverse * inverse
+        steepening += d_weight[:, None] * (ratio * ratio) - moved * away
+        if np.any(d_rate):
+            steepening += d_rate[:, None] * (2 * weight * (ratio * inverse) * ratio)
+    drives = slice(1 if symmetric else 2)
+    numerators, slopes = (of[0, drives] for of in arms.rotations(zeros))
+    weights = -numerators / steepness
+    weight_slopes = -(slopes * moved[:, None] + weights * steepening[:, None]) / steepness
+    return -x, weights, -moved, weight_slopes
 
 
 @dataclass(frozen=True)
-class Impedance:
+class _Impedance:
     """Impedance H = Z + b^2 G of n samples between the arms."""
 
     weights: NDArray[Any]
@@ -56,20 +145,8 @@ class Impedance:
     level: NDArray[Any]
     """B, (n,)."""
 
-    def zeros(self) -> Zeros:
-        """Return the rates of the modes; elements must be real."""
-        return interlaced_zeros(self.weights, self.rates, self.level)
 
-    def steepness(self, zeros: Zeros) -> Array:
-        """Return S of each mode, (n_modes, n)."""
-        x = zeros.values
-        total = np.zeros_like(x)
-        for weight, rate in zip(self.weights, self.rates, strict=True):
-            total += weight * (x / zeros.from_pole(rate)) ** 2
-        return total
-
-
-class Arms:
+class _Arms:
     """Impedance of both arms as seen from the sample between them.
 
     The arms may differ; they are alike if they are equal, and driven alike.
@@ -87,7 +164,7 @@ class Arms:
         difference, least = k_4 * c_2 - k_2 * c_4, _LEAST_DIFFERENCE * k_4 * c_2
         self._chi = (difference if abs(difference) > least else least) / (c_2 + c_4)
 
-    def with_sample(self, network: Network) -> Impedance:
+    def with_sample(self, network: Network) -> _Impedance:
         """Return the impedance with a sample, its branches `separated`, between the arms."""
         b_2, k, c = self._lever_m**2, self._k, self._c
         weights, rates = b_2 * network.k.T, (network.k / network.c).T
@@ -97,7 +174,7 @@ class Arms:
             rates = np.concatenate((rates, nothing + self._rate))
             weights, rates = _ascending(weights, rates)
         spring = k.prod() / k.sum() + b_2 * network.k_p
-        return Impedance(
+        return _Impedance(
             np.concatenate((spring[None], weights)),
             np.concatenate((nothing, rates)),
             c.prod() / c.sum() + b_2 * network.c_p,
@@ -162,98 +239,7 @@ def _ascending(weights: NDArray[Any], rates: NDArray[Any]) -> tuple[NDArray[Any]
     return weights, rates
 
 
-def modes_of_many(
-    gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool, force: bool = False
-) -> tuple[Array, NDArray[Any], NDArray[Any]]:
-    """Compute step responses of both arms, or of the jaw force: constants, rates and weights.
-
-    Arguments are those of `step_response`, with n samples of more than `MOST_BRANCHES` branches;
-    with `force`, the jaw force in N takes the place of the arms' rotations.
-
-    Returns
-    -------
-    static : (n, n_arms, n_drives)
-        In rad (N) per N m.
-    rates : (n, n_modes)
-    weights : (n, n_arms, n_drives, n_modes)
-        In rad (N) per N m.
-    """
-    network = separated(network)
-    arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
-    impedance = arms.with_sample(network)
-    zeros = impedance.zeros()
-    static = arms.forces_at_rest(network) if force else arms.rotations_at_rest(network)
-    if inertia:
-        found = Ringing(gripper, network, zeros, alike=arms.alike)
-        rates: NDArray[Any] = found.rates
-        weights: NDArray[Any] = found.forces() if force else found.rotations()
-    else:
-        rates = np.ascontiguousarray(-zeros.values.T)
-        numerators = arms.forces(zeros) if force else arms.rotations(zeros)[0]
-        weights = -numerators / impedance.steepness(zeros)
-    drives = slice(1 if symmetric else 2)
-    static, weights = (np.moveaxis(of[:, drives], -1, 0) for of in (static, weights))
-    return np.ascontiguousarray(static), rates, np.ascontiguousarray(weights)
-
-
-def modes_with_slopes(
-    gripper: Gripper, network: Network, tilt: float, count: int, *, symmetric: bool
-) -> tuple[Array, Array, Array, Array]:
-    """Compute rates and weights of the left arm, with derivatives by the log-parameters.
-
-    With H(x; p) = 0 at a rate, dx = (sum_j dK_j/(x - r_j) + ...) / (S/x^2); S and N follow. The
-    network has n samples, and after them the same with each of `count` parameters tilted into the
-    complex plane by the share `tilt`.
-
-    Returns
-    -------
-    rates : (n_modes, n)
-    weights : (n_drives, n_modes, n)
-    rate_slopes : (n_parameters, n_modes, n)
-    weight_slopes : (n_parameters, n_drives, n_modes, n)
-    """
-    arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
-    given = arms.with_sample(separated(network))
-    parts = [
-        of.reshape(*of.shape[:-1], count + 1, -1)
-        for of in (given.weights, given.rates, given.level)
-    ]
-    impedance = Impedance(*(of[..., 0, :].real for of in parts))
-    # (n_parameters, n) of every weight and rate, and of the level.
-    d_weights, d_rates, d_level = (of[..., 1:, :].imag / tilt for of in parts)
-    zeros = impedance.zeros()
-    x = zeros.values
-    moved = np.zeros((count, *x.shape)) - d_level[:, None]
-    steepness = np.zeros_like(x)
-    branches = list(zip(impedance.weights, impedance.rates, d_weights, d_rates, strict=True))
-    for weight, rate, d_weight, d_rate in branches:
-        inverse = 1 / zeros.from_pole(rate)
-        steepness += weight * (x * inverse) ** 2
-        moved += d_weight[:, None] * inverse
-        if np.any(d_rate):
-            moved += (weight * d_rate)[:, None] * (inverse * inverse)
-    moved *= x * x / steepness
-    steepening = np.zeros_like(moved)
-    for weight, rate, d_weight, d_rate in branches:
-        inverse = 1 / zeros.from_pole(rate)
-        ratio = x * inverse
-        away = 2 * weight * rate * ratio * inverse * inverse
-        steepening += d_weight[:, None] * (ratio * ratio) - moved * away
-        if np.any(d_rate):
-            steepening += d_rate[:, None] * (2 * weight * (ratio * inverse) * ratio)
-    drives = slice(1 if symmetric else 2)
-    numerators, slopes = (of[0, drives] for of in arms.rotations(zeros))
-    weights = -numerators / steepness
-    weight_slopes = -(slopes * moved[:, None] + weights * steepening[:, None]) / steepness
-    return -x, weights, -moved, weight_slopes
-
-
-# Factor that moves starts off the real axis, which no iteration from a real start would leave.
-_ASIDE = 1 + 1e-3j
-_ROUNDING = 1e-15
-
-
-class Ringing:
+class _Ringing:
     """Modes of arms with inertia on n samples with any number of branches.
 
     Points are at -origin + beyond, (n, n_points): the origin is the rate of a branch, or zero. The

@@ -1,26 +1,18 @@
-"""Closed form of the linear model with two modes: equal arms, one Maxwell branch, no inertia.
+"""RMS misfit of whole populations against traces, for the genetic algorithm.
 
-This special case of `biogrip.physics.linear` is written out for speed: populations of the
-genetic algorithm are small, and most time goes into calls.
+Between two torque steps the inertia-free response is a constant plus exponentials, so at uniform
+sampling it is sum_j a_j z_j^n. Its squared distance from the samples y_n expands into geometric
+series in z_i z_j, and into the projections of the trace on the response of each mode. These
+projections are long sums, but functions of the mode's rate alone: computed once at some hundred
+rates, they are interpolated for all others. No response is formed. Other protocols and samplings,
+and noise that is not white, need the condensed rows of `biogrip.physics.residuals`.
 
-RMS misfit of whole populations against traces, without forming a response.
-
-Between two torque steps the inertia-free response is a constant plus
-exponentials, so at uniform sampling it is sum_j a_j z_j^n. Its squared distance
-from the samples y_n expands into geometric series in z_i z_j, and into the
-projections of the trace on the response of each mode. These projections are long sums,
-but functions of the mode's rate alone: computed once at some hundred rates, they are
-interpolated for all others.
-
-The misfit of an individual is computed element by element, in a fixed order, without
-reductions of arrays: it does not depend, to the last bit, on the rest of the population
-or on the number of populations.
-
-Misfit of populations to traces, with a fast method for the paper's protocols.
+The misfit of an individual is computed element by element, in a fixed order, without reductions of
+arrays: it does not depend, to the last bit, on the rest of the population or on the number of
+populations.
 """
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from functools import cached_property
 from itertools import combinations
 
@@ -29,47 +21,56 @@ import numpy as np
 from biogrip.arrays import Array, IntArray, parts
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.linear import LEFT, is_symmetric, step_response
-from biogrip.physics.mode_rows import DecayTable
 from biogrip.physics.protocol import TorqueHistory, drives
+from biogrip.physics.rate_tables import DecayTable
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.roots import real_quadratic_roots
 from biogrip.physics.sample_model import Network, SampleModel
-
-
-def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array, Array]:
-    """Compute the response of either of two equal arms to a unit step of both torques.
-
-    Returns
-    -------
-    static : (n,)
-        Final rotation in rad per N m.
-    rates : (2, n)
-        Exponents in 1/s.
-    weights : (2, n)
-        Weights of the exponentials, in rad per N m.
-    """
-    k_p, c_p, c = network.k_p, network.c_p, network.c[:, 0]
-    relaxation_s = c / network.k[:, 0]
-    coupling = 2 * lever_m**2
-    stiffness, damping = arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad
-    # The denominator Z Q + 2 b^2 P, ascending powers.
-    denominator = np.empty((3, len(k_p)))
-    denominator[0] = coupling * k_p + stiffness
-    denominator[1] = coupling * (k_p * relaxation_s + c_p + c) + (
-        stiffness * relaxation_s + damping
-    )
-    denominator[2] = (coupling * c_p + damping) * relaxation_s
-    rates = real_quadratic_roots(denominator.T).T
-    slope = denominator[2] * (rates[0] - rates[1])
-    weights = (1 + relaxation_s * rates) / (rates * slope)
-    np.negative(weights[1], out=weights[1])
-    return 1 / denominator[0], rates, weights
-
 
 # Individuals computed together: many enough for few calls, few enough for the cache.
 _AT_ONCE = 7000
 # Most modes with rates in closed form; the rates of more are iterated until all have converged.
 _CLOSED_FORM = 2
+
+
+Misfit = Callable[[Array], Array]
+"""Function from parameters, (n, n_parameters), to RMS misfits in rad, (n,)."""
+
+Misfits = Callable[[Array, IntArray], Array]
+"""The same from (n_populations, n, n_parameters) and trace indices to (n_populations, n)."""
+
+
+def make_misfit(residuals: Residuals) -> Misfit:
+    """Return the RMS misfit to the trace of residuals.
+
+    That of residuals serves any protocol, sampling and noise. `SeriesMisfit` is used for steps of
+    a torque, sampled uniformly from the start on, in white noise alone.
+    """
+    torque, trace = residuals.torque, residuals.trace
+    intervals, end_s = residuals.samples - 1, residuals.duration_s
+    uniform = np.arange(residuals.samples) * (end_s / max(intervals, 1))
+    is_uniform = np.allclose(trace.time_s, uniform, rtol=0, atol=1e-9 * end_s)
+    if is_uniform and torque.only_steps and not torque.deforms and residuals.plain:
+        given = residuals.gripper, residuals.model, torque, end_s / intervals
+        return SeriesMisfit(*given, trace.rotation_rad)
+    return residuals.condensed_misfit
+
+
+def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:
+    """Combine the misfit functions of several traces into one of a population for each trace.
+
+    Its results equal those of the single functions to the last bit.
+    """
+    series = [misfit for misfit in misfits if isinstance(misfit, SeriesMisfit)]
+    if len(series) == len(misfits) and all(map(series[0].joins, series)):
+        return SeriesMisfit.joined(series).of_each
+
+    def one_by_one(parameters: Array, traces: IntArray) -> Array:
+        return np.stack(
+            [misfits[trace](own) for own, trace in zip(parameters, traces, strict=True)]
+        )
+
+    return one_by_one
 
 
 class SeriesMisfit:
@@ -113,9 +114,8 @@ class SeriesMisfit:
 
     def of_model(self, model: SampleModel) -> "SeriesMisfit":
         """Return the misfit of another model to the same traces, sharing their table."""
-        other = copy(self)
-        other._simulated = (self._simulated[0], model, *self._simulated[2:])
-        other.__dict__.pop("_closed_form", None)
+        gripper, _, torque, interval_s = self._simulated
+        other = SeriesMisfit(gripper, model, torque, interval_s, self._traces)
         other.projections = self.projections
         return other
 
@@ -249,6 +249,40 @@ class SeriesMisfit:
         return np.stack(projections, axis=1).reshape(-1, len(rates))
 
 
+def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array, Array]:
+    """Compute the response of either of two equal arms to a unit step of both torques.
+
+    A sample with one Maxwell branch has two modes without inertia. This special case of
+    `biogrip.physics.linear` is written out for speed: populations are small, and most time goes
+    into calls.
+
+    Returns
+    -------
+    static : (n,)
+        Final rotation in rad per N m.
+    rates : (2, n)
+        Exponents in 1/s.
+    weights : (2, n)
+        Weights of the exponentials, in rad per N m.
+    """
+    k_p, c_p, c = network.k_p, network.c_p, network.c[:, 0]
+    relaxation_s = c / network.k[:, 0]
+    coupling = 2 * lever_m**2
+    stiffness, damping = arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad
+    # The denominator Z Q + 2 b^2 P, ascending powers.
+    denominator = np.empty((3, len(k_p)))
+    denominator[0] = coupling * k_p + stiffness
+    denominator[1] = coupling * (k_p * relaxation_s + c_p + c) + (
+        stiffness * relaxation_s + damping
+    )
+    denominator[2] = (coupling * c_p + damping) * relaxation_s
+    rates = real_quadratic_roots(denominator.T).T
+    slope = denominator[2] * (rates[0] - rates[1])
+    weights = (1 + relaxation_s * rates) / (rates * slope)
+    np.negative(weights[1], out=weights[1])
+    return 1 / denominator[0], rates, weights
+
+
 def _sum(terms: Array) -> Array:
     """Sum over the first axis in order, whatever the shape."""
     total: Array = terms[0]
@@ -292,48 +326,3 @@ def _fold(pieces: list[Array], block: int) -> tuple[Array, list[tuple[int, int]]
         columns.append((start, start + rows))
         start += rows
     return np.ascontiguousarray(np.concatenate(folded, axis=1)), columns
-
-
-Misfit = Callable[[Array], Array]
-"""Function from parameters, (n, n_parameters), to RMS misfits in rad, (n,)."""
-
-Misfits = Callable[[Array, IntArray], Array]
-"""The same from (n_populations, n, n_parameters) and trace indices to (n_populations, n)."""
-
-
-def make_misfit(
-    residuals: Residuals,
-    gripper: Gripper,
-    torque: TorqueHistory,
-    time_s: Array,
-    rotation_rad: Array,
-) -> Misfit:
-    """Return the RMS misfit as a function of parameters of shape (n, n_parameters).
-
-    That of residuals serves any protocol, sampling and noise. `SeriesMisfit` is used for steps of
-    a torque, sampled uniformly from the start on, with the linear model, in white noise
-    alone.
-    """
-    uniform = np.arange(len(time_s)) * (time_s[-1] / max(len(time_s) - 1, 1))
-    is_uniform = np.allclose(time_s, uniform, rtol=0, atol=1e-9 * time_s[-1])
-    if is_uniform and torque.only_steps and not torque.deforms and residuals.plain:
-        interval_s = float(time_s[-1]) / (len(time_s) - 1)
-        return SeriesMisfit(gripper, residuals.model, torque, interval_s, rotation_rad)
-    return residuals.condensed_misfit
-
-
-def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:
-    """Combine the misfit functions of several traces into one of a population for each trace.
-
-    Its results equal those of the single functions to the last bit.
-    """
-    series = [misfit for misfit in misfits if isinstance(misfit, SeriesMisfit)]
-    if len(series) == len(misfits) and all(map(series[0].joins, series)):
-        return SeriesMisfit.joined(series).of_each
-
-    def one_by_one(parameters: Array, traces: IntArray) -> Array:
-        return np.stack(
-            [misfits[trace](own) for own, trace in zip(parameters, traces, strict=True)]
-        )
-
-    return one_by_one

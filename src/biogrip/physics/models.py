@@ -1,34 +1,19 @@
-"""The sample models that there are, by name.
+"""The sample models that there are, by name, and which of them are limits of which.
 
-Each is declared, beside its network, in a module here.
+A model is one entry of `MODELS`, declared beside its network; genome, tables and figures follow
+from it. Where an element vanishes, a model becomes a simpler one: a spring or damper beside others
+at zero, one in series with others rigid, at infinity; a springpot is a spring at an exponent of
+zero, and a damper at one. The simpler model's parameters are turned into those of the richer one,
+zeros and infinities among them, and such samples have the same response. Each model says which it
+contains directly; those in these are in it as well.
 
-Constitutive models of the sample: spring-dashpot networks between the two jaws (Figure 5).
-
-Every network is a parallel spring k_p and damper c_p beside any number of
-Maxwell branches (a spring k and a damper c in series). Its force follows the
-shortening delta of the sample as
-
-    F(s) = [k_p + c_p s + sum_j k_j c_j s / (k_j + c_j s)] delta(s)
-
-A model is one entry of `biogrip.physics.models`; genome, tables and figures follow from it. Its
-network is made by arithmetic alone, so that parameters with a small imaginary
-part carry derivatives through it (`biogrip.physics.sensitivity`).
-
-Nested sample models: limits in which a model becomes a simpler one.
-
-Where an element vanishes, a model becomes a simpler one: a spring or damper beside others at
-zero, one in series with others rigid, at infinity; a springpot is a spring at an exponent of
-zero, and a damper at one. The simpler model's parameters are turned into those of the richer
-one, zeros and infinities among them (`biogrip.physics.models` gives such samples the same
-response). Each model says which it contains directly; those in these are in it as well.
-
-True parameters of simulated samples, and the paper's results for comparison.
+True parameters of simulated samples, and the paper's results to compare with, are here, too.
 """
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, TypeAlias
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -36,16 +21,7 @@ from pydantic import Field
 from biogrip.arrays import Array
 from biogrip.keys import Block, OneOf
 from biogrip.physics.fractional import FRACTIONAL_MODELS
-from biogrip.physics.maxwell_models import (
-    BURGERS,
-    DAMPER,
-    GENERALIZED_MAXWELL,
-    KELVIN_VOIGT,
-    LIQUID_DROP,
-    MAXWELL,
-    ZENER_KELVIN,
-    ZENER_MAXWELL,
-)
+from biogrip.physics.maxwell_models import MAXWELL_MODELS
 from biogrip.physics.sample_model import (
     MOST_BRANCHES,
     SINGLE_BRANCH,
@@ -56,18 +32,7 @@ from biogrip.physics.sample_model import (
 )
 
 MODELS: dict[str, SampleModel] = {
-    model.name: model
-    for model in (
-        GENERALIZED_MAXWELL,
-        LIQUID_DROP,
-        DAMPER,
-        KELVIN_VOIGT,
-        MAXWELL,
-        ZENER_MAXWELL,
-        ZENER_KELVIN,
-        BURGERS,
-        *FRACTIONAL_MODELS,
-    )
+    model.name: model for model in (*MAXWELL_MODELS, *FRACTIONAL_MODELS)
 }
 
 
@@ -113,21 +78,20 @@ CANDIDATES: dict[str, Sample] = {
 """Models that a trace may be fitted with, by name with the number of branches."""
 
 
-Way: TypeAlias = tuple[Turned, ...]
-"""Conversions of parameters, from one model to the next."""
-
-
 def _directly(candidate: str) -> dict[str, Turned]:
     """Models that one contains, as it and they declare."""
-    others = {name: other.model.within for name, other in CANDIDATES.items()}
-    said = {name: within[candidate] for name, within in others.items() if candidate in within}
-    return {**CANDIDATES[candidate].model.contains, **said}
+    of_others = {
+        name: other.model.within[candidate]
+        for name, other in CANDIDATES.items()
+        if candidate in other.model.within
+    }
+    return {**CANDIDATES[candidate].model.contains, **of_others}
 
 
 @cache
-def contained(candidate: str) -> Mapping[str, Way]:
-    """Return the candidates nested in one, each with the shortest way of conversions to it."""
-    found: dict[str, Way] = {candidate: ()}
+def contained(candidate: str) -> Mapping[str, tuple[Turned, ...]]:
+    """Return the candidates nested in one, each with the fewest conversions of its parameters."""
+    found: dict[str, tuple[Turned, ...]] = {candidate: ()}
     ahead = [candidate]
     for richer in ahead:
         for name, turned in _directly(richer).items():

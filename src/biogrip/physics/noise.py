@@ -1,9 +1,4 @@
-"""One independent random stream per case, seed and purpose.
-
-Components of noise beside white noise: autocorrelated noise, a drift, and outliers.
-
-Noise that is added to simulated rotations.
-"""
+"""Noise that is added to simulated rotations: white, autocorrelated, a drift, and outliers."""
 
 import hashlib
 from collections.abc import Callable, Iterator
@@ -16,27 +11,19 @@ from pydantic import Field
 from biogrip.arrays import Array
 from biogrip.keys import Block, OneOf, Problem
 
-
-def stream(study_seed: int, case: str, seed: int, purpose: str) -> np.random.Generator:
-    """Return the generator of one purpose, e.g. ``"noise"``, of one seed of one case.
-
-    Its seed sequence is a child of the study's seed, with a spawn key made of the names
-    and numbers alone: no other case or seed, and no order of jobs, can change it.
-    """
-    key = (*_words(case), seed, *_words(purpose))
-    return np.random.default_rng(np.random.SeedSequence(study_seed, spawn_key=key))
-
-
-def _words(name: str) -> tuple[int, ...]:
-    digest = hashlib.sha256(name.encode()).digest()[:16]
-    return tuple(int.from_bytes(digest[i : i + 4], "big") for i in range(0, 16, 4))
-
-
 # Relaxation times of flicker noise are so many e-folds apart, or less: its spectrum is 1/f to
 # within 2 exp(-pi^2 / 1.5) = 0.3 %, as Poisson's summation has it.
 _EFOLDS = 1.5
 # Longest relaxation time over the length of the trace: slower processes are offsets.
 _SLOWEST = 3.0
+
+_HALF_WIDTH = np.sqrt(3.0)
+
+KINDS: dict[str, Callable[[np.random.Generator, int], Array]] = {
+    "gaussian": lambda rng, count: rng.standard_normal(count),
+    "uniform": lambda rng, count: rng.uniform(-_HALF_WIDTH, _HALF_WIDTH, count),
+}
+"""Distributions of white noise: functions that draw numbers of unit variance."""
 
 
 @dataclass(frozen=True)
@@ -74,55 +61,6 @@ class Outliers(Block):
     """Share of the samples, at random."""
     size: Annotated[float, Field(gt=0, le=1000)]
     """Standard deviation of their additional noise, in standard deviations of the noise."""
-
-
-def draw_ornstein_uhlenbeck(
-    time_s: Array, weights: Array, rates_per_s: Array, rng: np.random.Generator
-) -> Array:
-    """Draw a sum of independent Ornstein-Uhlenbeck processes, exactly, at any times, (n_times,).
-
-    From reading to reading, each is an AR(1) process [1]_. Weights are the variance of each, rates
-    the inverse of its relaxation time, (n_processes,).
-
-    References
-    ----------
-    .. [1] D. T. Gillespie, Exact numerical simulation of the Ornstein-Uhlenbeck process and its
-       integral, Physical Review E 54 (1996), 2084-2091.
-    """
-    states = rng.standard_normal((len(time_s), len(weights)))
-    elapsed = np.outer(np.diff(time_s), rates_per_s)
-    states[1:] *= np.sqrt(-np.expm1(-2 * elapsed))
-    left = np.empty(len(weights))
-    for before, kept, state in zip(states[:-1], np.exp(-elapsed), states[1:], strict=True):
-        state += np.multiply(kept, before, out=left)
-    # One product per reading: the order of its sums does not depend on the number of readings.
-    return (states[:, None] @ np.sqrt(weights)[:, None])[:, 0, 0]
-
-
-def flicker_rates(time_s: Array) -> Array:
-    """Return rates in 1/s of processes whose sum has the spectrum 1/f [1]_, (n_processes,).
-
-    A geometric series for Ornstein-Uhlenbeck processes of the same variance, which cover all
-    frequencies of ascending times.
-
-    References
-    ----------
-    .. [1] E. Milotti, 1/f noise: a pedagogical review, arXiv:physics/0204033, 2002, section 3:
-       a superposition of relaxation processes.
-    """
-    slowest = 1 / (_SLOWEST * (time_s[-1] - time_s[0]))
-    fastest = 1 / float(np.diff(time_s).min())
-    count = 2 + int(np.log(fastest / slowest) / _EFOLDS)
-    return np.geomspace(slowest, fastest, count)
-
-
-_HALF_WIDTH = np.sqrt(3.0)
-
-KINDS: dict[str, Callable[[np.random.Generator, int], Array]] = {
-    "gaussian": lambda rng, count: rng.standard_normal(count),
-    "uniform": lambda rng, count: rng.uniform(-_HALF_WIDTH, _HALF_WIDTH, count),
-}
-"""Distributions of white noise: functions that draw numbers of unit variance."""
 
 
 @dataclass(frozen=True)
@@ -169,22 +107,9 @@ class Noise(Block):
 def add_noise(
     rotation_rad: Array, noise: Noise, rng: np.random.Generator, time_s: Array | None = None
 ) -> Array:
-    """Return a noisy copy of a trace.
+    """Return a noisy copy of a trace, (n_samples,).
 
-    Parameters
-    ----------
-    rotation_rad : (n_samples,)
-        Noise-free rotation.
-    noise
-        Noise to add.
-    rng
-        Random generator.
-    time_s : (n_samples,), optional
-        Ascending sampling times, required unless the noise is white.
-
-    Returns
-    -------
-    (n_samples,)
+    Ascending sampling times, (n_samples,), are required unless the noise is white.
 
     Raises
     ------
@@ -236,3 +161,58 @@ def standard_deviation(rotation_rad: Array, noise: Noise) -> Array:
 def rms(values: Array) -> float:
     """Return the root mean square of values."""
     return float(np.sqrt(np.mean(np.square(values))))
+
+
+def draw_ornstein_uhlenbeck(
+    time_s: Array, weights: Array, rates_per_s: Array, rng: np.random.Generator
+) -> Array:
+    """Draw a sum of independent Ornstein-Uhlenbeck processes, exactly, at any times, (n_times,).
+
+    From reading to reading, each is an AR(1) process [1]_. Weights are the variance of each, rates
+    the inverse of its relaxation time, (n_processes,).
+
+    References
+    ----------
+    .. [1] D. T. Gillespie, Exact numerical simulation of the Ornstein-Uhlenbeck process and its
+       integral, Physical Review E 54 (1996), 2084-2091.
+    """
+    states = rng.standard_normal((len(time_s), len(weights)))
+    elapsed = np.outer(np.diff(time_s), rates_per_s)
+    states[1:] *= np.sqrt(-np.expm1(-2 * elapsed))
+    left = np.empty(len(weights))
+    for before, kept, state in zip(states[:-1], np.exp(-elapsed), states[1:], strict=True):
+        state += np.multiply(kept, before, out=left)
+    # One product per reading: the order of its sums does not depend on the number of readings.
+    return (states[:, None] @ np.sqrt(weights)[:, None])[:, 0, 0]
+
+
+def flicker_rates(time_s: Array) -> Array:
+    """Return rates in 1/s of processes whose sum has the spectrum 1/f [1]_, (n_processes,).
+
+    A geometric series for Ornstein-Uhlenbeck processes of the same variance, which cover all
+    frequencies of ascending times.
+
+    References
+    ----------
+    .. [1] E. Milotti, 1/f noise: a pedagogical review, arXiv:physics/0204033, 2002, section 3:
+       a superposition of relaxation processes.
+    """
+    slowest = 1 / (_SLOWEST * (time_s[-1] - time_s[0]))
+    fastest = 1 / float(np.diff(time_s).min())
+    count = 2 + int(np.log(fastest / slowest) / _EFOLDS)
+    return np.geomspace(slowest, fastest, count)
+
+
+def stream(study_seed: int, case: str, seed: int, purpose: str) -> np.random.Generator:
+    """Return the generator of one purpose, e.g. ``"noise"``, of one seed of one case.
+
+    Its seed sequence is a child of the study's seed, with a spawn key made of the names
+    and numbers alone: no other case or seed, and no order of jobs, can change it.
+    """
+    key = (*_words(case), seed, *_words(purpose))
+    return np.random.default_rng(np.random.SeedSequence(study_seed, spawn_key=key))
+
+
+def _words(name: str) -> tuple[int, ...]:
+    digest = hashlib.sha256(name.encode()).digest()[:16]
+    return tuple(int.from_bytes(digest[i : i + 4], "big") for i in range(0, 16, 4))

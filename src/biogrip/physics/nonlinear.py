@@ -33,7 +33,6 @@ from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
 from biogrip.physics.linear import (
     LEFT,
-    RIGHT,
     StepResponse,
     is_symmetric,
     rotation,
@@ -42,30 +41,16 @@ from biogrip.physics.linear import (
 from biogrip.physics.protocol import TorqueHistory, drives, torque_at
 from biogrip.physics.sample_model import Network
 
-STAGES = 5
+_STAGES = 5
 
 
-@dataclass(frozen=True)
-class Accuracy:
-    """Discretisation and tolerance of the correction."""
-
-    first_s: float
-    """Length of the first element after a jump of the torque."""
-    growth: float
-    """Ratio of each element's length to the one before."""
-    per_period: float
-    """Elements in a period of the fastest sinusoid."""
-    tolerance: float
-    """Largest change in the last sweep, relative to the peak."""
-    most_sweeps: int
-    """Limit of sweeps."""
-
-
-FINE = Accuracy(first_s=1e-8, growth=1.3, per_period=8.0, tolerance=1e-13, most_sweeps=200)
-"""For one trace: the error was below 1e-7 of the peak in all tests."""
-
-COARSE = Accuracy(first_s=1e-3, growth=2.0, per_period=4.0, tolerance=1e-8, most_sweeps=30)
-"""For a population: the error is far below the noise, at a hundredth of the cost."""
+# Length of the first element after a jump of the torque, in s, and the ratio of each element's
+# length to the one before: the error was below 1e-7 of the peak in all tests.
+_FIRST_S, _GROWTH = 1e-8, 1.3
+# Elements in a period of the fastest sinusoid.
+_PER_PERIOD = 8.0
+# Largest change in the last sweep, relative to the peak, and limit of sweeps.
+_TOLERANCE, _MOST_SWEEPS = 1e-13, 200
 
 
 @dataclass(frozen=True)
@@ -75,13 +60,22 @@ class Correction:
     edges_s: Array
     """The mesh, (n_elements + 1,)."""
     values_rad: Array
-    """Rotation at the start of each element and at its nodes, (n, n_arms, n_elements, STAGES +
+    """Rotation at the start of each element and at its nodes, (n, n_arms, n_elements, _STAGES +
     1)."""
     force_N: Array
-    """Nonlinear minus linear jaw force there, (n, n_elements, STAGES + 1); after a jump of the
+    """Nonlinear minus linear jaw force there, (n, n_elements, _STAGES + 1); after a jump of the
     torque, at the start."""
     converged: np.ndarray
     """True if the sweeps converged, (n,)."""
+
+    def checked(self) -> "Correction":
+        """Return itself, or raise an error if the sweeps of some sample did not converge."""
+        if not np.all(self.converged):
+            raise BiogripError(
+                "the nonlinear response could not be computed: the torque closes the arms so far "
+                "that they lose their lever on the sample. Allowed are smaller torques."
+            )
+        return self
 
     def at(self, time_s: Array, arm: int = LEFT) -> Array:
         """Evaluate nonlinear minus linear rotation in rad at ascending times, (n, n_times)."""
@@ -93,38 +87,18 @@ class Correction:
         return self._interpolated(self.force_N, time_s)
 
     def _interpolated(self, values: Array, time_s: Array) -> Array:
-        parts = [
-            values[:, element] @ np.ascontiguousarray(on_piece)
-            for element, on_piece in enumerate(_interpolation(self.edges_s, time_s))
-            if on_piece.shape[1]
-        ]
-        return np.concatenate(parts, axis=1)
-
-
-def mesh_functions(edges_s: Array, time_s: Array) -> Array:
-    """Return the basis functions whose sum, weighted by its values, is a `Correction`.
-
-    For a mesh of (n_elements + 1,) edges they are (n_elements * (STAGES + 1), n_times).
-    """
-    functions, start = np.zeros((len(edges_s) - 1, STAGES + 1, len(time_s))), 0
-    for element, on_piece in enumerate(_interpolation(edges_s, time_s)):
-        stop = start + on_piece.shape[1]
-        functions[element, :, start:stop] = on_piece
-        start = stop
-    return functions.reshape(-1, len(time_s))
-
-
-def _interpolation(edges_s: Array, time_s: Array) -> list[Array]:
-    """Return each element's polynomials at the times within, (STAGES + 1, n_times_within)."""
-    cuts = np.searchsorted(time_s, edges_s[1:-1], side="left")
-    starts, lengths = (
-        np.repeat(of_elements, np.diff(cuts, prepend=0, append=len(time_s)))
-        for of_elements in (edges_s[:-1], np.diff(edges_s))
-    )
-    points = np.concatenate(([0.0], _radau()[0]))
-    functions = _polynomials(points, (time_s - starts) / lengths)
-    functions[:, time_s < edges_s[0]] = 0.0
-    return np.split(functions, cuts, axis=1)
+        edges_s = self.edges_s
+        cuts = np.searchsorted(time_s, edges_s[1:-1], side="left")
+        starts, lengths = (
+            np.repeat(of_elements, np.diff(cuts, prepend=0, append=len(time_s)))
+            for of_elements in (edges_s[:-1], np.diff(edges_s))
+        )
+        points = np.concatenate(([0.0], _radau()[0]))
+        functions = _polynomials(points, (time_s - starts) / lengths)
+        functions[:, time_s < edges_s[0]] = 0.0
+        on_elements = enumerate(np.split(functions, cuts, axis=1))
+        found = [values[:, e] @ np.ascontiguousarray(own) for e, own in on_elements if own.size]
+        return np.concatenate(found, axis=1)
 
 
 def nonlinear_rotation(
@@ -137,36 +111,13 @@ def nonlinear_rotation(
     BiogripError
         If the torque closes the arms beyond what the model describes.
     """
-    found = computed_correction(gripper, network, torque, FINE)
-    linear = step_response(gripper, network, symmetric=torque.symmetric, both_arms=arm == RIGHT)
+    found = correction(gripper, network, torque).checked()
+    linear = step_response(gripper, network, symmetric=torque.symmetric)
     return rotation(linear, torque, time_s, arm) + found.at(time_s, arm)
 
 
-def computed_correction(
-    gripper: Gripper, network: Network, torque: TorqueHistory, accuracy: Accuracy
-) -> Correction:
-    """Compute `correction`, and raise an error if it has not converged.
-
-    Raises
-    ------
-    BiogripError
-        If the torque closes the arms beyond what the model describes.
-    """
-    found = correction(gripper, network, torque, accuracy)
-    if not np.all(found.converged):
-        raise BiogripError(
-            "the nonlinear response could not be computed: the torque closes the arms so far "
-            "that they lose their lever on the sample. Allowed are smaller torques."
-        )
-    return found
-
-
 def correction(
-    gripper: Gripper,
-    network: Network,
-    torque: TorqueHistory,
-    accuracy: Accuracy,
-    factors: Array | None = None,
+    gripper: Gripper, network: Network, torque: TorqueHistory, factors: Array | None = None
 ) -> Correction:
     """Compute nonlinear minus linear rotation, without inertia.
 
@@ -174,17 +125,13 @@ def correction(
     ----------
     gripper, network, torque
         The arms, n samples, the protocol.
-    accuracy
-        Discretisation and tolerance.
     factors : (n,)
         Factors on the torque of each sample, if any.
     """
     symmetric = is_symmetric(gripper, torque)
     arms = [gripper.left] if symmetric else [gripper.left, gripper.right]
-    response = step_response(
-        gripper, network, symmetric=symmetric, inertia=False, both_arms=not symmetric
-    )
-    edges = mesh(torque, accuracy)
+    response = step_response(gripper, network, symmetric=symmetric, inertia=False)
+    edges = _mesh(torque)
     modes = _Modes(response, np.diff(edges))
     nodes = _nodes(edges)
     before_jumps = np.minimum(nodes, np.nextafter(edges[1:, None], 0)).ravel()
@@ -207,7 +154,7 @@ def correction(
     converged = np.zeros(shape[0], dtype=bool)
     # Converged samples stay, so that their number of sweeps does not depend on the others.
     left = np.arange(shape[0])
-    for _ in range(accuracy.most_sweeps):
+    for _ in range(_MOST_SWEEPS):
         u = b_0 * (linear[left] + extra[left])
         u_rate = b_0 * (linear_rate[left] + extra_rate[left])
         loads[left] = load = b_0 * _load(gripper, arms, tau[left], u, u_rate)
@@ -215,7 +162,7 @@ def correction(
         found, extra_rate[left] = modes.respond(as_drives, left)
         change = np.abs(found - extra[left]).max(axis=(1, 2, 3))
         extra[left] = found
-        converged[left] = change <= accuracy.tolerance * peak[left]
+        converged[left] = change <= _TOLERANCE * peak[left]
         left = left[~converged[left] & np.isfinite(change)]
         if not len(left):
             break
@@ -240,26 +187,26 @@ def _from_starts(force: Array, edges_s: Array, torque: TorqueHistory) -> Array:
     return np.concatenate((starts[..., None], force), axis=2)
 
 
-def mesh(torque: TorqueHistory, accuracy: Accuracy) -> Array:
+def _mesh(torque: TorqueHistory) -> Array:
     """Return element edges from 0 to the end, graded towards every change of torque."""
     jumps = np.unique(np.concatenate((torque.time_s, torque.harmonic_time_s, [torque.end_s])))
     longest = np.inf
     if len(torque.omega_rad_per_s):
-        longest = 2 * np.pi / torque.omega_rad_per_s.max() / accuracy.per_period
+        longest = 2 * np.pi / torque.omega_rad_per_s.max() / _PER_PERIOD
     edges = [0.0]
     for start, end in pairwise(jumps[jumps <= torque.end_s]):
-        length, here = accuracy.first_s, start
+        length, here = _FIRST_S, start
         # The last element takes a short remainder along.
         while here + 1.5 * min(length, longest) < end:
             here += min(length, longest)
             edges.append(here)
-            length *= accuracy.growth
+            length *= _GROWTH
         edges.append(end)
     return np.array(edges)
 
 
 def _load(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array) -> Array:
-    """Compute the load g of every arm, shape (n, n_arms, n_elements, STAGES)."""
+    """Compute the load g of every arm, shape (n, n_arms, n_elements, _STAGES)."""
     b_0 = gripper.lever_m
     phi = rotation_of_tip(gripper, u)
     b = gripper.arm_length_m * np.sin(np.radians(gripper.reference_angle_deg) - phi)
@@ -276,22 +223,24 @@ class _Modes:
     """Computes the response of linear modes to loads given at the nodes of a mesh."""
 
     def __init__(self, response: StepResponse, lengths_s: Array) -> None:
-        a, ones = _radau()[1], np.ones(STAGES)
+        a, ones = _radau()[1], np.ones(_STAGES)
         z = response.rates[:, :, None] * lengths_s
         # (1 - z A)^-1 through the eigenvectors of A: one scalar inverse each.
         eigenvalues, vectors = np.linalg.eig(a)
-        products = np.einsum("ik,kj->kij", vectors, np.linalg.inv(vectors)).reshape(STAGES, -1)
+        products = np.einsum("ik,kj->kij", vectors, np.linalg.inv(vectors)).reshape(_STAGES, -1)
         inverse = (1 / (1 - z[..., None] * eigenvalues)) @ products
-        self._inverse = inverse.real.reshape(*z.shape, STAGES, STAGES)
+        self._inverse = inverse.real.reshape(*z.shape, _STAGES, _STAGES)
         self._carry = self._inverse @ ones
         self._gain = lengths_s[:, None, None] * (self._inverse @ a)
         self._rates = response.rates[:, None, :, None, None]
-        self._residues = response.weights * response.rates[:, None, None, :]
+        # Of one drive, one arm stands for both.
+        alone = response.weights[:, : response.weights.shape[2]]
+        self._residues = alone * response.rates[:, None, None, :]
 
     def respond(self, load: Array, which: IntArray) -> tuple[Array, Array]:
-        """Compute rotations and rates of arms at nodes, (n, n_arms, n_elements, STAGES) each.
+        """Compute rotations and rates of arms at nodes, (n, n_arms, n_elements, _STAGES) each.
 
-        The loads there are (n, n_drives, n_elements, STAGES), on samples with indices `which`.
+        The loads there are (n, n_drives, n_elements, _STAGES), on samples with indices `which`.
         """
         forced = np.einsum("nmeij,ndej->ndmei", self._gain[which], load)
         start = np.zeros(forced.shape[:4])
@@ -310,19 +259,19 @@ class _Modes:
 
 @cache
 def _radau() -> tuple[Array, Array]:
-    """Return nodes c and matrix A of the Radau IIA method with `STAGES` stages."""
+    """Return nodes c and matrix A of the Radau IIA method with `_STAGES` stages."""
     legendre = np.polynomial.legendre
-    ends = legendre.Legendre.basis(STAGES) - legendre.Legendre.basis(STAGES - 1)
+    ends = legendre.Legendre.basis(_STAGES) - legendre.Legendre.basis(_STAGES - 1)
     c = 0.5 * (np.sort(ends.roots().real) + 1)
     c[-1] = 1.0
-    powers = np.arange(STAGES)
+    powers = np.arange(_STAGES)
     vandermonde = c[:, None] ** powers
     integrals = c[:, None] ** (powers + 1) / (powers + 1)
     return c, integrals @ np.linalg.inv(vandermonde)
 
 
 def _nodes(edges: Array) -> Array:
-    """Return collocation nodes, shape (n_elements, STAGES)."""
+    """Return collocation nodes, shape (n_elements, _STAGES)."""
     nodes = edges[:-1, None] + np.diff(edges)[:, None] * _radau()[0]
     nodes[:, -1] = edges[1:]
     return nodes

@@ -1,17 +1,14 @@
 """Protocol of the experiment: torque of both arms against time, and sampling times.
 
-Within a phase a torque is a quadratic in time plus sinusoids, which covers holds,
-ramps and sinusoids given as torque or, since torque goes with the square of the
-voltage, as voltage.
-
-Sampling times of the rotation.
+Within a phase a torque is a quadratic in time plus sinusoids, which covers holds, ramps and
+sinusoids given as torque or, since torque goes with the square of the voltage, as voltage.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,11 +26,6 @@ class Harmonic:
     omega_rad_per_s: float
     phase_rad: float
 
-    @property
-    def frequency_Hz(self) -> float:
-        """Frequency in Hz."""
-        return self.omega_rad_per_s / (2 * math.pi)
-
 
 @dataclass(frozen=True)
 class Load:
@@ -47,6 +39,11 @@ class Load:
     """Its curvature."""
     harmonics: tuple[Harmonic, ...] = ()
     """Sinusoids on top of it."""
+
+    @property
+    def powers(self) -> tuple[float, float, float]:
+        """Value, slope and curvature."""
+        return self.value_Nm, self.slope_Nm_per_s, self.curvature_Nm_per_s2
 
     def at(self, elapsed: ArrayLike) -> Array:
         """Return the torque in N m at times in s after the start of the phase."""
@@ -94,6 +91,11 @@ class Phase:
     """Closing torque tau_2, as an increment on that which closes the arm onto the sample."""
     right: Load
     """Closing torque tau_4, likewise."""
+
+
+Courses: TypeAlias = tuple[Array, list[list[tuple[float, ComplexArray]]]]
+"""Value, slope and curvature at the start of each phase, (n_phases, n_drives, 3), and sinusoids of
+each phase, as angular frequency and amplitudes, (n_drives,)."""
 
 
 @dataclass(frozen=True)
@@ -147,20 +149,27 @@ class TorqueHistory:
         return [(float(start), float(omega), a) for start, omega, a in rows]
 
     @cached_property
-    def within_phases(self) -> tuple[Array, list[list[tuple[float, ComplexArray]]]]:
-        """Torque of each drive within phases: (n_phases, n_drives, 3) and sinusoids of each phase.
+    def within_phases(self) -> Courses:
+        """Course of each drive within phases."""
+        return self._courses(lambda left, right: drives(left, right, self.symmetric))
 
-        Value, slope and curvature at the start; angular frequency and amplitudes.
-        """
-        jumps = np.moveaxis(drives(self.left, self.right, self.symmetric), 1, 0)
-        powers = jumps.copy()
+    @cached_property
+    def of_arms(self) -> Courses:
+        """Course of the torque of each arm within phases."""
+        return self._courses(lambda left, right: np.stack((left, right)))
+
+    def _courses(self, combine: Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]]) -> Courses:
+        powers = np.moveaxis(combine(self.left, self.right), 1, 0).copy()
         for k, gap in enumerate(np.diff(self.time_s)):
             value, slope, curvature = powers[k].T
             carried = (value + slope * gap + curvature * gap**2 / 2, slope + curvature * gap)
             powers[k + 1] += np.stack((*carried, curvature), axis=1)
         harmonics: list[list[tuple[float, ComplexArray]]] = [[] for _ in self.time_s]
-        for start, omega, amplitudes in self.swings[::2]:
-            harmonics[self.time_s.searchsorted(start)].append((omega, amplitudes))
+        amplitudes = combine(self.harmonic_left, self.harmonic_right).T
+        # Each is followed by the one that switches it off.
+        starts = zip(self.harmonic_time_s, self.omega_rad_per_s, amplitudes, strict=True)
+        for start, omega, a in list(starts)[::2]:
+            harmonics[self.time_s.searchsorted(start)].append((float(omega), a))
         return powers, harmonics
 
     def times(self, factor: float) -> "TorqueHistory":
@@ -220,56 +229,40 @@ def torque_history(phases: tuple[Phase, ...], *, deforms: bool = False) -> Torqu
 
     They are of a torque or, if the protocol `deforms`, of a deformation.
     """
-    ends = np.cumsum([phase.duration_s for phase in phases])
+    durations = np.array([phase.duration_s for phase in phases])
+    ends = np.cumsum(durations)
     starts = np.concatenate(([0.0], ends[:-1]))
-    jumps, harmonics = [], []
-    before = {"left": np.zeros(3), "right": np.zeros(3)}
-    for start, phase in zip(starts, phases, strict=True):
-        row = []
-        for arm in ("left", "right"):
-            load: Load = getattr(phase, arm)
-            now = np.array([load.value_Nm, load.slope_Nm_per_s, load.curvature_Nm_per_s2])
-            row.append(now - before[arm])
-            t, (value, slope, curvature) = phase.duration_s, now
-            before[arm] = np.array(
-                [value + slope * t + curvature * t**2 / 2, slope + curvature * t, curvature]
-            )
-        jumps.append(row)
-        harmonics += _harmonic_events(start, phase)
-    left, right = np.moveaxis(np.array(jumps), 1, 0)
-    times, omegas, a_left, a_right = (
-        (np.array(c) for c in zip(*harmonics, strict=True))
-        if (harmonics)
-        else (np.zeros(0), np.zeros(0), np.zeros(0, complex), np.zeros(0, complex))
-    )
+    # Value, slope and curvature of each arm at the start of each phase, and at its end.
+    jumps = np.array([[load.powers for load in (phase.left, phase.right)] for phase in phases])
+    value, slope, curvature = np.moveaxis(jumps, 2, 0)
+    t = durations[:, None]
+    reached = value + slope * t + curvature * t**2 / 2, slope + curvature * t, curvature
+    jumps[1:] -= np.stack(reached, axis=2)[:-1]
+    events = [
+        event
+        for start, phase in zip(starts, phases, strict=True)
+        for event in _harmonic_events(start, phase)
+    ]
+    times, omegas = np.array([event[:2] for event in events]).reshape(-1, 2).T
+    left, right = np.array([a for *_, a in events], complex).reshape(-1, 2).T
     return TorqueHistory(
-        starts, left, right, times, omegas, a_left, a_right, float(ends[-1]), deforms
+        starts, jumps[:, 0], jumps[:, 1], times, omegas, left, right, float(ends[-1]), deforms
     )
 
 
-def _harmonic_events(start: float, phase: Phase) -> list[tuple[float, float, complex, complex]]:
-    """Return the events that switch the sinusoids of a phase on, and at its end off."""
-    events = []
-    for arm in ("left", "right"):
-        for h in getattr(phase, arm).harmonics:
-            for time, sign in ((0.0, 1), (phase.duration_s, -1)):
-                angle = h.phase_rad + h.omega_rad_per_s * time
-                a = sign * h.amplitude_Nm * complex(math.cos(angle), math.sin(angle))
-                both = (a, 0j) if arm == "left" else (0j, a)
-                events.append((start + time, h.omega_rad_per_s, *both))
-    return _merged(events)
+def _harmonic_events(start: float, phase: Phase) -> Iterator[tuple[float, float, ComplexArray]]:
+    """Yield the events that switch the sinusoids of a phase on, and at its end off.
 
-
-def _merged(
-    events: list[tuple[float, float, complex, complex]],
-) -> list[tuple[float, float, complex, complex]]:
-    """Merge the events of both arms that have the same time and frequency."""
-    merged: dict[tuple[float, float], list[complex]] = {}
-    for time, omega, left, right in events:
-        pair = merged.setdefault((time, omega), [0j, 0j])
-        pair[0] += left
-        pair[1] += right
-    return [(time, omega, left, right) for (time, omega), (left, right) in merged.items()]
+    Those of both arms that have the same frequency are one.
+    """
+    amplitudes: dict[float, ComplexArray] = {}
+    for arm, load in enumerate((phase.left, phase.right)):
+        for h in load.harmonics:
+            both = amplitudes.setdefault(h.omega_rad_per_s, np.zeros(2, complex))
+            both[arm] += h.amplitude_Nm * np.exp(1j * h.phase_rad)
+    for omega, both in amplitudes.items():
+        yield start, omega, both
+        yield start + phase.duration_s, omega, -both * np.exp(1j * omega * phase.duration_s)
 
 
 def torque_at(history: TorqueHistory, time_s: ArrayLike, arm: str = "left") -> Array:

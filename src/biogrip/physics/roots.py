@@ -1,11 +1,8 @@
-"""Root finding for polynomials with positive coefficients, many at once.
+"""Roots of polynomials with positive coefficients, and zeros of sums of simple poles, many at once.
 
-The coefficients of a gripper-sample polynomial span dozens of decades. An
-eigenvalue solver loses the small roots there; iterating on the polynomial
-itself, from starting radii read off its Newton polygon, keeps every root to
-full relative accuracy.
-
-Zeros of sums of simple poles, which interlace with the poles: relaxation rates of networks.
+The coefficients of a gripper-sample polynomial span dozens of decades. An eigenvalue solver loses
+the small roots there; iterating on the polynomial itself [1]_, [2]_, from starting radii read off
+its Newton polygon [3]_, keeps every root to full relative accuracy.
 
 A network of springs and dampers with parallel Maxwell branches has as many modes as branches, or
 one more. With branch rates p_0 < p_1 < ... the rates of the modes are the zeros of
@@ -13,8 +10,8 @@ one more. With branch rates p_0 < p_1 < ... the rates of the modes are the zeros
     f(x) = sum_j w_j / (x - p_j) - b,    w_j, b > 0,
 
 one in each interval between neighbouring rates and one beyond the last. Each zero is found
-independently, as its distance from the nearer pole. So a zero close to a pole keeps all its
-digits, and no polynomial is needed, whose coefficients would span hundreds of decades.
+independently [4]_, as its distance from the nearer pole [5]_. So a zero close to a pole keeps all
+its digits, and no polynomial is needed, whose coefficients would span hundreds of decades.
 
 References
 ----------
@@ -24,15 +21,14 @@ References
    Mathematics of Computation 27 (1973), 339-344.
 .. [3] D. A. Bini, Numerical computation of polynomial zeros by means of Aberth's method,
    Numerical Algorithms 13 (1996), 179-200: starting radii from the Newton polygon.
-.. [1] R.-C. Li, Solving secular equations stably and efficiently, LAPACK Working Note 89
+.. [4] R.-C. Li, Solving secular equations stably and efficiently, LAPACK Working Note 89
    (1994): both neighbouring poles matched in value and slope, the middle way.
-.. [2] J. R. Bunch, C. P. Nielsen and D. C. Sorensen, Rank-one modification of the symmetric
+.. [5] J. R. Bunch, C. P. Nielsen and D. C. Sorensen, Rank-one modification of the symmetric
    eigenproblem, Numerische Mathematik 31 (1978), 31-48.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -48,9 +44,14 @@ double root symmetrically apart by g changes the response by g^2. Both stay
 below 1e-9 here.
 """
 
-AnyRoot = TypeVar("AnyRoot", np.float64, np.complex128)
+_Root = TypeVar("_Root", np.float64, np.complex128)
 
-_SWEEPS = 80
+# Most sweeps over the roots of polynomials, and over the zeros of sums of poles.
+_SWEEPS, _MOST_SWEEPS = 80, 60
+# Share of a sum of poles below which it is zero, and of a distance below which a step is the last.
+_ROUNDING, _SHORT = 4e-16, 1e-9
+# Numbers in an array that fits into a processor's cache.
+_FITS = 70_000
 
 
 def real_quadratic_roots(coefficients: Array) -> Array:
@@ -116,10 +117,10 @@ def find_zeros(
     return z
 
 
-def separate(z: NDArray[AnyRoot]) -> NDArray[AnyRoot]:
+def separate(z: NDArray[_Root]) -> NDArray[_Root]:
     """Move roots that (nearly) coincide symmetrically apart to `SMALLEST_GAP`."""
     z = z.copy()
-    first, second = _pairs(z.shape[1])
+    first, second = np.triu_indices(z.shape[1], 1)
     if not np.any(np.abs(z[:, first] - z[:, second]) < SMALLEST_GAP * np.abs(z[:, first])):
         return z
     for i, j in zip(first, second, strict=True):
@@ -128,11 +129,6 @@ def separate(z: NDArray[AnyRoot]) -> NDArray[AnyRoot]:
         z[:, i] = np.where(close, middle * (1 + SMALLEST_GAP / 2), z[:, i])
         z[:, j] = np.where(close, middle * (1 - SMALLEST_GAP / 2), z[:, j])
     return z
-
-
-@cache
-def _pairs(count: int) -> tuple[IntArray, IntArray]:
-    return np.triu_indices(count, 1)
 
 
 def _newton_step(coefficients: Array, z: ComplexArray) -> ComplexArray:
@@ -156,12 +152,6 @@ def _newton_polygon_radii(coefficients: Array) -> Array:
                 chord = log[:, i] + (log[:, j] - log[:, i]) * (k - i) / (j - i)
                 hull[:, k] = np.maximum(hull[:, k], chord)
     return np.exp(hull[:, :-1] - hull[:, 1:])
-
-
-_MOST_SWEEPS = 60
-_ROUNDING, _SHORT = 4e-16, 1e-9
-# Numbers in an array that fits into a processor's cache.
-_FITS = 70_000
 
 
 @dataclass(frozen=True)
@@ -218,10 +208,6 @@ class _Sides:
     above: Array
     above_slope: Array
 
-    def reshaped(self, shape: tuple[int, ...]) -> "_Sides":
-        """Return the sums in another shape."""
-        return _Sides(*(of.reshape(shape) for of in vars(self).values()))
-
 
 def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
     pole, side, gap, start = _intervals(weights, poles, level)
@@ -257,13 +243,16 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
     gaps = np.diff(poles, axis=0)
     # The sign at the middle of a gap tells which pole the zero is nearer to.
     zero, which = np.divmod(np.arange(gaps.size), len(level))
-    halves = Zeros(poles[:-1].ravel(), 0.5 * gaps.ravel())
-    middle = _sides(weights, poles, zero, which, halves).reshaped(gaps.shape)
-    value = middle.below + middle.above - level
+    middle = _sides(weights, poles, zero, which, Zeros(poles[:-1].ravel(), 0.5 * gaps.ravel()))
+    below, above, below_slope, above_slope = (
+        of.reshape(gaps.shape)
+        for of in (middle.below, middle.above, middle.below_slope, middle.above_slope)
+    )
+    value = below + above - level
     pole = np.concatenate((np.where(value > 0, poles[1:], poles[:-1]), poles[-1:]))
     side, gap, start = np.ones_like(pole), np.full_like(pole, np.inf), np.empty_like(pole)
     side[:-1], gap[:-1] = np.where(value > 0, -1.0, 1.0), gaps
-    guess = _between(value, middle.below_slope, middle.above_slope, side[:-1], gaps, 0.5 * gaps)
+    guess = _between(value, below_slope, above_slope, side[:-1], gaps, 0.5 * gaps)
     start[:-1] = np.where((guess > 0) & (guess < 0.5 * gaps), guess, 0.25 * gaps)
     # Lower bounds of the last zero: with the last pole only, and with all poles at zero.
     start[-1] = np.maximum(weights[-1], sum(weights) - level * poles[-1]) / level
@@ -271,10 +260,10 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
 
 
 def _sides(weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros) -> _Sides:
-    """Return the sums in the order of the poles, vectorised if that fits into the cache.
+    """Return the sums, each in the order of the poles, vectorised if that fits into the cache.
 
-    Points are given in the order of `zero`, the poles up to which are below; `which` is their
-    function.
+    Points are given by the index of the last pole below, `zero`, in ascending order, and by that of
+    their function.
     """
     few = len(poles) * len(zero) <= _FITS
     return (_sides_at_once if few else _sides_in_turn)(weights, poles, zero, which, at)
@@ -331,7 +320,7 @@ def _nearer(
 def _between(
     value: Array, below_slope: Array, above_slope: Array, side: Array, gap: Array, at: Array
 ) -> Array:
-    """Return the zero of c + p/d - q/(gap - d), matched in value and slopes, one pole per side [1].
+    """Return the zero of c + p/d - q/(gap - d), matched in value and slopes, one pole per side [4].
 
     Distances are from the nearer pole, so that d keeps all its digits.
     """

@@ -1,12 +1,9 @@
-"""Networks of springs and dampers, the common form of all constitutive models.
-
-Sample models and their parameters, and the parameters that several models share.
-"""
+"""What a sample model is: its parameters, and its network of springs and dampers."""
 
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, wraps
 from math import inf
 from typing import TypeAlias
 
@@ -34,11 +31,19 @@ class Network:
 _RIGID = 1e18
 
 
-def columns_of(parameters: ArrayLike) -> Array:
-    """Return columns of parameters, (n, n_parameters), with infinite ones replaced by rigid."""
-    columns = np.atleast_2d(np.asarray(parameters) * 1.0).T
-    rigid = np.isinf(columns)
-    return np.where(rigid, _RIGID, columns) if np.any(rigid) else columns
+def of_columns(network: Callable[..., Network]) -> Callable[[ArrayLike], Network]:
+    """Return a function of parameters, (n, n_parameters), from a function of their columns, (n,).
+
+    Infinite parameters are replaced by rigid ones.
+    """
+
+    @wraps(network)
+    def of_parameters(parameters: ArrayLike) -> Network:
+        columns = np.atleast_2d(np.asarray(parameters) * 1.0).T
+        rigid = np.isinf(columns)
+        return network(*(np.where(rigid, _RIGID, columns) if np.any(rigid) else columns))
+
+    return of_parameters
 
 
 def complex_modulus(network: Network, omega: Array) -> tuple[Array, Array]:
@@ -57,21 +62,10 @@ MOST_BRANCHES = 8
 """Most branches for which polynomials are used; springpots have more of them."""
 
 
+# Units of kinds of parameters, and where a sample is under stress, and strained.
 _UNITS = {"stiffness": "N/m", "damping": "N s/m", "springpot": "N/m", "exponent": ""}
-_SUFFIXES = {
-    "stiffness": "_N_per_m",
-    "damping": "_Ns_per_m",
-    "springpot": "_N_per_m",
-    "exponent": "",
-}
-# Where a sample is under stress, and strained.
 _UNITS_PER_AREA = {"stiffness": "Pa", "damping": "Pa s", "springpot": "Pa", "exponent": ""}
-_SUFFIXES_PER_AREA = {
-    "stiffness": "_Pa",
-    "damping": "_Pa_s",
-    "springpot": "_Pa",
-    "exponent": "",
-}
+_SUFFIXES = {"N/m": "_N_per_m", "N s/m": "_Ns_per_m", "Pa": "_Pa", "Pa s": "_Pa_s", "": ""}
 
 
 @dataclass(frozen=True)
@@ -102,7 +96,7 @@ class Parameter:
     @property
     def column(self) -> str:
         """Name of the parameter's column in result files."""
-        return self.name + (_SUFFIXES_PER_AREA if self.per_area else _SUFFIXES)[self.kind]
+        return self.name + _SUFFIXES[self.unit]
 
     @property
     def symbol(self) -> str:

@@ -1,16 +1,16 @@
-"""Simulated rotation and shortening of samples, with the linear or the nonlinear model.
+"""Simulated rotation and shortening of samples, by the linear or the nonlinear model.
 
-Effect of the arms' inertia on a trace, which targets have and fits leave out.
-
-After a change of the torque, arms ring for milliseconds. Later changes by inertia are negligible
-(docs/model.md, "Without inertia").
+Targets have the arms' inertia, fits leave it out: after a change of the torque, arms ring for
+milliseconds, and later changes by inertia are negligible (docs/model.md, "Without inertia"). What
+of the ring shows in a trace is found here, too.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biogrip.arrays import Array, BoolArray
+from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper, displacement_of_tip
 from biogrip.physics.linear import LEFT, RIGHT, rotation, step_response
 from biogrip.physics.modes import relaxation
@@ -24,7 +24,7 @@ def simulated_rotation(
 ) -> Array:
     """Simulate the closing rotation of the left arm in rad, with inertia, (n, n_times).
 
-    By the nonlinear model, corrected eqs. (1)-(3), which has the errors of `computed_correction`,
+    By the nonlinear model, corrected eqs. (1)-(3), which has the errors of `nonlinear_rotation`,
     or the linear one, (4)-(6), at ascending times.
     """
     if nonlinear:
@@ -45,7 +45,7 @@ def simulated_shortening(
         turns = (nonlinear_rotation(gripper, network, torque, time_s, a) for a in (LEFT, RIGHT))
         left, right = (displacement_of_tip(gripper, turn) for turn in turns)
         return left + right
-    response = step_response(gripper, network, symmetric=torque.symmetric, both_arms=True)
+    response = step_response(gripper, network, symmetric=torque.symmetric)
     both = rotation(response, torque, time_s, LEFT) + rotation(response, torque, time_s, RIGHT)
     return gripper.lever_m * both
 
@@ -71,6 +71,45 @@ class Ring:
     """Time after a change of the torque of the last reading that would have to be left out."""
 
 
+def find_ring(
+    gripper: Gripper,
+    network: Network,
+    torque: TorqueHistory,
+    time_s: Array,
+    in_noise: Callable[[Array], Array],
+) -> Ring | None:
+    """Return what shows of the ringing of arms on the first sample, or None.
+
+    A parallel damper ends a ring. It only counts if it is seen when the ring is over, too: what
+    readings of a ring tell of it, without inertia, is the ring's.
+
+    Parameters
+    ----------
+    gripper, network, torque
+        Arms, sample and protocol.
+    time_s : (n_samples,)
+        Sampling times.
+    in_noise
+        Turns a change of the readings, (n_samples,), into standard deviations of white noise.
+    """
+    if not gripper.has_inertia:
+        return None
+    springs = network.k_p + network.k.sum(axis=1) + gripper.jaw_stiffness_N_per_m
+    is_seen = network.c_p > ringing_s(gripper) * springs
+    network = replace(network, c_p=np.where(is_seen, network.c_p, 0.0))
+    elapsed = elapsed_s(torque, time_s)
+    ringing = elapsed <= ringing_s(gripper)
+    change = np.zeros(len(time_s))
+    change[ringing] = ring(gripper, network, torque, time_s[ringing])[0]
+    shown = in_noise(change)
+    latest_first = np.argsort(-elapsed, kind="stable")
+    norms = np.sqrt(np.cumsum(shown[latest_first] ** 2))
+    visible = np.flatnonzero(norms > VISIBLE)
+    if not len(visible):
+        return None
+    return Ring(float(np.max(np.abs(shown))), float(elapsed[latest_first[visible[0]]]))
+
+
 def ringing_s(gripper: Gripper) -> float:
     """Return the time in s after which the ringing of the arms has decayed below rounding.
 
@@ -88,11 +127,6 @@ def elapsed_s(torque: TorqueHistory, time_s: Array) -> Array:
     return time_s - changes_s[last]
 
 
-def while_ringing(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> BoolArray:
-    """Return True for times, (n_times,), at which arms may ring."""
-    return elapsed_s(torque, time_s) <= ringing_s(gripper)
-
-
 def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array) -> Array:
     """Compute the change of the left arm's rotation by inertia, (n, n_times) in rad."""
     responses = (
@@ -101,21 +135,3 @@ def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Arra
     )
     with_it, without = (rotation(response, torque, time_s) for response in responses)
     return with_it - without
-
-
-def find_ring(change: Array, elapsed_s: Array) -> Ring | None:
-    """Return what shows of the ringing of arms, or None.
-
-    Parameters
-    ----------
-    change : (n_times,)
-        Change of the readings by inertia, in standard deviations of the noise.
-    elapsed_s : (n_times,)
-        Time of each reading since the last change of the torque.
-    """
-    latest_first = np.argsort(-elapsed_s, kind="stable")
-    norms = np.sqrt(np.cumsum(change[latest_first] ** 2))
-    shown = np.flatnonzero(norms > VISIBLE)
-    if not len(shown):
-        return None
-    return Ring(float(np.max(np.abs(change))), float(elapsed_s[latest_first[shown[0]]]))

@@ -1,21 +1,19 @@
-"""Motion of first-order systems of springs and dampers from an initial state, mode by mode.
+"""The linear model with unilateral contact: jaws press but do not pull, and may lose contact.
 
-A system M z' + K z = f with M = L L^T and K = G^T G, one row of G a spring, has the
-modes q = V^T L^T z of the singular value decomposition G L^-T = U S V^T, and the
-rates S^2. Taking the decomposition of the factor rather than the eigenvalues of its
-square keeps twice as many digits of the slow rates.
+While the jaws touch, arms and sample are one system without inertia. When the contact force reaches
+zero, contact is lost: each arm turns against its own hinge, and the unloaded sample recovers. When
+the gap closes, jaws and sample touch again. Every stretch is solved exactly; only the instants at
+which it ends are found numerically.
 
-The linear model with unilateral contact: jaws press but do not pull, and may lose contact.
+All states are continuous when contact changes. Loss and contact do not alternate at once, for the
+force that contact would give and the rate at which the gap would open without contact are
+proportional, with opposite signs. The sample may shift between the jaws freely, so that only the
+sum of both tips' displacements counts.
 
-While the jaws touch, arms and sample are one system without inertia. When the contact
-force reaches zero, contact is lost: each arm turns against its own hinge, and the
-unloaded sample recovers. When the gap closes, jaws and sample touch again. Every
-stretch is solved exactly; only the instants at which it ends are found numerically.
-
-All states are continuous when contact changes. Loss and contact do not alternate at
-once, for the force that contact would give and the rate at which the gap would open
-without contact are proportional, with opposite signs. The sample may shift between the
-jaws freely, so that only the sum of both tips' displacements counts.
+A system of springs and dampers M z' + K z = f with M = L L^T and K = G^T G, one row of G a spring,
+has the modes q = V^T L^T z of the singular value decomposition G L^-T = U S V^T, and the rates S^2.
+Taking the decomposition of the factor rather than the eigenvalues of its square keeps twice as many
+digits of the slow rates.
 """
 
 from collections.abc import Callable, Iterator
@@ -29,117 +27,8 @@ from biogrip.arrays import Array, BoolArray, ComplexArray
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import phi_function
-from biogrip.physics.protocol import TorqueHistory, torque_at
+from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.sample_model import Network
-
-
-@dataclass(frozen=True)
-class Forcing:
-    """Loads from an instant on, while the torque is smooth."""
-
-    powers: Array
-    """Value, slope and curvature at that instant, (n_loads, 3)."""
-    omega_rad_per_s: Array
-    """Angular frequencies of sinusoids on top, (n_harmonics,)."""
-    amplitudes: ComplexArray
-    """Their complex amplitudes at that instant, (n_loads, n_harmonics)."""
-
-    def at(self, elapsed_s: Array) -> Array:
-        """Return the loads at times since the instant, (n_loads, n_times)."""
-        powers = np.stack((np.ones_like(elapsed_s), elapsed_s, elapsed_s**2 / 2))
-        turning = np.exp(1j * self.omega_rad_per_s[:, None] * elapsed_s)
-        return self.powers @ powers + (self.amplitudes @ turning).real
-
-    def later(self, elapsed_s: float) -> "Forcing":
-        """Return the same loads, counted from a later instant on."""
-        t = elapsed_s
-        shift = np.array([[1, 0, 0], [t, 1, 0], [t**2 / 2, t, 1]])
-        turned = self.amplitudes * np.exp(1j * self.omega_rad_per_s * t)
-        return Forcing(self.powers @ shift, self.omega_rad_per_s, turned)
-
-
-def smooth_pieces(torque: TorqueHistory) -> list[tuple[float, float, Forcing]]:
-    """Divide a protocol at changes of torque into start, length and torques of both arms."""
-    instants = np.concatenate((torque.time_s, torque.harmonic_time_s))
-    starts = np.unique(instants[instants < torque.end_s])
-    lengths = np.diff(np.append(starts, torque.end_s))
-    pieces = []
-    for start, length in zip(starts, lengths, strict=True):
-        begun = torque.time_s <= start
-        powers = np.zeros((2, 3))
-        for at, left, right in zip(
-            torque.time_s[begun], torque.left[begun], torque.right[begun], strict=True
-        ):
-            jumps = Forcing(np.stack((left, right)), np.zeros(0), np.zeros((2, 0), complex))
-            powers += jumps.later(start - at).powers
-        swinging = torque.harmonic_time_s <= start
-        both = np.stack((torque.harmonic_left, torque.harmonic_right))[:, swinging]
-        omega = torque.omega_rad_per_s[swinging]
-        turned = both * np.exp(1j * omega * (start - torque.harmonic_time_s[swinging]))
-        pieces.append((float(start), float(length), Forcing(powers, omega, turned)))
-    return pieces
-
-
-class Modes:
-    """Modes of a system of springs and dampers.
-
-    Of the springs G is given, (n_springs, n_states): the extension of each, times the root of its
-    stiffness, by the states; of the dampers L, (n_states, n_states), lower triangular.
-    """
-
-    def __init__(self, springs: Array, dampers: Array) -> None:
-        inverse = np.linalg.inv(dampers)
-        _, sizes, turns = np.linalg.svd(springs @ inverse.T, full_matrices=False)
-        self.rates = sizes**2
-        self._into = turns @ dampers.T
-        self._out = inverse.T @ turns.T
-        self._drive = turns @ inverse
-
-    def follow(self, state: Array, forcing: Forcing) -> "Motion":
-        """Return the motion from a state, (n_states,), under loads on the first states."""
-        drive = self._drive[:, : len(forcing.powers)]
-        return Motion(
-            self.rates[:, None],
-            self._out,
-            self._into @ state,
-            Forcing(drive @ forcing.powers, forcing.omega_rad_per_s, drive @ forcing.amplitudes),
-        )
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Motion of a system from an initial state."""
-
-    rates: Array
-    """Rates of decay, (n_modes, 1)."""
-    shapes: Array
-    """States by modes, (n_states, n_modes)."""
-    start: Array
-    """Initial values of the modes, (n_modes,)."""
-    forcing: Forcing
-    """Loads on the modes."""
-
-    def at(self, elapsed_s: Array) -> Array:
-        """Return the states at times since the beginning, (n_states, n_times)."""
-        return self.shapes @ self._modes(elapsed_s)
-
-    def rate(self, elapsed_s: Array) -> Array:
-        """Return the states' rates of change at times since the beginning."""
-        loads = self.forcing.at(elapsed_s)
-        return self.shapes @ (loads - self.rates * self._modes(elapsed_s))
-
-    def _modes(self, elapsed_s: Array) -> Array:
-        z = -self.rates * elapsed_s
-        modes: NDArray[Any] = np.exp(z) * self.start[:, None]
-        for order in range(3):
-            load = self.forcing.powers[:, order, None]
-            if np.any(load):
-                modes = modes + load * elapsed_s ** (order + 1) * phi_function(order + 1, z)
-        for omega, a in zip(self.forcing.omega_rad_per_s, self.forcing.amplitudes.T, strict=True):
-            swing = np.exp(1j * omega * elapsed_s) - np.exp(z)
-            modes = modes + (a[:, None] / (1j * omega + self.rates) * swing).real
-        return modes
-
 
 _MOST_EVENTS = 100_000
 # Share of the largest force and closing below which a change of contact is rounding.
@@ -166,6 +55,163 @@ class UnilateralResponse:
     """Times at which contact was lost."""
     met_s: tuple[float, ...]
     """Times at which contact was regained."""
+
+
+def unilateral_response(
+    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array
+) -> UnilateralResponse:
+    """Simulate the first sample in unilateral contact with the jaws, without inertia.
+
+    Times ascend; at the instant of a step: what follows it.
+
+    Raises
+    ------
+    BiogripError
+        If contact is lost too often.
+    """
+    system, pieces = _System(gripper, network), list(_pieces(torque))
+    most_torque = max(
+        float(np.max(np.abs(loads.at(length * np.linspace(0, 1, 65)[:-1]))))
+        for _, length, loads in pieces
+    )
+    softest = min(arm.stiffness_Nm_per_rad for arm in (gripper.left, gripper.right))
+    least = {
+        True: _NOTHING * most_torque / gripper.lever_m,
+        False: _NOTHING * 2 * gripper.lever_m * most_torque / softest,
+    }
+    branches = network.k.shape[1]
+    states = np.zeros((3 + branches, len(time_s)))
+    force, touches = np.zeros(len(time_s)), np.zeros(len(time_s), dtype=bool)
+    touching, state = True, np.zeros(3 + branches)
+    parted: list[float] = []
+    met: list[float] = []
+    for start, length, loads in pieces:
+        done = 0.0
+        while True:
+            go_on = system.in_contact if touching else system.apart
+            stretch = go_on(state, loads.later(done))
+            grid = _grid(stretch.fastest_per_s, loads.omega_rad_per_s, length - done)
+            lasts = _first_below(stretch.margin, grid, least[touching])
+            begin, end = start + done, start + (length if lasts is None else done + lasts)
+            final = lasts is None and start + length >= torque.end_s
+            here = (time_s >= begin) & ((time_s <= end) if final else (time_s < end))
+            elapsed = time_s[here] - begin
+            if len(elapsed):
+                states[:, here] = stretch.state(elapsed)
+                touches[here] = touching
+                if touching:
+                    force[here] = np.maximum(stretch.margin(elapsed), 0.0)
+            over = np.array([length - done if lasts is None else lasts])
+            state = stretch.state(over)[:, 0]
+            if lasts is None:
+                break
+            done += lasts
+            (parted if touching else met).append(start + done)
+            touching = not touching
+            if len(parted) > _MOST_EVENTS:
+                raise BiogripError(
+                    f"the jaws leave the sample more than {_MOST_EVENTS} times; allowed are "
+                    "protocols with fewer periods."
+                )
+    return UnilateralResponse(
+        states[:2], force, touches, states[2], states[3:], tuple(parted), tuple(met)
+    )
+
+
+@dataclass(frozen=True)
+class _Forcing:
+    """Loads from an instant on, while the torque is smooth."""
+
+    powers: Array
+    """Value, slope and curvature at that instant, (n_loads, 3)."""
+    omega_rad_per_s: Array
+    """Angular frequencies of sinusoids on top, (n_harmonics,)."""
+    amplitudes: ComplexArray
+    """Their complex amplitudes at that instant, (n_loads, n_harmonics)."""
+
+    def at(self, elapsed_s: Array) -> Array:
+        """Return the loads at times since the instant, (n_loads, n_times)."""
+        powers = np.stack((np.ones_like(elapsed_s), elapsed_s, elapsed_s**2 / 2))
+        turning = np.exp(1j * self.omega_rad_per_s[:, None] * elapsed_s)
+        return self.powers @ powers + (self.amplitudes @ turning).real
+
+    def later(self, elapsed_s: float) -> "_Forcing":
+        """Return the same loads, counted from a later instant on."""
+        t = elapsed_s
+        shift = np.array([[1, 0, 0], [t, 1, 0], [t**2 / 2, t, 1]])
+        turned = self.amplitudes * np.exp(1j * self.omega_rad_per_s * t)
+        return _Forcing(self.powers @ shift, self.omega_rad_per_s, turned)
+
+
+def _pieces(torque: TorqueHistory) -> Iterator[tuple[float, float, _Forcing]]:
+    """Yield start and length of each phase, and the torques of both arms in it."""
+    powers, swings = torque.of_arms
+    lengths = np.diff(torque.time_s, append=torque.end_s)
+    for start, length, own, waves in zip(torque.time_s, lengths, powers, swings, strict=True):
+        omega = np.array([omega for omega, _ in waves])
+        amplitudes = np.array([a for _, a in waves]).reshape(-1, 2).T
+        yield float(start), float(length), _Forcing(own, omega, amplitudes)
+
+
+class _Modes:
+    """Modes of a system of springs and dampers.
+
+    Of the springs G is given, (n_springs, n_states): the extension of each, times the root of its
+    stiffness, by the states; of the dampers L, (n_states, n_states), lower triangular.
+    """
+
+    def __init__(self, springs: Array, dampers: Array) -> None:
+        inverse = np.linalg.inv(dampers)
+        _, sizes, turns = np.linalg.svd(springs @ inverse.T, full_matrices=False)
+        self.rates = sizes**2
+        self._into = turns @ dampers.T
+        self._out = inverse.T @ turns.T
+        self._drive = turns @ inverse
+
+    def follow(self, state: Array, forcing: _Forcing) -> "_Motion":
+        """Return the motion from a state, (n_states,), under loads on the first states."""
+        drive = self._drive[:, : len(forcing.powers)]
+        return _Motion(
+            self.rates[:, None],
+            self._out,
+            self._into @ state,
+            _Forcing(drive @ forcing.powers, forcing.omega_rad_per_s, drive @ forcing.amplitudes),
+        )
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """Motion of a system from an initial state."""
+
+    rates: Array
+    """Rates of decay, (n_modes, 1)."""
+    shapes: Array
+    """States by modes, (n_states, n_modes)."""
+    start: Array
+    """Initial values of the modes, (n_modes,)."""
+    forcing: _Forcing
+    """Loads on the modes."""
+
+    def at(self, elapsed_s: Array) -> Array:
+        """Return the states at times since the beginning, (n_states, n_times)."""
+        return self.shapes @ self._modes(elapsed_s)
+
+    def rate(self, elapsed_s: Array) -> Array:
+        """Return the states' rates of change at times since the beginning."""
+        loads = self.forcing.at(elapsed_s)
+        return self.shapes @ (loads - self.rates * self._modes(elapsed_s))
+
+    def _modes(self, elapsed_s: Array) -> Array:
+        z = -self.rates * elapsed_s
+        modes: NDArray[Any] = np.exp(z) * self.start[:, None]
+        for order in range(3):
+            load = self.forcing.powers[:, order, None]
+            if np.any(load):
+                modes = modes + load * elapsed_s ** (order + 1) * phi_function(order + 1, z)
+        for omega, a in zip(self.forcing.omega_rad_per_s, self.forcing.amplitudes.T, strict=True):
+            swing = np.exp(1j * omega * elapsed_s) - np.exp(z)
+            modes = modes + (a[:, None] / (1j * omega + self.rates) * swing).real
+        return modes
 
 
 @dataclass(frozen=True)
@@ -195,16 +241,16 @@ class _System:
         spring_rows = np.hstack((np.diag(np.sqrt(self._k)), np.zeros((2, n))))
         branches = np.sqrt(k)[:, None] * np.hstack((np.tile(tips, (n, 1)), -np.eye(n)))
         side = np.sqrt(k_p) * np.concatenate((tips, np.zeros(n)))
-        self._touching = Modes(
+        self._touching = _Modes(
             np.vstack((spring_rows, side, branches)),
-            _block(_coupled(self._c, b * b * c_p), np.sqrt(c)),
+            _coupled(self._c, b * b * c_p, np.sqrt(c)),
         )
-        self._arms = Modes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
+        self._arms = _Modes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
         self._has_damper = bool(c_p > 0)
         if self._has_damper:
             own = np.concatenate(([np.sqrt(k_p)], np.zeros(n)))
             rest = np.sqrt(k)[:, None] * np.hstack((np.ones((n, 1)), -np.eye(n)))
-            self._sample = Modes(np.vstack((own, rest)), np.diag(np.sqrt(np.append(c_p, c))))
+            self._sample = _Modes(np.vstack((own, rest)), np.diag(np.sqrt(np.append(c_p, c))))
         elif n:
             # Without a parallel damper the sample's springs are in equilibrium.
             whole = k_p + k.sum()
@@ -213,10 +259,10 @@ class _System:
             others = k_p + np.array([np.delete(k, j).sum() for j in range(n)])
             apart[np.diag_indices(n)] = -others / whole
             springs = np.vstack((np.sqrt(k_p) * self._balance, np.sqrt(k)[:, None] * apart))
-            self._sample = Modes(springs, np.diag(np.sqrt(c)))
+            self._sample = _Modes(springs, np.diag(np.sqrt(c)))
         self._branches = n
 
-    def in_contact(self, state: Array, torque: Forcing) -> _Stretch:
+    def in_contact(self, state: Array, torque: _Forcing) -> _Stretch:
         """Solve from a state on, in contact."""
         motion = self._touching.follow(np.delete(state, 2), torque)
 
@@ -230,7 +276,7 @@ class _System:
 
         return _Stretch(states, force, float(self._touching.rates.max()))
 
-    def apart(self, state: Array, torque: Forcing) -> _Stretch:
+    def apart(self, state: Array, torque: _Forcing) -> _Stretch:
         """Solve from a state on, without contact."""
         arms = self._arms.follow(state[:2], torque)
         sample = self._recovery(state)
@@ -248,97 +294,24 @@ class _System:
         """Solve for the shortening and dampers of the unloaded sample."""
         if not self._has_damper and not self._branches:
             return lambda elapsed_s: np.zeros((1, len(elapsed_s)))
-        nothing = Forcing(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 0), complex))
-        begin = state[2:] if self._has_damper else state[3:]
-        motion: Motion = self._sample.follow(begin, nothing)
+        nothing = _Forcing(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 0), complex))
         if self._has_damper:
-            return motion.at
-
-        def balanced(elapsed_s: Array) -> Array:
-            dampers = motion.at(elapsed_s)
-            return np.vstack((self._balance @ dampers, dampers))
-
-        return balanced
+            return self._sample.follow(state[2:], nothing).at
+        dampers = self._sample.follow(state[3:], nothing)
+        to_all = np.vstack((self._balance, np.eye(self._branches)))
+        return lambda elapsed_s: to_all @ dampers.at(elapsed_s)
 
 
-def unilateral_response(
-    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array
-) -> UnilateralResponse:
-    """Simulate the first sample in unilateral contact with the jaws, without inertia.
+def _coupled(arms: Array, shared: float, diagonal: Array) -> Array:
+    """Return the Cholesky factor of diag(c_2, c_4) + w (1, 1)(1, 1)^T, and roots beside it.
 
-    Times ascend; at the instant of a step: what follows it.
-
-    Raises
-    ------
-    BiogripError
-        If contact is lost too often.
+    Written without cancellation.
     """
-    system = _System(gripper, network)
-    pieces = smooth_pieces(torque)
-    most_torque, softest = _scales(gripper, torque, pieces)
-    least = {
-        True: _NOTHING * most_torque / gripper.lever_m,
-        False: _NOTHING * 2 * gripper.lever_m * most_torque / softest,
-    }
-    branches = network.k.shape[1]
-    states = np.zeros((3 + branches, len(time_s)))
-    force, touches = np.zeros(len(time_s)), np.zeros(len(time_s), dtype=bool)
-    touching, state = True, np.zeros(3 + branches)
-    changes: tuple[list[float], list[float]] = ([], [])
-    for start, length, loads in pieces:
-        done = 0.0
-        while True:
-            go_on = system.in_contact if touching else system.apart
-            stretch = go_on(state, loads.later(done))
-            grid = _grid(stretch.fastest_per_s, loads.omega_rad_per_s, length - done)
-            lasts = _first_below(stretch.margin, grid, least[touching])
-            begin, end = start + done, start + (length if lasts is None else done + lasts)
-            final = lasts is None and start + length >= torque.end_s
-            here = (time_s >= begin) & ((time_s <= end) if final else (time_s < end))
-            elapsed = time_s[here] - begin
-            if len(elapsed):
-                states[:, here] = stretch.state(elapsed)
-                touches[here] = touching
-                if touching:
-                    force[here] = np.maximum(stretch.margin(elapsed), 0.0)
-            over = np.array([length - done if lasts is None else lasts])
-            state = stretch.state(over)[:, 0]
-            if lasts is None:
-                break
-            done += lasts
-            changes[not touching].append(start + done)
-            touching = not touching
-            if len(changes[0]) > _MOST_EVENTS:
-                raise BiogripError(
-                    f"the jaws leave the sample more than {_MOST_EVENTS} times; allowed are "
-                    "protocols with fewer periods."
-                )
-    return UnilateralResponse(
-        states[:2], force, touches, states[2], states[3:], tuple(changes[0]), tuple(changes[1])
-    )
-
-
-def _scales(
-    gripper: Gripper, torque: TorqueHistory, pieces: list[tuple[float, float, Forcing]]
-) -> tuple[float, float]:
-    """Return the largest torque, and the softer arm's stiffness."""
-    instants = np.concatenate(
-        [start + length * np.linspace(0, 1, 65)[:-1] for start, length, _ in pieces]
-    )
-    most = max(float(np.max(np.abs(torque_at(torque, instants, arm)))) for arm in ("left", "right"))
-    return most, min(arm.stiffness_Nm_per_rad for arm in (gripper.left, gripper.right))
-
-
-def _coupled(arms: Array, shared: float) -> Array:
-    """Return the Cholesky factor of diag(c_2, c_4) + w (1, 1)(1, 1)^T without cancellation."""
     c_2, c_4 = arms
     first = np.sqrt(c_2 + shared)
-    return np.array([[first, 0], [shared / first, np.sqrt(c_4 + shared * c_2 / (c_2 + shared))]])
-
-
-def _block(corner: Array, diagonal: Array) -> Array:
-    whole = np.diag(np.concatenate(([0.0, 0.0], diagonal)))
-    whole[:2, :2] = corner
+    second = np.sqrt(c_4 + shared * c_2 / (c_2 + shared))
+    whole = np.diag(np.concatenate(([first, second], diagonal)))
+    whole[1, 0] = shared / first
     return whole
 
 

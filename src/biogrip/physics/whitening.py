@@ -1,13 +1,10 @@
-"""Noise of a trace, estimated without a model, and the rounding of its readings.
+"""The noise of a trace: its size, estimated without a model, and its colour, whitened.
 
-Whitening of autocorrelated noise, for generalised least squares.
-
-The autocorrelation is that of white noise plus exponentials of the time between two
-readings (Ornstein-Uhlenbeck processes): one of any relaxation time, and a geometric
-series of them for 1/f noise. White noise may have a part that grows with the rotation.
-The Cholesky factor L of its matrix C is computed, and
-solved with, in linear time [1]_. Residuals r become L^-1 r, which are white and on
-average as large as r. Least squares of these are generalised least squares [2]_.
+The autocorrelation is that of white noise plus exponentials of the time between two readings
+(Ornstein-Uhlenbeck processes): one of any relaxation time, and a geometric series of them for 1/f
+noise. White noise may have a part that grows with the rotation. The Cholesky factor L of its matrix
+C is computed, and solved with, in linear time [1]_. Residuals r become L^-1 r, which are white and
+on average as large as r. Least squares of these are generalised least squares [2]_.
 
 References
 ----------
@@ -42,12 +39,8 @@ def estimate_noise(rotation_rad: Array, rounding_rad: float | None = None) -> fl
     the same, it is their mean square without the largest, and no less than the rounding errors'
     [1]_. Of a trace without noise the estimate is tiny.
 
-    Parameters
-    ----------
-    rotation_rad : (n_samples,)
-        Trace, or what a fit leaves of it.
-    rounding_rad
-        Step of the readings; by default that of `rotation_rad`.
+    The trace is (n_samples,), or what a fit leaves of it; the step of its readings is by default
+    measured.
 
     References
     ----------

@@ -12,7 +12,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.nonlinear import FINE, correction
+from biogrip.physics.nonlinear import correction
 from biogrip.physics.protocol import TorqueHistory, torque_history
 from biogrip.physics.sample_model import Network
 from biogrip.records.identifications import DIFFERENCES
@@ -53,7 +53,7 @@ def difference_over_peak(
     model's validity.
     """
     time_s = _times(torque)
-    found = correction(gripper, network, torque, FINE, factors)
+    found = correction(gripper, network, torque, factors)
     response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
     difference = found.at(time_s)
     nonlinear = factors[:, None] * rotation(response, torque, time_s) + difference

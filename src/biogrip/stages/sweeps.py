@@ -157,7 +157,7 @@ def _resolution_rad(point: Case, true: Mapping[str, float]) -> float:
         problem.model.network(np.array([truth, rounded])),
         problem.torque,
         time_s,
-        nonlinear=problem.nonlinear,
+        nonlinear=False,
     )
     return rms(both[1] - both[0])
 

@@ -51,12 +51,10 @@ _AnyGripper = Annotated[
 
 @dataclass(frozen=True)
 class Equations(Block):
-    """Equations solved to simulate targets and to identify samples."""
+    """Equations solved to simulate targets; fits solve the linear ones."""
 
     target: Literal["linear", "nonlinear"]
     """`linear`: corrected eqs. (4)-(6); `nonlinear`: corrected eqs. (1)-(3)."""
-    identification: Literal["linear", "nonlinear"]
-    """The same for the model to fit."""
 
 
 @dataclass(frozen=True)

@@ -139,7 +139,6 @@ class Case:
             self.sample,
             self.fixed,
             self.instrument,
-            nonlinear=self.block.models.identification == "nonlinear",
             offset=measurement.fits_offset,
             drift=measurement.fits_drift,
             noise_rad=measurement.noise_rad,

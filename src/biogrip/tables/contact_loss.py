@@ -33,12 +33,8 @@ _COLUMNS = (
 
 
 def linear_cases(study: Study) -> list[str]:
-    """Return the simulated cases whose target and identification are linear."""
-    return [
-        name
-        for name in study.gripped
-        if not (study.cases[name].nonlinear_target or study.cases[name].problem.nonlinear)
-    ]
+    """Return the simulated cases whose target is linear."""
+    return [name for name in study.gripped if not study.cases[name].nonlinear_target]
 
 
 def contact_loss(study: Study) -> Table:
