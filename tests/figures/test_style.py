@@ -1,15 +1,9 @@
 """Files of figures, ticks, prefixes, colours, and what is beyond an axis."""
 
-import re
-import zlib
-from contextlib import suppress
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
-from fontTools import subset
-from fontTools.ttLib import TTFont
 from matplotlib.lines import Line2D
 
 from biogrip.figures.actuator import draw_torque
@@ -33,31 +27,6 @@ def test_saved_figures_are_the_same_every_time(tmp_path: Path) -> None:
             save(draw_torque(STUDY), tmp_path / f"{name}.png")
     for suffix in (".png", ".pdf"):
         assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
-
-
-def test_a_pdf_has_the_glyphs_that_are_drawn_and_no_table_that_lays_text_out(
-    tmp_path: Path,
-) -> None:
-    load_font = subset.load_font
-    with styled():
-        empty = figure(2, 2)
-        empty.subplots().set_title("Wxyz")
-        save(empty, tmp_path / "drawn.png")
-    assert subset.load_font is load_font
-    content = (tmp_path / "drawn.pdf").read_bytes()
-    streams = map(decompressed, re.findall(rb"stream\r?\n(.*?)\r?\nendstream", content, re.DOTALL))
-    (font,) = (TTFont(BytesIO(text)) for text in streams if text.startswith(b"\x00\x01\x00\x00"))
-    assert not {"GDEF", "GPOS", "GSUB", "kern"} & set(font.keys())
-    with_outlines = sum(font["glyf"][name].numberOfContours != 0 for name in font.getGlyphOrder())
-    # Of the title, and of 0.0, 0.2 ... 1.0 at the ticks: seven digits and the point.
-    assert with_outlines >= len("Wxyz") + len("01.2468") - 1
-
-
-def decompressed(stream: bytes) -> bytes:
-    """What is in a stream of a PDF; nothing if it is not compressed."""
-    with suppress(zlib.error):
-        return zlib.decompress(stream)
-    return b""
 
 
 @pytest.mark.parametrize(

@@ -21,50 +21,37 @@ from biogrip.records.identifications import INTERPRETATIONS
 from biogrip.study.study import Study
 from biogrip.tables.layout import Column, Row, Table
 
-COMPARED = ("k", "k_p", "c")
+_COMPARED = ("k", "k_p", "c")
 """Parameters compared with the paper's at once; of c_p it says only that it errs by over 100 %."""
-ROUNDING = 0.005
+_ROUNDING = 0.005
 """Relative error by which the paper's values may be rounded."""
 _HALF_A_DECADE = 10**0.5
 _RESOLVED = 0.01
 """What two digits resolve at best; smaller errors are of this order."""
+_AS_SMALL, _SAME_ORDER = "as small", "of the same order"
 
 
-def compared_parameters(truth: Truth) -> list[str]:
+def _compared(truth: Truth) -> list[str]:
     """Return the parameters that are compared, of those that the paper identifies."""
     published = truth.published.identified
-    return [name for name in COMPARED if name in published and truth.parameters.get(name)]
+    return [name for name in _COMPARED if name in published and truth.parameters.get(name)]
 
 
-def relative_errors(truth: Truth, found: pd.DataFrame) -> Array:
+def _relative_errors(truth: Truth, found: pd.DataFrame) -> Array:
     """Return absolute relative errors of every seed, shape (n_parameters, n_seeds)."""
     columns = {p.name: p.column for p in SINGLE_BRANCH}
-    names = compared_parameters(truth)
     return np.abs(
-        [found[columns[name]].to_numpy(float) / truth.parameters[name] - 1 for name in names]
+        [found[columns[n]].to_numpy(float) / truth.parameters[n] - 1 for n in _compared(truth)]
     )
 
 
-def as_small(truth: Truth, found: pd.DataFrame) -> BoolArray:
-    """Return True for each seed whose errors are all as small as the paper's."""
-    return _all_below(_printed_errors(truth) + ROUNDING, truth, found)
-
-
-def of_same_order(truth: Truth, found: pd.DataFrame) -> BoolArray:
-    """Return True for each seed with all errors at most half a decade above the paper's."""
-    allowed = _HALF_A_DECADE * np.maximum(_printed_errors(truth), _RESOLVED)
-    return _all_below(allowed, truth, found)
-
-
-def _all_below(allowed: Array, truth: Truth, found: pd.DataFrame) -> BoolArray:
-    return np.all(relative_errors(truth, found) <= allowed[:, None], axis=0)
-
-
-def _printed_errors(truth: Truth) -> Array:
+def _is_close(truth: Truth, found: pd.DataFrame, criterion: str) -> BoolArray:
+    """Return True for each seed whose errors are all as small as the paper's, or of its order."""
     published = truth.published.identified
-    return np.array(
-        [abs(published[name] / truth.parameters[name] - 1) for name in compared_parameters(truth)]
-    )
+    printed = np.array([abs(published[n] / truth.parameters[n] - 1) for n in _compared(truth)])
+    of_order = _HALF_A_DECADE * np.maximum(printed, _RESOLVED)
+    allowed = printed + _ROUNDING if criterion == _AS_SMALL else of_order
+    return np.all(_relative_errors(truth, found) <= allowed[:, None], axis=0)
 
 
 def interpretations(study: Study, found: list[Path]) -> Table:
@@ -81,8 +68,8 @@ def interpretations(study: Study, found: list[Path]) -> Table:
                 "near_noise_share": near_noise(mine, study.near_noise_tolerance).mean(),
                 "last_improvement": mine["last_improvement"].median(),
             }
-            if compared_parameters(truth):
-                row["as_close_share"] = as_small(truth, mine).mean()
+            if _compared(truth):
+                row["as_close_share"] = _is_close(truth, mine, _AS_SMALL).mean()
             for p in SINGLE_BRANCH:
                 if target := truth.parameters.get(p.name):
                     error = 100 * np.abs(mine[p.column].to_numpy(float) / target - 1)
@@ -94,7 +81,7 @@ def interpretations(study: Study, found: list[Path]) -> Table:
         Column("interpretation", "Interpretation"),
         Column("seeds", "Seeds"),
         Column("near_noise_share", f"Share {words}", 2),
-        Column("as_close_share", f"Share as close as the paper in {', '.join(COMPARED)}", 2),
+        Column("as_close_share", f"Share as close as the paper in {', '.join(_COMPARED)}", 2),
         *(Column(f"error_percent {p.name}", f"Error {p.name} %", 2) for p in SINGLE_BRANCH),
         Column("last_improvement", "Last improvement", 3),
     )
@@ -107,8 +94,6 @@ def interpretations(study: Study, found: list[Path]) -> Table:
     return Table(caption, columns, rows)
 
 
-_AS_SMALL = "as small"
-_CRITERIA = {_AS_SMALL: as_small, "of the same order": of_same_order}
 _JOINT_COLUMNS = (
     Column("interpretation", "Interpretation"),
     Column("errors", "Errors beside the printed ones"),
@@ -124,7 +109,7 @@ _JOINT_COLUMNS = (
 )
 _TAILS = 0.025, 0.975
 _LOG2_DRAWS = 14
-_ROUNDING = 1e-9
+_EQUAL = 1e-9
 """Products of shares that differ by less are equal."""
 
 
@@ -132,7 +117,7 @@ def interpretations_jointly(study: Study, found: list[Path]) -> Table:
     """Compute the probabilities from the rows of each case, CSV."""
     caption = (
         f"How probable the errors of the paper's tables are: share of seeds whose errors of "
-        f"{', '.join(COMPARED)} are all as small as those that follow from the printed values "
+        f"{', '.join(_COMPARED)} are all as small as those that follow from the printed values "
         "(with half a percent for rounding), or at most half a decade larger (errors below 1 %, "
         "which two digits do not resolve, taken as 1 %), with 95 % limits by Jeffreys. The tables "
         "are independent runs: the probability of all is the product, its limits those of products "
@@ -142,7 +127,7 @@ def interpretations_jointly(study: Study, found: list[Path]) -> Table:
     cases = [
         (case.truth, INTERPRETATIONS.read(path))
         for path, case in zip(found, study.cases.values(), strict=True)
-        if compared_parameters(case.truth)
+        if _compared(case.truth)
     ]
     rows = [
         {"interpretation": title, **row}
@@ -156,9 +141,11 @@ def interpretations_jointly(study: Study, found: list[Path]) -> Table:
 
 def _joint_rows(cases: list[tuple[Truth, pd.DataFrame]]) -> Iterator[Row]:
     """Yield by each criterion a row for every table of the paper, and one for all of them."""
-    own = [own_shares(relative_errors(truth, found)) for truth, found in cases]
-    for criterion, is_close in _CRITERIA.items():
-        counts = [(int(is_close(truth, found).sum()), len(found)) for truth, found in cases]
+    own = [own_shares(_relative_errors(truth, found)) for truth, found in cases]
+    for criterion in (_AS_SMALL, _SAME_ORDER):
+        counts = [
+            (int(_is_close(truth, found, criterion).sum()), len(found)) for truth, found in cases
+        ]
         for (truth, _), (count, seeds) in zip(cases, counts, strict=True):
             low, high = limits([(count, seeds)])
             row: Row = {"errors": criterion, "table": truth.published.table, "seeds": seeds}
@@ -211,6 +198,6 @@ def share_not_larger(shares: list[Array], product: float) -> float:
     """Return the share of combinations, one of each array, whose product is at most `product`."""
     *others, last = shares
     of_others = reduce(np.multiply.outer, others, np.ones(())).ravel()
-    allowed = product * (1 + _ROUNDING) / of_others
+    allowed = product * (1 + _EQUAL) / of_others
     ranks = np.searchsorted(np.sort(last), allowed, side="right")
     return float(ranks.mean() / len(last))
