@@ -71,11 +71,11 @@ def test_the_block_that_is_asked_for_is_identified(
 def test_readings_of_a_rounded_clock_are_averaged_and_counted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    trace = exported(tmp_path / "gel.csv", repeated=True)
-    few = config(tmp_path / "few.yaml", {})
+    trace = exported(tmp_path / "gel.csv", np.floor(TIMES / 0.5) * 0.5)
+    few = config(tmp_path / "few.yaml")
     command = ["identify", str(trace), *READ, "--config", few, "--block", "2", "--start", "7"]
     assert main(command) == 1
-    assert "are averaged by average_repeated: true under measurement." in capsys.readouterr().err
+    assert "are averaged by --set measurement.average_repeated=true." in capsys.readouterr().err
     assert main([*command, "--set", "measurement.average_repeated=true"]) == 0
     notes = found(trace)["notes"]
     assert {"weight": "harmless", "text": "Averaged at repeated times: 58 readings."} in notes

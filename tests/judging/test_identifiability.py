@@ -23,7 +23,6 @@ from biogrip.judging.verdicts import (
 )
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
-from biogrip.records.identifications import diagnosis_data, exact_data
 from tests.helpers.problems import GRIPPER, MODEL, SAMPLES, TORQUE, clean, posed_for, problem, run
 
 DAMPER = MODELS["damper"]

@@ -1,5 +1,6 @@
 """Profile likelihoods of every quantity, and chi-squared over two that trade: a valley."""
 
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -39,7 +40,17 @@ from biogrip.tables.verdicts import target_of
 
 def draw_profiles(case: Case, measured: Path, expected: list[Path]) -> Figure:
     """Draw the profile of every quantity of a case, with confidence limits."""
-    found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
+    others = [read_verdicts(path) for path in expected]
+    return draw_profiles_of(read_verdicts(measured), others, case.title, case.parameters)
+
+
+def draw_profiles_of(
+    found: Mapping[str, Any],
+    others: Sequence[Mapping[str, Any]] = (),
+    title: str = "",
+    truth_of: Mapping[str, float] | None = None,
+) -> Figure:
+    """Draw profiles of verdicts, beside others that are expected and true parameters."""
     foreseen = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
     quantities = found["quantities"]
     drawn, grid = row_of_panels(len(quantities), 2.5, sharey=True)
@@ -54,7 +65,7 @@ def draw_profiles(case: Case, measured: Path, expected: list[Path]) -> Figure:
         ):
             axes.axhline(increase, color=TARGET, linestyle=style, linewidth=0.7, label=label)
         _limits(axes, item)
-        truth = target_of(item["quantity"], case.parameters)
+        truth = target_of(item["quantity"], truth_of or {})
         if truth is not None:
             axes.axvline(truth, color=TARGET, linewidth=0.7, label="truth")
         low, high = profile_limits(item)
@@ -70,7 +81,7 @@ def draw_profiles(case: Case, measured: Path, expected: list[Path]) -> Figure:
     grid[0].set_ylabel("rise of χ²")
     handles, labels = grid[0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside lower right", ncols=5)
-    drawn.suptitle(case.title, x=0.01, ha="left", fontsize=8)
+    drawn.suptitle(title, x=0.01, ha="left", fontsize=8)
     return drawn
 
 

@@ -6,7 +6,7 @@ is smooth only between neighbouring ones, and is minimised there.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np

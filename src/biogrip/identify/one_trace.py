@@ -41,22 +41,14 @@ from biogrip.keys import plain
 from biogrip.physics.drift import within
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.simulation import simulated_rotation
-from biogrip.records.identifications import exact_data
 from biogrip.processes import worker_processes
-from biogrip.progress import Progress
+from biogrip.records.identifications import exact_data
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
 from biogrip.stages.judgement import fits_judged, notes_on_fit
-from biogrip.study.experiment_blocks import fixed_problems
-from biogrip.study.load import load_study, read_configs
-from biogrip.study.source import KeyPath, default_config, dotted, keys_in, overlaid, shown_path
-from biogrip.study.study import Case, Study
-from biogrip.terminal import Progress, visible
-from biogrip.traces.columns import place, trace_file_problem
-from biogrip.traces.onset import note_late_onset
 from biogrip.study.study import Case
-from biogrip.terminal import visible
-from biogrip.traces.late_onset import note_late_onset
+from biogrip.terminal import Progress, visible
+from biogrip.traces.onset import note_late_onset
 
 # Most traces of a batch, and most readings of traces that are fitted together.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000

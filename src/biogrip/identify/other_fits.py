@@ -1,7 +1,8 @@
 """Other fits that are held against that of a trace: sample models, an offset and a drift.
 
 Several sample models are fitted with the noise model of the trace's fit, and ranked by AIC and BIC;
-with fixed parameters none are. If the own model fits better than it was diagnosed, the trace is diagnosed again.
+with fixed parameters none are. If the own model fits better than it was diagnosed, the trace is
+diagnosed again.
 
 An offset and a drift that the user did not declare are fitted along. The test is a likelihood
 ratio: if neither is in the trace, the decrease of chi^2 follows a chi-squared distribution with as

@@ -3,6 +3,7 @@
 Pictures are Matplotlib's. A page of very many traces has the table and the distributions only.
 """
 
+import base64
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -18,7 +19,7 @@ from matplotlib.ticker import MaxNLocator
 from biogrip import __version__
 from biogrip.digits import with_unit
 from biogrip.figures.fit import draw_fit
-from biogrip.figures.profiles import draw_profiles
+from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.figures.results import fit_of
 from biogrip.figures.style import BLUE, COLUMN_IN, figure, save_png, styled
 from biogrip.files import write_text
@@ -26,7 +27,6 @@ from biogrip.identify import words
 from biogrip.identify.one_trace import Identified
 from biogrip.identify.outputs import WRITTEN_BY, Outcome
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
-from biogrip.page.png_address import png_address
 from biogrip.terminal import visible, visible_lines
 
 _MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
@@ -43,7 +43,7 @@ def draw(identified: Identified) -> list[str]:
     with styled():
         return [
             _address(draw_fit(fit, "best fit", "")),
-            _address(draw_profiles("", {}, data)),
+            _address(draw_profiles_of(data)),
         ]
 
 
@@ -53,7 +53,7 @@ def _address(drawn: Figure) -> str:
     # With few colours a picture is a third as large.
     with PIL.Image.open(png) as image:
         image.convert("RGB").quantize(64, dither=PIL.Image.Dither.NONE).save(few, "png")
-    return png_address(few.getvalue())
+    return f"data:image/png;base64,{base64.b64encode(few.getvalue()).decode()}"
 
 
 def draw_strip(label: str, traces: Sequence[Mapping[str, Any]]) -> Figure:

@@ -36,7 +36,7 @@ from biogrip.study.source import (
 from biogrip.study.study import Case
 from biogrip.terminal import visible
 from biogrip.traces.columns import listed, place
-from biogrip.traces.recordings import read_recording
+from biogrip.traces.reader import read_recording
 
 MODEL = "generalized_maxwell"
 """Sample model of traces of which nothing says another."""

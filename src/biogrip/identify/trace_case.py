@@ -22,7 +22,7 @@ from biogrip.physics.whitening import estimate_noise
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
 from biogrip.study.study import Case
-from biogrip.traces.recognised import Recognised
+from biogrip.traces.reader import Recognised
 
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
 _CLEAREST, _MARGIN = 1e5, 10.0

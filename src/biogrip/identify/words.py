@@ -15,8 +15,6 @@ from biogrip.judging.verdicts import (
     NOT_DETERMINED,
 )
 from biogrip.records.identifications import FIT_REJECTED
-from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
-from biogrip.records.verdicts import FIT_REJECTED
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
 
