@@ -24,7 +24,7 @@ from biogrip.fit.problem import History, Identification
 from biogrip.identify import one_trace
 from biogrip.identify.other_fits import FittedModels
 from biogrip.identify.outputs import WRITTEN_BY, check_output
-from biogrip.identify.settings import Asked, Setting, case_of
+from biogrip.identify.settings import HOLD, Asked, Setting, case_of
 from biogrip.identify.trace_case import read_trace
 from biogrip.identify.words import for_a_paper, side_by_side
 from biogrip.judging.profiles import Profile
@@ -126,6 +126,15 @@ def test_options_are_keys_of_the_config_and_the_last_one_counts(
     by_options = case_of(Asked(EXAMPLE, None, tuple(settings)))
     assert by_options.block == case_of(Asked(EXAMPLE, tmp_path / "same.yaml", (model,))).block
     assert by_options.sample.candidate == "generalized_maxwell_2"
+
+
+def test_a_protocol_replaces_what_was_held_and_the_reverse() -> None:
+    held = Setting("--hold", HOLD, 3e-9)
+    phases = [{"duration_s": 100.0, "torque_Nm": 1e-9}, {"duration_s": 300.0, "torque_Nm": 2e-9}]
+    protocol = Setting("cells.tsv", ("protocol", "phases"), phases, 2)
+    for settings, durations_s in (((held, protocol), [100.0, 300.0]), ((protocol, held), [400.0])):
+        case = case_of(Asked(EXAMPLE, None, settings))
+        assert [phase.duration_s for phase in case.phases] == durations_s
 
 
 def test_known_deviations_are_weights_of_the_fit(tmp_path: Path) -> None:
