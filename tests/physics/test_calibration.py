@@ -57,14 +57,14 @@ def test_without_noise_the_arm_itself_is_found() -> None:
 
 
 def test_uncertainties_are_honest() -> None:
-    """Over 100 records the errors have the spread that each record's own uncertainty says."""
+    """Over 40 records the errors have the spread that each record's own uncertainty says."""
     pulls = []
-    for seed in range(100):
+    for seed in range(40):
         found = calibrate(noisy(ARM, 0.05, seed), *CAUSES)
         error = np.subtract(dataclasses.astuple(found.arm), dataclasses.astuple(ARM))
         pulls.append(error / dataclasses.astuple(found.uncertainty))
-    # The standard deviation of 100 draws is known to 7 %, three times that is allowed.
-    np.testing.assert_allclose(np.std(pulls, axis=0), 1.0, rtol=0.22)
+    # The standard deviation of 40 draws is known to 11 %, three times that is allowed.
+    np.testing.assert_allclose(np.std(pulls, axis=0), 1.0, rtol=0.34)
 
 
 @pytest.mark.parametrize("scale", [0.3, 3.0])

@@ -27,10 +27,11 @@ def _alike(duration_s: float, given: Load) -> Phase:
     return Phase(duration_s, given, given)
 
 
-# A ramp of finite rate, a hold, a sinusoid on a level that ends with a jump, recovery.
+# A ramp of finite rate, a hold, a parabola, a sinusoid on a level that ends with a jump, recovery.
 PHASES = (
     _alike(0.5, load(0.5, 0.0, 2.0)),
-    hold(3.0, 2.0),
+    hold(2.0, 2.0),
+    _alike(1.0, Load(2.0, 0.5, -0.8)),
     _alike(2.0, load(2.0, 1.0, None, 0.5, 0.3)),
     hold(2.0, 0.0),
 )

@@ -91,7 +91,7 @@ def test_times_of_steps_are_rounded_to_samples(gripper: Gripper) -> None:
     np.testing.assert_allclose(misfits[1:], misfits[:1] * 2, rtol=1e-12)
 
 
-@pytest.mark.parametrize("count", [2, 3, 5, 1_000_001])
+@pytest.mark.parametrize("count", [2, 3, 5, 200_001])
 def test_few_and_many_samples(count: int, gripper: Gripper) -> None:
     steps = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
     time_s = np.linspace(0, 400.0, count)

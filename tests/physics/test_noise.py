@@ -101,7 +101,7 @@ def test_flicker_has_equal_power_in_every_octave() -> None:
 
 
 def test_shares_leave_the_variance_as_it_is() -> None:
-    seen = noises(400, TIMES[::10], ar1=AR1(0.3, 1.0), flicker=Flicker(0.2))
+    seen = noises(200, TIMES[::10], ar1=AR1(0.3, 1.0), flicker=Flicker(0.2))
     assert np.mean(seen**2) == pytest.approx(1, rel=0.05)
 
 

@@ -164,3 +164,14 @@ def test_rounding_does_not_lose_the_last_sample() -> None:
     """0.3 s at 10 Hz: 0.3 * 10 is 2.9999999999999996 in doubles."""
     assert len(sample_times(0.1 + 0.2, 10.0)) == 4
     assert len(sample_times(0.3, 10.0)) == 4
+
+
+def test_sinusoids_of_one_frequency_add_up_on_each_arm() -> None:
+    one, other = Harmonic(1e-10, 2.0, 0.3), Harmonic(3e-10, 2.0, 1.9)
+    left, right = Load(1e-9, 0.0, 0.0, (one, other)), Load(2e-9, 0.0, 0.0, (other,))
+    history = torque_history((hold(1.5, 0.0), Phase(4.0, left, right), hold(2.0, 1e-9)))
+    inside, time_s = np.linspace(0.01, 3.99, 50), np.linspace(1.51, 5.49, 50)
+    assert len(history.omega_rad_per_s) == 2
+    for arm, own in (("left", left), ("right", right)):
+        np.testing.assert_allclose(torque_at(history, time_s, arm), own.at(inside), rtol=1e-12)
+        np.testing.assert_allclose(torque_at(history, [6.0, 7.0], arm), 1e-9, rtol=1e-12)

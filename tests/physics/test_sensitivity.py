@@ -158,3 +158,25 @@ def test_the_gradient_of_many_samples_is_summed_in_parts(
         (gradient,), (misfit_rad,) = residuals.gradients(x[None], [residuals])
         np.testing.assert_allclose(gradient, slopes @ residual, rtol=1e-11)
         assert misfit_rad == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
+
+
+def test_a_later_protocol_is_one_of_earlier_readings(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    model, parameters = MODELS["maxwell"], np.array([[2.0, 50.0]])
+    trace = np.random.default_rng(0).standard_normal(401) * 1e-4
+    here, there = (
+        Residuals(
+            gripper,
+            model,
+            steps,
+            Trace(times, trace, Condensed(steps, times, np.zeros((0, 401)))),
+            instrument=GRIPPER,
+        )
+        for times in (np.arange(401.0), np.arange(401.0) - 3.0)
+    )
+    moved = here.later(3.0)
+    np.testing.assert_array_equal(moved(np.log(parameters[0]))[0], there(np.log(parameters[0]))[0])
+    expected = there.condensed_misfit(parameters)
+    assert moved.condensed_misfit(parameters) == pytest.approx(expected, rel=1e-12)
+    assert moved.noise_scale_rad == here.noise_scale_rad
