@@ -73,7 +73,8 @@ def read_trace(
         if not form.is_usual(case.columns):
             show(form.in_words(file))
 
-    trace = recording.read_checked(file, case.gripper, case.problem, case.columns, show_unusual)
+    columns = replace(case.columns, by_options=True)
+    trace = recording.read_checked(file, case.gripper, case.problem, columns, show_unusual)
     ranges = ranges_of(case.problem.weighted(trace.sd_rad), trace.time_s, trace.rotation_rad[0])
     for name in given.get("search_range") or {}:
         ranges.pop(name, None)

@@ -96,7 +96,7 @@ class Columns:
 def _option(key: str) -> str:
     if key in _BY_SET:
         return f"--set measurement.{key}={_BY_SET[key]}"
-    return "--reading" if key in INSTRUMENTS and key != ROTATION.name else f"--{key}"
+    return "--reading" if key in INSTRUMENTS else f"--{key}"
 
 
 def unit_of(
