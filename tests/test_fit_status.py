@@ -66,7 +66,7 @@ def identified(trace: Path, *options: object, config: str = FEW) -> tuple[int, s
     """Status and words of the command, and what its file says."""
     settings, found = trace.with_suffix(".yaml"), trace.with_suffix(".json")
     settings.write_text(config)
-    arguments = ["identify", trace, "--config", settings, "--output", found, "--force", *options]
+    arguments = ["identify", trace, "--config", settings, "--output", found, *options]
     with redirect_stdout(StringIO()) as said:
         status = main([*map(str, arguments)])
     return status, said.getvalue(), json.loads(found.read_text())

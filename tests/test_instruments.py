@@ -93,7 +93,7 @@ def test_what_is_not_held_is_asked_for_and_kinds_do_not_mix(tmp_path: Path) -> N
         ("--reading", "strian=strain"): "--reading: measurement.strian: unknown key. Did you mean",
         ("--reading", "modulus=strain", "--set", "measurement.reading_unit=mm"): "--set: "
         "measurement.reading_unit: found 'mm', allowed are Pa, kPa",
-        ("--reading", "strain=x", "--hold", "1"): "Say which is which by time and strain",
+        ("--reading", "strain=x", "--hold", "1"): "Say which is which by --time and --reading",
         (*strain, "--hold", "1e99"): "--hold: protocol.phases[0].stress_Pa: found 1e+99, allowed",
         (*strain, "--config", str(relaxing)): "--reading: measurement.strain: is not what "
         "relaxation reads where",

@@ -21,6 +21,7 @@ from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config
 from biogrip.traces.onset import begins_constant, estimate_onset
 from tests.helpers.default import STUDY
+from tests.helpers.places import EXAMPLE
 
 PHASES = (hold(20.0, 1e-9), hold(20.0, 0.4e-9), hold(20.0, 1.2e-9))
 TRUTH = {"k": 29.0, "k_p": 6.0, "c": 100.0, "c_p": 20.0}
@@ -284,6 +285,5 @@ def test_a_clock_with_negative_times_is_read_with_its_start(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("given", ["soon", ""])
 def test_a_start_that_is_no_time_is_refused(given: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["identify", "trace.csv", "--start", given])
-    assert f"found '{given}', allowed are seconds, or fit" in capsys.readouterr().err
+    assert main(["identify", str(EXAMPLE), "--start", given]) == 1
+    assert f"--start: measurement.start_s: found '{given}', allowed is" in capsys.readouterr().err

@@ -24,7 +24,7 @@ from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.problem import Identification
-from biogrip.identify.search_ranges import ranges_of
+from biogrip.identify.trace_case import ranges_of
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.library import Phase, Sample, hold, identify_sample, judge, simulate
 from biogrip.records.traces import Measurements

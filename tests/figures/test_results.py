@@ -137,7 +137,7 @@ def test_histories_of_the_seeds_that_are_drawn_are_read(tmp_path: Path) -> None:
     kept = [("method", "==", "least_squares"), ("seed", "!=", SHOWN_SEEDS)]
     names = ["seed", "generation", "k"]
     pd.testing.assert_frame_equal(found, pd.read_parquet(path, columns=names, filters=kept))
-    with pytest.raises(BiogripError, match=r"histories.parquet: cannot be read as histories"):
+    with pytest.raises(BiogripError, match=r"histories.parquet: cannot be read: No match"):
         read_history(path, "genetic", 0, ["no such column"])
 
 

@@ -118,9 +118,11 @@ def mixed() -> list[Problem]:
     drop = MODELS["liquid_drop"]
     sparse = problem_alone(GRIPPER, MODEL, TORQUE, *half)
     narrow = replace(linear[2], low=linear[2].low + 1)
+    of_drop = linear[2].residuals.of_model(drop)
     simple = replace(
         linear[2],
-        residuals=linear[2].residuals.of_model(drop),
+        residuals=of_drop,
+        misfit=of_drop.condensed_misfit,
         low=linear[2].low[:3],
         high=linear[2].high[:3],
     )
