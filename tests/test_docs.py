@@ -3,7 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.generated_docs import GENERATED, ROOT, renewed
+from tests.generated_docs import GENERATED, renewed
+from tests.helpers.places import ROOT
 
 
 @pytest.mark.parametrize("document", GENERATED, ids=lambda path: str(path.relative_to(ROOT)))
