@@ -55,7 +55,7 @@ def generalized_maxwell(*columns: Array) -> Network:
                       c_p
     """
     n = len(columns) // 2 - 1
-    k, c = np.array(columns[:n]), np.array(columns[n + 1 : 2 * n + 1])
+    k, c = (np.array(columns)[some] for some in (slice(n), slice(n + 1, 2 * n + 1)))
     if not (np.all(k) and np.all(c)):
         # Of several branches that are gone none relaxes with another: equal rates cost digits.
         weak = _GONE * 10.0 ** np.arange(n)[:, None]

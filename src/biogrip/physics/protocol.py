@@ -121,7 +121,7 @@ class TorqueHistory:
     end_s: float
     """End of the protocol."""
     deforms: bool = False
-    """True if it is a deformation that is held, and the load is read: relaxation. `left` and
+    """True if a deformation is controlled, and the load is read: relaxation. `left` and
     `right` are then equal, and so are units of deformation everywhere."""
 
     @cached_property
@@ -283,7 +283,7 @@ def torque_at(history: TorqueHistory, time_s: ArrayLike, arm: str = "left") -> A
 
 
 def largest_load(phases: Iterable[Phase]) -> float:
-    """Return the torque of either arm, or what else phases hold, of the largest magnitude.
+    """Return the torque of either arm, or of what else they control, of the largest magnitude.
 
     Within a phase nothing but a sinusoid turns round, which counts with its whole amplitude.
     """
