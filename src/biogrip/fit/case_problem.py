@@ -142,13 +142,18 @@ class CaseProblem:
         )
 
     def of_each(
-        self, time_s: Array, traces: Iterable[Array], model: SampleModel | None = None
+        self,
+        time_s: Array,
+        traces: Iterable[Array],
+        model: SampleModel | None = None,
+        condensed: Condensed | None = None,
     ) -> list[Problem]:
         """Pose the problems of traces with the same times, which are then fitted together.
 
-        Rows are condensed once, for that takes as long as some fifty responses.
+        Rows are condensed once, for that takes as long as some fifty responses. Whoever poses
+        several groups gives all of them the same rows, from `condensed`.
         """
-        rows = self.condensed(time_s)
+        rows = self.condensed(time_s) if condensed is None else condensed
         return [self.of(time_s, trace, model, condensed=rows) for trace in traces]
 
     def condensed(self, time_s: Array) -> Condensed:

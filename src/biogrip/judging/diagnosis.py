@@ -123,9 +123,9 @@ def diagnose_all(
             for trace in left
         ]
         every = compute_findings(likelihoods, parameters_and_sum(model))
-        for trace, likelihood, findings in zip(left, likelihoods, every, strict=True):
-            trades = find_trade_offs(likelihood, model, findings)
-            judged = Diagnosis(likelihood, findings, trades, None, [])
+        trades = find_trade_offs(likelihoods, model, every)
+        for place, trace in enumerate(left):
+            judged = Diagnosis(likelihoods[place], every[place], trades[place], None, [])
             lower = _lower_optimum(judged, best[trace])
             if lower is None:
                 done[trace] = _with_notes(judged, model, converged=best[trace].converged)

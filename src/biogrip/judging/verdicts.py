@@ -154,33 +154,45 @@ def compute_findings(
 
 
 def find_trade_offs(
-    likelihood: Likelihood, model: SampleModel, findings: Sequence[Finding]
-) -> list[Trade]:
-    """Find determined combinations of parameters that are not determined themselves.
+    likelihoods: Sequence[Likelihood], model: SampleModel, findings: Sequence[Sequence[Finding]]
+) -> list[list[Trade]]:
+    """Find, in each of several traces, determined combinations of undetermined parameters.
 
     Combinations among the findings come first. Of other pairs of undetermined parameters, the
-    combination known best to first order is profiled, if it is worth a look.
+    combination known best to first order is profiled, if it is worth a look; traces with the same
+    combination are profiled together.
     """
-    left = [
-        finding.quantity.members[0]
-        for finding in findings
-        if len(finding.quantity.members) == 1 and finding.verdict != DETERMINED
-    ]
-    found: list[tuple[Sequence[int], Finding]] = []
-    for finding in findings:
-        members = [index for index in finding.quantity.members if index in left]
-        if len(members) > 1:
-            found.append((members, finding))
-            left = [index for index in left if index not in members]
-    for pair in combinations(left, 2):
-        candidates = find_combinations(model, list(pair))
-        deviations = [likelihood.deviation(quantity) for quantity in candidates]
-        if min(deviations, default=np.inf) < _WORTH_A_LOOK:
-            best = candidates[int(np.argmin(deviations))]
-            ((finding,),) = compute_findings([likelihood], [best])
-            found.append((pair, finding))
+    found: list[list[tuple[tuple[int, ...], Finding]]] = [[] for _ in findings]
+    pairs: list[tuple[int, tuple[int, ...], Quantity]] = []
+    for trace, own in enumerate(findings):
+        left = [
+            finding.quantity.members[0]
+            for finding in own
+            if len(finding.quantity.members) == 1 and finding.verdict != DETERMINED
+        ]
+        for finding in own:
+            members = tuple(index for index in finding.quantity.members if index in left)
+            if len(members) > 1:
+                found[trace].append((members, finding))
+                left = [index for index in left if index not in members]
+        for pair in combinations(left, 2):
+            candidates = find_combinations(model, list(pair))
+            deviations = [likelihoods[trace].deviation(quantity) for quantity in candidates]
+            if min(deviations, default=np.inf) < _WORTH_A_LOOK:
+                pairs.append((trace, pair, candidates[int(np.argmin(deviations))]))
+    profiled: dict[tuple[int, Quantity], Finding] = {}
+    for quantity in dict.fromkeys(quantity for _, _, quantity in pairs):
+        traces = [trace for trace, _, other in pairs if other == quantity]
+        every = compute_findings([likelihoods[trace] for trace in traces], [quantity])
+        for trace, (finding,) in zip(traces, every, strict=True):
+            profiled[trace, quantity] = finding
+    for trace, members, quantity in pairs:
+        found[trace].append((members, profiled[trace, quantity]))
     return [
-        Trade(tuple(model.parameters[index].name for index in members), finding)
-        for members, finding in found
-        if finding.verdict == DETERMINED
+        [
+            Trade(tuple(model.parameters[index].name for index in members), finding)
+            for members, finding in own
+            if finding.verdict == DETERMINED
+        ]
+        for own in found
     ]

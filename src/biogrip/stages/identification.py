@@ -57,11 +57,12 @@ def identify(
     progress = Progress(f"{case.name}, {method}", len(seeds))
     whose = case.name, method, case_problem.model, case_problem.searched, case_problem.fixed
     records = []
+    condensed = case_problem.condensed(recorded.time_s)
     for group in groups(seeds):
         traces = [recorded.rotation_rad[seed] for seed in group]
         rngs = [stream(case.study.study_seed, case.name, seed, method) for seed in group]
         start = time.process_time()
-        problems = case_problem.of_each(recorded.time_s, traces)
+        problems = case_problem.of_each(recorded.time_s, traces, condensed=condensed)
         answers = identified(problems, rngs, progress.within)
         cpu_s = (time.process_time() - start) / len(group)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
@@ -116,9 +117,10 @@ def fit(
     problem = problem.weighted(recorded.sd_rad)
     progress = Progress(f"{case.name}, models", len(models) * len(seeds))
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
+    condensed = problem.condensed(recorded.time_s)
     for group in groups(seeds):
         rotations = (recorded.rotation_rad[seed] for seed in group)
-        traces = problem.of_each(recorded.time_s, rotations)
+        traces = problem.of_each(recorded.time_s, rotations, condensed=condensed)
         found = fit_models(
             {
                 name: [problem.for_model(trace, model) for trace in traces]

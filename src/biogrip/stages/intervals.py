@@ -7,7 +7,7 @@ it: multiples of `verdicts_every`, whatever the batch.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from biogrip.judging.limits import find_limits
 from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding
+from biogrip.physics.condensed import Condensed
 from biogrip.physics.noise import add_noise, standard_deviation, stream
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.records.identifications import INTERVALS, read_verdicts
@@ -69,6 +70,8 @@ def _rows(
     every = parameters_and_sum(case_problem.searched)
     selected = [index for index, quantity in enumerate(every) if quantity.label in determined]
     rest_known, informed, truth = _rest_known(case, case_problem, time_s, rotation)
+    # The same rows for all, so that seeds of different groups are profiled together.
+    condensed = case_problem.condensed(time_s)
     progress = Progress(f"{case.name}, intervals", len(seeds))
     # Combine groups until they hold enough seeds with full verdicts.
     for some in groups(seeds, case.verdicts_every):
@@ -78,10 +81,11 @@ def _rows(
             rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in group]
             traces = [add_noise(rotation, case.noise, rng, time_s) for rng in rngs]
             quantities = [every[index] for index in selected]
-            likelihoods, limits = _fitted(case, case_problem, group, time_s, traces, quantities)
+            found = _optima(case, case_problem, group, time_s, traces, condensed)
+            likelihoods, limits = _limited(case, found, quantities)
             known = np.tile(truth, (len(group), 1))
             if len(informed):
-                simpler = case_problem.of_each(time_s, traces, rest_known)
+                simpler = case_problem.of_each(time_s, traces, rest_known, condensed)
                 known[:, informed] = fit_from(simpler, truth[informed]).x
             for index, seed in enumerate(group):
                 with_limits = dict(zip(selected, limits[index], strict=True))
@@ -112,20 +116,14 @@ def _rest_known(
     return with_fixed(case_problem.searched, given), informed, truth
 
 
-def _fitted(
-    case: Case,
-    case_problem: CaseProblem,
-    group: Sequence[int],
-    time_s: Array,
-    traces: list[Array],
-    quantities: Sequence[Quantity],
+def _limited(
+    case: Case, optima: Iterable[tuple[Problem, Identification]], quantities: Sequence[Quantity]
 ) -> tuple[list[Likelihood], Array]:
-    """Return optima of a group and their limits; refit where a profile has a lower chi^2."""
-    rngs = [stream(case.study.study_seed, case.name, seed, "coverage") for seed in group]
+    """Return likelihoods of optima and their limits; refit where a profile has a lower chi^2."""
     confidence = case.confidence
     found = [
         make_likelihood(problem, np.log(each.parameters), each.misfit_rad, confidence=confidence)
-        for problem, each in _optima(case, case_problem, time_s, traces, rngs)
+        for problem, each in optima
     ]
     limits, missed = find_limits(found, quantities)
     for trace, x in missed.items():
@@ -137,13 +135,15 @@ def _fitted(
 def _optima(
     case: Case,
     case_problem: CaseProblem,
+    group: Sequence[int],
     time_s: Array,
     traces: list[Array],
-    rngs: Sequence[np.random.Generator],
+    condensed: Condensed,
 ) -> Iterator[tuple[Problem, Identification]]:
     """Yield problems and fits of traces, fitted together if their noise is white."""
+    rngs = [stream(case.study.study_seed, case.name, seed, "coverage") for seed in group]
     if case_problem.plain:
-        problems = case_problem.of_each(time_s, traces)
+        problems = case_problem.of_each(time_s, traces, condensed=condensed)
         identify = identifier("least_squares", case.least_squares)
         yield from zip(problems, identify(problems, rngs, silent), strict=True)
         return
