@@ -12,7 +12,6 @@ from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import Genome, make_genome
 from biogrip.fit.problem import Problem, make_problem
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.drift import nuisance_basis
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.linear import rotation, step_response
@@ -21,6 +20,7 @@ from biogrip.physics.noise import add_noise, rms
 from biogrip.physics.protocol import TorqueHistory, sample_times, torque_history
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel
+from biogrip.physics.whitening import nuisance_basis
 from biogrip.study.load import load_study
 from biogrip.study.study import Case
 

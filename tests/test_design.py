@@ -20,8 +20,8 @@ from biogrip.design import (
 )
 from biogrip.fit.multi_start import fit_from
 from biogrip.library import simulate
-from biogrip.physics.jaw_force import compute_grip
 from biogrip.physics.protocol import Sampling
+from biogrip.physics.simulation import compute_grip
 from tests.helpers.default import study_of
 
 GRIPPER = """

@@ -10,7 +10,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.cli import main
-from biogrip.physics.actuator import voltage
+from biogrip.physics.gripper import voltage
 from biogrip.physics.simulation import simulated_rotation
 from tests.helpers.default import STUDY
 

@@ -23,11 +23,10 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs, write_text
 from biogrip.identify.outputs import WRITTEN_BY, check_output
-from biogrip.physics.jaw_force import compute_grip, jaw_force_response
 from biogrip.physics.modes import Modes, compute_modes, linear_responses
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.protocol import Burst, Phase, Sampling, hold, largest_load, torque_history
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import compute_grip, jaw_force_response, simulated_rotation
 from biogrip.study.config import DesignBlock
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config, overlaid, read_config
@@ -425,7 +424,7 @@ def relative_bounds(found: Array) -> Array:
     """Return standard deviations of log-parameters from information, (..., n_parameters).
 
     A parameter that is not told to a factor of e with all others known is taken as known for the
-    others, as in `biogrip.judging.fisher`, and has `NO_BOUND`.
+    others, as in `biogrip.judging.likelihood`, and has `NO_BOUND`.
     """
     own = np.diagonal(found, axis1=-2, axis2=-1)
     informed = own >= 1

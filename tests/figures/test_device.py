@@ -9,12 +9,11 @@ import pytest
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
-from biogrip.figures.actuator import draw_comb, draw_torque
-from biogrip.figures.linearisation import draw_linearisation
-from biogrip.figures.linkage import draw_linkage
+from biogrip.figures.gripper import draw_comb, draw_linkage, draw_torque
+from biogrip.figures.mechanics import draw_linearisation
 from biogrip.figures.style import styled
 from biogrip.records.identifications import DIFFERENCES
-from biogrip.stages.model_difference import compare
+from biogrip.stages.targets import compare
 from biogrip.study.study import Study
 from tests.helpers.default import STUDY, seen, study_of
 

@@ -15,7 +15,7 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.figures.course import draw_convergence, draw_evolution
 from biogrip.figures.fit import draw_fit, draw_judged_fit, draw_typical_fit
-from biogrip.figures.force import draw_force
+from biogrip.figures.mechanics import draw_force
 from biogrip.figures.overview import draw_ratios
 from biogrip.figures.results import SHOWN_SEEDS, Fit, read_history
 from biogrip.figures.scatter import draw_scatter

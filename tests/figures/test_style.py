@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.lines import Line2D
 
-from biogrip.figures.actuator import draw_torque
+from biogrip.figures.gripper import draw_torque
 from biogrip.figures.results import scale_of
 from biogrip.figures.style import (
     COLORS,

@@ -10,7 +10,6 @@ from biogrip.fit import least_squares
 from biogrip.fit.methods import identifier
 from biogrip.fit.problem import Identification, Problem, make_problem, silent
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.drift import nuisance_basis
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.linear import rotation, step_response
@@ -19,6 +18,7 @@ from biogrip.physics.noise import Noise, add_noise
 from biogrip.physics.protocol import TorqueHistory, sample_times, torque_history
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.sample_model import SampleModel
+from biogrip.physics.whitening import nuisance_basis
 from tests.helpers.default import STUDY
 
 MODEL = MODELS["generalized_maxwell"]

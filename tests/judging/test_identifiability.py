@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from biogrip.judging.diagnosis import Diagnosis, diagnose
-from biogrip.judging.fisher import bound, covariance
-from biogrip.judging.likelihood import Likelihood
+from biogrip.judging.likelihood import Likelihood, bound, covariance
+from biogrip.judging.profiles import compute_valley
 from biogrip.judging.quantities import (
     find_combinations,
     parameters_and_sum,
 )
-from biogrip.judging.valley import compute_valley
 from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,

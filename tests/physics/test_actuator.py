@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from biogrip.physics.actuator import (
+from biogrip.physics.gripper import (
     CombDrive,
     capacitance_slope,
     torque,

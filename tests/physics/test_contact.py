@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.physics.actuator import torque
 from biogrip.physics.contact import (
     apparent_modulus,
     contact,
@@ -14,7 +13,7 @@ from biogrip.physics.contact import (
     mass_of_sample,
     rolling_of_contact,
 )
-from biogrip.physics.gripper import Gripper, displacement_of_tip, rotation_of_tip
+from biogrip.physics.gripper import Gripper, displacement_of_tip, rotation_of_tip, torque
 from tests.physics.test_actuator import TABLE_2
 
 

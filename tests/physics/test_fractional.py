@@ -8,12 +8,12 @@ import pytest
 from mpmath import rgamma
 
 from biogrip.arrays import Array
+from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import hold, torque_history
 from biogrip.physics.sample_model import Network
-from biogrip.physics.springpot import LONGEST_S, SHORTEST_S
 from tests.helpers.power_law import inverted, mittag_leffler
 
 TIMES = np.geomspace(1e-3, 1e3, 13)

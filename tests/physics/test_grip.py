@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.jaw_force import compute_grip
 from biogrip.physics.maxwell_models import damper, generalized_maxwell, kelvin_voigt
 from biogrip.physics.protocol import Harmonic, Load, Phase, TorqueHistory, hold, torque_history
+from biogrip.physics.simulation import compute_grip
 
 
 def test_a_damper_is_pulled_from_the_drop_on(gripper: Gripper, steps: TorqueHistory) -> None:

@@ -3,11 +3,11 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.jaw_force import jaw_force, jaw_force_response, linear_jaw_force
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import damper, generalized_maxwell, maxwell
 from biogrip.physics.nonlinear import nonlinear_rotation
 from biogrip.physics.protocol import TorqueHistory, hold, torque_at, torque_history
+from biogrip.physics.simulation import jaw_force, jaw_force_response, linear_jaw_force
 from tests.helpers.responses import jaw_force_50_digits, random_samples
 from tests.physics.test_linear import TIMES
 from tests.physics.test_nonlinear import ARM, symmetric_states

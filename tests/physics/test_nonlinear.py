@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
-from biogrip.physics.jaw_force import jaw_force
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.nonlinear import (
@@ -18,6 +17,7 @@ from biogrip.physics.nonlinear import (
     nonlinear_rotation,
 )
 from biogrip.physics.protocol import Harmonic, Load, Phase, TorqueHistory, hold, torque_history
+from biogrip.physics.simulation import jaw_force
 from tests.helpers.responses import random_samples
 
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.jaw_force import jaw_force_response
 from biogrip.physics.linear import LEFT, RIGHT, StepResponse, rotation, step_response
 from biogrip.physics.many_branches import modes_of_many
 from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import TorqueHistory, hold, torque_history
 from biogrip.physics.sample_model import Network
+from biogrip.physics.simulation import jaw_force_response
 from tests.helpers.power_law import rotations, springpot
 
 TAU = 1.6e-9

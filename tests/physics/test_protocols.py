@@ -10,8 +10,8 @@ from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
-from biogrip.physics.actuator import torque as torque_of_voltage
 from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.gripper import torque as torque_of_voltage
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.linear import phi_function, rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell

@@ -7,7 +7,6 @@ from biogrip.arrays import Array
 from biogrip.physics import modes
 from biogrip.physics import residuals as of_residuals
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.drift import nuisance_basis, with_uncertain, within, without
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.linear import rotation, step_response
@@ -16,6 +15,7 @@ from biogrip.physics.modes import linear_responses
 from biogrip.physics.protocol import TorqueHistory, torque_history
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
+from biogrip.physics.whitening import nuisance_basis, with_uncertain, within, without
 from tests.helpers.responses import (
     MODEL_PARAMETERS,
     PROTOCOLS,

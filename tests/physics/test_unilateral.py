@@ -9,7 +9,6 @@ from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.jaw_force import jaw_force
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import (
     damper,
@@ -28,6 +27,7 @@ from biogrip.physics.protocol import (
     torque_at,
     torque_history,
 )
+from biogrip.physics.simulation import jaw_force
 from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
 from tests.helpers.responses import random_samples
 

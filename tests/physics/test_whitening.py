@@ -6,11 +6,10 @@ from scipy.linalg import cholesky
 
 from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.drift import drift_is_flow, nuisance_basis
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import flicker_rates
 from biogrip.physics.protocol import hold, sample_times, torque_history
-from biogrip.physics.whitening import WEIGHTED, NoiseModel, Whitening
+from biogrip.physics.whitening import WEIGHTED, NoiseModel, Whitening, drift_is_flow, nuisance_basis
 from tests.helpers.problems import MODEL, SAMPLES, TORQUE, posed_for
 
 UNEVEN = np.cumsum(np.random.default_rng(3).exponential(1.0, 300))

@@ -10,7 +10,7 @@ from biogrip.stages.identification import identify
 from biogrip.stages.sweeps import identify_interpreted
 from biogrip.stages.targets import measure, simulate
 from biogrip.study.study import Study
-from biogrip.tables.interpretations import interpretations
+from biogrip.tables.sweeps import interpretations
 from tests.helpers.default import study_of
 
 OVERLAY = """

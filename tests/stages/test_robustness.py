@@ -9,7 +9,7 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.figures.robustness import draw_robustness
 from biogrip.figures.style import styled
-from biogrip.judging.fisher import headlines
+from biogrip.judging.likelihood import headlines
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
@@ -19,7 +19,7 @@ from biogrip.records.identifications import columns
 from biogrip.records.rows import write_rows
 from biogrip.stages import sweeps as stage
 from biogrip.study.study import Study
-from biogrip.tables.robustness import robustness
+from biogrip.tables.sweeps import robustness
 from tests.helpers.default import study_of
 
 CASE = "endothelial_cell"

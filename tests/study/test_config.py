@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from biogrip.errors import BiogripError
-from biogrip.physics.actuator import torque
+from biogrip.physics.gripper import torque
 from biogrip.physics.noise import Noise
 from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config

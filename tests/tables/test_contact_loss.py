@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from biogrip.tables.contact_loss import contact_loss, linear_cases
+from biogrip.tables.mechanics import contact_loss, linear_cases
 from tests.helpers.default import study_of
 
 

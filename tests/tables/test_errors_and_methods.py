@@ -12,10 +12,9 @@ from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
 from biogrip.physics.models import MODELS, UNPUBLISHED, Published, Sample, Truth
 from biogrip.records.identifications import MODEL_FITS, columns
-from biogrip.tables.errors_of_case import errors, errors_of_case
+from biogrip.tables.cases import errors, errors_of_case, verdicts
 from biogrip.tables.layout import write
 from biogrip.tables.methods import methods, models, timings
-from biogrip.tables.verdicts import verdicts
 from tests.helpers.default import seen, study_of
 
 PAPER = Published(

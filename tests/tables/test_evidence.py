@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from biogrip.fit.genome import GeneRange
-from biogrip.physics.actuator import torque
+from biogrip.physics.gripper import torque
 from biogrip.physics.models import Published, Sample, Truth
 from biogrip.tables.evidence import evidence, printed_values, sampling_evidence
 from tests.helpers.default import STUDY, seen

@@ -9,13 +9,13 @@ from scipy.stats import beta
 
 from biogrip.records.identifications import INTERPRETATIONS
 from biogrip.records.rows import read_table
-from biogrip.tables.interpretations import (
+from biogrip.tables.layout import write
+from biogrip.tables.sweeps import (
     interpretations_jointly,
     limits,
     own_shares,
     share_not_larger,
 )
-from biogrip.tables.layout import write
 from tests.helpers.default import study_of
 
 OVERLAY = """

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from biogrip.physics.drift import nuisance_basis
+from biogrip.physics.whitening import nuisance_basis
 from biogrip.traces.any_sample import proportional_deviations
 from tests.helpers.problems import GRIPPER, TORQUE, clean
 

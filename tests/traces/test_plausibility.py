@@ -8,7 +8,6 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.physics.drift import nuisance_basis
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.linear import rotation, step_response
@@ -24,6 +23,7 @@ from biogrip.physics.protocol import (
     sample_times,
     torque_history,
 )
+from biogrip.physics.whitening import nuisance_basis
 from biogrip.traces.columns import Columns
 from biogrip.traces.plausibility import (
     LARGEST_SHARE,

@@ -4,9 +4,8 @@ from pathlib import Path
 
 from biogrip.stages.identification import join
 from biogrip.stages.job import job_case, logged, paths
-from biogrip.tables.errors_of_case import errors_of_case
+from biogrip.tables.cases import errors_of_case, verdicts
 from biogrip.tables.layout import write
-from biogrip.tables.verdicts import verdicts
 
 with logged(snakemake):
     case, files, made = job_case(snakemake), snakemake.input, snakemake.output

@@ -2,7 +2,10 @@
 
 from pathlib import Path
 
-from biogrip.figures import actuator, linearisation, linkage, moduli, overview
+from biogrip.figures import gripper as actuator
+from biogrip.figures import gripper as linkage
+from biogrip.figures import mechanics as linearisation
+from biogrip.figures import moduli, overview
 from biogrip.figures.overview import shown_cases
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from biogrip.stages.job import job_study, logged, paths
-from biogrip.tables.interpretations import interpretations, interpretations_jointly
 from biogrip.tables.layout import write
+from biogrip.tables.sweeps import interpretations, interpretations_jointly
 
 with logged(snakemake):
     found = paths(snakemake.input.found)

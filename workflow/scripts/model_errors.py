@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from biogrip.stages.job import job_study, logged
-from biogrip.stages.model_difference import compare
-from biogrip.tables.contact_loss import contact_loss, linear_cases
+from biogrip.stages.targets import compare
 from biogrip.tables.layout import write
+from biogrip.tables.mechanics import contact_loss, linear_cases
 
 with logged(snakemake):
     study = job_study(snakemake)

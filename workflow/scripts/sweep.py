@@ -7,7 +7,7 @@ from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.stages.sweeps import judge
 from biogrip.tables.layout import write
-from biogrip.tables.robustness import robustness
+from biogrip.tables.sweeps import robustness
 
 with logged(snakemake):
     study, sweep = job_study(snakemake), snakemake.wildcards.sweep

@@ -3,7 +3,9 @@
 from pathlib import Path
 
 from biogrip.stages.job import job_study, logged, paths
-from biogrip.tables import coverage, errors_of_case, evidence, inputs, mechanics, methods, verdicts
+from biogrip.tables import cases as errors_of_case
+from biogrip.tables import cases as verdicts
+from biogrip.tables import coverage, evidence, inputs, mechanics, methods
 from biogrip.tables.layout import write
 
 with logged(snakemake):

@@ -35,7 +35,7 @@ from biogrip.figures.style import (
 from biogrip.judging.likelihood import CERTAIN
 from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.study.study import Case
-from biogrip.tables.verdicts import target_of
+from biogrip.tables.cases import target_of
 
 
 def draw_profiles(case: Case, measured: Path, expected: list[Path]) -> Figure:

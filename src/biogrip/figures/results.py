@@ -11,9 +11,9 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.methods import typical
-from biogrip.physics.drift import within
 from biogrip.physics.instruments import ROTATION, Quantity
 from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.whitening import within
 from biogrip.records.identifications import read_histories, read_identifications
 from biogrip.records.traces import Measurements, read_measurements
 from biogrip.stages.job import seeds_of

@@ -15,7 +15,7 @@ from biogrip.arrays import Array
 from biogrip.figures.style import PAGE_IN, figure, panel
 from biogrip.study.study import Study
 from biogrip.study.sweeps import SweepBlock
-from biogrip.tables.robustness import axis_title, headlines_of, read_points, shown_values
+from biogrip.tables.sweeps import axis_title, headlines_of, read_points, shown_values
 
 _MOST_CASES = 3
 _CELL_IN = 0.24

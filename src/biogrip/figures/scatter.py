@@ -22,7 +22,7 @@ from biogrip.figures.style import (
     points_within,
     row_of_panels,
 )
-from biogrip.judging.fisher import bound
+from biogrip.judging.likelihood import bound
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.noise import standard_deviation

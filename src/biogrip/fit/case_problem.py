@@ -12,14 +12,19 @@ from biogrip.fit.genome import GeneRange
 from biogrip.fit.problem import Problem, make_problem, searched
 from biogrip.physics.calibration import read_calibrated_arms
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.drift import nuisance_basis, with_uncertain
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.misfit import Misfit, SeriesMisfit
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import Phase, TorqueHistory, torque_history
 from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.physics.whitening import WEIGHTED, NoiseModel, Whitening
+from biogrip.physics.whitening import (
+    WEIGHTED,
+    NoiseModel,
+    Whitening,
+    nuisance_basis,
+    with_uncertain,
+)
 
 NOT_FITTED = "inertia_kgm2"
 """Key of an arm that fits leave out, and its uncertainty with it."""

@@ -18,11 +18,10 @@ from biogrip.fit.multi_start import fit_from
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
 from biogrip.fit.problem import Identification, Problem
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.drift import drift_is_flow
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.simulation import simulated_rotation
-from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel
+from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, drift_is_flow
 
 # Square of three standard uncertainties.
 _SECOND_ORDER = 9.0

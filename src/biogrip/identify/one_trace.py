@@ -38,9 +38,9 @@ from biogrip.judging.diagnosis import Diagnosis, diagnose_all
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
 from biogrip.judging.onset_profiles import profile_over_onset
 from biogrip.keys import plain
-from biogrip.physics.drift import within
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.whitening import within
 from biogrip.processes import worker_processes
 from biogrip.records.identifications import exact_data
 from biogrip.records.traces import Measurements

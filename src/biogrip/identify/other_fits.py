@@ -35,10 +35,10 @@ from biogrip.judging.diagnosis import Diagnosis, diagnose, diagnose_all
 from biogrip.judging.doubts import DOUBT, FALSE_ALARM, HARMLESS, REJECTED, REJECTION, Note, one_in
 from biogrip.judging.likelihood import MISSED, compute_fall
 from biogrip.judging.verdicts import Finding
-from biogrip.physics.drift import drift_is_flow
+from biogrip.physics.fractional import LONGEST_S
 from biogrip.physics.models import CANDIDATES, as_richer, contained
 from biogrip.physics.noise import stream
-from biogrip.physics.springpot import LONGEST_S
+from biogrip.physics.whitening import drift_is_flow
 
 _MOST_SAMPLES = 50_000
 # Each of the others would take half a second to five; they are tried where the config names them.

@@ -35,8 +35,8 @@ from biogrip.judging.doubts import (
 from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
-from biogrip.physics.jaw_force import Grip
 from biogrip.physics.sample_model import C_P, SampleModel
+from biogrip.physics.simulation import Grip
 from biogrip.physics.whitening import estimate_noise
 
 # Decrease of chi^2 beyond an end that is more than chance: three standard deviations squared.

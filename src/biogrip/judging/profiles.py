@@ -4,7 +4,8 @@ All quantities of many traces are profiled at once, over their whole search rang
 fitted from the optimum, then from the fits of both neighbours, again and again where these have
 improved: a basin found anywhere in a profile is followed both ways. Where a profile exceeds the
 certainty at an end, its limit is where it crosses the threshold. The limits are the outermost:
-values between them may be excluded, too, which gaps tell.
+values between them may be excluded, too, which gaps tell. A map of chi^2 shows
+the valley in which a branch's and the parallel damper trade off.
 
 References
 ----------
@@ -14,18 +15,21 @@ References
    dynamical models by exploiting the profile likelihood, Bioinformatics 25 (2009), 1923-1929.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.digits import round_increase, rounded
 from biogrip.fit.local_fits import FAIR, FINE, alike
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.limits import Brackets, crossings
 from biogrip.judging.quantities import Quantity
+from biogrip.physics.sample_model import SampleModel
 
 HIGHEST = 16.0
 """Increase of chi^2 up to which a profile has dense points, as figures show no more."""
@@ -269,3 +273,87 @@ def _crossing(
         return float(log_values[outside])
     share = min((np.sqrt(threshold) - ends[0]) / (ends[1] - ends[0]), 1.0)
     return float(log_values[inside] + share * (log_values[outside] - log_values[inside]))
+
+
+# Shares of the first damper in the sum, dense where either is small, and sums relative to the best
+# one, dense in the valley.
+_SHARES = 1 / (1 + np.exp(-np.linspace(-8.0, 8.0, 31)))
+_BESIDE = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
+_SUMS = np.concatenate((1 - _BESIDE[::-1], [1.0], 1 + _BESIDE))
+# Second arm of the valley: if the branch is too weak to show, the second damper alone is the sum.
+_FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 12)))
+_SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
+
+
+def compute_valley(
+    likelihood: Likelihood, model: SampleModel
+) -> tuple[dict[str, Any] | None, Array | None]:
+    """Compute the increase of chi^2 over two exchangeable parameters, with the others fitted.
+
+    Returns
+    -------
+    dict or None
+        ``x`` and ``y``, names and units; ``best``; and under ``grids``, one along the
+        valley of constant sum and one along its arm of constant second parameter,
+        ``x_values``, ``y_values`` and ``increases``, nested lists.
+        None unless exactly two exchangeable parameters were searched, among others.
+    (n_parameters,) or None
+        Log-parameters whose chi^2 is clearly below that of the optimum, which is not the
+        global one.
+    """
+    pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
+    if len(pair) != 2 or len(model.parameters) == 2:
+        return None, None
+    best = np.exp(likelihood.best[pair])
+    sums = best.sum() * _SUMS[:, None]
+    arm = np.meshgrid(best.sum() * _FIRSTS, best.sum() * _SECONDS)
+    grids, missed = [], None
+    for x_values, y_values in ((sums * _SHARES, sums * (1 - _SHARES)), arm):
+        increases, lower = _increases(likelihood, pair, x_values, y_values)
+        grid = {"x_values": _listed(x_values, rounded), "y_values": _listed(y_values, rounded)}
+        grids.append({**grid, "increases": _listed(increases, round_increase)})
+        missed = missed if lower is None else lower
+    both = [model.parameters[index] for index in pair]
+    x, y = ({"name": p.name, "symbol": p.symbol, "unit": p.unit} for p in both)
+    at_best = [rounded(float(value)) for value in best]
+    return {"x": x, "y": y, "grids": grids, "best": at_best}, missed
+
+
+def _listed(values: Array, rounding: Callable[[float], float | None]) -> list[list[float | None]]:
+    return [[rounding(float(value)) for value in row] for row in values]
+
+
+def _increases(
+    likelihood: Likelihood, pair: list[int], x_values: Array, y_values: Array
+) -> tuple[Array, Array | None]:
+    """Compute the increase of chi^2 at every point of a grid, and find a missed optimum.
+
+    All points are fitted from the optimum, then from neighbours as long as these improve.
+    """
+    fits = ConstrainedFits([likelihood], [])
+    rows, columns = x_values.shape
+    x = np.tile(likelihood.best, (rows * columns, 1))
+    x[:, pair[0]], x[:, pair[1]] = np.log(x_values.ravel()), np.log(y_values.ravel())
+    fixed = np.isin(np.arange(x.shape[1]), pair)
+    increases = np.full(len(x), np.inf)
+    points, start = np.arange(len(x)), x.copy()
+    # A point, and its neighbours on the grid.
+    beside = np.pad(points.reshape(rows, columns), 1, constant_values=-1)
+    shifts = ((0, 1), (2, 1), (1, 0), (1, 2))
+    neighbours = np.stack([beside[i : i + rows, j : j + columns].ravel() for i, j in shifts])
+    tolerance = FAIR
+    while len(points):
+        found, fitted = fits.with_fixed(start, fixed, tolerance)
+        news = np.zeros(len(x), dtype=bool)
+        for point, increase, parameters in zip(points, found, fitted, strict=True):
+            if increase < increases[point]:
+                news[point] |= increase < increases[point] - NEWS * (1 + abs(increase))
+                increases[point], x[point] = increase, parameters
+        origin = np.repeat(np.flatnonzero(news), 4)
+        points = neighbours[:, news].T.ravel()
+        origin, points = origin[points >= 0], points[points >= 0]
+        start = x[origin].copy()
+        start[:, pair] = x[points][:, pair]
+        tolerance = CLOSE
+    missed = fits.missed.get(0)
+    return increases.reshape(rows, columns), None if missed is None else missed[1]

@@ -26,7 +26,7 @@ from biogrip.records.identifications import read_verdicts
 from biogrip.records.rows import read_table
 from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case, Study
-from biogrip.tables.verdicts import target_of
+from biogrip.tables.cases import target_of
 
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000

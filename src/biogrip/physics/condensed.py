@@ -36,11 +36,10 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array, IntArray
-from biogrip.physics.drift import without
-from biogrip.physics.mode_responses import mode_responses
+from biogrip.physics.modes import mode_responses
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.rate_tables import ModeRows
-from biogrip.physics.whitening import Whitening
+from biogrip.physics.whitening import Whitening, without
 
 _NODES = 20
 _DEGREE = _NODES - 1

@@ -19,9 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.errors import BiogripError
-from biogrip.physics import actuator
-from biogrip.physics.actuator import CombDrive
-from biogrip.physics.gripper import Gripper, rotation_of_tip
+from biogrip.physics import gripper as actuator
+from biogrip.physics.gripper import CombDrive, Gripper, rotation_of_tip
 
 SMALLEST_M, LARGEST_M = 30e-6, 120e-6
 

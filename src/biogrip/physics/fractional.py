@@ -1,6 +1,26 @@
 """Fractional (power-law) models: springpots, alone and with springs, dampers or one another.
 
-A springpot (`biogrip.physics.springpot`) has a modulus k_alpha (N/m, at 1 rad/s) and an exponent
+A springpot, between spring and damper, is a ladder of Maxwell branches. Its force is V (t_0
+d/dt)^alpha delta with t_0 = 1 s: that of a spring V for alpha = 0, of a damper V t_0 for alpha = 1.
+In
+
+    s^alpha = sin(pi alpha)/pi int_-inf^inf e^(alpha u) s / (s + e^u) du
+
+the trapezoidal rule of step h [2] gives springs h sin(pi alpha)/pi e^(alpha u_j), each with a
+damper in series. They relax at the rates e^(u_j), whatever alpha is. For the poles of
+the integrand, at a distance of pi from the real axis if s is real and of pi/2 if it is
+imaginary, the relative error is about e^(-2 pi^2/h) or 2 e^(-pi^2/h). Of the infinite
+sum a band of rates is kept. All slower branches together are replaced by a spring and a
+few branches, all faster ones by a damper and a few branches, which have the same first
+moments: a quadrature on Chebyshev's nodes, one of them at zero. All springs come out
+positive and smooth in alpha, and the limits, spring and damper, are exact.
+
+Ladders have the same rates, so in parallel they add up. In series their impedance is
+L_1 L_2/H with H = L_1 + L_2. It has branches at the zeros -x of H, with the springs
+L_1(-x)^2/(x H'(-x)), and, if both ladders have branches, at the shared rates p_j, with the
+springs W_1j W_2j/(W_1j + W_2j).
+
+A springpot has a modulus k_alpha (N/m, at 1 rad/s) and an exponent
 alpha; with a second one, k_beta and beta < alpha. All models are represented by Maxwell branches,
 as a `Network` like all other models. J is the creep compliance, G the relaxation modulus (N/m), t
 in seconds, E_(a,b) the Mittag-Leffler function, a = alpha - beta [1]_. What they are for, and their
@@ -16,7 +36,7 @@ names in other programs, is in `docs/model.md`.
     J = t^alpha/k_alpha E_(a,1+alpha)(-(k_beta/k_alpha) t^a), G the sum of both
 `springpots_in_series`, beta at short times and alpha at long ones: --<>---<>--
     G = k_beta t^-beta E_(a,1-beta)(-(k_beta/k_alpha) t^a), J the sum of both
-`fractional_maxwell`, a power law that flows at long times, as cells do [2]_: --<>---[==]-- c
+`fractional_maxwell`, a power law that flows at long times, as cells do [3]_: --<>---[==]-- c
     J = t^alpha/(k_alpha Gamma(1+alpha)) + t/c,
     G = k_alpha t^-alpha E_(1-alpha,1-alpha)(-(k_alpha/c) t^(1-alpha))
 `fractional_maxwell_gel`: a spring k in series with --<>--
@@ -24,7 +44,7 @@ names in other programs, is in `docs/model.md`.
 `fractional_zener`, elastic at once and in the end: the gel beside a spring k_p
     G = k_p + k E_alpha(-(k/k_alpha) t^alpha),
     J = 1/k_p - (1/k_p - 1/(k+k_p)) E_alpha(-(t/tau)^alpha), tau^alpha = k_alpha (1/k + 1/k_p)
-`fractional_solid`, which flows until the spring bears the load [2]_: the liquid beside k_p
+`fractional_solid`, which flows until the spring bears the load [3]_: the liquid beside k_p
     G = k_p and that of `fractional_maxwell`
 `fractional_jeffreys`: the liquid `fractional_maxwell` beside a damper c_p
     J = t/(c+c_p) + t (1/c_p - 1/(c+c_p)) E_(1-alpha,2)(-(k_alpha (1/c + 1/c_p)) t^(1-alpha)),
@@ -33,18 +53,165 @@ names in other programs, is in `docs/model.md`.
 References
 ----------
 .. [1] A. Bonfanti, J. L. Kaplan, G. Charras and A. Kabla, Fractional viscoelastic models for
-   power-law materials, Soft Matter 16 (2020), 6002-6020.
-.. [2] A. Bonfanti, J. Fouchard, N. Khalilgharibi, G. Charras and A. Kabla, A unified rheological
+   power-law materials, Soft Matter 16 (2020), 6002-6020: springpots, and what they describe.
+.. [2] L. N. Trefethen and J. A. C. Weideman, The exponentially convergent trapezoidal rule,
+   SIAM Review 56 (2014), 385-458.
+.. [3] A. Bonfanti, J. Fouchard, N. Khalilgharibi, G. Charras and A. Kabla, A unified rheological
    model for cells and cellularised materials, Royal Society Open Science 7 (2020), 190920: a
    springpot and a damper in series, with a spring beside both.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from biogrip.arrays import Array
+from biogrip.physics.roots import Zeros, interlaced_zeros
 from biogrip.physics.sample_model import C_P, K_P, C, K, Network, Parameter, SampleModel, of_columns
-from biogrip.physics.springpot import damper, ladder, series, spring
+
+SHORTEST_S, LONGEST_S = 1e-5, 1e5
+"""Range of times, and of reciprocal rates, in which the ladder is a springpot to 1e-6."""
+
+_STEP, _WHOLE = 0.6, 45
+_SLOWEST_PER_S = 0.5e-5
+_NODES = 3
+
+_RATES = _SLOWEST_PER_S * np.exp(_STEP * np.arange(_WHOLE))
+# The first rate left out is e^-h times the last one kept; the nodes go a little beyond.
+_PLACES = np.exp(-_STEP / 2) * (np.sin(np.pi * np.arange(_NODES + 1) / (2 * _NODES + 1)) ** 2)
+
+BRANCH_RATES_PER_S: Array = np.concatenate(
+    (_SLOWEST_PER_S * _PLACES[1:], _RATES, _RATES[-1] / _PLACES[:0:-1])
+)
+"""Rates at which the branches of every springpot relax, ascending."""
+
+
+def _interpolation(places: Array) -> Array:
+    """Return ascending coefficients of the Lagrange polynomials of some places."""
+    rows = np.zeros((len(places), len(places)))
+    rows[:, 0] = 1.0
+    for row, place in zip(rows, places, strict=True):
+        for other in places[places != place]:
+            row[:] = (np.append(0.0, row[:-1]) - other * row) / (place - other)
+    return rows
+
+
+_TO_WEIGHTS = _interpolation(_PLACES)
+
+
+_ROUNDING = 2.0**-44
+# Spring of a branch that equal ladders in series do not have, in N/m: no response shows it.
+_GONE = 1e-30
+# Least relative distance of the rates of two springpots in series.
+_APART = 2e-6
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Parallel spring, damper and Maxwell branches of n samples."""
+
+    spring: NDArray[Any]
+    """Parallel spring in N/m, (n,)."""
+    damper: NDArray[Any]
+    """Parallel damper in N s/m, (n,)."""
+    springs: NDArray[Any]
+    """Springs of the Maxwell branches in N/m, (n_branches, n), whose rates are
+    `BRANCH_RATES_PER_S`; without branches zeros, (1, n)."""
+
+    def __add__(self, other: "Ladder") -> "Ladder":
+        """Return both ladders in parallel."""
+        return Ladder(
+            self.spring + other.spring, self.damper + other.damper, self.springs + other.springs
+        )
+
+    @property
+    def network(self) -> Network:
+        """Springs and dampers of the samples; the ladder has branches."""
+        dampers = self.springs / BRANCH_RATES_PER_S[:, None]
+        return Network(k_p=self.spring, c_p=self.damper, k=self.springs.T, c=dampers.T)
+
+    @property
+    def weights(self) -> NDArray[Any]:
+        """Parallel spring and springs of the branches, (1 + n_branches, n)."""
+        return np.concatenate((self.spring[None], self.springs))
+
+    def near(self, zeros: Zeros) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return L(-x)/x and -d(L(-x)/x)/dx at positive numbers x, each (n_zeros, n)."""
+        value, steepness = -self.damper + np.zeros_like(zeros.beyond), np.zeros_like(zeros.beyond)
+        for weight, pole in zip(self.weights, _POLES, strict=False):
+            distance = zeros.from_pole(pole)
+            value = value + weight / distance
+            steepness = steepness + weight / distance**2
+        return value, steepness
+
+
+_POLES = np.append(0.0, BRANCH_RATES_PER_S)
+
+
+def spring(k: NDArray[Any]) -> Ladder:
+    """Return n springs as ladders."""
+    return Ladder(k, 0 * k, 0 * k[None])
+
+
+def damper(c: NDArray[Any]) -> Ladder:
+    """Return n dampers as ladders."""
+    return Ladder(0 * c, c, 0 * c[None])
+
+
+def series(first: Ladder, second: Ladder) -> Network:
+    """Return the network of ladders in series; one of the two has branches."""
+    both = first + second
+    poles = _POLES[:, None] * np.ones(len(both.spring))
+    zeros = interlaced_zeros(both.weights, poles, both.damper)
+    (of_first, steep_first), (of_second, steep_second) = first.near(zeros), second.near(zeros)
+    steepness = steep_first + steep_second
+    # L_1 = -L_2 at the zeros. Of this mean no digits cancel that the softer ladder has.
+    share = steep_first / steepness
+    springs = ((1 - share) * of_first - share * of_second) ** 2 / steepness
+    rates = zeros.values
+    if np.all(product := first.springs * second.springs):
+        springs = np.where(springs == 0, _GONE, springs)
+        shared, own = product / both.springs, springs[1:]
+        # Rates that are nearly equal cost digits: apart, with the same mean, they do not.
+        lack = np.maximum(_APART * poles[1:] - (rates[1:] - poles[1:]).real, 0)
+        share = shared / (shared + own)
+        rates[1:] += lack * share
+        rates = np.concatenate((rates, poles[1:] - lack * (1 - share)))
+        springs = np.concatenate((springs, shared))
+    return Network(
+        k_p=first.spring * second.spring / both.spring,
+        c_p=first.damper * second.damper / both.damper,
+        k=springs.T,
+        c=(springs / rates).T,
+    )
+
+
+def ladder(modulus_N_per_m: NDArray[Any], exponent: NDArray[Any]) -> Ladder:
+    """Return the springs and dampers that represent n springpots V (s t_0)^alpha.
+
+    V is the modulus at 1 rad/s, alpha between 0 and 1. Both may be complex: the result is an
+    analytic function.
+    """
+    # At 0 and 1, where tails would be infinite, the next exponent gives the same response.
+    exponent = np.where(exponent == 0, _ROUNDING, exponent)
+    exponent = np.where(exponent == 1, 1 - _ROUNDING, exponent)
+    # sin(pi alpha), with all digits near one, too.
+    near = np.where(np.real(exponent) > 0.5, 1 - exponent, exponent)
+    density = modulus_N_per_m * _STEP * np.sin(np.pi * near) / np.pi
+    springs = density * np.exp(exponent * np.log(_RATES)[:, None])
+    slow = springs[0] * _tail(exponent)
+    fast = springs[-1] * _tail(1 - exponent)
+    within = (slow[1:], springs, fast[:0:-1] / _PLACES[:0:-1, None])
+    return Ladder(slow[0], fast[0] / _RATES[-1], np.concatenate(within))
+
+
+def _tail(exponent: NDArray[Any]) -> NDArray[Any]:
+    """Return weights at the nodes with the moments of e^(-a j h), j = 1, 2, ..., at e^(-j h)."""
+    powers = exponent + np.arange(_NODES + 1)[:, None]
+    return np.einsum("mk,kn->mn", _TO_WEIGHTS, 1 / np.expm1(_STEP * powers))
 
 
 def _liquid(k_alpha: Array, alpha: Array, c: Array) -> Network:

@@ -28,8 +28,7 @@ from numpy.polynomial import Chebyshev, Polynomial, chebyshev
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array, IntArray
-from biogrip.physics.mode_responses import mode_responses
-from biogrip.physics.modes import Modes
+from biogrip.physics.modes import Modes, mode_responses
 from biogrip.physics.protocol import TorqueHistory
 
 # Width and degree of wide pieces, and number of short pieces in one for sums and for rows.

@@ -8,15 +8,13 @@ import numpy as np
 
 from biogrip.arrays import Array, parts
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.drift import taken_out
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
-from biogrip.physics.jaw_force import Grip, compute_grip
 from biogrip.physics.modes import compute_modes, linear_responses
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.sample_model import Network, SampleModel
-from biogrip.physics.simulation import Ring, find_ring
-from biogrip.physics.whitening import estimate_noise, measure_rounding
+from biogrip.physics.simulation import Grip, Ring, compute_grip, find_ring
+from biogrip.physics.whitening import estimate_noise, measure_rounding, taken_out
 
 # Most numbers in the rows that are formed at once.
 _AT_ONCE = 100_000

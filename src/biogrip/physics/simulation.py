@@ -1,4 +1,18 @@
-"""Simulated rotation and shortening of samples, by the linear or the nonlinear model.
+"""Simulated rotation and shortening of samples, and the force on them, linear or nonlinear.
+
+The jaws exert on the sample the force F = G delta, positive while they press. In the linear model
+it is a rational function of the torques like the rotations,
+
+    F = [b P (Z_2 + Z_4) tau_2 - b P Z_2 (tau_2 - tau_4)] / D
+
+(with equal arms and torques 2 b P tau / (Z Q + 2 b^2 P)), so its modes have the rates of the
+rotations and weights of their own. The arm's equation gives it too, b F = tau - Z phi, but where a
+liquid has given way that is a difference of nearly equal torques; here the constant and every mode
+are products of what is positive, and late in a phase only what is left of the slow modes is summed.
+
+In the nonlinear model, the arm's equation, divided by its lever, gives
+F - F_linear = g - (c u' + k u)/b_0^2 with g the load and u the correction of
+`biogrip.physics.nonlinear`. All of them are of second order: again no large terms cancel.
 
 Targets have the arms' inertia, fits leave it out: after a change of the torque, arms ring for
 milliseconds, and later changes by inertia are negligible (docs/model.md, "Without inertia"). What
@@ -7,16 +21,170 @@ of the ring shows in a trace is found here, too.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import factorial
 
 import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper, displacement_of_tip
-from biogrip.physics.linear import LEFT, RIGHT, rotation, step_response
+from biogrip.physics.linear import (
+    LEFT,
+    RIGHT,
+    StepResponse,
+    add,
+    arm_polynomial,
+    multiply,
+    partial_fractions,
+    phi_function,
+    rotation,
+    sample_polynomials,
+    step_response,
+    transfer_functions,
+)
+from biogrip.physics.many_branches import modes_of_many
 from biogrip.physics.modes import relaxation
-from biogrip.physics.nonlinear import nonlinear_rotation
+from biogrip.physics.nonlinear import correction, nonlinear_rotation
 from biogrip.physics.protocol import TorqueHistory
-from biogrip.physics.sample_model import Network
+from biogrip.physics.sample_model import MOST_BRANCHES, Network
+
+
+def jaw_force_response(
+    gripper: Gripper, network: Network, *, symmetric: bool = True, inertia: bool = True
+) -> StepResponse:
+    """Compute the jaw force of n samples after unit torque steps, in N per N m.
+
+    The force takes the place of an arm. Arguments are those of `step_response`; without inertia a
+    parallel damper makes the force jump with the torque.
+    """
+    if network.k.shape[1] > MOST_BRANCHES:
+        return StepResponse(
+            *modes_of_many(gripper, network, symmetric=symmetric, inertia=inertia, force=True)
+        )
+    _, denominator = transfer_functions(gripper, network, symmetric=symmetric, inertia=inertia)
+    p = gripper.lever_m * sample_polynomials(network)[0]
+    z_2 = arm_polynomial(gripper.left, inertia)
+    if symmetric and gripper.left == gripper.right:
+        numerators = [2 * p]
+    else:
+        both = add(z_2, arm_polynomial(gripper.right, inertia))
+        numerators = [multiply(p, both), -multiply(p, z_2)][: 1 if symmetric else 2]
+    return partial_fractions(np.array([numerators]).swapaxes(2, 3), denominator, real=not inertia)
+
+
+def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Array) -> Array:
+    """Compute the jaw force of the linear model in N, (n, n_times), at any times.
+
+    The response is that of `jaw_force_response`; at the instant of a step: what follows it.
+    """
+    force = np.zeros((len(response.rates), len(time_s)))
+    rates = response.rates[:, :, None]
+    static, weights = response.static[:, 0], response.weights[:, 0]
+    for start, order, heights in torque.jumps:
+        after = time_s >= start
+        elapsed = time_s[after] - start
+        constant, amplitude = static @ heights, np.einsum("ndj,d->nj", weights, heights)
+        z = rates * elapsed
+        growth = elapsed**order * (phi_function(order, z) if order else np.exp(z))
+        rest = constant[:, None] * elapsed**order / factorial(order)
+        force[:, after] += rest + np.einsum("nj,njt->nt", amplitude, growth).real
+    for start, omega, a in torque.swings:
+        after = time_s >= start
+        elapsed = time_s[after] - start
+        amplitude = np.einsum("ndj,d->nj", weights, a)
+        steady = static @ a + np.sum(amplitude * 1j * omega / (1j * omega - response.rates), axis=1)
+        fading = amplitude * response.rates / (response.rates - 1j * omega)
+        swing = steady[:, None] * np.exp(1j * omega * elapsed)
+        force[:, after] += (swing + np.einsum("nj,njt->nt", fading, np.exp(rates * elapsed))).real
+    return force
+
+
+def jaw_force(
+    gripper: Gripper,
+    network: Network,
+    torque: TorqueHistory,
+    time_s: Array,
+    *,
+    nonlinear: bool,
+    inertia: bool = True,
+) -> Array:
+    """Compute the jaws' force on the sample in N, positive while they press, (n, n_times).
+
+    By either model, as in `simulated_rotation`; at the instant of a step: what follows it. Without
+    inertia, the force may jump.
+    """
+    response = jaw_force_response(gripper, network, symmetric=torque.symmetric, inertia=inertia)
+    force = linear_jaw_force(response, torque, time_s)
+    if nonlinear:
+        # Arms with inertia have not moved yet at the instant of a step.
+        instants = np.nextafter(time_s, -np.inf) if inertia else time_s
+        more = correction(gripper, network, torque).checked().force_at(instants)
+        force += np.where(instants < 0, 0, more)
+    return force
+
+
+# Forces below this share of the largest one are rounding errors.
+_NOTHING = 1e-9
+_A_PHASE, _A_PERIOD, _MOST = 200, 32, 200_000
+
+
+@dataclass(frozen=True)
+class Grip:
+    """The force of the jaws on a sample that they hold throughout a protocol."""
+
+    largest_N: float
+    """Largest force with which the jaws press."""
+    lowest_N: float
+    """Lowest force, negative if the jaws pull, else after the largest one."""
+    lowest_at_s: float
+    """Time of the lowest force."""
+    pulls_from_s: float | None
+    """Time from which the jaws would have to pull; None if they press throughout."""
+
+    def words(self) -> str | None:
+        """Describe from when and how hard the jaws would have to pull, if they would."""
+        if self.pulls_from_s is None:
+            return None
+        return (
+            f"the jaws would have to pull the sample from {self.pulls_from_s:.4g} s on "
+            f"(with {-1e6 * self.lowest_N:.2g} µN at {self.lowest_at_s:.4g} s, where they press "
+            f"with {1e6 * self.largest_N:.2g} µN at most)"
+        )
+
+
+def compute_grip(
+    gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlinear: bool
+) -> Grip:
+    """Compute the extreme forces of the jaws on the first sample, without inertia.
+
+    By either model, as in `simulated_rotation`.
+    """
+    time_s = _instants(torque)
+    force = jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear, inertia=False)[0]
+    least_shown = _NOTHING * float(np.abs(force).max()) or 1.0
+    shown = np.round(force / least_shown)
+    most, negative = int(np.argmax(shown)), np.flatnonzero(shown < 0)
+    first = 0 if len(negative) else most
+    least = first + int(np.argmin(shown[first:]))
+    return Grip(
+        float(shown[most] * least_shown),
+        float(shown[least] * least_shown),
+        float(time_s[least]),
+        float(time_s[negative[0]]) if len(negative) else None,
+    )
+
+
+def _instants(torque: TorqueHistory) -> Array:
+    """Return times that are dense after every change of torque and within every period."""
+    starts = np.unique(np.concatenate((torque.time_s, torque.harmonic_time_s)))
+    starts = starts[starts < torque.end_s]
+    lengths = np.diff(np.append(starts, torque.end_s))
+    share = np.geomspace(1e-9, 1.0, _A_PHASE)[:-1]
+    pieces = [start + length * share for start, length in zip(starts, lengths, strict=True)]
+    if len(torque.omega_rad_per_s):
+        periods = torque.end_s * float(torque.omega_rad_per_s.max()) / (2 * np.pi)
+        count = int(min(_MOST, _A_PERIOD * np.ceil(periods)))
+        pieces.append(np.linspace(0, torque.end_s, count))
+    return np.unique(np.append(np.concatenate(pieces), torque.end_s))
 
 
 def simulated_rotation(

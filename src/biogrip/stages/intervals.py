@@ -18,8 +18,7 @@ from biogrip.fit.methods import best_fit, identifier
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.fit.trace_fit import trace_fit
-from biogrip.judging.fisher import covariance
-from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
+from biogrip.judging.likelihood import MISSED, Likelihood, covariance, make_likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import Quantity, parameters_and_sum

@@ -20,7 +20,7 @@ from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit
 from biogrip.judging.likelihood import MISSED
 from biogrip.judging.onset_profiles import profile_over_onset
-from biogrip.judging.valley import compute_valley
+from biogrip.judging.profiles import compute_valley
 from biogrip.physics.noise import rms, standard_deviation, stream
 from biogrip.records.identifications import diagnosis_data
 from biogrip.records.traces import read_measurements, read_target

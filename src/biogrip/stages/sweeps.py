@@ -16,7 +16,7 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.fit.genetic import identify_many
 from biogrip.fit.genome import nearest_encodable
 from biogrip.fit.methods import near_noise
-from biogrip.judging.fisher import bounds_percent, headlines
+from biogrip.judging.likelihood import bounds_percent, headlines
 from biogrip.judging.quantities import Quantity
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH

@@ -9,9 +9,9 @@ from pydantic import Field
 from biogrip.errors import nearest
 from biogrip.fit.methods import METHODS
 from biogrip.keys import Block, Distinct, OneOf, Printed, Problem, adapter, below
-from biogrip.physics.actuator import CombDrive
+from biogrip.physics.fractional import LONGEST_S
+from biogrip.physics.gripper import CombDrive
 from biogrip.physics.models import CANDIDATES
-from biogrip.physics.springpot import LONGEST_S
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
 from biogrip.study.sweeps import MOST_POINTS, SweepBlock, list_points, name_problems
 

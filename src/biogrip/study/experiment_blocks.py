@@ -14,10 +14,9 @@ from pydantic import BaseModel, Field
 
 from biogrip.errors import nearest
 from biogrip.keys import OPEN, Block, Checked, OneOf, Problem
-from biogrip.physics.actuator import CombDrive, capacitance_slope, torque_uncertainty
 from biogrip.physics.calibration import ARM_KEYS
 from biogrip.physics.contact import LARGEST_M, SMALLEST_M, Contact, contact
-from biogrip.physics.gripper import Gripper
+from biogrip.physics.gripper import CombDrive, Gripper, capacitance_slope, torque_uncertainty
 from biogrip.physics.instruments import CONTROLLED, Instrument
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import Phase, largest_load, load

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array
-from biogrip.judging.fisher import bound
+from biogrip.judging.likelihood import bound
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.noise import standard_deviation

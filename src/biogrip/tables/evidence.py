@@ -13,16 +13,16 @@ import numpy as np
 
 from biogrip.digits import counted
 from biogrip.fit.genome import nearest_encodable
-from biogrip.judging.fisher import DETERMINED_PERCENT, bounds_percent
+from biogrip.judging.likelihood import DETERMINED_PERCENT, bounds_percent
 from biogrip.judging.quantities import Quantity
-from biogrip.physics import actuator
+from biogrip.physics import gripper as actuator
 from biogrip.physics.models import Truth
 from biogrip.physics.protocol import sample_times
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.records.identifications import read_identifications
 from biogrip.records.traces import each_trace, read_jaw_force
 from biogrip.study.study import Case, Study
-from biogrip.tables.errors_of_case import error_percent
+from biogrip.tables.cases import error_percent
 from biogrip.tables.layout import Column, Row, Table
 
 _COLUMNS = (

@@ -10,7 +10,7 @@ from biogrip.fit.methods import chi_square_increase, near_noise, near_noise_word
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.records.identifications import MODEL_FITS, TIMINGS, read_identifications
 from biogrip.study.study import Study
-from biogrip.tables.errors_of_case import error_percent
+from biogrip.tables.cases import error_percent
 from biogrip.tables.layout import Column, Row, Table
 
 _METHOD_COLUMNS = (

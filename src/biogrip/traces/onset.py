@@ -14,11 +14,10 @@ from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFits
 from biogrip.judging.doubts import REJECTION, Note
 from biogrip.judging.likelihood import compute_fall
-from biogrip.physics.drift import nuisance_basis, without
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lagged_torques
 from biogrip.physics.protocol import TorqueHistory
-from biogrip.physics.whitening import estimate_noise
+from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
 from biogrip.traces.any_sample import extreme_responses, left_over
 
 # Relaxation times over the protocol's duration.

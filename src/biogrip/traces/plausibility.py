@@ -16,11 +16,11 @@ import numpy as np
 
 from biogrip.arrays import Array, parts
 from biogrip.errors import BiogripError
-from biogrip.physics.drift import without
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.modes import lagged_torques
 from biogrip.physics.protocol import TorqueHistory, torque_at
+from biogrip.physics.whitening import without
 from biogrip.traces.any_sample import extreme_responses, left_over
 from biogrip.traces.columns import TIME_UNITS, Columns, place, unit_of
 from biogrip.traces.reader import Recording
