@@ -154,7 +154,7 @@ class NoiseModelLikelihood:
         self, time_s: Array, residual: Array, directions: Array, growing: Array | None = None
     ) -> None:
         self._time_s, self._residual, self._growing = time_s, residual, growing
-        self._reached = _independent(directions)
+        self._reached = absorbed(directions)
         shortest, longest = float(np.diff(time_s).min()), float(time_s[-1] - time_s[0])
         times = float(np.log(shortest / 2)), float(np.log(longest))
         self._bounds = [(_LEAST, _MOST), times, (_LEAST, _MOST)]
@@ -278,8 +278,8 @@ def _noise_model(x: Array) -> NoiseModel:
     )
 
 
-def _independent(directions: Array) -> Array:
-    """Return orthonormal rows with the span of given ones, leaving out rounding errors."""
+def absorbed(directions: Array) -> Array:
+    """Return orthonormal rows with the span of what a fit absorbs, without rounding errors."""
     sizes = np.linalg.norm(directions, axis=1)
     rows = directions[sizes > 0] / sizes[sizes > 0, None]
     _, shares, basis = np.linalg.svd(rows, full_matrices=False)

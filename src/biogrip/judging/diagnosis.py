@@ -5,8 +5,8 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 
 1. A confidence set in parts is harmless.
 2. A parameter at an end of its search range, with chi^2 lower beyond it, rejects the fit.
-3. Residuals that are not white noise (`biogrip.judging.doubts`) make it doubtful; a misfit above
-   the noise of neighbouring readings rejects it, unless it looks like noise.
+3. Residuals that are not white noise (`biogrip.judging.doubts`) make it doubtful; a misfit far
+   above the noise rejects it. Limits allow for a small one.
 4. Jaws that would have to pull are harmless.
 5. A fit that has not converged is doubtful, and so are arms that ring.
 """
@@ -16,39 +16,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biogrip.arrays import Array
 from biogrip.fit.multi_start import descend_from, fit_from
-from biogrip.fit.noise_model_fit import compute_growth, outliers_of
 from biogrip.fit.problem import Identification, Problem
 from biogrip.judging.doubts import (
     DOUBT,
-    FALSE_ALARM,
     HARMLESS,
     REJECTED,
     REJECTION,
     Note,
     compute_status,
-    doubts_about_noise,
-    has_fast_noise,
-    has_uneven_noise,
+    examine_residuals,
 )
 from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
-from biogrip.physics.whitening import estimate_noise
 
 # Decrease of chi^2 beyond an end that is more than chance: three standard deviations squared.
 _NOTICEABLE = 9.0
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
 _WIDER, _BEYOND, _AT_END = np.log(1e3), 1.0, 1e-9
-# A misfit larger than the scatter of neighbouring readings by this factor is not noise.
-_TOO_MUCH = 1.2
-# A misfit below these shares of the noise and of the peak is that of a trace without noise.
-_NOISE_FREE, _NOISE_FREE_OF_PEAK = 0.01, 1e-3
-# A misfit below this share of the given noise is reported: noise is rarely known better.
-_TOO_LITTLE = 0.5
 
 
 @dataclass(frozen=True)
@@ -122,10 +110,16 @@ def diagnose_all(
             )
             for trace in left
         ]
+        remainders = [examine_residuals(likelihood) for likelihood in likelihoods]
+        likelihoods = [
+            likelihood.as_misfit(remainder.independent) if remainder.independent else likelihood
+            for likelihood, remainder in zip(likelihoods, remainders, strict=True)
+        ]
         every = compute_findings(likelihoods, parameters_and_sum(model))
         trades = find_trade_offs(likelihoods, model, every)
         for place, trace in enumerate(left):
-            judged = Diagnosis(likelihoods[place], every[place], trades[place], None, [])
+            notes = remainders[place].notes
+            judged = Diagnosis(likelihoods[place], every[place], trades[place], None, notes)
             lower = _lower_optimum(judged, best[trace])
             if lower is None:
                 done[trace] = _with_notes(judged, model, converged=best[trace].converged)
@@ -145,7 +139,7 @@ def _lower_optimum(judged: Diagnosis, found: Identification) -> Identification |
 
 
 def _with_notes(judged: Diagnosis, model: SampleModel, *, converged: bool) -> Diagnosis:
-    """Return a diagnosis with the force of the jaws and with notes."""
+    """Return a diagnosis with the force of the jaws and with all notes."""
     likelihood, findings = judged.likelihood, judged.findings
     residuals = likelihood.problem.residuals
     grip = residuals.grip(likelihood.best)
@@ -158,7 +152,7 @@ def _with_notes(judged: Diagnosis, model: SampleModel, *, converged: bool) -> Di
         for finding in findings
         if finding.gaps
     ]
-    notes += [*_range_ends(likelihood, model), *_noise(likelihood)]
+    notes += [*_range_ends(likelihood, model), *judged.notes]
     notes += _pulling(grip, residuals.duration_s)
     if not converged:
         text = (
@@ -210,7 +204,8 @@ def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
     damper = [each for each in judged.findings if each.quantity.label == C_P.name]
     if damper:
         network = replace(network, c_p=np.array([damper[0].low or 0.0]))
-    noise_rad = residuals.noise_scale_rad if rejected else likelihood.noise_rad
+    misfit = rejected or np.isfinite(likelihood.independent)
+    noise_rad = residuals.noise_scale_rad if misfit else likelihood.noise_rad
     if ring := residuals.ring(network, noise_rad):
         yield Note(
             REJECTION if rejected else DOUBT,
@@ -237,68 +232,3 @@ def _pulling(grip: Grip | None, last_s: float) -> Iterator[Note]:
             f"With the best fit {grip.words()}. Without adhesion the jaws lost contact "
             "there: fit only the samples before that.",
         )
-
-
-def _noise(likelihood: Likelihood) -> Iterator[Note]:
-    """Yield doubts about the residuals and about the noise that was given."""
-    residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
-    least_rad = min(_NOISE_FREE * likelihood.noise_rad, _NOISE_FREE_OF_PEAK * residuals.peak_rad)
-    if misfit_rad < least_rad:
-        return
-    residual = residuals.left(likelihood.best)
-    growth = compute_growth(residual, residuals.rotation(likelihood.best))
-    rounding_rad = residuals.rounding_rad
-    doubts = list(doubts_about_noise(residual, growth, residuals.instrument, rounding_rad))
-    yield from (Note(DOUBT, doubt) for doubt in doubts)
-    if doubts and not residuals.coloured:
-        yield Note(
-            HARMLESS,
-            "If the set-up is right, measurement.noise_model: coloured, or --noise-model coloured, "
-            "gives intervals that allow for such noise.",
-        )
-    if _too_little(likelihood):
-        yield Note(
-            DOUBT,
-            f"The noise that was given is {likelihood.noise_rad / misfit_rad:.2g} times what the "
-            "fit leaves: its value, or its unit, is not the right one.",
-        )
-    # Outliers are noise of the recording: they make a fit doubtful, not wrong.
-    scale, even = residuals.noise_scale_rad, residual / growth
-    if np.ptp(growth):
-        scale = max(scale, estimate_noise(even, rounding_rad))
-    bulk = even[~outliers_of(even, rounding_rad)]
-    bulk_rad = float(np.sqrt(np.mean(bulk**2)))
-    if bulk_rad > _TOO_MUCH * scale:
-        yield _misfit(likelihood, bulk_rad / scale, residual)
-
-
-def _misfit(likelihood: Likelihood, times: float, residual: Array) -> Note:
-    """Return the note on a misfit that is some times the noise."""
-    if has_uneven_noise(residual, likelihood.problem.residuals.rounding_rad):
-        return Note(
-            DOUBT,
-            "The noise differs from one part of the trace to another, and the intervals do not "
-            "allow for that: leave out the readings that scatter most (--from, --until), or give "
-            "standard deviations (--sd).",
-        )
-    if has_fast_noise(likelihood.problem.residuals, likelihood.best):
-        return Note(
-            DOUBT,
-            f"The misfit is {times:.2g} times the noise of neighbouring readings, as of noise that "
-            "is correlated for a short time: the intervals are too narrow.",
-        )
-    return Note(
-        REJECTION,
-        f"The misfit is {times:.2g} times the noise of the trace: "
-        f"{likelihood.problem.residuals.instrument.suspects(unit=True)} is not the right one.",
-    )
-
-
-def _too_little(likelihood: Likelihood) -> bool:
-    """Return True if the misfit is too small for the given noise, by a chi-squared test."""
-    from scipy.special import chdtr
-
-    residuals = likelihood.problem.residuals
-    share = likelihood.misfit_rad / likelihood.noise_rad
-    left = max(residuals.free - len(likelihood.best), 1)
-    return share < _TOO_LITTLE and float(chdtr(left, residuals.samples * share**2)) < FALSE_ALARM

@@ -1,12 +1,17 @@
-"""Notes on a fit, their weights, and the tests of its residuals that give reasons for them.
+"""Notes on a fit, their weights, and those that its residuals give reason for.
 
 The heaviest note decides the status of a fit: ok, doubtful or rejected (`compute_status`).
-Residuals are tested for white noise, each test at the level `FALSE_ALARM`: correlation of
-neighbours, else the cumulative periodogram; means over stretches; number of outliers. Noise that
-grows with the rotation is told first, and the other tests are of what it leaves. A noise model
-may itself be misfit (`find_slow_misfit`): if it is correlated for too long. A misfit may be noise
-(`has_fast_noise`, `has_uneven_noise`): if it is correlated for a short time, or if the noise
-differs from one part of the trace to another.
+Residuals are tested for white noise (`biogrip.judging.whiteness`), each test at the level
+`FALSE_ALARM`: correlation of neighbours, the cumulative periodogram, means over stretches,
+outliers. Noise that grows with the rotation is told first, and the other tests are of what it
+leaves.
+
+What is correlated beyond chance (`CERTAIN_MISFIT`) and larger than the scatter of neighbouring
+readings may be noise all the same: if it is correlated for a short time (`has_fast_noise`), or if
+the noise differs from one part of the trace to another (`has_uneven_noise`). Else it is misfit. One
+of more than a few per cent of the peak rejects the fit. Of a smaller one limits are given that
+count independent residuals only: the fit is good to so much of the peak, which is doubtful, not
+wrong. A noise model may be misfit, too (`find_slow_misfit`): if it is correlated for too long.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,9 +19,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted
-from biogrip.fit.noise_model_fit import FAR, NoiseModelLikelihood, outliers_of
+from biogrip.fit.noise_model_fit import (
+    NoiseModelLikelihood,
+    absorbed,
+    compute_growth,
+    outliers_of,
+)
+from biogrip.judging.likelihood import Likelihood
+from biogrip.judging.whiteness import correlated, count_independent, far_out, uneven, wandering
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, estimate_noise
@@ -61,114 +73,193 @@ def find_reasons(notes: Sequence[Note]) -> list[str]:
 FALSE_ALARM = 0.003
 """Significance level of each test: share of traces with white noise that fail it."""
 
-# Largest correlation of neighbouring residuals, in standard deviations of that of white noise.
-_CORRELATED = 5.0
-# Stretches over which residuals are averaged, and readings in the shortest.
-_STRETCHES, _SHORTEST = 20, 5
+CERTAIN_MISFIT = 0.001
+"""The same of the test by which a fit is rejected."""
+
+# A misfit larger than the scatter of neighbouring readings by this factor changes limits.
+_TOO_MUCH = 1.2
+# A misfit of this share of the peak is far off.
+_FAR_OFF = 0.02
+# A misfit below these shares of the noise and of the peak is that of a trace without noise.
+_NOISE_FREE, _NOISE_FREE_OF_PEAK = 0.01, 1e-3
+# A misfit below this share of the given noise is reported: noise is rarely known better.
+_TOO_LITTLE = 0.5
+# Of more readings no basis is formed: what a fit absorbs of so many is nothing.
+_MANY = 100_000
+# Most outliers that are named.
+_NAMED = 5
 
 
-def doubts_about_noise(
-    residual: Array, growth: Array, instrument: Instrument, rounding_rad: float = 0.0
-) -> Iterator[str]:
-    """Yield a sentence for each test of white noise that the residuals of a fit fail.
+@dataclass(frozen=True)
+class Remainder:
+    """What a fit leaves."""
 
-    Parameters
-    ----------
-    residual, growth : (n_samples,)
-        Residuals of the fit, and growth of the noise with the rotation, see `compute_growth`.
-    instrument
-        The instrument, for its words.
-    rounding_rad
-        Step of the readings.
-    """
-    from scipy.special import ndtr, pdtrc
+    notes: list[Note]
+    """Doubts about it and about the noise that was given."""
+    independent: float | None = None
+    """How many residuals count as independent, if those of neighbours depend on each other."""
 
-    read, wrong = instrument.read.name, instrument.suspects()
-    many = f"{read}s" if instrument.has_jaws else "readings"
+
+def examine_residuals(likelihood: Likelihood) -> Remainder:
+    """Test what the best fit of a trace leaves for noise, and for misfit."""
+    residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
+    least_rad = min(_NOISE_FREE * likelihood.noise_rad, _NOISE_FREE_OF_PEAK * residuals.peak_rad)
+    if misfit_rad < least_rad:
+        return Remainder([])
+    residual, directions = _left(residuals, likelihood.best)
+    growth = compute_growth(residual, residuals.rotation(likelihood.best))
+    basis = absorbed(directions / growth)
+    time_s, rounding_rad = residuals.trace.time_s, residuals.rounding_rad
+    struck = outliers_of(residual / growth, rounding_rad)
+    if far_out(residual / growth, struck, len(basis)) >= FALSE_ALARM:
+        struck[:] = False
+    # Outliers are noise of the recording: they make a fit doubtful, not wrong.
+    bulk = (residual / growth)[~struck]
+    basis = absorbed(basis[:, ~struck]) if struck.any() else basis
+    scale = residuals.noise_scale_rad
     if np.ptp(growth):
+        scale = max(scale, estimate_noise(residual / growth, rounding_rad))
+    times = float(np.sqrt(np.mean(bulk**2))) / scale
+    _, chance = correlated(bulk, basis)
+    notes: list[Note] = []
+    found = None
+    if chance < CERTAIN_MISFIT and times > _TOO_MUCH:
+        found = _misfit(likelihood, residual, bulk, times, scale)
+        notes += found.notes
+    doubts = [
+        *_about_growth(growth, residuals.instrument),
+        *([] if found else _about_colour(bulk, basis, residuals.instrument)),
+        *_about_outliers(time_s, struck),
+    ]
+    notes += (Note(DOUBT, doubt) for doubt in doubts)
+    if notes and not residuals.coloured and compute_status(notes) == DOUBTFUL:
+        notes.append(
+            Note(
+                HARMLESS,
+                "If the set-up is right, measurement.noise_model: coloured, or --noise-model "
+                "coloured, gives intervals that allow for such noise.",
+            )
+        )
+    if not found and _is_far_from_given(likelihood):
+        notes.append(
+            Note(
+                DOUBT,
+                f"The noise that was given is {likelihood.noise_rad / misfit_rad:.2g} times what "
+                "the fit leaves: its value, or its unit, is not the right one.",
+            )
+        )
+    return Remainder(notes, found.independent if found else None)
+
+
+def _left(residuals: Residuals, log_parameters: Array) -> tuple[Array, Array]:
+    """Return residuals, and the directions that the fit absorbs, (n_directions, n_samples)."""
+    if residuals.samples > _MANY:
+        return residuals.left(log_parameters), np.zeros((0, residuals.samples))
+    residual, slopes = residuals(log_parameters)
+    return residual, np.vstack((slopes, residuals.trace.condensed.nuisance))
+
+
+def _misfit(
+    likelihood: Likelihood, residual: Array, bulk: Array, times: float, scale: float
+) -> Remainder:
+    """Return the note on a misfit that is some times the noise, and whether it widens limits."""
+    residuals = likelihood.problem.residuals
+    if has_uneven_noise(residual, residuals.rounding_rad):
+        text = (
+            "The noise differs from one part of the trace to another, and the intervals do not "
+            "allow for that: leave out the readings that scatter most (--from, --until), or give "
+            "standard deviations (--sd)."
+        )
+        return Remainder([Note(DOUBT, text)])
+    independent = count_independent(bulk)
+    allowed = f"The limits count {max(independent, 1):.2g} of {len(bulk)} residuals as independent."
+    if has_fast_noise(residuals, likelihood.best):
+        text = (
+            f"The misfit is {times:.2g} times the noise of neighbouring readings, as of noise that "
+            f"is correlated for a short time. {allowed}"
+        )
+        return Remainder([Note(DOUBT, text)], independent)
+    share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak_rad
+    suspects = residuals.instrument.suspects(unit=True)
+    if share < _FAR_OFF:
+        text = (
+            f"The fit is good to {100 * share:.2g} % of the peak; the rest, {times:.2g} times the "
+            f"noise of the trace, is not noise: {suspects} is not quite the right one. {allowed}"
+        )
+        return Remainder([Note(DOUBT, text)], independent)
+    text = (
+        f"The misfit is {times:.2g} times the noise of the trace, and {100 * share:.2g} % of the "
+        f"peak: {suspects} is not the right one."
+    )
+    return Remainder([Note(REJECTION, text)])
+
+
+def _about_growth(growth: Array, instrument: Instrument) -> Iterator[str]:
+    """Yield a sentence on noise that grows with what is read, (n_samples,)."""
+    if np.ptp(growth):
+        read = instrument.read.name
+        many = f"{read}s" if instrument.has_jaws else "readings"
         low, high = np.quantile(growth, (0.05, 0.95))
         yield (
             f"The noise grows with the {read}: it is {high / low:.2g} times as large for the "
             f"largest tenth of the {many} as for the smallest, and neither the weights of the "
             "readings nor the intervals allow for that."
         )
-        residual = residual / growth
-    correlation = float(np.dot(residual[1:], residual[:-1]) / np.dot(residual, residual))
-    chance = uneven(residual)
-    if abs(correlation) > _CORRELATED / np.sqrt(len(residual)):
+
+
+def _about_colour(residual: Array, basis: Array, instrument: Instrument) -> Iterator[str]:
+    """Yield a sentence for each test of white noise that residuals, (n_samples,), fail."""
+    wrong = instrument.suspects()
+    correlation, chance = correlated(residual, basis)
+    if chance < FALSE_ALARM:
         yield (
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
             f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {wrong} "
             "is not the right one."
         )
-    elif chance < FALSE_ALARM:
+    elif (chance := uneven(residual, basis)) < FALSE_ALARM:
         yield (
             "The residual has more of some frequencies than of others, as white noise has only "
             f"{one_in(chance)} traces: the intervals are wrong, or {wrong} is."
         )
-    chance = wandering(residual)
+    chance = wandering(residual, basis)
     if chance < FALSE_ALARM:
         yield (
             "The residual wanders: its means over stretches of the trace scatter as much as those "
             f"of white noise do only {one_in(chance)} traces. It contains something slow that the "
             "model lacks, perhaps a drift of the instrument: the intervals are too narrow."
         )
-    far = int(np.count_nonzero(outliers_of(residual, rounding_rad)))
-    # Poisson's distribution of their number in Gaussian noise.
-    chance = float(pdtrc(far - 1, 2 * len(residual) * ndtr(-FAR))) if far else 1.0
-    if chance < FALSE_ALARM:
+
+
+def _about_outliers(time_s: Array, struck: BoolArray) -> Iterator[str]:
+    """Yield a sentence that names outliers by their times."""
+    far = time_s[struck]
+    if len(far):
+        named = ", ".join(f"{each:.6g} s" for each in far[:_NAMED])
+        more = f" and {len(far) - _NAMED} more" if len(far) > _NAMED else ""
         yield (
-            f"Beyond {FAR:g} standard deviations from the samples around: "
-            f"{counted(far, 'outlier')}, as of Gaussian noise only {one_in(chance)} traces. "
-            "Outliers distort the fit."
+            f"{counted(len(far), 'outlier')}, at {named}{more} of the protocol: further from the "
+            "fit than noise as that of the other readings is. Outliers distort the fit."
         )
+
+
+def _is_far_from_given(likelihood: Likelihood) -> bool:
+    """Return True if the misfit is far from the noise that was given, by a chi-squared test."""
+    from scipy.special import chdtr, chdtrc
+
+    if likelihood.freedom < np.inf:
+        return False
+    residuals = likelihood.problem.residuals
+    share = likelihood.misfit_rad / likelihood.noise_rad
+    left = max(residuals.free - len(likelihood.best), 1)
+    sum_of_squares = residuals.samples * share**2
+    too_little = share < _TOO_LITTLE and float(chdtr(left, sum_of_squares)) < FALSE_ALARM
+    return too_little or (share > _TOO_MUCH and float(chdtrc(left, sum_of_squares)) < FALSE_ALARM)
 
 
 def one_in(chance: float) -> str:
     """Return a probability in words, e.g. ``"once in 2e+03"``."""
     return f"once in {1 / max(chance, 1e-300):.1g}"
-
-
-def wandering(residual: Array) -> float:
-    """Return the p-value of a chi-squared test of means over stretches of white noise.
-
-    The statistic is the sum of n_i m_i^2 / sigma^2 over stretches of n_i readings and mean
-    m_i, with a degree of freedom each; a fit only lowers it. The test detects parts of the
-    spectrum below some ten periods a trace, however small they are beside single readings' noise.
-    """
-    from scipy.special import chdtrc
-
-    stretches = min(_STRETCHES, len(residual) // _SHORTEST)
-    if stretches < 2:
-        return 1.0
-    parts = np.array_split(residual, stretches)
-    scatter = sum(len(part) * float(np.mean(part)) ** 2 for part in parts)
-    return float(chdtrc(stretches, scatter / float(np.mean(np.square(residual)))))
-
-
-def uneven(residual: Array) -> float:
-    """Return the p-value of the cumulative periodogram test of white noise [1]_.
-
-    The statistic is the largest distance between the cumulative periodogram and a straight
-    line, with Kolmogorov's distribution. The test detects noise with a correlation time of some
-    readings and too small a share to correlate neighbours.
-
-    References
-    ----------
-    .. [1] J. Durbin, Tests for serial correlation in regression analysis based on the periodogram
-       of least-squares residuals, Biometrika 56 (1969), 1-15.
-    """
-    from scipy.fft import prev_fast_len
-    from scipy.special import kolmogorov
-
-    # A transform takes many times the memory if its length has no small factors.
-    residual = residual[: prev_fast_len(len(residual))]
-    power = np.abs(np.fft.rfft(residual)[1 : (len(residual) + 1) // 2]) ** 2
-    if len(power) < 2:
-        return 1.0
-    reached = np.cumsum(power)[:-1] / np.sum(power)
-    shares = np.arange(1, len(power)) / len(power)
-    return float(kolmogorov(np.sqrt(len(power)) * np.max(np.abs(reached - shares))))
 
 
 # Autocorrelated noise with most of the variance, and slower than this share of the trace, is

@@ -20,7 +20,7 @@ References
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from statistics import NormalDist
 
@@ -63,6 +63,31 @@ class Likelihood:
     profile that levels off between `threshold` and this would have a limit by chance alone."""
     freedom: float = inf
     """Degrees of freedom of the noise's estimated variance; infinite if the noise is known."""
+
+    confidence: float = 0.95
+    """Of the limits."""
+    independent: float = inf
+    """How many residuals count as independent, if what the fit leaves is misfit."""
+
+    def as_misfit(self, independent: float) -> "Likelihood":
+        """Return the likelihood if what the fit leaves is misfit, not noise.
+
+        So many residuals count as independent. They estimate the size of the misfit, with at least
+        one degree of freedom; the noise is as much larger as makes all readings worth as many.
+        """
+        from scipy.special import fdtri
+
+        freedom = max(independent - len(self.best), 1.0)
+        noise_rad = self.misfit_rad * math.sqrt(self.problem.residuals.samples / freedom)
+        threshold, certainty = (fdtri(1, freedom, level) for level in (self.confidence, CERTAIN))
+        return replace(
+            self,
+            noise_rad=noise_rad,
+            threshold=float(threshold),
+            certainty=float(certainty),
+            freedom=freedom,
+            independent=independent,
+        )
 
     def increase(self, misfit_rad: float) -> float:
         """Return the increase of chi^2 over the optimum."""
@@ -113,7 +138,14 @@ def make_likelihood(
         freedom = float(min(left, problem.residuals.freedom))
         threshold, certainty = fdtri(1, freedom, levels)
     return Likelihood(
-        problem, best, misfit_rad, noise_rad, float(threshold), float(certainty), freedom
+        problem,
+        best,
+        misfit_rad,
+        noise_rad,
+        float(threshold),
+        float(certainty),
+        freedom,
+        confidence,
     )
 
 

@@ -1,0 +1,168 @@
+"""Tests of the residuals of a fit for white noise, each with its chance for the trace's own fit.
+
+A fit of p parameters to n readings leaves M e of white noise e, where M = 1 - Q^T Q projects out
+the directions Q that it absorbs. So ratios of quadratic forms of residuals, e^T M A M e / e^T M e,
+have moments that are traces of M A, and follow nearly a beta distribution with the same mean and
+variance, whatever the number of readings, their times and the standard deviation of the noise
+[1]_. That of successive differences tests for correlation, that of means over stretches for what
+is slow.
+
+References
+----------
+.. [1] J. Durbin and G. S. Watson, Testing for serial correlation in least squares regression II,
+   Biometrika 38 (1951), 159-177: section 4.
+.. [2] J. Durbin, Tests for serial correlation in regression analysis based on the periodogram of
+   least-squares residuals, Biometrika 56 (1969), 1-15.
+.. [3] R. D. Cook and S. Weisberg, Residuals and Influence in Regression, Chapman and Hall, 1982:
+   section 2.2.2, the test for an outlier.
+.. [4] A. Sokal, Monte Carlo methods in statistical mechanics, in: Functional Integration,
+   Springer, 1997: the integrated autocorrelation time.
+"""
+
+import numpy as np
+
+from biogrip.arrays import Array, BoolArray
+
+# Stretches over which residuals are averaged, and readings in the shortest.
+_STRETCHES, _SHORTEST = 20, 5
+
+
+def correlated(residual: Array, basis: Array) -> tuple[float, float]:
+    """Return the correlation of neighbouring residuals, and the chance of as much in white noise.
+
+    The statistic is that of Durbin and Watson, d = sum (r_i+1 - r_i)^2 / sum r_i^2 [1]_, the
+    correlation 1 - d/2 relative to the mean of d; the chance is that of a smaller d.
+
+    Parameters
+    ----------
+    residual : (n_samples,)
+        Residuals of a fit, over the noise's standard deviation where that is not the same.
+    basis : (n_directions, n_samples)
+        What the fit absorbs, orthonormal rows; see `biogrip.fit.noise_model_fit.absorbed`.
+    """
+    n = len(residual)
+    observed = float(np.sum(np.diff(residual) ** 2) / np.sum(residual**2))
+    differences = np.diff(basis)
+    # A Q^T, for the matrix A = D^T D of differences D.
+    through = np.zeros_like(basis)
+    through[:, 1:] += differences
+    through[:, :-1] -= differences
+    within = differences @ differences.T
+    first = 2 * (n - 1) - float(np.trace(within))
+    second = 2 * (3 * n - 4) - 2 * float(np.sum(through**2)) + float(np.sum(within**2))
+    free = n - len(basis)
+    chance = _chance_of_less(observed, first, second, free, 4.0)
+    return 1 - observed * free / first, chance
+
+
+def wandering(residual: Array, basis: Array) -> float:
+    """Return the chance of means over stretches of white noise that scatter as much.
+
+    The statistic is the share of the sum of squares that these means have. The test detects parts
+    of the spectrum below some ten periods a trace, however small they are beside single readings'
+    noise.
+    """
+    n, count = len(residual), min(_STRETCHES, len(residual) // _SHORTEST)
+    if count < 2:
+        return 1.0
+    sizes = np.array([len(part) for part in np.array_split(residual, count)])
+    starts = np.append(0, np.cumsum(sizes)[:-1])
+
+    def averaged(rows: Array) -> Array:
+        sums: Array = np.add.reduceat(rows, starts, axis=-1) / np.sqrt(sizes)
+        return sums
+
+    observed = float(np.sum(averaged(residual) ** 2) / np.sum(residual**2))
+    means = averaged(basis)
+    within = means @ means.T
+    first = count - float(np.trace(within))
+    second = count - 2 * float(np.trace(within)) + float(np.sum(within**2))
+    free = n - len(basis)
+    if first < 1e-6 * count:
+        return 1.0
+    # The share of the rest is small where that of the means is large.
+    return _chance_of_less(1 - observed, free - first, free - 2 * first + second, free, 1.0)
+
+
+def _chance_of_less(observed: float, first: float, second: float, free: int, most: float) -> float:
+    """Return the chance of a smaller ratio r^T A r / r^T r of what a fit leaves of white noise.
+
+    The traces of M A and of its square are given, and the largest that the ratio can be.
+    """
+    from scipy.special import betainc
+
+    mean = first / free
+    variance = 2 * (second - first**2 / free) / (free * (free + 2))
+    share = mean / most
+    weight = share * (1 - share) / (variance / most**2) - 1
+    chance = betainc(share * weight, (1 - share) * weight, min(max(observed / most, 0.0), 1.0))
+    return float(chance)
+
+
+def uneven(residual: Array, basis: Array) -> float:
+    """Return the p-value of the cumulative periodogram test of white noise [2]_.
+
+    The statistic is the largest distance between the cumulative periodogram and that of what the
+    fit leaves of white noise, with Kolmogorov's distribution. The test detects noise with a
+    correlation time of some readings and too small a share to correlate neighbours.
+    """
+    from scipy.fft import prev_fast_len
+    from scipy.special import kolmogorov
+
+    # A transform takes many times the memory if its length has no small factors.
+    n = prev_fast_len(len(residual))
+    places = slice(1, (n + 1) // 2)
+    power = np.abs(np.fft.rfft(residual[:n])[places]) ** 2
+    if len(power) < 2:
+        return 1.0
+    expected = np.full(len(power), float(n))
+    for row in basis:
+        expected -= np.abs(np.fft.rfft(row[:n])[places]) ** 2
+    reached = np.cumsum(power)[:-1] / np.sum(power)
+    shares = np.cumsum(expected)[:-1] / np.sum(expected)
+    return float(kolmogorov(np.sqrt(len(power)) * np.max(np.abs(reached - shares))))
+
+
+def far_out(residual: Array, struck: BoolArray, directions: int) -> float:
+    """Return the chance that white noise has readings as far out as those that are struck.
+
+    Their distances are in standard deviations of the others, with Student's distribution [3]_;
+    that of the nearest of them, and their number, have Poisson's distribution, and so has that of
+    the farthest alone.
+
+    Parameters
+    ----------
+    residual, struck : (n_samples,)
+        Residuals of a fit, and True for outliers.
+    directions
+        Number of directions that the fit absorbs.
+    """
+    from scipy.special import pdtrc, stdtr
+
+    count = int(np.count_nonzero(struck))
+    free = len(residual) - count - directions
+    if not count or free < 1:
+        return 1.0
+    scale = np.sqrt(np.sum(residual[~struck] ** 2) / free)
+    away = np.abs(residual[struck]) / scale
+    most, least = (2 * len(residual) * float(stdtr(free, -far)) for far in (away.max(), away.min()))
+    # Two tests, so each at half the level.
+    chance = 2 * min(float(pdtrc(0, most)), float(pdtrc(count - 1, least)))
+    return min(chance, 1.0)
+
+
+def count_independent(residual: Array) -> float:
+    """Count the independent ones among residuals that are a misfit: n over their correlation time.
+
+    The correlation time is the integrated one, 1 + 2 sum rho_k, in readings, up to the first
+    correlation rho_k that is not positive [4]_.
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    n = len(residual)
+    power = np.abs(rfft(residual, next_fast_len(2 * n))) ** 2
+    correlation = irfft(power)[:n]
+    correlation = correlation / correlation[0]
+    ends = np.flatnonzero(correlation <= 0)
+    until = ends[0] if len(ends) else n
+    return float(n / (1 + 2 * np.sum(correlation[1:until])))
