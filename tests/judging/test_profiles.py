@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import t
 
 from biogrip.arrays import Array, IntArray
 from biogrip.fit.local_fits import FINE
@@ -12,12 +13,25 @@ from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.limits import Brackets, crossings, find_limits
+from biogrip.judging.onset_profiles import profile_over_onset
 from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
+from biogrip.library import set_up, simulate
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.protocol import hold
 from biogrip.physics.sample_model import with_fixed
-from tests.helpers.problems import GRIPPER, MODEL, TORQUE, identified, of_case, posed_for, run
+from tests.helpers.problems import (
+    GRIPPER,
+    MODEL,
+    TORQUE,
+    case_problem,
+    clean,
+    identified,
+    of_case,
+    posed_for,
+    run,
+)
 from tests.helpers.scipy_fits import scipy_fit
 
 PARAMETERS = parameters_and_sum(MODEL)
@@ -110,6 +124,10 @@ def test_profiles_are_as_low_as_fits_with_the_parameter_known(case: str) -> None
         ends = likelihood.problem.low[index], likelihood.problem.high[index]
         np.testing.assert_allclose(found.log_values[[0, -1]], ends)
         assert np.min(found.increases) > -1e-3
+        # Points are close enough for a curve, and at the limits, where it crosses the threshold.
+        assert {found.low, found.high} - {None} <= {*found.log_values}
+        shown = np.sqrt(np.clip(found.increases, 0.0, 16.0))
+        assert np.max(np.abs(np.diff(shown))) <= 0.3
         for value, increase in zip(found.log_values[::6], found.increases[::6], strict=True):
             alone = rest_fitted(likelihood, [index], [value], likelihood.best)
             assert increase < alone + 1e-3 * (1 + alone)
@@ -124,9 +142,9 @@ def test_the_search_range_determines_no_combination() -> None:
     times = np.linspace(0.0, 400.0, 801)
     clean_rad = rotation(step_response(GRIPPER, MODEL.network(sample)), TORQUE, times)[0]
     noise = 4e-6 * np.random.default_rng(1).standard_normal(len(times))
-    case_problem = posed_for(MODEL, times, clean_rad + noise)
-    found, k_and_k_p = run("least_squares", case_problem), find_combinations(MODEL, [0, 1])
-    told = diagnose(case_problem, MODEL, found, confidence=0.95, noise_rad=1e-4)
+    problem = posed_for(MODEL, times, clean_rad + noise)
+    found, k_and_k_p = run("least_squares", problem), find_combinations(MODEL, [0, 1])
+    told = diagnose(problem, MODEL, found, confidence=0.95, noise_rad=1e-4)
     series = next(q for q in k_and_k_p if q.form == "series")
     # To first order it is known well enough to be looked at.
     assert told.likelihood.deviation(series) < 0.5
@@ -135,7 +153,7 @@ def test_the_search_range_determines_no_combination() -> None:
     assert one.high is not None
     assert told.trades == []
     # With one spring as soft as it may be, and the other any, it is lower than any limit.
-    soft, best = case_problem.low[0], told.likelihood.best
+    soft, best = problem.low[0], told.likelihood.best
     assert series.log(np.array([soft, *best[1:]])) < soft + 1e-3
     assert rest_fitted(told.likelihood, [0], [soft], best) < told.likelihood.threshold
 
@@ -156,19 +174,11 @@ def test_points_of_a_valley_take_one_call() -> None:
 
 def test_a_model_with_one_parameter_has_a_profile() -> None:
     damper = MODELS["damper"]
-    (problem,) = of_case("liquid_drop_2", 1)
-    case_problem = replace(
-        problem,
-        residuals=problem.residuals.of_model(damper),
-        low=problem.low[3:],
-        high=problem.high[3:],
-    )
-    best = fit_from([case_problem], np.array([2.0]))
+    (problem,) = case_problem(*clean("liquid_drop_2"), 1, damper)
+    best = fit_from([problem], np.array([2.0]))
     misfit_rad = float(best.misfit_rad[0])
-    assert misfit_rad == pytest.approx(
-        scipy_fit(case_problem, np.array([2.0])).misfit_rad, rel=1e-9
-    )
-    likelihood = make_likelihood(case_problem, best.x[0], misfit_rad, confidence=0.95)
+    assert misfit_rad == pytest.approx(scipy_fit(problem, np.array([2.0])).misfit_rad, rel=1e-9)
+    likelihood = make_likelihood(problem, best.x[0], misfit_rad, confidence=0.95)
     quantities = parameters_and_sum(damper)
     (limits,) = find_limits([likelihood], quantities)[0]
     ((alone,),) = compute_profiles([likelihood], quantities)
@@ -203,3 +213,33 @@ def test_a_basin_seen_on_the_way_is_followed_to_the_outer_end() -> None:
     assert np.isnan(crossing)
     assert brackets.increases[1, 0] == pytest.approx(2.7)
     assert brackets.x[1].tolist() == [[3.0, 1.0]]
+
+
+@pytest.mark.parametrize("taken_out", [{}, {"offset": True}, {"offset": True, "drift": True}])
+def test_unknown_noise_is_that_of_a_regression(taken_out: dict[str, bool]) -> None:
+    """Of n readings and p parameters, offset and drift included, n - p are left; Student's t."""
+    model, times = MODELS["maxwell"], np.arange(0.0, 400.0, 40.0)
+    response = rotation(step_response(GRIPPER, model.network([[1.0, 10.0]])), TORQUE, times)[0]
+    (problem,) = case_problem(times, response, 1, model, **taken_out)
+    best = scipy_fit(problem, np.log([1.0, 10.0]))
+    left = len(times) - 2 - len(taken_out)
+    found = make_likelihood(problem, best.log_parameters, best.misfit_rad, confidence=0.95)
+    assert found.noise_rad**2 == pytest.approx(len(times) * best.misfit_rad**2 / left)
+    assert found.threshold == pytest.approx(t.ppf(0.975, left) ** 2)
+
+
+def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
+    """With the best onset alone the damper would be known from below, too."""
+    experiment = set_up(GRIPPER, (hold(20.0, 1e-9), hold(40.0, 0.4e-9)), Sample("kelvin_voigt"))
+    times = np.arange(61.0)
+    exact = simulate(experiment, {"k_p": 6.0, "c_p": 30.0}, times)
+    trace = exact + 9e-6 * np.random.default_rng(1).standard_normal(len(times))
+    problem = experiment.of(times, trace)
+    found = run("least_squares", problem)
+    alone = diagnose(problem, experiment.model, found, confidence=0.95)
+    merged = profile_over_onset(alone, times)
+    certainty = alone.likelihood.certainty
+    for low_of, diagnosis in (([True, True], alone), ([True, False], merged)):
+        assert [finding.low is not None for finding in diagnosis.findings] == low_of
+        at_the_end = [finding.profile.increases[0] for finding in diagnosis.findings]
+        assert [increase > certainty for increase in at_the_end] == low_of
