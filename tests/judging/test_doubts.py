@@ -49,6 +49,17 @@ def test_white_noise_is_seldom_doubted() -> None:
     assert doubted <= expected + 4 * np.sqrt(expected)
 
 
+@pytest.mark.parametrize(("count", "doubted"), [(0, False), (1, False), (2, True)])
+def test_one_outlier_among_500_readings_is_chance_and_two_are_not(
+    count: int, doubted: bool
+) -> None:
+    """Beyond 4.5 standard deviations white noise has one in 300 traces, two in 200,000."""
+    residual = np.clip(np.random.default_rng(2).standard_normal(501), -3, 3)
+    residual[[100, 400][:count]] = 8.0
+    doubts = doubts_about_noise(residual, SAME[:501], instrument=GRIPPER)
+    assert any("outlier" in said for said in doubts) == doubted
+
+
 @pytest.mark.parametrize(
     ("parts", "said"),
     [

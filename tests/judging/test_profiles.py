@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import t
+from scipy.stats import norm, t
 
 from biogrip.arrays import Array, IntArray
 from biogrip.fit.local_fits import FINE
@@ -216,8 +216,11 @@ def test_a_basin_seen_on_the_way_is_followed_to_the_outer_end() -> None:
 
 
 @pytest.mark.parametrize("taken_out", [{}, {"offset": True}, {"offset": True, "drift": True}])
-def test_unknown_noise_is_that_of_a_regression(taken_out: dict[str, bool]) -> None:
-    """Of n readings and p parameters, offset and drift included, n - p are left; Student's t."""
+def test_noise_and_threshold_are_those_of_a_regression(taken_out: dict[str, bool]) -> None:
+    """Of n readings and p parameters, offset and drift included, n - p are left; Student's t.
+
+    Of known noise it is the normal distribution.
+    """
     model, times = MODELS["maxwell"], np.arange(0.0, 400.0, 40.0)
     response = rotation(step_response(GRIPPER, model.network([[1.0, 10.0]])), TORQUE, times)[0]
     (problem,) = case_problem(times, response, 1, model, **taken_out)
@@ -226,6 +229,8 @@ def test_unknown_noise_is_that_of_a_regression(taken_out: dict[str, bool]) -> No
     found = make_likelihood(problem, best.log_parameters, best.misfit_rad, confidence=0.95)
     assert found.noise_rad**2 == pytest.approx(len(times) * best.misfit_rad**2 / left)
     assert found.threshold == pytest.approx(t.ppf(0.975, left) ** 2)
+    known = make_likelihood(problem, found.best, best.misfit_rad, confidence=0.95, noise_rad=1e-6)
+    assert known.threshold == pytest.approx(norm.ppf(0.975) ** 2)
 
 
 def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:

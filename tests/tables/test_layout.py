@@ -22,13 +22,7 @@ def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
     assert "1.23e+03" in markdown
     assert "None" not in markdown + latex + page
     assert r"Fifty \% of a\_b." in latex
-    assert r"c \& d" in latex
     assert "c &amp; d" in page
-
-
-def test_a_cell_of_no_column_is_refused() -> None:
-    with pytest.raises(ValueError, match="no column: vlaue"):
-        Table("", (Column("value", "Value"),), [{"vlaue": 1.0}])
 
 
 def test_markup_in_a_cell_is_text_in_every_format(tmp_path: Path) -> None:
@@ -69,9 +63,5 @@ def test_regenerated_tables_are_the_same_bytes_or_their_lines_are_shown(tmp_path
     assert said[0] == f"the regenerated tables differ from {published}."
     assert said[-3:] == ["-3,4", "+3,5", "c.csv: is not published."]
     assert "text" not in str(error.value)
-    (made / "a.csv").write_text("".join(f"{n}\n" for n in range(1000)))
-    with pytest.raises(BiogripError) as error:
-        compare(published, [made / "a.csv"])
-    assert len(str(error.value).splitlines()) == 41
     with pytest.raises(BiogripError, match="holds no tables to compare with"):
         compare(published, [])
