@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
 
-from biogrip.figures.actuator import draw_comb
 from biogrip.figures.linearisation import draw_linearisation
 from biogrip.figures.style import styled
 from biogrip.records.identifications import DIFFERENCES
@@ -14,17 +13,6 @@ from biogrip.stages.model_difference import compare
 from tests.helpers.default import STUDY, seen, study_of
 
 CASE = "liquid_drop_1"
-
-
-def test_comb_has_every_finger_where_it_is() -> None:
-    with styled():
-        whole, _, curve = draw_comb(STUDY).axes
-    floating, fixed = whole.collections
-    assert len(floating.get_paths()) == len(fixed.get_paths()) == 66
-    outermost = max(np.hypot(*np.asarray(p.vertices).T).max() for p in fixed.get_paths())
-    # Outside the last finger is one more gap; arcs are splines, good to 2e-4.
-    assert outermost == pytest.approx(321 + 66 * 14 - 3, rel=3e-4)
-    assert curve.get_xlabel() == "voltage (V)"
 
 
 def test_each_case_is_compared_under_its_own_protocol_and_small_differences_are_yellow(

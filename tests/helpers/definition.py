@@ -162,23 +162,3 @@ def rise_at(
     ]
     held = FitConstraint(likelihood, quantity, limit)
     return held.increase(rng, count, (likelihood.best, *others))
-
-
-def rises_along(
-    likelihood: Likelihood, quantity: Quantity, limit: float, steps: int
-) -> tuple[float, float]:
-    """Rise at a limit, followed in small steps from the optimum, and back from beyond the limit.
-
-    They differ where the optimum's basin ends, or is no longer the lowest, close to the limit.
-    """
-    x, increases = likelihood.best, []
-    start = quantity.log(x)
-    ends = quantity.range(likelihood.problem.low, likelihood.problem.high)
-    beyond = float(np.clip(1.25 * limit - 0.25 * start, *ends))
-    there = np.linspace(start, limit, steps + 1)[1:]
-    on = np.linspace(limit, beyond, steps // 4 + 1)[1:]
-    for target in (*there, *on, *on[-2::-1], limit):
-        increase, x = FitConstraint(likelihood, quantity, float(target)).fitted(x)
-        if target == limit:
-            increases.append(increase)
-    return increases[0], increases[-1]

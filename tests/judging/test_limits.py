@@ -32,7 +32,7 @@ QUANTITIES = parameters_and_sum(MODEL)
 @pytest.mark.nightly
 def test_the_rise_at_a_limit_is_the_threshold(case: str, seed: int) -> None:
     found = list(misses(likelihood_for(case, seed), QUANTITIES))
-    assert len(found) >= 8
+    assert len(found) >= 3
     assert [miss for miss in found if abs(miss[-1]) > ALLOWED] == []
 
 

@@ -136,10 +136,3 @@ def test_every_seed_is_covered_once_whatever_there_is(
         assert covered == list(range(seeds))
         # Half-way through, the plan does not change: a restarted run continues.
         assert batch_names(seeds, size, made(folder, *plan[::2])) == plan
-
-
-def test_very_many_seeds_make_larger_batches_not_more() -> None:
-    assert len(batch_names(500)) == 1
-    assert {len(batch_names(seeds)) for seeds in (4_001, 6_001, 8_000)} == {8}
-    # But none that would take much memory.
-    assert len(batch_names(1_000_000)) == 1000

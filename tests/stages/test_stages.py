@@ -13,11 +13,10 @@ from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import Phase, Sampling, hold
 from biogrip.records.identifications import columns
 from biogrip.records.rows import write_rows
-from biogrip.records.traces import read_jaw_force, read_measurements, read_target
+from biogrip.records.traces import read_jaw_force, read_target
 from biogrip.stages import identification as identifications
 from biogrip.stages import judgement, recording
 from biogrip.stages import targets as target
-from biogrip.traces.columns import Columns
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import EXAMPLE
 
@@ -73,25 +72,6 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     np.testing.assert_allclose(
         rotation[until], bilateral[until], rtol=0, atol=1e-5 * rotation.max()
     )
-
-
-def test_rows_of_a_recording_without_a_number_are_counted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    case = STUDY.cases["liquid_drop_2"]
-    columns = Columns("time_s", "rotation_rad")
-    read = seen(gripper=case.gripper, problem=case.problem, columns=columns)
-    # The example is a trace of this gripper under this protocol.
-    text, rows = EXAMPLE.read_text(), 1 + np.arange(3) / 10
-    for gaps in ("", "".join(f"{400 + row:g},nan\n" for row in rows)):
-        trace, made = tmp_path / "trace.csv", tmp_path / "made.parquet"
-        trace.write_text(text + gaps)
-        recording.record(read, trace, made)
-        samples = len(read_measurements(made).time_s)
-        said = capsys.readouterr().out
-        warned = f"{trace}: Left out for want of a number: 3 rows of {samples + 3}."
-        assert (warned in said) == bool(gaps)
-        assert np.isfinite(read_measurements(made).rotation_rad[0]).all()
 
 
 def test_what_is_left_from_a_larger_study_is_not_joined(tmp_path: Path) -> None:

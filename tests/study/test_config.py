@@ -168,13 +168,3 @@ def test_numbers_of_the_command_line_are_numbers() -> None:
     assert (case.sampling.rate_Hz, case.block.measurement.drift) == (10.0, False)
     assert [phase.duration_s for phase in case.phases] == [200.0]
     assert (case.title, case.parameters["k"]) == ("5", 9.0)
-
-
-def test_what_is_wrong_on_the_command_line_is_said_of_it() -> None:
-    typed = {"evaluation": {"near_noise_tolerance": "few"}, "methods": ["gentic"]}
-    with pytest.raises(BiogripError) as caught:
-        load_study(overlaid(read_config(CONFIG), typed), [CONFIG], typed)
-    said = str(caught.value)
-    place = "command line, --config: "
-    assert f"{place}evaluation.near_noise_tolerance: found 'few', allowed is a number." in said
-    assert f"{place}methods[0]: found 'gentic'. Did you mean 'genetic'?" in said

@@ -168,11 +168,3 @@ def test_every_claim_of_the_published_study_has_a_verdict_and_evidence() -> None
     assert [(row["place"], row["claim"]) for row in rows] == [(c.place, c.words) for c in CLAIMS]
     assert {row["verdict"] for row in rows} == {REPLICATED, IN_PART, NOT, UNDECIDED}
     assert [row for row in rows if "Not here" in row["evidence"] or not row["evidence"]] == []
-
-
-def test_the_published_order_of_magnitude_is_that_of_the_published_history() -> None:
-    """As counted apart from this code, of the 50 seeds of the default study."""
-    rows = read_table(ROOT / "results" / "published" / "tables" / "claims.csv")
-    (early,) = (row for row in rows if "20th generation" in row["claim"])
-    assert early["verdict"] == IN_PART
-    assert "k 48 %, k_p 98 %, c 54 %" in early["evidence"]

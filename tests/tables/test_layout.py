@@ -62,6 +62,5 @@ def test_regenerated_tables_are_the_same_bytes_or_their_lines_are_shown(tmp_path
     said = str(error.value).splitlines()
     assert said[0] == f"the regenerated tables differ from {published}."
     assert said[-3:] == ["-3,4", "+3,5", "c.csv: is not published."]
-    assert "text" not in str(error.value)
     with pytest.raises(BiogripError, match="holds no tables to compare with"):
         compare(published, [])

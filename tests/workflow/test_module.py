@@ -54,9 +54,7 @@ use rule * from biogrip as biogrip_*
 use rule measurement from biogrip as biogrip_measurement with:
     resources: mem_mb=4321
     message: "Measuring with {{resources.mem_mb}} MB"
-
-use rule target from biogrip as biogrip_target with:
-    output: target="elsewhere/{{case}}.csv"
+    output: "elsewhere/{{case}}/{{batch}}.parquet"
 
 assert config == BEFORE
 
@@ -64,13 +62,13 @@ rule mine:
     output: "mine.txt"
     shell: "command -v python > {{output}}"
 """
-    made = ("elsewhere/liquid_drop_2.csv", "sub/results/measurements/liquid_drop_2")
-    run = host(tmp_path, text, "--", made[0], f"{made[1]}/seeds_0-0.parquet", "mine.txt")
+    run = host(tmp_path, text, "--", "elsewhere/liquid_drop_2/seeds_0-0.parquet", "mine.txt")
     assert run.status == 0, run.output
     assert "Measuring with 4321 MB" in run.output
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         *(".snakemake", "Snakefile", "elsewhere", "mine.txt", "sub")
     ]
+    assert (tmp_path / "sub/results/targets/liquid_drop_2.csv").is_file()
     # The host's rules find what they found before.
     assert (tmp_path / "mine.txt").read_text().strip() == shutil.which(
         "python", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}"

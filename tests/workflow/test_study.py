@@ -22,14 +22,10 @@ QUANTITIES = ["k", "k_p", "c", "c_p", "c + c_p"]
 PARAMETERS = ["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"]
 
 
-def test_targets_and_identifications_have_the_columns_they_promise(tiny: Path) -> None:
+def test_identifications_have_a_row_for_each_method_and_seed(tiny: Path) -> None:
+    """Whose misfit is the last of its history."""
     results = tiny / "results"
-    target = pd.read_csv(results / "targets" / f"{CASE}.csv")
-    assert list(target.columns) == ["time_s", "torque_Nm", "rotation_rad", "jaw_force_N"]
-    assert len(target) == 201
     found = pd.read_csv(results / "identifications" / f"{CASE}.csv")
-    ends = ["misfit", "noise_rms", "generations", "evaluations", "stop_reason"]
-    assert list(found.columns) == ["case", "method", "seed", *PARAMETERS, *ends]
     assert found["method"].unique().tolist() == METHODS
     assert found["seed"].tolist() == [0, 1] * 2
     history = pd.read_parquet(results / "histories" / f"{CASE}.parquet")
@@ -64,16 +60,15 @@ def test_a_summary_says_what_the_judgement_does(tiny: Path) -> None:
     assert page.count("data:image/png;base64,") == 3
 
 
-def test_a_recorded_trace_gets_what_a_simulated_one_gets(tiny: Path) -> None:
+def test_a_recorded_trace_has_verdicts_and_no_errors(tiny: Path) -> None:
     results = tiny / "results"
     errors = pd.read_csv(results / "tables" / "errors_mine.csv")
     assert errors["parameter"].tolist() == QUANTITIES
     assert errors[["target", "typical_error_percent"]].isna().all(axis=None)
     identified = pd.read_csv(results / "identifications" / "mine.csv")
-    assert len(identified) == len(METHODS)
     assert identified["noise_rms"].isna().all()
-    told = json.loads((results / "identifiability" / "mine.json").read_text())
-    k = next(item for item in told["quantities"] if item["quantity"] == "k")
+    verdicts = pd.read_csv(results / "tables" / "verdicts_mine.csv").set_index("quantity")
+    k = verdicts.loc["k"]
     assert k["low"] < identified["k_N_per_m"].iloc[-1] < k["high"]
 
 
@@ -98,7 +93,5 @@ def test_snakemakes_report_shows_tables_figures_and_pages(tiny: Path, tmp_path: 
     errors = (tiny / "results" / "tables" / "errors.csv").read_text().splitlines()
     described = page[page.index("workflow_desc") :]
     assert all(f"<td>{cell}</td>" in described for cell in errors[1].split(",")[:5] if cell)
-    for item in ("errors", "sampling evidence", "judged fit", "summary", "report"):
-        assert f'"{item}"' in page
-    for kind in ("data:text/html", "data:image/png"):
-        assert kind in page
+    for item in ('"judged fit"', '"summary"', '"report"', "data:text/html", "data:image/png"):
+        assert item in page
