@@ -2,8 +2,7 @@
 
 With a quantity held, SciPy searches all samples for the lowest chi^2 over what is left free,
 without a prior. A parameter is held by leaving it out; of a sum what is left free is the logarithm
-of the ratio of its two members. The starts are the best of many random points, some others of
-them, and what is handed in.
+of the ratio of its two members. The starts are random points, and what is handed in.
 """
 
 from collections.abc import Iterable
@@ -16,7 +15,6 @@ from biogrip.arrays import Array
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
 
-CANDIDATES = 400
 ROUGH, TIGHT = 1e-6, 1e-11
 # What the project says of branches that do not relax within the experiment.
 HINGE = 10.0
@@ -120,19 +118,9 @@ class FitConstraint:
 
     def increase(self, rng: np.random.Generator, count: int, starts: Iterable[Array] = ()) -> float:
         """Lowest rise of chi^2 from so many random starts, and some more."""
-        points = rng.uniform(self.low, self.high, (CANDIDATES, len(self.low)))
-        many = np.array([self.log_parameters(point) for point in points])
-        misfit = self._likelihood.problem.misfit(np.exp(many))
-        late = np.array([sum(max(u, 0.0) ** 2 for u in self._late(x)) for x in many])
-        increases = (
-            np.array([self._likelihood.increase(float(u)) for u in misfit]) + HINGE**2 * late
-        )
-        order = np.argsort(increases)
-        good = count // 3
-        first = np.concatenate(
-            (many[order[:good]], many[rng.permutation(order[good:])[good:count]])
-        )
-        found = sorted((self.fitted(x, ROUGH) for x in (*first, *starts)), key=lambda fit: fit[0])
+        random = rng.uniform(self.low, self.high, (count, len(self.low)))
+        first = [*starts, *map(self.log_parameters, random)]
+        found = sorted((self.fitted(x, ROUGH) for x in first), key=lambda fit: fit[0])
         return min(self.fitted(x)[0] for _, x in found[:3])
 
 

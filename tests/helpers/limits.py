@@ -12,7 +12,7 @@ from tests.helpers.problems import problem, run
 
 ALLOWED = 0.01
 # Random starts at a limit.
-STARTS = 6
+STARTS = 20
 
 
 def likelihood_for(case: str, seed: int) -> Likelihood:

@@ -10,6 +10,11 @@ import pytest
 
 from biogrip.figures.results import Fit
 from biogrip.fit.methods import METHODS
+from biogrip.page.answers import (
+    compare_with_paper,
+    say_what_traces_tell,
+    say_which_method_finds_it,
+)
 from biogrip.page.explorer import explorer
 from biogrip.page.page import entry_of
 from biogrip.records.identifications import read_identifications
@@ -80,6 +85,17 @@ def test_the_page_is_legible_and_no_column_of_the_first_table_is_clipped(
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert medium == "print" or page.evaluate(SMALLEST_LETTERS) >= 12
     opened.context.close()
+
+
+def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path) -> None:
+    tables = report.parent / "tables"
+    errors, compared = (read_table(tables / f"{name}.csv") for name in ("errors", "methods"))
+    verdicts = [row for file in tables.glob("verdicts_*.csv") for row in read_table(file)]
+    assert opened.page.locator("h1 + .answers p").all_inner_texts() == [
+        compare_with_paper(errors, verdicts, {}),
+        say_what_traces_tell(sorted(verdicts, key=lambda row: row["case"])),
+        say_which_method_finds_it(compared, "genetic algorithm"),
+    ]
 
 
 def test_full_tables_are_folded_and_can_be_downloaded(opened: Opened, report: Path) -> None:

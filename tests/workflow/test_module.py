@@ -54,7 +54,7 @@ use rule * from biogrip as biogrip_*
 use rule measurement from biogrip as biogrip_measurement with:
     resources: mem_mb=4321
     message: "Measuring with {{resources.mem_mb}} MB"
-    output: "elsewhere/{{case}}/{{batch}}.parquet"
+    output: measurements="elsewhere/{{case}}/{{batch}}.parquet"
 
 assert config == BEFORE
 
