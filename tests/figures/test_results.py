@@ -147,7 +147,9 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     (axes,) = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.parquet").axes
     colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]
     assert (colors.count(ALL_SEEDS), colors.count(FITTED)) == (others, 1)
-    assert axes.get_legend().get_texts()[0].get_text() == label
+    legend = axes.get_legend()
+    assert legend
+    assert legend.get_texts()[0].get_text() == label
 
 
 def scattered(overlay: str, identifications: Path) -> Any:

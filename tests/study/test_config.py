@@ -121,17 +121,17 @@ def test_cases_in_volts_and_in_torque_share_a_study(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("keys", "along"),
+    ("noise_model", "along"),
     [
-        ("noise_model: white", (False, False)),
-        ("noise_model: coloured", (True, True)),
-        ("noise_model: coloured, drift: false", (True, False)),
+        ("white", (False, False)),
+        ("coloured", (True, True)),
+        ("coloured, drift: false", (True, False)),
     ],
 )
-def test_a_coloured_noise_model_has_every_identification_fit_an_offset_and_a_drift(
-    tmp_path: Path, keys: str, along: tuple[bool, bool]
+def test_with_coloured_noise_an_offset_and_a_drift_are_fitted(
+    tmp_path: Path, noise_model: str, along: tuple[bool, bool]
 ) -> None:
-    study = load(tmp_path, f"measurement: {{rate_Hz: 1.0, {keys}}}")
+    study = load(tmp_path, f"measurement: {{rate_Hz: 1.0, noise_model: {noise_model}}}")
     assert {(case.problem.offset, case.problem.drift) for case in study.cases.values()} == {along}
 
 
