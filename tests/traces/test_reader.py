@@ -2,6 +2,7 @@
 
 import csv
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,19 +15,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from biogrip.errors import BiogripError
-from biogrip.physics.instruments import COMPLIANCE, INSTRUMENTS, MODULUS, ROTATION
+from biogrip.physics.instruments import COMPLIANCE, INSTRUMENTS, MODULUS, ROTATION, STRAIN
 from biogrip.traces.columns import TIME_UNITS, Columns, unit_of
 from biogrip.traces.reader import Recording, read_recording
 
 FILES = Path(__file__).with_name("files")
 KEPT: list[dict[str, Any]] = yaml.safe_load((FILES / "files.yaml").read_text(encoding="utf-8"))
+EXPORTS = [
+    ("anton_paar_intervals.utf16.csv", ("Time", "Relaxation Modulus", 1)),
+    ("trios.txt", ("Step time", "Modulus", 3)),
+]
 PLAIN = Columns("time_s", "rotation_rad")
 ROWS = tuple(f"{i},{i}e-6" for i in range(12))
 
 
 def columns_of(given: dict[str, Any]) -> Columns:
     quantity = INSTRUMENTS[given.get("quantity", "rotation")].read
-    return Columns(**{**given, "quantity": quantity})
+    usual = {"time": "time_s", "reading": "rotation_rad"}
+    return Columns(**{**usual, **given, "quantity": quantity})
 
 
 def first_last_sum(values: Any) -> list[float]:
@@ -39,32 +45,89 @@ def refusal(path: Path, columns: Columns = PLAIN) -> str:
     return str(error.value)
 
 
-@pytest.mark.parametrize("kept", KEPT, ids=lambda kept: f"{kept['file']} {kept['columns']}")
+@pytest.mark.parametrize("kept", KEPT, ids=lambda kept: kept.get("message", kept.get("form")))
 def test_a_kept_file_is_read_or_refused_as_its_table_says(
     kept: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The numbers are those of a reader by the csv module, from before pandas read the files."""
     monkeypatch.chdir(FILES)
-    path, columns = Path(kept["file"]), columns_of(kept["columns"])
-    if "lines" in kept:
+    path, columns = Path(kept.get("file", "plain.csv")), columns_of(kept.get("columns", {}))
+    if "lines" in kept or "text" in kept:
         lines = path.read_bytes().decode("latin-1").splitlines()
-        for number, line in kept["lines"].items():
+        for number, line in kept.get("lines", {}).items():
             lines[number - 1 : number] = [line]
         monkeypatch.chdir(tmp_path)
-        path.write_bytes("\n".join(lines).encode("latin-1"))
+        path.write_bytes(kept.get("text", "\n".join(lines)).encode("latin-1"))
     if "message" in kept:
-        assert refusal(path, columns) == kept["message"]
+        assert refusal(path, columns).startswith(f"{path}{kept['message']}")
         return
     found = read_recording(path, columns)
+    names_and_units = (
+        {"column": name, "unit": unit}
+        for name, unit in zip(columns.named.values(), kept["units"], strict=True)
+    )
+    form = {"encoding": "UTF-8", "separator": "commas", "decimal": "point", "rows": 12, "gaps": 0}
+    form |= {"columns": dict(zip(columns.named, names_and_units, strict=True)), **kept["form"]}
     assert found.recognised is not None
-    assert found.recognised.data() == kept["read_as"]
-    assert first_last_sum(found.lines) == kept["lines_read"]
+    assert found.recognised.data() == form
+    assert found.without_number == form["gaps"]
+    assert found.time_s[[0, -1]].tolist() == [form["first_s"], form["last_s"]]
     assert first_last_sum(found.rotation_rad) == pytest.approx(kept["reading"], rel=1e-14)
-    assert found.time_s.sum() == pytest.approx(kept["time_sum_s"], rel=1e-14)
-    assert found.without_number == kept["read_as"]["gaps"]
     if "sd" in kept:
         assert found.sd_rad is not None
         assert first_last_sum(found.sd_rad) == pytest.approx(kept["sd"], rel=1e-14)
+
+
+@pytest.mark.parametrize(("file", "wanted"), EXPORTS)
+def test_a_table_between_commas_is_that_between_tabs(
+    tmp_path: Path, file: str, wanted: tuple[str, str, int]
+) -> None:
+    time, reading, block = wanted
+    columns = columns_of({"time": time, "reading": reading, "quantity": "modulus", "block": block})
+    tabs = read_recording(FILES / file, columns)
+    text = (FILES / file).read_bytes().decode("utf-16" if "utf16" in file else "utf-8")
+    (tmp_path / "t.csv").write_text(text.replace(",", ".").replace("\t", ","), "utf-8")
+    commas = read_recording(tmp_path / "t.csv", columns)
+    for name in ("time_s", "rotation_rad", "lines"):
+        np.testing.assert_array_equal(getattr(commas, name), getattr(tabs, name))
+
+
+GAPS = ("", "NaN", "NA", "N/A", "-", '""', '" nan "', "n/a", "#N/A", "#NV", " ", "nan, ")
+NO_NUMBERS = ("abc", "1_0", "1.2.3", "0x1", "--", "1 2", "inf", "-1e999", "\0", '"3,5"', "#BEZUG!")
+
+
+def test_a_row_with_a_gap_is_left_out_and_counted(tmp_path: Path) -> None:
+    gaps = [row for gap in GAPS for row in (f"2.5,{gap}", f"{gap},1")]
+    text = "\n".join(["time_s,rotation_rad", *ROWS[:3], *gaps, "# note", "", "  ", *ROWS[3:]])
+    (tmp_path / "t.csv").write_text(text.replace("nan, ,1", "nan,1"))
+    found = read_recording(tmp_path / "t.csv", PLAIN)
+    assert found.without_number == len(gaps)
+    np.testing.assert_array_equal(found.time_s, np.arange(12))
+    assert found.lines.tolist() == [2, 3, 4, *range(len(gaps) + 8, len(gaps) + 17)]
+
+
+@pytest.mark.parametrize("cell", NO_NUMBERS)
+def test_a_cell_that_is_neither_a_number_nor_a_gap_is_refused(tmp_path: Path, cell: str) -> None:
+    path, shown = tmp_path / "t.csv", cell.strip('"')
+    for name, row in (("time_s", f"{cell},1"), ("rotation_rad", f"4, {cell}")):
+        path.write_text("\n".join(["time_s,rotation_rad", *ROWS[:4], row, *ROWS[5:]]))
+        place = f"{path}, line 6, column '{name}'"
+        assert refusal(path).startswith(f"{place}: found '{shown}', allowed is a finite number, or")
+
+
+ENCODINGS = {
+    "utf-8": "UTF-8",
+    "utf-8-sig": "UTF-8",
+    "utf-16": "UTF-16",
+    "utf-16-be": "UTF-16",
+    "cp1252": "Windows-1252",
+}
+
+
+def encoded(text: str, encoding: str) -> bytes:
+    """UTF-16 has its mark, in either order of the bytes."""
+    mark = BOM_UTF16_BE if encoding == "utf-16-be" else b""
+    return mark + text.encode(encoding)
 
 
 @settings(max_examples=60, deadline=None)
@@ -72,9 +135,8 @@ def test_a_kept_file_is_read_or_refused_as_its_table_says(
     values=st.lists(st.floats(-1e300, 1e300), min_size=10, max_size=20),
     decimal=st.sampled_from([(",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ",")]),
     line_end=st.sampled_from(["\n", "\r\n", "\r"]),
-    encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "cp1252"]),
+    encoding=st.sampled_from([*ENCODINGS]),
     quoting=st.sampled_from([csv.QUOTE_ALL, csv.QUOTE_MINIMAL, csv.QUOTE_NONNUMERIC]),
-    gap=st.sampled_from(["", "NaN", "nan", "NA", "N/A", "-", "n/a", "#N/A", "#NV", " "]),
     more=st.lists(st.sampled_from(["", "  ", "# 1,2", "#REF!", " #x", "##;1"]), max_size=3),
     seed=st.integers(0, 1000),
 )
@@ -85,14 +147,13 @@ def test_what_pandas_writes_is_read_to_the_last_bit(
     line_end: str,
     encoding: str,
     quoting: int,
-    gap: str,
     more: list[str],
     seed: int,
 ) -> None:
     """With gaps, other columns, comments and empty lines between the rows."""
     rng = np.random.default_rng(seed)
     times = np.cumsum(rng.uniform(1e-3, 10, len(values)))
-    frame = pd.DataFrame({"angle (µrad)": values, "note, é": 'any; "thing"', "time_s": times})
+    frame = pd.DataFrame({"angle, left (µrad)": values, "note, é": 'any; "thing"', "time_s": times})
     holes = rng.choice(len(values) + 1, 2)
     frame = pd.concat([frame[: holes[0]], frame[:0].reindex([0]), frame[holes[0] :]])
     path = tmp_path_factory.mktemp("t") / "t.csv"
@@ -102,14 +163,16 @@ def test_what_pandas_writes_is_read_to_the_last_bit(
         decimal=decimal[1],
         index=False,
         quoting=quoting,
-        na_rep=gap,
+        na_rep="NA",
         lineterminator="\n",
     )
     lines = path.read_text("utf-8").splitlines()
     for line in more:
         lines.insert(int(rng.integers(len(lines) + 1)), line)
-    path.write_bytes("".join(line + line_end for line in lines).encode(encoding))
-    found = read_recording(path, Columns("time_s", "angle (urad)"))
+    path.write_bytes(encoded("".join(line + line_end for line in lines), encoding))
+    found = read_recording(path, Columns("time_s", "angle, left (urad)"))
+    assert found.recognised is not None
+    assert found.recognised.encoding == ENCODINGS[encoding]
     np.testing.assert_array_equal(found.time_s, times)
     np.testing.assert_array_equal(found.rotation_rad, np.array(values) * 1e-6)
     assert found.without_number == 1
@@ -135,6 +198,7 @@ UNITS = {
     "Pa**-1": (1.0, COMPLIANCE.units),
     "Pa-1": (1.0, COMPLIANCE.units),
     "Pa\u207b\u00b9": (1.0, COMPLIANCE.units),
+    "%": (0.01, STRAIN.units),
 }
 
 
@@ -225,23 +289,12 @@ def test_what_was_recognised_is_a_small_table_unless_it_is_usual() -> None:
     form = read_recording(path, columns).recognised
     assert form is not None
     assert not form.is_usual(columns)
-    assert form.in_words(Path("t.tsv")).split("\n") == [
-        "t.tsv is read as",
-        "  encoding     Windows-1252",
-        "  separator    semicolons",
-        "  decimal      comma",
-        "  header_line  22",
-        "  units_line   24",
-        "  block        2",
-        "  blocks       2",
-        "  preamble     Interval: 2",
-        "  rows         12",
-        "  gaps         0",
-        "  first_s      12.5",
-        "  last_s       18.0",
-        "  time         Time, in s",
-        "  modulus      Relaxation Modulus, in kPa",
-    ]
+    first, *lines = form.in_words(Path("t.tsv")).split("\n")
+    said = {line[2:15].strip(): line[15:] for line in lines}
+    assert first == "t.tsv is read as"
+    assert said.pop("time") == "Time, in s"
+    assert said.pop("modulus") == "Relaxation Modulus, in kPa"
+    assert said == {key: str(value) for key, value in form.data().items() if key != "columns"}
     plain = read_recording(FILES / "plain.csv", PLAIN).recognised
     assert plain is not None
     assert plain.is_usual(PLAIN)
@@ -249,12 +302,16 @@ def test_what_was_recognised_is_a_small_table_unless_it_is_usual() -> None:
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
 def test_a_byte_that_is_no_text_is_placed_however_late_it_is(tmp_path: Path, newline: str) -> None:
-    """The byte 0x81 is no character of Windows-1252."""
-    lines = ["time_s,rotation_rad", *(f"{i},{i}" for i in range(5000)), "1,\x81"]
-    (tmp_path / "t.csv").write_bytes(newline.join(lines).encode("latin-1"))
-    assert ", line 5002: found the byte 0x81, allowed is text in UTF-8" in refusal(
-        tmp_path / "t.csv"
-    )
+    """The byte 0x81 is no character of Windows-1252; UTF-16 has no half of a pair."""
+    path = tmp_path / "t.csv"
+    text = newline.join(["time_s,rotation_rad", *(f"{i},{i}" for i in range(5000)), "1,"])
+    for content, byte in (
+        (text.encode() + b"\x81", "0x81"),
+        (BOM_UTF16_LE + text.encode("utf-16-le") + b"\0\xd8a", "0x00"),
+        (BOM_UTF16_BE + text.encode("utf-16-be") + b"\xd8\0a", "0xd8"),
+    ):
+        path.write_bytes(content)
+        assert f", line 5002: found the byte {byte}, allowed is text in UTF-8" in refusal(path)
 
 
 @pytest.mark.parametrize(
@@ -299,14 +356,15 @@ def is_sound(recording: Recording) -> bool:
 @pytest.mark.parametrize(
     "kept",
     [
-        next(kept for kept in KEPT if kept["file"] == name and "read_as" in kept)
-        for name in ("plain.csv", "anton_paar.utf16.csv", "trios.txt", "volts.cp1252.csv")
+        next(kept for kept in KEPT if kept.get("file") == name and "form" in kept)
+        for name in (None, "anton_paar_intervals.utf16.csv", "trios.txt", "volts.cp1252.csv")
     ],
-    ids=lambda kept: kept["file"],
+    ids=lambda kept: kept.get("file"),
 )
 def test_a_damaged_file_is_refused_or_leaves_a_trace(kept: dict[str, Any], tmp_path: Path) -> None:
-    content, rng = (FILES / kept["file"]).read_bytes(), np.random.default_rng(5)
-    columns, path, read = columns_of(kept["columns"]), tmp_path / "t.csv", 0
+    content = (FILES / kept.get("file", "plain.csv")).read_bytes()
+    columns, rng = columns_of(kept.get("columns", {})), np.random.default_rng(5)
+    path, read = tmp_path / "t.csv", 0
     for _ in range(60):
         path.write_bytes(damaged(content, rng))
         with suppress(BiogripError):
