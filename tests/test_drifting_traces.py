@@ -113,7 +113,10 @@ def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(
 def test_under_a_constant_torque_a_drift_is_not_told_from_flow(tmp_path: Path) -> None:
     """A drop that flows, read as one that does not, is not said to drift."""
     held = tmp_path / "held.yaml"
-    held.write_text("protocol: {phases: [{duration_s: 200.0, torque_Nm: 1.6e-9}]}\n")
+    held.write_text(
+        "protocol: {phases: [{duration_s: 200.0, torque_Nm: 1.6e-9}]}\n"
+        "model_selection: {models: []}\n"
+    )
     first = TIMES <= 200
     file = write_trace(tmp_path / "t.csv", TIMES[first], trace(0, 0 * DRIFT)[first])
     (found,) = identify_batch([asked(file, model="kelvin_voigt", config=held)], None).found
