@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from biogrip.terminal import QUIET
-from tests.helpers.identified import by_quantity, identify, write_trace
+from tests.helpers.identified import by_quantity, identify
 
 READ = ("--time", "Time", "--reading", "modulus=Relaxation Modulus", "--model", "liquid_drop")
 BEGINS_S = 7.0
@@ -79,12 +79,3 @@ def test_readings_of_a_rounded_clock_are_averaged_and_counted(tmp_path: Path) ->
     notes = found(trace)["notes"]
     assert {"weight": "harmless", "text": "Averaged at repeated times: 58 readings."} in notes
     assert found(trace)["samples"] in (30, 31)
-
-
-def test_a_usual_file_is_read_without_a_word(tmp_path: Path) -> None:
-    trace = write_trace(tmp_path / "plain.csv", TIMES, MODULI, "time_s,modulus_Pa")
-    few = config(tmp_path / "few.yaml")
-    command = (trace, "--reading", "modulus=modulus_Pa", "--model", "liquid_drop", "--config", few)
-    status, _, said = identify(*command)
-    assert (status, said) == (0, "")
-    assert "read_as" not in found(trace)

@@ -72,6 +72,7 @@ def test_the_example_gives_its_truth(example: tuple[str, dict[str, Any]]) -> Non
     assert quantities["c_p"]["high"] > truth["c_p"]
     assert found["noise_rad"] == pytest.approx(0.05 * 6.7e-5, rel=0.3)
     assert found["notes"] == []
+    assert "read_as" not in found
     assert set(found["versions"]) == {"biogrip", "numpy", "scipy"}
     assert found["by_default"] == ["gripper", "protocol"]
 
@@ -137,7 +138,8 @@ def test_known_deviations_are_weights_of_the_fit(tmp_path: Path) -> None:
         np.testing.assert_allclose(sd_rad[100:], expected[100:], rtol=0.02)
 
 
-REFUSED = {
+# Arguments of `identify`, and what is said of them.
+OPTIONS = {
     "--noise nan": "--noise: measurement.noise_rad: found 'nan', allowed is a number.",
     "--noise-model pink": "found 'pink'. Allowed: white, coloured.",
     "--noise-model coloured --noise 1e-6": "--noise: measurement.noise_rad: is that of white noise",
@@ -149,22 +151,76 @@ REFUSED = {
     "--fix k=0": "--fix: fixed.k: found 0, allowed is at least 1e-18 and at most 1e+12 N/m.",
     "--fix kp=1": "--fix: fixed.kp: is no parameter of the sample, which has k, k_p, c, c_p. Did",
     "--model maxwel": "--model: sample.model: found 'maxwel'. Did you mean 'maxwell'?",
+    "--model generalized_maxwell_99": "sample.model: found 'generalized_maxwell_99'",
     "--sd sd": "found no such column, allowed are time_s, rotation_rad.",
+    "--start soon": "--start: measurement.start_s: found 'soon', allowed is",
+    "--start=": "--start: measurement.start_s: found '', allowed is",
     "--reading strian=x": "--reading: measurement.strian: unknown key. Did you mean 'strain'?",
     "--time=": "--time: measurement.time: found '' of 0 characters, allowed are at least 1.",
     f"--config {'x' * 300}": "File name too long",
+    "--config bad.yaml": "bad.yaml, line 1: seedz: unknown key",
+    "--report theirs.html": "biogrip did not write it",
+    "--report x.html --csv x.html": "to be written twice",
+}
+WRITTEN = {
+    "a.csv": "a.csv: is read; allowed is another file to write.",
+    "link.csv": "link.csv: is read; allowed is another file to write.",
+    "b.csv": "b.csv: is there, and biogrip did not write it; allowed is another name",
+    "link.json": "link.json: is there, and biogrip did not write it; allowed is another name",
+    ".": "cannot be written; allowed is a file in a folder that you may write to.",
+    "nowhere/x.json": "cannot be written; allowed is a file in a folder that you may write",
+    "x" * 250: "cannot be written: File name too long.",
+    "x" * 300 + "/a.json": "cannot be written; allowed is a file in a folder that you may",
+}
+# Of a pipe that nobody writes to, reading would wait without end.
+PIPES = [
+    "identify pipe",
+    "identify a.csv --config pipe",
+    "identify a.csv --output pipe",
+    "identify a.csv --report pipe",
+    f"identify a.csv --csv {os.devnull}",
+    "identify table.csv --config pipe",
+    "groups pipe --by dish",
+    "design pipe",
+]
+REFUSED = {
+    **{f"identify a.csv {options}": said for options, said in OPTIONS.items()},
+    **{f"identify a.csv --output {name}": said for name, said in WRITTEN.items()},
+    **{f"identify a.csv --csv {name}": said for name, said in WRITTEN.items()},
+    **dict.fromkeys(PIPES, "no regular file; allowed is one."),
+    "identify .": "TRACE: found the folder '.', allowed is a file.",
+    "identify tabel.csv": "found 'tabel.csv', allowed is a file that exists. Did you mean 'table.",
+    f"identify {'x/' * 3000}": "allowed is a file that exists.",
+    "identify a.csv b.csv --output x.json": "--output: only for one trace",
+    "identify table.csv --output x.json": "--output: only for one trace",
+    "identify table.csv --csv a.csv": "a.csv: is read; allowed is another file to write.",
+    "identify a.csv b.csv --config bad.yaml": "bad.yaml, line 1: seedz: unknown key",
 }
 
 
-@pytest.mark.parametrize("arguments", REFUSED, ids=lambda text: text[:30])
-def test_an_option_that_cannot_be_used_is_named(tmp_path: Path, arguments: str) -> None:
-    output = tmp_path / "found.json"
-    status, _, error = identify(EXAMPLE, "--output", output, *arguments.split())
-    assert status == 1
+@pytest.mark.parametrize("arguments", REFUSED, ids=lambda text: text[:50])
+def test_what_cannot_be_used_is_named_once_and_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: str
+) -> None:
+    """Before anything is written."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.csv", "b.csv"):
+        shutil.copy(EXAMPLE, name)
+    Path("table.csv").write_text("file,dish\na.csv,left\n")
+    Path("theirs.html").write_text("<p>mine</p>")
+    Path("bad.yaml").write_text("seedz: 3")
+    Path("link.csv").symlink_to("a.csv")
+    Path("link.json").symlink_to("b.csv")
+    os.mkfifo("pipe")
+    before = {path: path.is_fifo() or path.read_bytes() for path in Path().iterdir()}
+    with redirect_stderr(StringIO()) as said:
+        assert main(arguments.split()) == 1
+    error = said.getvalue()
     assert error.startswith("biogrip: ")
     assert REFUSED[arguments] in error
     assert error.count("\n") == 1
-    assert not output.exists()
+    assert len(error) < 500
+    assert {path: path.is_fifo() or path.read_bytes() for path in Path().iterdir()} == before
 
 
 @pytest.mark.parametrize(
@@ -183,25 +239,6 @@ def test_text_that_is_no_value_of_an_option_is_refused(option: str, text: str, s
     assert said in error.getvalue()
 
 
-@pytest.mark.parametrize(
-    ("path", "found"),
-    [
-        ("", "found the folder '.', allowed is a file."),
-        ("data/example_trcae.csv", "a file that exists. Did you mean 'data/example_trace.csv'?"),
-        ("x/" * 3000, "allowed is a file that exists."),
-    ],
-)
-def test_a_trace_that_is_no_file_is_refused(
-    monkeypatch: pytest.MonkeyPatch, path: str, found: str
-) -> None:
-    monkeypatch.chdir(ROOT)
-    status, _, said = identify(path)
-    assert status == 1
-    assert said.startswith("biogrip: TRACE: found ")
-    assert found in said
-    assert len(said) < 500
-
-
 @pytest.mark.nightly
 def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: str) -> None:
     reader, writer = os.pipe()
@@ -215,82 +252,9 @@ def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: str) -> None:
     assert done.stderr == ""
 
 
-@pytest.mark.parametrize("name", ["a{b}.csv", "<results>.csv", "=1+1.csv", "a\nb.csv"])
-def test_a_trace_of_any_name_is_read(tmp_path: Path, name: str) -> None:
-    """Without a workflow, no name is a pattern; the trace is refused for what is in it."""
-    times, rotation = clean("liquid_drop_2")
-    status, _, error = identify(write_trace(tmp_path / name, times, -rotation))
-    assert status == 1
-    assert "found a rotation that goes against the torque" in error
-    assert not list(tmp_path.glob("*.json"))
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("trace.csv", "trace.csv: is read; allowed is another file to write."),
-        ("link.csv", "link.csv: is read; allowed is another file to write."),
-        ("other.csv", "other.csv: is there, and biogrip did not write it; allowed is another name"),
-        ("link.json", "link.json: is there, and biogrip did not write it; allowed is another name"),
-        (".", "cannot be written; allowed is a file in a folder that you may write to."),
-        ("nowhere/x.json", "cannot be written; allowed is a file in a folder that you may write"),
-        ("x" * 250, "cannot be written: File name too long."),
-        ("x" * 300 + "/a.json", "cannot be written; allowed is a file in a folder that you may"),
-    ],
-)
-@pytest.mark.parametrize("option", ["--output", "--csv"])
-def test_an_output_that_cannot_be_written_is_refused_at_once(
-    tmp_path: Path, name: str, said: str, option: str
-) -> None:
-    trace, other = tmp_path / "trace.csv", tmp_path / "other.csv"
-    for file in (trace, other):
-        shutil.copy(EXAMPLE, file)
-    (tmp_path / "link.csv").symlink_to(trace)
-    (tmp_path / "link.json").symlink_to(other)
-    before = sorted(tmp_path.iterdir())
-    status, _, error = identify(trace, option, f"{tmp_path}/{name}")
-    assert status == 1
-    assert said in error
-    assert sorted(tmp_path.iterdir()) == before
-    assert trace.read_bytes() == other.read_bytes() == EXAMPLE.read_bytes()
-
-
 def test_a_table_is_known_as_ours_by_the_end_of_a_long_header(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(f"{'k value (N/m),' * 1000}{WRITTEN_BY}\n")
     check_output(tmp_path / "a.csv")
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        "identify pipe",
-        "identify a.csv --config pipe",
-        "identify a.csv --output pipe",
-        "identify a.csv --report pipe",
-        f"identify a.csv --csv {os.devnull}",
-        "identify table.csv --config pipe",
-        "groups pipe --by dish",
-        "design pipe",
-    ],
-)
-def test_what_is_no_regular_file_is_neither_read_nor_replaced(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-    command: str,
-) -> None:
-    """At once: of a pipe that nobody writes to, reading waits without end."""
-    monkeypatch.chdir(tmp_path)
-    os.mkfifo("pipe")
-    shutil.copy(EXAMPLE, "a.csv")
-    Path("table.csv").write_text("file,dish\na.csv,left\n")
-    before = sorted(tmp_path.iterdir())
-    assert main(command.split()) == 1
-    error = capfd.readouterr().err
-    assert "no regular file; allowed is one." in error
-    assert error.count("\n") == 1
-    assert sorted(tmp_path.iterdir()) == before
-    assert Path("pipe").is_fifo()
 
 
 def test_a_trace_whose_fit_fails_costs_no_other_its_result(
@@ -439,32 +403,6 @@ def test_values_of_a_simpler_model_are_held_against_limits() -> None:
     outside = advised(k=(21.0, None), c=(None, 90.0), c_and_c_p=(70.0, 79.0))
     assert outside.endswith("Outside the limits lies its k, 20 N/m and its c + c_p, 80 N s/m.")
     assert "limits" not in advised()
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (["--output", "x.json"], "--output: only for one trace"),
-        (["--report", "no/such/out.html"], "cannot be written"),
-        (["--report", "theirs.html"], "biogrip did not write it"),
-        (["--report", "x.html", "--csv", "x.html"], "to be written twice"),
-        (["--config", "bad.yaml"], "bad.yaml, line 1: seedz: unknown key"),
-        (["--model", "generalized_maxwell_99"], "sample.model: found 'generalized_maxwell_99'"),
-    ],
-)
-def test_what_is_wrong_with_all_traces_is_said_once_and_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, given: list[str], said: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    for name in ("a.csv", "b.csv"):
-        shutil.copy(EXAMPLE, name)
-    Path("theirs.html").write_text("<p>mine</p>")
-    Path("bad.yaml").write_text("seedz: 3")
-    status, _, told = identify("a.csv", "b.csv", *given)
-    assert status == 1
-    assert said in told
-    assert told.count("\n") == 1
-    assert not Path("a.identified.json").exists()
 
 
 def test_colours_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:

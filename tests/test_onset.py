@@ -20,7 +20,6 @@ from biogrip.traces.onset import begins_constant, estimate_onset
 from tests.helpers import identified as command
 from tests.helpers.default import STUDY
 from tests.helpers.identified import by_quantity, identify, write_trace
-from tests.helpers.places import EXAMPLE
 
 PHASES = (hold(20.0, 1e-9), hold(20.0, 0.4e-9), hold(20.0, 1.2e-9))
 TRUTH = {"k": 29.0, "k_p": 6.0, "c": 100.0, "c_p": 20.0}
@@ -242,10 +241,3 @@ def test_a_clock_outside_the_protocol_is_refused(
     (tmp_path / "lab.yaml").write_text(CONFIG)
     status, _, error = identify(trace, "--config", tmp_path / "lab.yaml", *start)
     assert (status, message in error) == (1, True)
-
-
-@pytest.mark.parametrize("given", ["soon", ""])
-def test_a_start_that_is_no_time_is_refused(given: str) -> None:
-    status, _, error = identify(EXAMPLE, "--start", given)
-    assert status == 1
-    assert f"--start: measurement.start_s: found '{given}', allowed is" in error

@@ -269,12 +269,6 @@ def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None
         assert found(row[0]) == written[row[0]]
 
 
-def test_options_that_do_not_go_with_a_table_are_refused(here: Path) -> None:
-    assert "--output: only for one trace" in identify("cells.tsv", "--output", "x.json")[2]
-    assert "other.csv: is read; allowed is" in identify("cells.tsv", "--csv", "other.csv")[2]
-    assert not list(here.glob("*.json"))
-
-
 def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met(here: Path) -> None:
     """A trace tells stiffnesses times the square of the sine: smaller samples seem stiffer."""
     shutil.copy(here / "usual.csv", here / "small.csv")

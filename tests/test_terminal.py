@@ -11,7 +11,7 @@ import pytest
 
 from biogrip import terminal
 from biogrip.cli import main
-from biogrip.terminal import aligned, visible, visible_lines
+from biogrip.terminal import visible, visible_lines
 from tests.helpers.identified import identify
 from tests.helpers.places import EXAMPLE
 
@@ -24,15 +24,6 @@ HOSTILE = "\x1b[31m\x9b2J\x1b]0;x\x07\r\u202ea\x7f"
 OBEYED = re.compile("[^\n -~\xa1-\u200d\u2010-\u2027\u2030-\u2065\u2070-\ud7ff]")
 # Of these, what a cell of a table may hold.
 FOUND = HOSTILE.replace("\r", "")
-
-
-def test_columns_are_as_wide_as_their_widest_cell() -> None:
-    assert aligned([["a", "12.5"], ["longer", ""]], ["trace", "k"]).splitlines() == [
-        "trace   k",
-        "------  ----",
-        "a       12.5",
-        "longer",
-    ]
 
 
 def test_text_is_shown_as_it_is_but_for_what_a_terminal_obeys() -> None:

@@ -208,11 +208,3 @@ def test_anybody_can_use_it(
     paper = opened.page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert paper == "rgb(255, 255, 255)"
     opened.context.close()
-
-
-def test_a_thousand_rows_are_a_small_page(dish: Outcome, tmp_path: Path) -> None:
-    path = tmp_path / "many.html"
-    traces = [{**made_up(dish.found[0], n % 12), "trace": f"{n}.csv"} for n in range(1000)]
-    write_page(replace(dish, found=traces, pictures={}), path)
-    assert path.read_text().count("<tr") > 1001
-    assert path.stat().st_size < 2_500_000
