@@ -145,20 +145,17 @@ OPTIONS = {
     "--noise-model coloured --noise 1e-6": "--noise: measurement.noise_rad: is that of white noise",
     "--sd sd_rad --noise 1e-6": "--noise: measurement.noise_rad: does not go with sd",
     "--set measurement.time_unit=hours": "--set: measurement.time_unit: found 'hours'. Did you",
-    "--set measurement.scale=-1e-400": "--set: measurement.scale: found 0, allowed is another",
     "--set measurment.skip=1": "--set: measurment: unknown key. Did you mean 'measurement'?",
     '--set protocol.phases=[{"duration_s":0}]': "--set: protocol.phases[0].duration_s: found 0",
     "--fix k=0": "--fix: fixed.k: found 0, allowed is at least 1e-18 and at most 1e+12 N/m.",
     "--fix kp=1": "--fix: fixed.kp: is no parameter of the sample, which has k, k_p, c, c_p. Did",
     "--model maxwel": "--model: sample.model: found 'maxwel'. Did you mean 'maxwell'?",
-    "--model generalized_maxwell_99": "sample.model: found 'generalized_maxwell_99'",
     "--sd sd": "found no such column, allowed are time_s, rotation_rad.",
     "--start soon": "--start: measurement.start_s: found 'soon', allowed is",
     "--start=": "--start: measurement.start_s: found '', allowed is",
     "--reading strian=x": "--reading: measurement.strian: unknown key. Did you mean 'strain'?",
     "--time=": "--time: measurement.time: found '' of 0 characters, allowed are at least 1.",
     f"--config {'x' * 300}": "File name too long",
-    "--config bad.yaml": "bad.yaml, line 1: seedz: unknown key",
     "--report theirs.html": "biogrip did not write it",
     "--report x.html --csv x.html": "to be written twice",
 }
@@ -177,7 +174,6 @@ PIPES = [
     "identify pipe",
     "identify a.csv --config pipe",
     "identify a.csv --output pipe",
-    "identify a.csv --report pipe",
     f"identify a.csv --csv {os.devnull}",
     "identify table.csv --config pipe",
     "groups pipe --by dish",
@@ -366,17 +362,16 @@ def test_models_that_are_named_are_held_against_the_chosen_one(
     assert said.count("97.5 %") == 1
     assert "generalized_maxwell_3" in tried
     named = ["damper", "maxwell", "liquid_drop", "generalized_maxwell"]
-    for model, others, advice in (
-        ("liquid_drop", named, "suits the trace better"),
-        ("damper", named, "is not adequate"),
-        ("liquid_drop", named[:2], "suits the trace better"),
-        ("damper", named[:1], None),
+    for model, others, tried, advice in (
+        ("liquid_drop", named, named, "none of the 4 models tried suits the trace better"),
+        ("damper", named, named, "Bare damper is not adequate"),
+        ("liquid_drop", named[:2], named[:3], "none of the 3 models tried suits the trace better"),
+        ("damper", named[:1], [], "None"),
     ):
         chosen = ("--model", model, "--set", f"model_selection.models=[{','.join(others)}]")
         found = identified(tmp_path, EXAMPLE, *chosen)
-        tried = [row["model"] for row in found["models"]]
-        assert tried == ([name for name in named if name in (*others, model)] if advice else [])
-        assert (advice or "None") in str(found["advice"])
+        assert [row["model"] for row in found["models"]] == tried
+        assert advice in str(found["advice"])
 
 
 def test_values_of_a_simpler_model_are_held_against_limits() -> None:
@@ -405,17 +400,16 @@ def test_values_of_a_simpler_model_are_held_against_limits() -> None:
     assert "limits" not in advised()
 
 
-def test_colours_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
-    quantity: dict[str, Any] = {"quantity": "k", "unit": "N/m", "verdict": "determined"}
-    quantity |= {"value": 2.0, "low": 1.0, "high": 3.0, "provided": None}
-    found: dict[str, Any] = {"trace": "a", "quantities": [quantity], "confidence": 0.9}
-    found |= {"by_default": [], "notes": [], "fit": "ok", "limits": "Limits are statistical."}
-    assert "\x1b" not in side_by_side([found], {})
+def test_colours_are_for_terminals(
+    example: tuple[str, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = [example[1]]
+    assert "\x1b" not in side_by_side(found, {})
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
     monkeypatch.delenv("NO_COLOR", raising=False)
-    assert "\x1b[32m2 (1 to 3)\x1b[0m" in side_by_side([found], {})
+    assert "\x1b[32m5.0" in side_by_side(found, {})
     monkeypatch.setenv("NO_COLOR", "1")
-    assert "\x1b" not in side_by_side([found], {})
+    assert "\x1b" not in side_by_side(found, {})
 
 
 def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path, few: str) -> None:

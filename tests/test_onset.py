@@ -65,14 +65,8 @@ RAMP = (Phase(30.0, load(30.0, 0.0, 1e-9), load(30.0, 0.0, 1e-9)), hold(30.0, 0.
 
 
 @pytest.mark.parametrize("phases", [PHASES, RAMP])
-@pytest.mark.parametrize(
-    ("model", "options"),
-    [
-        ("generalized_maxwell", {}),
-        ("generalized_maxwell", {"offset": True, "drift": True}),
-        ("fractional_kelvin_voigt", {}),
-    ],
-)
+@pytest.mark.parametrize("model", ["generalized_maxwell", "fractional_kelvin_voigt"])
+@pytest.mark.parametrize("options", [{}, {"offset": True, "drift": True}])
 def test_before_the_protocol_nothing_responds(
     phases: tuple[Phase, ...], model: str, options: dict[str, Any]
 ) -> None:
@@ -112,8 +106,7 @@ def test_a_fitted_onset_has_the_lowest_misfit() -> None:
 CLOCKS = {
     "later than the step": np.arange(5, 301) / 5,
     "eight decades": np.geomspace(1e-4, 1e4, 81),
-    "six decades": np.geomspace(1e-3, 1e3, 301),
-    "log-spaced and later": np.geomspace(0.05, 60.0, 200),
+    "log-spaced": np.geomspace(0.05, 60.0, 200),
 }
 
 

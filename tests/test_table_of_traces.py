@@ -17,8 +17,6 @@ from biogrip.library import hold
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import torque_history
-from biogrip.tables.mechanics import contacts
-from tests.helpers.default import STUDY
 from tests.helpers.identified import by_quantity, write_trace
 from tests.helpers.identified import identify as run
 from tests.helpers.problems import GRIPPER, TORQUE
@@ -281,7 +279,3 @@ def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met(here: Path) -> N
     ratio = (np.sin(angle) / np.sin(np.radians(75))) ** 2
     for name in ("k_p", "c_p"):
         assert unsized[name]["value"] / sized[name]["value"] == pytest.approx(ratio, rel=1e-3)
-    # So says the table of contact.
-    smallest = contacts(STUDY).rows[0]
-    assert smallest["size_um"] == pytest.approx(30)
-    assert smallest["off_percent"] == pytest.approx(100 * (ratio - 1))
