@@ -45,7 +45,7 @@ def test_the_block_that_is_asked_for_is_identified(
 ) -> None:
     """What is recognised is said; the same keys in a config give the same, and so does QUIET."""
     trace = exported(tmp_path / "gel.csv")
-    command = [trace, *READ, "--config", config(tmp_path / "few.yaml")]
+    command: list[str | Path] = [trace, *READ, "--config", config(tmp_path / "few.yaml")]
     status, _, said = identify(*command)
     assert status == 1
     assert "found 2 blocks with the columns 'Time', 'Relaxation Modulus'" in said
@@ -71,7 +71,7 @@ def test_the_block_that_is_asked_for_is_identified(
 def test_readings_of_a_rounded_clock_are_averaged_and_counted(tmp_path: Path) -> None:
     trace = exported(tmp_path / "gel.csv", np.floor(TIMES / 0.5) * 0.5)
     few = config(tmp_path / "few.yaml")
-    command = [trace, *READ, "--config", few, "--block", "2", "--start", "7"]
+    command: list[str | Path] = [trace, *READ, "--config", few, "--block", "2", "--start", "7"]
     status, _, said = identify(*command)
     assert status == 1
     assert "are averaged by --set measurement.average_repeated=true." in said

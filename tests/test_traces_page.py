@@ -94,7 +94,7 @@ def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path
     assert r"$k_{p} = 5.01\,\mathrm{N/m}$ (95\,\% profile-likelihood interval $" in text
 
 
-def test_pictures_are_small_and_in_the_page(page: Path, dish: Outcome) -> None:
+def test_pictures_are_small_and_in_the_page(page: Path) -> None:
     text = page.read_text()
     pictures = re.findall('src="data:image/png;base64,([^"]+)"', text)
     # Two a trace, and one a quantity.

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from biogrip.arrays import Array
 from biogrip.identify.one_trace import identify_batch
 from biogrip.identify.settings import Asked, Setting
 from biogrip.physics.linear import rotation, step_response
@@ -32,20 +33,19 @@ def test_the_answer_is_that_of_means(tmp_path: Path, uniform: bool) -> None:
     Peak memory stays a few hundred bytes a sample.
     """
     rng = np.random.default_rng(6)
-    times = np.arange(SAMPLES) * (400.0 / SAMPLES)
-    if not uniform:
-        times = np.unique(np.round(rng.uniform(0.0, 400.0, SAMPLES), 6))
+    irregular = np.unique(np.round(rng.uniform(0.0, 400.0, SAMPLES), 6))
+    times: Array = np.linspace(0.0, 400.0, SAMPLES, endpoint=False) if uniform else irregular
     clean = rotation(step_response(GRIPPER, MODEL.network(TRUTH)), TORQUE, times)[0]
     trace = clean + 0.1 * clean.max() * rng.standard_normal(len(times))
     path = write_trace(tmp_path / "every.csv", times, trace)
     # No mean over both sides of the second step.
     sides = np.split(np.arange(len(times)), [times.searchsorted(200.0)])
     groups = [side[: len(side) // MEANS_OF * MEANS_OF].reshape(-1, MEANS_OF) for side in sides]
-    means = (
+    mean_times, means = (
         np.concatenate([values[group].mean(axis=1) for group in groups])
         for values in (times, trace)
     )
-    few = write_trace(tmp_path / "few.csv", *means)
+    few = write_trace(tmp_path / "few.csv", mean_times, means)
     # What libraries take is no part of the memory.
     fewer = identify_batch(asked(few), None).found[0]
     tracemalloc.start()
