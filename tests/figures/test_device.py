@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from biogrip.stages.model_difference import compare
 from matplotlib.collections import QuadMesh
 
 from biogrip.figures.mechanics import draw_linearisation
 from biogrip.figures.style import styled
 from biogrip.records.identifications import DIFFERENCES
+from biogrip.stages.targets import compare
 from tests.helpers.default import STUDY, seen, study_of
 
 CASE = "liquid_drop_1"
