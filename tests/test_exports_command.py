@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
-from biogrip.cli import main
 from biogrip.terminal import QUIET
+from tests.helpers.identified import by_quantity, identify
 
 READ = ("--time", "Time", "--reading", "modulus=Relaxation Modulus", "--model", "liquid_drop")
 BEGINS_S = 7.0
@@ -41,54 +41,41 @@ def found(trace: Path) -> dict[str, Any]:
 
 
 def test_the_block_that_is_asked_for_is_identified(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What is recognised is said; the same keys in a config give the same, and so does QUIET."""
     trace = exported(tmp_path / "gel.csv")
-    command = ["identify", str(trace), *READ, "--config", config(tmp_path / "few.yaml")]
-    assert main(command) == 1
-    said = capsys.readouterr().err
+    command: list[str | Path] = [trace, *READ, "--config", config(tmp_path / "few.yaml")]
+    status, _, said = identify(*command)
+    assert status == 1
     assert "found 2 blocks with the columns 'Time', 'Relaxation Modulus'" in said
     assert "\n  2: line 23, Interval: 2; Point No., Time, Relaxation Modulus; 60 rows, 7,25" in said
-    assert main([*command, "--block", "2", "--start", str(BEGINS_S)]) == 0
-    said = capsys.readouterr().err
+    status, _, said = identify(*command, "--block", "2", "--start", str(BEGINS_S))
+    assert status == 0
     assert "gel.csv is read as\n  encoding     UTF-16\n  separator    tabs\n" in said
     assert "\n  modulus      Relaxation Modulus, in kPa\n" in said
     by_options = found(trace)
     assert by_options["read_as"]["block"] == 2
-    limits = {each["quantity"]: (each["low"], each["high"]) for each in by_options["quantities"]}
-    assert limits["k"][0] < 20 < limits["k"][1]
-    assert limits["k_p"][0] < 5 < limits["k_p"][1]
+    for name, truth in (("k", 20), ("k_p", 5)):
+        own = by_quantity(by_options)[name]
+        assert own["low"] < truth < own["high"]
     monkeypatch.setenv(QUIET, "1")
     measurement = {"time": "Time", "modulus": "Relaxation Modulus", "start_s": BEGINS_S, "block": 2}
     keys = config(tmp_path / "keys.yaml", instrument="relaxation", measurement=measurement)
-    assert main(["identify", str(trace), "--model", "liquid_drop", "--config", keys]) == 0
-    assert capsys.readouterr().err == ""
+    status, _, said = identify(trace, "--model", "liquid_drop", "--config", keys)
+    assert (status, said) == (0, "")
     assert found(trace)["quantities"] == by_options["quantities"]
     assert found(trace)["assumed"]["measurement"] == by_options["assumed"]["measurement"]
 
 
-def test_readings_of_a_rounded_clock_are_averaged_and_counted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_readings_of_a_rounded_clock_are_averaged_and_counted(tmp_path: Path) -> None:
     trace = exported(tmp_path / "gel.csv", np.floor(TIMES / 0.5) * 0.5)
     few = config(tmp_path / "few.yaml")
-    command = ["identify", str(trace), *READ, "--config", few, "--block", "2", "--start", "7"]
-    assert main(command) == 1
-    assert "are averaged by --set measurement.average_repeated=true." in capsys.readouterr().err
-    assert main([*command, "--set", "measurement.average_repeated=true"]) == 0
+    command: list[str | Path] = [trace, *READ, "--config", few, "--block", "2", "--start", "7"]
+    status, _, said = identify(*command)
+    assert status == 1
+    assert "are averaged by --set measurement.average_repeated=true." in said
+    assert identify(*command, "--set", "measurement.average_repeated=true")[0] == 0
     notes = found(trace)["notes"]
     assert {"weight": "harmless", "text": "Averaged at repeated times: 58 readings."} in notes
     assert found(trace)["samples"] in (30, 31)
-
-
-def test_a_usual_file_is_read_without_a_word(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    trace = tmp_path / "plain.csv"
-    rows = (f"{t},{g}" for t, g in zip(TIMES, MODULI, strict=True))
-    trace.write_text("\n".join(["time_s,modulus_Pa", *rows]))
-    command = ["identify", str(trace), "--reading", "modulus=modulus_Pa", "--model", "liquid_drop"]
-    assert main([*command, "--config", config(tmp_path / "few.yaml")]) == 0
-    assert capsys.readouterr().err == ""
-    assert "read_as" not in found(trace)

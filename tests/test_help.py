@@ -1,11 +1,10 @@
-"""The help of each command: examples that can be typed, and models by their names."""
+"""The help of each command has examples that can be typed."""
 
 import shlex
 
 import pytest
 
 from biogrip.cli import _parser, main
-from biogrip.physics.models import MODELS
 
 
 @pytest.mark.parametrize("command", ["identify", "groups", "design"])
@@ -21,13 +20,3 @@ def test_examples_are_commands_that_can_be_typed(
         program, *arguments = shlex.split(line)
         assert (program, arguments[0]) == ("biogrip", command)
         _parser().parse_args(arguments)
-
-
-def test_models_are_listed_as_they_are_typed_and_printed(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    with pytest.raises(SystemExit):
-        main(["identify", "--help"])
-    _, _, listed = capsys.readouterr().out.partition("\nsample models:\n")
-    rows = [line.split(maxsplit=1) for line in listed.partition("\n\n")[0].splitlines()]
-    assert rows == [[name, model.title] for name, model in MODELS.items()]

@@ -32,7 +32,7 @@ from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.models import CANDIDATES, MODELS
 from biogrip.traces.onset import note_late_onset
-from tests.helpers.identified import FEW, identified, identify, write_trace
+from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean
 
@@ -43,14 +43,6 @@ TRUTH = yaml.safe_load((ROOT / "data" / "example_truth.yaml").read_text())["case
 def few(tmp_path: Path) -> str:
     (tmp_path / "few.yaml").write_text(FEW)
     return str(tmp_path / "few.yaml")
-
-
-@pytest.fixture(scope="module")
-def trace() -> tuple[Array, Array]:
-    """Table 7's sample at 1 Hz with 5 % noise."""
-    times, response = clean("liquid_drop_2")
-    noise = 0.05 * response.max() * np.random.default_rng(0).standard_normal(len(times))
-    return times, response + noise
 
 
 @pytest.fixture(scope="module")
@@ -80,28 +72,23 @@ def test_the_example_gives_its_truth(example: tuple[str, dict[str, Any]]) -> Non
     assert quantities["c_p"]["high"] > truth["c_p"]
     assert found["noise_rad"] == pytest.approx(0.05 * 6.7e-5, rel=0.3)
     assert found["notes"] == []
+    assert "read_as" not in found
     assert set(found["versions"]) == {"biogrip", "numpy", "scipy"}
     assert found["by_default"] == ["gripper", "protocol"]
 
 
-def test_units_separators_offset_and_drift(tmp_path: Path, trace: tuple[Array, Array]) -> None:
-    times, values = trace
-    file = write_trace(tmp_path / "a.csv", times, values)
-    plain = identified(tmp_path, file)
+def test_a_declared_offset_and_drift_are_fitted_along(tmp_path: Path) -> None:
+    times, response = clean("liquid_drop_2")
+    values = response + 0.05 * response.max() * np.random.default_rng(0).standard_normal(401)
+    plain = identified(tmp_path, write_trace(tmp_path / "a.csv", times, values))
     shifted = 1e3 * (values + 5e-4 + 1e-6 * times)
-    other = write_trace(tmp_path / "b.csv", times / 60, shifted, "t;phi_mrad;note")
-    other.write_text(other.read_text().replace(",", ";") + "6.67;-;\n6.68;;\n")
+    file = write_trace(tmp_path / "b.csv", times / 60, shifted, "t,phi_mrad")
     columns = ("--time", "t", "--set", "measurement.time_unit=min", "--reading", "phi_mrad")
-    options = (*columns, "--offset", "--drift")
-    found = identified(tmp_path, other, *options)
-    left_out = f"Left out for want of a number: 2 rows of {len(times) + 2}."
-    assert {"weight": "harmless", "text": left_out} in found["notes"]
-    # Fitted along, both are known to some per cent of the rotation.
+    found = identified(tmp_path, file, *columns, "--offset", "--drift")
+    # Both are known to some per cent of the rotation.
     assert found["offset_rad"] == pytest.approx(5e-4, abs=1e-4)
     assert found["drift_rad_per_s"] == pytest.approx(1e-6, abs=1e-6)
-    total, before = (
-        next(q for q in each["quantities"] if q["quantity"] == "c + c_p") for each in (found, plain)
-    )
+    total, before = (by_quantity(each)["c + c_p"] for each in (found, plain))
     assert total["high"] - total["low"] > before["high"] - before["low"]
     assert total["low"] < before["value"] < total["high"]
 
@@ -151,40 +138,85 @@ def test_known_deviations_are_weights_of_the_fit(tmp_path: Path) -> None:
         np.testing.assert_allclose(sd_rad[100:], expected[100:], rtol=0.02)
 
 
-REFUSED = {
-    "--noise -1": "--noise: measurement.noise_rad: found -1, allowed is at least 1e-15 and at most",
+# Arguments of `identify`, and what is said of them.
+OPTIONS = {
     "--noise nan": "--noise: measurement.noise_rad: found 'nan', allowed is a number.",
-    "--noise 1e999": "--noise: measurement.noise_rad: found inf, allowed is a finite number.",
     "--noise-model pink": "found 'pink'. Allowed: white, coloured.",
     "--noise-model coloured --noise 1e-6": "--noise: measurement.noise_rad: is that of white noise",
     "--sd sd_rad --noise 1e-6": "--noise: measurement.noise_rad: does not go with sd",
-    "--noise-share 3": "--noise-share: measurement.noise_share: found 3, allowed is greater than 0",
     "--set measurement.time_unit=hours": "--set: measurement.time_unit: found 'hours'. Did you",
-    "--set measurement.scale=-1e-400": "--set: measurement.scale: found 0, allowed is another",
     "--set measurment.skip=1": "--set: measurment: unknown key. Did you mean 'measurement'?",
     '--set protocol.phases=[{"duration_s":0}]': "--set: protocol.phases[0].duration_s: found 0",
-    "--fix k=1e300": "--fix: fixed.k: found 1e+300, allowed is at least 0 and at most 1e+12.",
     "--fix k=0": "--fix: fixed.k: found 0, allowed is at least 1e-18 and at most 1e+12 N/m.",
     "--fix kp=1": "--fix: fixed.kp: is no parameter of the sample, which has k, k_p, c, c_p. Did",
     "--model maxwel": "--model: sample.model: found 'maxwel'. Did you mean 'maxwell'?",
     "--sd sd": "found no such column, allowed are time_s, rotation_rad.",
-    "--reading rotaton_rad": "Did you mean 'rotation_rad'?",
+    "--start soon": "--start: measurement.start_s: found 'soon', allowed is",
+    "--start=": "--start: measurement.start_s: found '', allowed is",
     "--reading strian=x": "--reading: measurement.strian: unknown key. Did you mean 'strain'?",
     "--time=": "--time: measurement.time: found '' of 0 characters, allowed are at least 1.",
-    f"--reading {'x' * 5000}": "of 5000 characters, allowed are at most 4000.",
     f"--config {'x' * 300}": "File name too long",
+    "--report theirs.html": "biogrip did not write it",
+    "--report x.html --csv x.html": "to be written twice",
+}
+WRITTEN = {
+    "a.csv": "a.csv: is read; allowed is another file to write.",
+    "link.csv": "link.csv: is read; allowed is another file to write.",
+    "b.csv": "b.csv: is there, and biogrip did not write it; allowed is another name",
+    "link.json": "link.json: is there, and biogrip did not write it; allowed is another name",
+    ".": "cannot be written; allowed is a file in a folder that you may write to.",
+    "nowhere/x.json": "cannot be written; allowed is a file in a folder that you may write",
+    "x" * 250: "cannot be written: File name too long.",
+    "x" * 300 + "/a.json": "cannot be written; allowed is a file in a folder that you may",
+}
+# Of a pipe that nobody writes to, reading would wait without end.
+PIPES = [
+    "identify pipe",
+    "identify a.csv --config pipe",
+    "identify a.csv --output pipe",
+    f"identify a.csv --csv {os.devnull}",
+    "identify table.csv --config pipe",
+    "groups pipe --by dish",
+    "design pipe",
+]
+REFUSED = {
+    **{f"identify a.csv {options}": said for options, said in OPTIONS.items()},
+    **{f"identify a.csv --output {name}": said for name, said in WRITTEN.items()},
+    **{f"identify a.csv --csv {name}": said for name, said in WRITTEN.items()},
+    **dict.fromkeys(PIPES, "no regular file; allowed is one."),
+    "identify .": "TRACE: found the folder '.', allowed is a file.",
+    "identify tabel.csv": "found 'tabel.csv', allowed is a file that exists. Did you mean 'table.",
+    f"identify {'x/' * 3000}": "allowed is a file that exists.",
+    "identify a.csv b.csv --output x.json": "--output: only for one trace",
+    "identify table.csv --output x.json": "--output: only for one trace",
+    "identify table.csv --csv a.csv": "a.csv: is read; allowed is another file to write.",
+    "identify a.csv b.csv --config bad.yaml": "bad.yaml, line 1: seedz: unknown key",
 }
 
 
-@pytest.mark.parametrize("arguments", REFUSED, ids=lambda text: text[:30])
-def test_an_option_that_cannot_be_used_is_named(tmp_path: Path, arguments: str) -> None:
-    output = tmp_path / "found.json"
-    status, _, error = identify(EXAMPLE, "--output", output, *arguments.split())
-    assert status == 1
+@pytest.mark.parametrize("arguments", REFUSED, ids=lambda text: text[:50])
+def test_what_cannot_be_used_is_named_once_and_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: str
+) -> None:
+    """Before anything is written."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.csv", "b.csv"):
+        shutil.copy(EXAMPLE, name)
+    Path("table.csv").write_text("file,dish\na.csv,left\n")
+    Path("theirs.html").write_text("<p>mine</p>")
+    Path("bad.yaml").write_text("seedz: 3")
+    Path("link.csv").symlink_to("a.csv")
+    Path("link.json").symlink_to("b.csv")
+    os.mkfifo("pipe")
+    before = {path: path.is_fifo() or path.read_bytes() for path in Path().iterdir()}
+    with redirect_stderr(StringIO()) as said:
+        assert main(arguments.split()) == 1
+    error = said.getvalue()
     assert error.startswith("biogrip: ")
     assert REFUSED[arguments] in error
     assert error.count("\n") == 1
-    assert not output.exists()
+    assert len(error) < 500
+    assert {path: path.is_fifo() or path.read_bytes() for path in Path().iterdir()} == before
 
 
 @pytest.mark.parametrize(
@@ -203,27 +235,6 @@ def test_text_that_is_no_value_of_an_option_is_refused(option: str, text: str, s
     assert said in error.getvalue()
 
 
-@pytest.mark.parametrize(
-    ("path", "found"),
-    [
-        ("", "found the folder '.', allowed is a file."),
-        ("/", "found the folder '/', allowed is a file."),
-        ("data/example_trcae.csv", "a file that exists. Did you mean 'data/example_trace.csv'?"),
-        ("x" * 300, "allowed is a file that exists."),
-        ("x/" * 3000, "allowed is a file that exists."),
-    ],
-)
-def test_a_trace_that_is_no_file_is_refused(
-    monkeypatch: pytest.MonkeyPatch, path: str, found: str
-) -> None:
-    monkeypatch.chdir(ROOT)
-    status, _, said = identify(path)
-    assert status == 1
-    assert said.startswith("biogrip: TRACE: found ")
-    assert found in said
-    assert len(said) < 500
-
-
 @pytest.mark.nightly
 def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: str) -> None:
     reader, writer = os.pipe()
@@ -237,88 +248,17 @@ def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: str) -> None:
     assert done.stderr == ""
 
 
-@pytest.mark.parametrize("name", ["a{b}.csv", "<results>.csv", "=1+1.csv", "a\nb.csv"])
-def test_a_trace_of_any_name_is_read(tmp_path: Path, trace: tuple[Array, Array], name: str) -> None:
-    """Without a workflow, no name is a pattern; the trace is refused for what is in it."""
-    status, _, error = identify(write_trace(tmp_path / name, trace[0], -trace[1]))
-    assert status == 1
-    assert "found a rotation that goes against the torque" in error
-    assert not list(tmp_path.glob("*.json"))
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("trace.csv", "trace.csv: is read; allowed is another file to write."),
-        ("link.csv", "link.csv: is read; allowed is another file to write."),
-        ("other.csv", "other.csv: is there, and biogrip did not write it; allowed is another name"),
-        ("link.json", "link.json: is there, and biogrip did not write it; allowed is another name"),
-        (".", "cannot be written; allowed is a file in a folder that you may write to."),
-        ("nowhere/x.json", "cannot be written; allowed is a file in a folder that you may write"),
-        ("x" * 300, "cannot be written: File name too long."),
-        ("x" * 250, "cannot be written: File name too long."),
-        ("x" * 300 + "/a.json", "cannot be written; allowed is a file in a folder that you may"),
-    ],
-)
-@pytest.mark.parametrize("option", ["--output", "--csv"])
-def test_an_output_that_cannot_be_written_is_refused_at_once(
-    tmp_path: Path, name: str, said: str, option: str
-) -> None:
-    trace, other = tmp_path / "trace.csv", tmp_path / "other.csv"
-    for file in (trace, other):
-        shutil.copy(EXAMPLE, file)
-    (tmp_path / "link.csv").symlink_to(trace)
-    (tmp_path / "link.json").symlink_to(other)
-    before = sorted(tmp_path.iterdir())
-    status, _, error = identify(trace, option, f"{tmp_path}/{name}")
-    assert status == 1
-    assert said in error
-    assert sorted(tmp_path.iterdir()) == before
-    assert trace.read_bytes() == other.read_bytes() == EXAMPLE.read_bytes()
-
-
 def test_a_table_is_known_as_ours_by_the_end_of_a_long_header(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(f"{'k value (N/m),' * 1000}{WRITTEN_BY}\n")
     check_output(tmp_path / "a.csv")
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        "identify pipe",
-        "identify a.csv --config pipe",
-        "identify a.csv --output pipe",
-        "identify a.csv --report pipe",
-        f"identify a.csv --csv {os.devnull}",
-        "identify table.csv --config pipe",
-        "groups pipe --by dish",
-        "design pipe",
-    ],
-)
-def test_what_is_no_regular_file_is_neither_read_nor_replaced(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-    command: str,
-) -> None:
-    """At once: of a pipe that nobody writes to, reading waits without end."""
-    monkeypatch.chdir(tmp_path)
-    os.mkfifo("pipe")
-    shutil.copy(EXAMPLE, "a.csv")
-    Path("table.csv").write_text("file,dish\na.csv,left\n")
-    before = sorted(tmp_path.iterdir())
-    assert main(command.split()) == 1
-    error = capfd.readouterr().err
-    assert "no regular file; allowed is one." in error
-    assert error.count("\n") == 1
-    assert sorted(tmp_path.iterdir()) == before
-    assert Path("pipe").is_fifo()
 
 
 def test_a_trace_whose_fit_fails_costs_no_other_its_result(
     tmp_path: Path, few: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A fault of ours, here of a test that only adds notes: a row says why, alone one message."""
+    good, bad = Path(shutil.copy(EXAMPLE, tmp_path / "good.csv")), tmp_path / "bad.csv"
+    bad.write_text("".join(EXAMPLE.read_text().splitlines(keepends=True)[:-1]))
     whole_length = len(pd.read_csv(EXAMPLE))
 
     def fails(problem: Any, time_s: Array, values: Array, near: Array) -> Any:
@@ -327,13 +267,9 @@ def test_a_trace_whose_fit_fails_costs_no_other_its_result(
         return note_late_onset(problem, time_s, values, near)
 
     monkeypatch.setattr(one_trace, "note_late_onset", fails)
-    good, bad = (tmp_path / name for name in ("good.csv", "bad.csv"))
-    shutil.copy(EXAMPLE, good)
-    bad.write_text("".join(EXAMPLE.read_text().splitlines(keepends=True)[:-1]))
-    table = tmp_path / "found.csv"
-    status, said, error = identify(bad, good, "--config", few, "--csv", table)
-    assert status == 1
-    assert "Traceback" not in error
+    table, options = tmp_path / "found.csv", ("--config", few, "--model", "liquid_drop")
+    status, said, error = identify(bad, good, "--csv", table, *options)
+    assert (status, "Traceback" in error) == (1, False)
     assert f"{bad}: the fit failed" in said
     rows = pd.read_csv(table, keep_default_na=False)
     assert rows["trace"].tolist() == [str(bad), str(good)]
@@ -342,7 +278,7 @@ def test_a_trace_whose_fit_fails_costs_no_other_its_result(
     assert rows.loc[1, "failed"] == ""
     assert good.with_suffix(".identified.json").exists()
     assert not bad.with_suffix(".identified.json").exists()
-    status, _, error = identify(bad, "--config", few)
+    status, _, error = identify(bad, *options)
     assert status == 1
     assert "the fit failed, which is a fault of biogrip" in error
 
@@ -350,30 +286,30 @@ def test_a_trace_whose_fit_fails_costs_no_other_its_result(
 def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) -> None:
     """The bad are skipped, listed with their reasons, and make the status 1."""
     good = [shutil.copy(EXAMPLE, tmp_path / name) for name in ("a.csv", "b.csv")]
-    bad = tmp_path / "bad.csv"
+    bad, missing = tmp_path / "bad.csv", tmp_path / "c.csv"
     bad.write_text(EXAMPLE.read_text().replace(",", ";", 5))
     page, table = tmp_path / "out.html", tmp_path / "out.csv"
-    missing = tmp_path / "c.csv"
     # Of a folder there is no name to write beside.
-    options = ("--config", few, "--report", page, "--csv", table)
+    options = ("--config", few, "--model", "liquid_drop", "--report", page, "--csv", table)
     status, said, error = identify(*good, good[0], bad, missing, "/", *options)
     assert (status, "Traceback" in error) == (1, False)
     rows = pd.read_csv(table, keep_default_na=False).set_index("trace")
     assert list(rows.index) == [*map(str, good), str(bad), str(missing), "/"]
     assert list(rows["fit"]) == ["ok", "ok", "failed", "failed", "failed"]
     told = json.loads((tmp_path / "a.identified.json").read_text())
-    assert rows.loc[str(good[0]), "k value (N/m)"] == str(told["quantities"][0]["value"])
-    assert rows.loc[str(good[0]), "c + c_p high (N s/m)"] == str(told["quantities"][-1]["high"])
+    first, second = (rows.loc[str(each)] for each in good)
+    assert first["k value (N/m)"] == str(told["quantities"][0]["value"])
+    assert first["c high (N s/m)"] == str(told["quantities"][-1]["high"])
     (lowest,) = (row["model"] for row in told["models"] if row["delta_bic"] == 0)
-    assert rows.loc[str(good[0]), "preferred_model"] == lowest
+    assert first["preferred_model"] == lowest
     # The same trace under another name is the same trace.
-    assert list(rows.loc[str(good[0])]) == list(rows.loc[str(good[1])])
+    assert list(first) == list(second)
     for text in (said, page.read_text()):
         assert "not identified" in text.lower()
         assert "bad.csv, line" in text
     assert "5 traces: 2 ok, 0 doubtful, 0 rejected, 3 not identified." in page.read_text()
     # Fit and profiles of each, and a strip of each quantity.
-    assert page.read_text().count("<img") == 2 * 2 + 5
+    assert page.read_text().count("<img") == 2 * 2 + 3
     # What biogrip wrote is replaced, be there nothing to draw.
     assert identify(bad, missing, *options)[0] == 1
     assert "2 traces: 0 ok, 0 doubtful, 0 rejected, 2 not identified." in page.read_text()
@@ -413,37 +349,29 @@ def test_all_that_is_assumed_repeats_it(
     assert told[0] == told[1]
 
 
-@pytest.mark.parametrize(
-    ("named", "tried"),
-    [
-        ("[damper, maxwell]", ["damper", "maxwell", "generalized_maxwell"]),
-        ("[generalized_maxwell]", []),
-    ],
-)
-def test_models_that_are_named_are_those_that_are_tried(
-    tmp_path: Path, named: str, tried: list[str]
-) -> None:
-    """Beside the one that the trace is identified with."""
-    models = ("--set", f"model_selection.models={named}")
-    found = identified(tmp_path, EXAMPLE, *models)
-    assert [row["model"] for row in found["models"]] == tried
-    assert (found["advice"] is None) == (not tried)
-
-
-def test_the_chosen_model_is_held_against_others(
+def test_models_that_are_named_are_held_against_the_chosen_one(
     tmp_path: Path, example: tuple[str, dict[str, Any]]
 ) -> None:
     """The example is of a drop with a membrane; its parallel damper does not show."""
-    assert "model is richer than the trace asks for: Maxwell liquid drop" in example[0]
-    assert example[1]["advice"].endswith(" Its values lie within the limits.")
-    tried = [row["model"] for row in example[1]["models"]]
+    said, found = example
+    assert "model is richer than the trace asks for: Maxwell liquid drop" in said
+    assert found["advice"].endswith(" Its values lie within the limits.")
+    tried = [row["model"] for row in found["models"]]
     assert tried[-2:] == ["fractional_kelvin_voigt", "fractional_maxwell"]
     assert sum(CANDIDATES[name].model.power_law for name in tried) == 2
-    assert example[0].count("97.5 %") == 1
+    assert said.count("97.5 %") == 1
     assert "generalized_maxwell_3" in tried
-    config = FEW.replace("maxwell]", "maxwell, liquid_drop, generalized_maxwell]")
-    for model, said in (("liquid_drop", "suits the trace better"), ("damper", "is not adequate")):
-        assert said in identified(tmp_path, EXAMPLE, "--model", model, config=config)["advice"]
+    named = ["damper", "maxwell", "liquid_drop", "generalized_maxwell"]
+    for model, others, tried, advice in (
+        ("liquid_drop", named, named, "none of the 4 models tried suits the trace better"),
+        ("damper", named, named, "Bare damper is not adequate"),
+        ("liquid_drop", named[:2], named[:3], "none of the 3 models tried suits the trace better"),
+        ("damper", named[:1], [], "None"),
+    ):
+        chosen = ("--model", model, "--set", f"model_selection.models=[{','.join(others)}]")
+        found = identified(tmp_path, EXAMPLE, *chosen)
+        assert [row["model"] for row in found["models"]] == tried
+        assert advice in str(found["advice"])
 
 
 def test_values_of_a_simpler_model_are_held_against_limits() -> None:
@@ -472,43 +400,16 @@ def test_values_of_a_simpler_model_are_held_against_limits() -> None:
     assert "limits" not in advised()
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (["--output", "x.json"], "--output: only for one trace"),
-        (["--report", "no/such/out.html"], "cannot be written"),
-        (["--report", "theirs.html"], "biogrip did not write it"),
-        (["--report", "x.html", "--csv", "x.html"], "to be written twice"),
-        (["--config", "bad.yaml"], "bad.yaml, line 1: seedz: unknown key"),
-        (["--model", "generalized_maxwell_99"], "sample.model: found 'generalized_maxwell_99'"),
-    ],
-)
-def test_what_is_wrong_with_all_traces_is_said_once_and_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, given: list[str], said: str
+def test_colours_are_for_terminals(
+    example: tuple[str, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    for name in ("a.csv", "b.csv"):
-        shutil.copy(EXAMPLE, name)
-    Path("theirs.html").write_text("<p>mine</p>")
-    Path("bad.yaml").write_text("seedz: 3")
-    status, _, told = identify("a.csv", "b.csv", *given)
-    assert status == 1
-    assert said in told
-    assert told.count("\n") == 1
-    assert not Path("a.identified.json").exists()
-
-
-def test_colours_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
-    quantity: dict[str, Any] = {"quantity": "k", "unit": "N/m", "verdict": "determined"}
-    quantity |= {"value": 2.0, "low": 1.0, "high": 3.0, "provided": None}
-    found: dict[str, Any] = {"trace": "a", "quantities": [quantity], "confidence": 0.9}
-    found |= {"by_default": [], "notes": [], "fit": "ok", "limits": "Limits are statistical."}
-    assert "\x1b" not in side_by_side([found], {})
+    found = [example[1]]
+    assert "\x1b" not in side_by_side(found, {})
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
     monkeypatch.delenv("NO_COLOR", raising=False)
-    assert "\x1b[32m2 (1 to 3)\x1b[0m" in side_by_side([found], {})
+    assert "\x1b[32m5.0" in side_by_side(found, {})
     monkeypatch.setenv("NO_COLOR", "1")
-    assert "\x1b" not in side_by_side([found], {})
+    assert "\x1b" not in side_by_side(found, {})
 
 
 def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path, few: str) -> None:

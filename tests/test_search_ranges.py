@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import yaml
 
-from biogrip.identify.trace_case import ranges_of
+from biogrip.identify.settings import Asked, case_of
+from biogrip.identify.trace_case import ranges_of, read_trace
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import hold, torque_history
@@ -30,18 +31,17 @@ CONFIG = {
     "model_selection": {"models": []},
     "least_squares": {"candidates": 500, "starts": 8},
 }
-DEFAULT = {"search_range": {name: {"exponent": [-4, 5]} for name in ("c", "c_p")}}
 
 
-@pytest.fixture
-def polystyrene(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def polystyrene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     gripper = Gripper(LEVER_M, 90.0, Arm(**ARM), Arm(**ARM))
     network = MODELS["generalized_maxwell"].network(np.array([1e6, K_P, C, 1e3]))
     times = np.geomspace(1.0, DURATION_S, 200)
     torque = torque_history((hold(DURATION_S, TORQUE_NM),))
     clean = simulated_rotation(gripper, network, torque, times, nonlinear=False)[0]
     noisy = clean + NOISE_RAD * np.random.default_rng(1).standard_normal(len(times))
-    return write_trace(tmp_path / "polystyrene.csv", times, noisy)
+    return write_trace(tmp_path_factory.mktemp("creep") / "polystyrene.csv", times, noisy)
 
 
 def of_ranges(trace: Path, **config: Any) -> dict[str, Any]:
@@ -60,12 +60,13 @@ def test_a_sample_beyond_the_ranges_of_the_paper_is_found(polystyrene: Path) -> 
 
 
 def test_a_given_range_stays(polystyrene: Path) -> None:
-    found = of_ranges(polystyrene, **DEFAULT)
-    ranges = found["assumed"]["search_range"]
-    assert ranges["c"]["exponent"] == ranges["c_p"]["exponent"] == [-4, 5]
-    assert ranges["k"]["exponent"] != [-3, 8]
-    assert found["fit"] == "rejected"
-    assert any("c is at the upper end of its search range" in text for text in found["reasons"])
+    given = {name: {"exponent": [-4, 5]} for name in ("c", "c_p")}
+    config = polystyrene.with_name("given.yaml")
+    config.write_text(yaml.safe_dump({**CONFIG, "search_range": given}))
+    asked = Asked(polystyrene, config)
+    ranges = read_trace(polystyrene, case_of(asked), asked.given, print).problem.ranges
+    assert ranges["c"].exponent == ranges["c_p"].exponent == (-4, 5)
+    assert ranges["k"].exponent != (-3, 8)
 
 
 @pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1", "liquid_drop_2"])
@@ -76,9 +77,8 @@ def test_elements_at_the_ends_do_not_show(case: str) -> None:
 
     def response(**changes: float) -> np.ndarray:
         network = problem.searched.sample({**chosen.parameters, **changes})
-        return simulated_rotation(
-            problem.gripper, network, problem.torque, time_s, nonlinear=False
-        )[0]
+        known = (problem.gripper, network, problem.torque, time_s)
+        return simulated_rotation(*known, nonlinear=False)[0]
 
     simulated = response()
     noise_rad = 0.1 * simulated.max()

@@ -76,13 +76,9 @@ def test_what_is_ignored_stays_so() -> None:
 
 def test_it_can_be_stopped_before_it_loads_anything_large() -> None:
     """What is loaded before the signals are taken is what a stop would show a stack of."""
-    code = """
-import sys
-before = {*sys.modules}
-import biogrip.__main__
-print(*{*sys.modules} - before)
-"""
+    code = "import sys; b = {*sys.modules}; import biogrip.__main__; print(*{*sys.modules} - b)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    ours = {name for name in run.stdout.split() if name.startswith("biogrip")}
+    loaded = set(run.stdout.split())
+    ours = {name for name in loaded if name.startswith("biogrip")}
     assert ours == {"biogrip", "biogrip.__main__", "biogrip.processes", "biogrip.terminal"}
-    assert not {"argparse", "json", "typing", "hashlib", "pathlib"} & set(run.stdout.split())
+    assert not {"argparse", "json", "typing", "hashlib", "pathlib"} & loaded

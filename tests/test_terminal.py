@@ -11,7 +11,8 @@ import pytest
 
 from biogrip import terminal
 from biogrip.cli import main
-from biogrip.terminal import aligned, visible, visible_lines
+from biogrip.terminal import visible, visible_lines
+from tests.helpers.identified import identify
 from tests.helpers.places import EXAMPLE
 
 FEW = """
@@ -23,15 +24,6 @@ HOSTILE = "\x1b[31m\x9b2J\x1b]0;x\x07\r\u202ea\x7f"
 OBEYED = re.compile("[^\n -~\xa1-\u200d\u2010-\u2027\u2030-\u2065\u2070-\ud7ff]")
 # Of these, what a cell of a table may hold.
 FOUND = HOSTILE.replace("\r", "")
-
-
-def test_columns_are_as_wide_as_their_widest_cell() -> None:
-    assert aligned([["a", "12.5"], ["longer", ""]], ["trace", "k"]).splitlines() == [
-        "trace   k",
-        "------  ----",
-        "a       12.5",
-        "longer",
-    ]
 
 
 def test_text_is_shown_as_it_is_but_for_what_a_terminal_obeys() -> None:
@@ -51,13 +43,11 @@ def test_text_is_shown_as_it_is_but_for_what_a_terminal_obeys() -> None:
         (f"time_s,{FOUND}", "1,2", f"allowed are time_s, {visible(FOUND)}"),
     ],
 )
-def test_a_message_shows_what_was_found(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], header: str, row: str, said: str
-) -> None:
+def test_a_message_shows_what_was_found(tmp_path: Path, header: str, row: str, said: str) -> None:
     trace = tmp_path / f"a{HOSTILE}\nb.csv"
     trace.write_text(f"{header}\n{row}\n", newline="\n")
-    assert main(["identify", str(trace)]) == 1
-    error = capsys.readouterr().err
+    status, _, error = identify(trace)
+    assert status == 1
     assert error.startswith(f"biogrip: {visible(trace)}, line ")
     assert said in error
     assert not OBEYED.search(error)
@@ -72,27 +62,23 @@ def test_what_was_typed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert not OBEYED.search(error)
 
 
-def test_names_of_traces_are_shown_wherever_they_are_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_names_of_traces_are_shown_wherever_they_are_said(tmp_path: Path) -> None:
     config, page = tmp_path / "few.yaml", tmp_path / "page.html"
     config.write_text(FEW)
     good, bad, absent = (tmp_path / f"{name}{HOSTILE}\n.csv" for name in ("good", "bad", "absent"))
     shutil.copy(EXAMPLE, good)
     bad.write_text("time_s,rotation_rad\n1,high\n")
-    options = ["--config", str(config)]
-    several = [*map(str, (good, bad, absent)), "--report", str(page)]
-    for arguments, status in ((several, 1), ([str(good)], 0)):
-        assert main(["identify", *arguments, *options]) == status
-        said = capsys.readouterr()
-        for text in said:
-            assert not OBEYED.search(text)
-        assert visible(good) in said.out
-        assert f"{visible(good.with_suffix('.identified.json'))}" in said.out
-        if arguments is several:
-            assert said.err.splitlines() == [f"1 of 2: {visible(good)}", f"2 of 2: {visible(bad)}"]
-            assert f"  {visible(bad)}, line 2, column" in said.out
-            assert f"  TRACE: found '{visible(absent)}'"[:200] in said.out
+    options = ("--config", config, "--model", "liquid_drop")
+    several = identify(good, bad, absent, *options, "--report", page)
+    alone = identify(good, *options)
+    assert (several[0], alone[0]) == (1, 0)
+    for _, said, error in (several, alone):
+        assert not OBEYED.search(said + error)
+        assert visible(good) in said
+        assert f"{visible(good.with_suffix('.identified.json'))}" in said
+    assert several[2].splitlines() == [f"1 of 2: {visible(good)}", f"2 of 2: {visible(bad)}"]
+    assert f"  {visible(bad)}, line 2, column" in several[1]
+    assert f"  TRACE: found '{visible(absent)}'"[:200] in several[1]
     assert json.loads(good.with_suffix(".identified.json").read_text())["trace"] == str(good)
     assert f">{visible(good)}<" in page.read_text()
 

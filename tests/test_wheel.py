@@ -7,7 +7,6 @@ import sys
 import sysconfig
 import tomllib
 from pathlib import Path
-from zipfile import ZipFile
 
 import pytest
 import yaml
@@ -73,17 +72,6 @@ def commands(wheel: Path) -> Path:
     where = called(python, "-c", "import biogrip; print(biogrip.__file__)", folder=folder)
     assert Path(where.strip()).is_relative_to(folder)
     return folder / "bin"
-
-
-def test_the_wheel_has_every_file_of_the_package(wheel: Path) -> None:
-    source = ROOT / "src"
-    files = {
-        file.relative_to(source).as_posix()
-        for file in (source / "biogrip").rglob("*")
-        if file.is_file() and file.suffix != ".pyc"
-    }
-    with ZipFile(wheel) as archive:
-        assert files <= set(archive.namelist())
 
 
 def test_the_wheel_identifies_the_example(commands: Path, tmp_path: Path) -> None:

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pytest
 from matplotlib.patches import Rectangle
 
 from biogrip.figures.likelihood import draw_profiles, draw_valley
-from biogrip.figures.style import lay_out, styled
+from biogrip.figures.style import styled
 from biogrip.fit.methods import METHODS
 from tests.helpers.default import seen
 
@@ -84,13 +85,19 @@ def drawn_valley(
         return draw_valley(case, path, folder / "found.csv").axes[0]
 
 
+KNOWN = ("truth", "paper")
 DEEP = [[50.0] * 5, [0.0] * 5, [60.0] * 5]
 # Deep at its last point alone, where c is 9.
 CLOSED = [[900.0] * 5, [900.0, 900.0, 900.0, 900.0, 0.0], [900.0] * 5]
 
 
-def test_fits_beyond_a_valleys_axes_are_marked(tmp_path: Path) -> None:
-    axes = drawn_valley(tmp_path, DEEP, {"c": [3.0, 4e4, 5.0], "c_p": [7.0, 10.0, 5.0]})
+@pytest.mark.parametrize(
+    ("c", "paper"), [([3.0, 4e4, 5.0], {}), ([3.0, 5.0, 5.0], {"c": 1e5, "c_p": 10.0})]
+)
+def test_fits_and_a_paper_beyond_a_valleys_axes_are_marked(
+    tmp_path: Path, c: list[float], paper: dict[str, float]
+) -> None:
+    axes = drawn_valley(tmp_path, DEEP, {"c": c, "c_p": [7.0, 10.0, 5.0]}, paper=paper)
     (beyond,) = (line for line in axes.lines if line.get_label() == "beyond the axis")
     np.testing.assert_allclose(np.asarray(beyond.get_xydata()), [[11.5, 10.0]])
     assert beyond.get_marker() == ">"
@@ -110,31 +117,7 @@ def test_a_valleys_axes_end_around_what_is_in_it(tmp_path: Path) -> None:
     assert wide.get_xlim()[0] < 1
     assert wide.get_xlim()[1] > 9
     known = {"c": 6.0, "c_p": 4.0}
-    for name in ("truth", "paper"):
-        axes = drawn_valley(tmp_path, CLOSED, near, **{name: known})
+    more = drawn_valley(tmp_path, CLOSED, {"c": [6.0, 9.05], "c_p": [4.0, 0.95]})
+    for axes in (more, *(drawn_valley(tmp_path, CLOSED, near, **{n: known}) for n in KNOWN)):
         assert axes.get_xlim()[0] < 6 < 9.05 < axes.get_xlim()[1]
         assert axes.get_ylim()[0] < 0.95 < 4 < axes.get_ylim()[1]
-    fit = drawn_valley(tmp_path, CLOSED, {"c": [2.0, 9.0], "c_p": [7.0, 1.0]})
-    assert 0 < fit.get_xlim()[0] < 2
-    assert fit.get_ylim()[1] > 7
-
-
-def test_a_paper_far_off_is_marked_and_leaves_the_valley_its_room(tmp_path: Path) -> None:
-    fits, size = {"c": [9.0], "c_p": [1.0]}, []
-    for c in (9.0, 1e5):
-        axes = drawn_valley(tmp_path, DEEP, fits, paper={"c": c, "c_p": 1.0})
-        with styled():
-            lay_out(axes.figure, 100)
-        size.append(axes.get_position().height)
-    (beyond,) = (line for line in axes.lines if line.get_label() == "beyond the axis")
-    assert float(np.asarray(beyond.get_xdata())[0]) == axes.get_xlim()[1]
-    # A third row of the legend is a twentieth of the figure.
-    assert size[1] > 0.85 * size[0]
-
-
-def test_where_truth_and_paper_coincide_both_are_seen(tmp_path: Path) -> None:
-    known = {"c": 9.0, "c_p": 1.0}
-    axes = drawn_valley(tmp_path, CLOSED, {"c": [9.0], "c_p": [1.0]}, truth=known, paper=known)
-    marks = {line.get_label(): line for line in axes.lines}
-    assert marks["truth"].get_zorder() > marks["paper"].get_zorder()
-    assert marks["paper"].get_markerfacecolor() == "none"

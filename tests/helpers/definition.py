@@ -2,8 +2,7 @@
 
 With a quantity held, SciPy searches all samples for the lowest chi^2 over what is left free,
 without a prior. A parameter is held by leaving it out; of a sum what is left free is the logarithm
-of the ratio of its two members. The starts are the best of many random points, some others of
-them, and what is handed in.
+of the ratio of its two members. The starts are random points, and what is handed in.
 """
 
 from collections.abc import Iterable
@@ -16,7 +15,6 @@ from biogrip.arrays import Array
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
 
-CANDIDATES = 400
 ROUGH, TIGHT = 1e-6, 1e-11
 # What the project says of branches that do not relax within the experiment.
 HINGE = 10.0
@@ -120,19 +118,9 @@ class FitConstraint:
 
     def increase(self, rng: np.random.Generator, count: int, starts: Iterable[Array] = ()) -> float:
         """Lowest rise of chi^2 from so many random starts, and some more."""
-        points = rng.uniform(self.low, self.high, (CANDIDATES, len(self.low)))
-        many = np.array([self.log_parameters(point) for point in points])
-        misfit = self._likelihood.problem.misfit(np.exp(many))
-        late = np.array([sum(max(u, 0.0) ** 2 for u in self._late(x)) for x in many])
-        increases = (
-            np.array([self._likelihood.increase(float(u)) for u in misfit]) + HINGE**2 * late
-        )
-        order = np.argsort(increases)
-        good = count // 3
-        first = np.concatenate(
-            (many[order[:good]], many[rng.permutation(order[good:])[good:count]])
-        )
-        found = sorted((self.fitted(x, ROUGH) for x in (*first, *starts)), key=lambda fit: fit[0])
+        random = rng.uniform(self.low, self.high, (count, len(self.low)))
+        first = [*starts, *map(self.log_parameters, random)]
+        found = sorted((self.fitted(x, ROUGH) for x in first), key=lambda fit: fit[0])
         return min(self.fitted(x)[0] for _, x in found[:3])
 
 
@@ -162,23 +150,3 @@ def rise_at(
     ]
     held = FitConstraint(likelihood, quantity, limit)
     return held.increase(rng, count, (likelihood.best, *others))
-
-
-def rises_along(
-    likelihood: Likelihood, quantity: Quantity, limit: float, steps: int
-) -> tuple[float, float]:
-    """Rise at a limit, followed in small steps from the optimum, and back from beyond the limit.
-
-    They differ where the optimum's basin ends, or is no longer the lowest, close to the limit.
-    """
-    x, increases = likelihood.best, []
-    start = quantity.log(x)
-    ends = quantity.range(likelihood.problem.low, likelihood.problem.high)
-    beyond = float(np.clip(1.25 * limit - 0.25 * start, *ends))
-    there = np.linspace(start, limit, steps + 1)[1:]
-    on = np.linspace(limit, beyond, steps // 4 + 1)[1:]
-    for target in (*there, *on, *on[-2::-1], limit):
-        increase, x = FitConstraint(likelihood, quantity, float(target)).fitted(x)
-        if target == limit:
-            increases.append(increase)
-    return increases[0], increases[-1]

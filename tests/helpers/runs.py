@@ -24,7 +24,7 @@ _JOBS = re.compile(r"^(\w+) +(\d+) *$", re.MULTILINE)
 # a user recorded, which is `mine.csv` in the study's folder.
 TINY: dict[str, Any] = {
     "seeds": 2,
-    "batch_size": 1,
+    "batch_size": 2,
     "measurement": {"rate_Hz": 0.5},
     "methods": ["genetic", "least_squares"],
     "least_squares": {"candidates": 50, "starts": 3},

@@ -4,20 +4,33 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm, t
 
-from biogrip.arrays import Array, IntArray
-from biogrip.fit.local_fits import FINE
+from biogrip.arrays import Array
 from biogrip.fit.multi_start import fit_from
-from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
+from biogrip.judging.constrained_fits import QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
-from biogrip.judging.limits import Brackets, crossings, find_limits
+from biogrip.judging.limits import find_limits
+from biogrip.judging.onset_profiles import profile_over_onset
 from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
+from biogrip.library import set_up, simulate
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.protocol import hold
 from biogrip.physics.sample_model import with_fixed
-from tests.helpers.problems import GRIPPER, MODEL, TORQUE, identified, of_case, posed_for, run
+from tests.helpers.problems import (
+    GRIPPER,
+    MODEL,
+    TORQUE,
+    case_problem,
+    clean,
+    identified,
+    of_case,
+    posed_for,
+    run,
+)
 from tests.helpers.scipy_fits import scipy_fit
 
 PARAMETERS = parameters_and_sum(MODEL)
@@ -48,29 +61,26 @@ def rest_fitted(likelihood: Likelihood, known: list[int], logs: list[float], sta
     return likelihood.increase(scipy_fit(rest, np.delete(start, known)).misfit_rad)
 
 
-def values(quantities: list[Quantity], which: IntArray, x: Array) -> Array:
-    return np.array([quantities[q].log(point) for q, point in zip(which, x, strict=True)])
-
-
-BRANCHED = {branches: Sample("generalized_maxwell", branches).model for branches in (1, 2, 3)}
 BURGERS = MODELS["burgers"]
+TWO, THREE = (Sample("generalized_maxwell", branches).model for branches in (2, 3))
 FORMS = {
-    "one branch": (BRANCHED[1], find_combinations(BRANCHED[1], [0, 1, 2])),
-    "two branches": (BRANCHED[2], parameters_and_sum(BRANCHED[2])[-1:]),
-    "three branches": (BRANCHED[3], find_combinations(BRANCHED[3], [0, 1, 4])),
-    "springs of burgers": (BURGERS, find_combinations(BURGERS, [0, 2])),
-    "spring and damper of burgers": (BURGERS, find_combinations(BURGERS, [0, 3])),
+    "one branch": (MODEL, find_combinations(MODEL, [0, 1, 2])),
+    "two branches": (TWO, parameters_and_sum(TWO)[-1:]),
+    "three branches": (THREE, find_combinations(THREE, [0, 1, 4])),
+    "burgers": (
+        BURGERS,
+        [q for pair in ([0, 2], [0, 3]) for q in find_combinations(BURGERS, pair)],
+    ),
 }
 
 
-@pytest.mark.parametrize("alike", [True, False])
 @pytest.mark.parametrize("form", FORMS)
-def test_points_are_moved_to_where_quantities_are_held(form: str, alike: bool) -> None:
+def test_points_are_moved_to_where_quantities_are_held(form: str) -> None:
     """Within bounds, from anywhere, for targets all over the ranges and at their very ends."""
     model, combined = FORMS[form]
     quantities = [*parameters_and_sum(model), *combined]
     low = np.full(len(model.names), -3.0)
-    high = np.full(len(low), 4.0) if alike else np.linspace(2.0, 5.0, len(low))
+    high = np.linspace(2.0, 5.0, len(low))
     ends = np.array([quantity.range(low, high) for quantity in quantities])
     rng = np.random.default_rng(0)
     which = rng.integers(len(quantities), size=3000)
@@ -81,7 +91,8 @@ def test_points_are_moved_to_where_quantities_are_held(form: str, alike: bool) -
     # Points out of bounds are moved into them first.
     x = held.started(np.clip(rng.uniform(low - 1, high + 1, (3000, len(low))), low, high))
     assert np.all((x >= low) & (x <= high))
-    assert np.max(np.abs(values(quantities, which, x) - targets)) < 1e-6
+    values = [quantities[q].log(point) for q, point in zip(which, x, strict=True)]
+    assert np.max(np.abs(values - targets)) < 1e-6
     with pytest.raises(ValueError, match="outside its range"):
         QuantityConstraint(quantities, which, targets + 20, *bounds, 400.0).started(x)
 
@@ -110,6 +121,10 @@ def test_profiles_are_as_low_as_fits_with_the_parameter_known(case: str) -> None
         ends = likelihood.problem.low[index], likelihood.problem.high[index]
         np.testing.assert_allclose(found.log_values[[0, -1]], ends)
         assert np.min(found.increases) > -1e-3
+        # Points are close enough for a curve, and at the limits, where it crosses the threshold.
+        assert {found.low, found.high} - {None} <= {*found.log_values}
+        shown = np.sqrt(np.clip(found.increases, 0.0, 16.0))
+        assert np.max(np.abs(np.diff(shown))) <= 0.3
         for value, increase in zip(found.log_values[::6], found.increases[::6], strict=True):
             alone = rest_fitted(likelihood, [index], [value], likelihood.best)
             assert increase < alone + 1e-3 * (1 + alone)
@@ -124,9 +139,9 @@ def test_the_search_range_determines_no_combination() -> None:
     times = np.linspace(0.0, 400.0, 801)
     clean_rad = rotation(step_response(GRIPPER, MODEL.network(sample)), TORQUE, times)[0]
     noise = 4e-6 * np.random.default_rng(1).standard_normal(len(times))
-    case_problem = posed_for(MODEL, times, clean_rad + noise)
-    found, k_and_k_p = run("least_squares", case_problem), find_combinations(MODEL, [0, 1])
-    told = diagnose(case_problem, MODEL, found, confidence=0.95, noise_rad=1e-4)
+    problem = posed_for(MODEL, times, clean_rad + noise)
+    found, k_and_k_p = run("least_squares", problem), find_combinations(MODEL, [0, 1])
+    told = diagnose(problem, MODEL, found, confidence=0.95, noise_rad=1e-4)
     series = next(q for q in k_and_k_p if q.form == "series")
     # To first order it is known well enough to be looked at.
     assert told.likelihood.deviation(series) < 0.5
@@ -135,40 +150,18 @@ def test_the_search_range_determines_no_combination() -> None:
     assert one.high is not None
     assert told.trades == []
     # With one spring as soft as it may be, and the other any, it is lower than any limit.
-    soft, best = case_problem.low[0], told.likelihood.best
+    soft, best = problem.low[0], told.likelihood.best
     assert series.log(np.array([soft, *best[1:]])) < soft + 1e-3
     assert rest_fitted(told.likelihood, [0], [soft], best) < told.likelihood.threshold
 
 
-def test_points_of_a_valley_take_one_call() -> None:
-    (likelihood,) = likelihoods("liquid_drop_2", 1)
-    fits = ConstrainedFits([likelihood], PARAMETERS)
-    shares = np.array([0.1, 0.4, 0.7, 0.99, 0.9, 0.5])
-    total = np.exp(likelihood.best[2:]).sum() * np.array([1.0, 1.0, 1.0, 1.0, 1.02, 0.97])
-    x = np.tile(likelihood.best, (len(shares), 1))
-    x[:, 2], x[:, 3] = np.log(total * shares), np.log(total * (1 - shares))
-    increases, found = fits.with_fixed(x, np.array([False, False, True, True]), FINE)
-    np.testing.assert_array_equal(found[:, 2:], x[:, 2:])
-    for increase, point in zip(increases, found, strict=True):
-        alone = rest_fitted(likelihood, [2, 3], list(point[2:]), point)
-        assert increase == pytest.approx(alone, rel=1e-5, abs=2e-3)
-
-
 def test_a_model_with_one_parameter_has_a_profile() -> None:
     damper = MODELS["damper"]
-    (problem,) = of_case("liquid_drop_2", 1)
-    case_problem = replace(
-        problem,
-        residuals=problem.residuals.of_model(damper),
-        low=problem.low[3:],
-        high=problem.high[3:],
-    )
-    best = fit_from([case_problem], np.array([2.0]))
+    (problem,) = case_problem(*clean("liquid_drop_2"), 1, damper)
+    best = fit_from([problem], np.array([2.0]))
     misfit_rad = float(best.misfit_rad[0])
-    assert misfit_rad == pytest.approx(
-        scipy_fit(case_problem, np.array([2.0])).misfit_rad, rel=1e-9
-    )
-    likelihood = make_likelihood(case_problem, best.x[0], misfit_rad, confidence=0.95)
+    assert misfit_rad == pytest.approx(scipy_fit(problem, np.array([2.0])).misfit_rad, rel=1e-9)
+    likelihood = make_likelihood(problem, best.x[0], misfit_rad, confidence=0.95)
     quantities = parameters_and_sum(damper)
     (limits,) = find_limits([likelihood], quantities)[0]
     ((alone,),) = compute_profiles([likelihood], quantities)
@@ -176,30 +169,36 @@ def test_a_model_with_one_parameter_has_a_profile() -> None:
     np.testing.assert_allclose(limits[0], ends, rtol=0, atol=1e-4)
 
 
-class TwoBasins(ConstrainedFits):
-    """Rises in two basins, which fits do not leave; a second parameter says in which they are."""
+@pytest.mark.parametrize("taken_out", [{}, {"offset": True}, {"offset": True, "drift": True}])
+def test_noise_and_threshold_are_those_of_a_regression(taken_out: dict[str, bool]) -> None:
+    """Of n readings and p parameters, offset and drift included, n - p are left; Student's t.
 
-    def __init__(self) -> None:
-        self.threshold = np.array([4.0])
+    Of known noise it is the normal distribution.
+    """
+    model, times = MODELS["maxwell"], np.arange(0.0, 400.0, 40.0)
+    response = rotation(step_response(GRIPPER, model.network([[1.0, 10.0]])), TORQUE, times)[0]
+    (problem,) = case_problem(times, response, 1, model, **taken_out)
+    best = scipy_fit(problem, np.log([1.0, 10.0]))
+    left = len(times) - 2 - len(taken_out)
+    found = make_likelihood(problem, best.log_parameters, best.misfit_rad, confidence=0.95)
+    assert found.noise_rad**2 == pytest.approx(len(times) * best.misfit_rad**2 / left)
+    assert found.threshold == pytest.approx(t.ppf(0.975, left) ** 2)
+    known = make_likelihood(problem, found.best, best.misfit_rad, confidence=0.95, noise_rad=1e-6)
+    assert known.threshold == pytest.approx(norm.ppf(0.975) ** 2)
 
-    def at(
-        self, profile: IntArray, targets: Array, near: Array, tolerance: float
-    ) -> tuple[Array, Array]:
-        """Rises of 0.3 t^2 or, from -1, of 5 + (t - 3)^2."""
-        first = near[:, 1] > -1
-        increases = np.where(first, 0.3 * targets**2, 5 + (targets - 3) ** 2)
-        return increases, np.column_stack((targets, np.where(first, 1.0, -1.0)))
 
-
-def test_a_basin_seen_on_the_way_is_followed_to_the_outer_end() -> None:
-    """There it is below the threshold, at 2.7, so that the crossing lies further out."""
-    brackets = Brackets(
-        np.zeros(1, dtype=np.int64),
-        values=np.array([[0.0], [3.0]]),
-        increases=np.array([[0.0], [5.0]]),
-        x=np.array([[[0.0, 1.0]], [[3.0, -1.0]]]),
-    )
-    (crossing,) = crossings(TwoBasins(), brackets, 1e-7, 1e-6)
-    assert np.isnan(crossing)
-    assert brackets.increases[1, 0] == pytest.approx(2.7)
-    assert brackets.x[1].tolist() == [[3.0, 1.0]]
+def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
+    """With the best onset alone the damper would be known from below, too."""
+    experiment = set_up(GRIPPER, (hold(20.0, 1e-9), hold(40.0, 0.4e-9)), Sample("kelvin_voigt"))
+    times = np.arange(61.0)
+    exact = simulate(experiment, {"k_p": 6.0, "c_p": 30.0}, times)
+    trace = exact + 9e-6 * np.random.default_rng(1).standard_normal(len(times))
+    problem = experiment.of(times, trace)
+    found = run("least_squares", problem)
+    alone = diagnose(problem, experiment.model, found, confidence=0.95)
+    merged = profile_over_onset(alone, times)
+    certainty = alone.likelihood.certainty
+    for low_of, diagnosis in (([True, True], alone), ([True, False], merged)):
+        assert [finding.low is not None for finding in diagnosis.findings] == low_of
+        at_the_end = [finding.profile.increases[0] for finding in diagnosis.findings]
+        assert [increase > certainty for increase in at_the_end] == low_of

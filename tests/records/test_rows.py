@@ -5,13 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.identify.outputs import Outcome, write_table
 from biogrip.records.rows import (
     as_it_was,
     escape_formula,
     read_frame,
     read_rows,
-    read_table,
     write_rows,
 )
 
@@ -34,16 +32,6 @@ def test_no_cell_is_a_formula_and_all_are_read_back(tmp_path: Path, text: str) -
 @pytest.mark.parametrize("text", PLAIN)
 def test_numbers_and_other_text_are_written_as_they_are(text: str) -> None:
     assert escape_formula(text) == as_it_was(text) == text
-
-
-def test_a_table_of_traces_names_those_that_look_like_formulas(tmp_path: Path) -> None:
-    table = tmp_path / "table.csv"
-    reason = "=1+1.csv: found no header, allowed is a line with column names."
-    write_table(Outcome([], {"=1+1.csv": reason}), table)
-    with table.open(newline="") as stream:
-        assert list(csv.reader(stream))[1][:2] == ["'=1+1.csv", "failed"]
-    assert read_rows(table)[1][:2] == ["=1+1.csv", "failed"]
-    assert read_table(table)[0]["trace"] == "=1+1.csv"
 
 
 def test_a_name_that_is_no_text_is_written(tmp_path: Path) -> None:

@@ -38,16 +38,10 @@ def test_a_target_is_read_back_to_nine_digits(tmp_path: Path) -> None:
     assert ",-0" not in written(tmp_path).read_text()
 
 
-def test_no_force_at_all_is_written_as_none(tmp_path: Path) -> None:
-    write_target(tmp_path / "t.csv", TIMES, TIMES, TIMES, np.zeros(5))
-    assert np.all(read_jaw_force(tmp_path / "t.csv")[2] == 0)
-
-
 @pytest.mark.parametrize(
     ("line", "text", "message"),
     [
         (3, "2,1e-9,nan,0", "line 4, rotation_rad: found nan, allowed is a finite number"),
-        (2, "1,inf,1e-6,0", "line 3, torque_Nm: found inf, allowed is a finite number"),
         (1, "0,1e-9,abc,0", "cannot be read as a target: could not convert string"),
         (0, "t,tau,phi", "line 1: found the columns t, tau, phi"),
     ],

@@ -13,12 +13,8 @@ from biogrip.errors import BiogripError
 from biogrip.stages.job import (
     batch_names,
     case_of,
-    job_case,
-    job_seeds,
-    job_study,
     keys_of_cases,
     logged,
-    paths,
     seeds_of,
     settings,
     study_of,
@@ -58,43 +54,21 @@ def test_what_the_rule_does_not_name_cannot_be_read(key: str) -> None:
         getattr(case, key)
 
 
-@pytest.mark.parametrize("overlay", ["", SWEPT])
-def test_all_keys_give_the_study_back(overlay: str) -> None:
-    study = default.study_of(overlay)
+def test_all_keys_give_the_study_and_its_cases_back() -> None:
+    """The points of sweeps are cases, too; what the study gives is the study's."""
+    study = default.study_of(SWEPT)
     again = study_of(told(settings(study, [*WHOLE, *keys_of_cases(study)])))
     assert again.plain == study.plain
     assert (list(again.cases), list(again.points)) == (list(study.cases), list(study.points))
-
-
-@pytest.mark.parametrize("overlay", ["", SWEPT])
-def test_all_keys_of_a_case_give_the_case_back(overlay: str) -> None:
-    """The points of sweeps are cases, too; what the study gives is the study's."""
-    study = default.study_of(overlay)
     keys = [field.name for field in fields(CaseBlock)]
     keys += ["study_seed", "seeds", "methods", "actuator"]
     for name in (*study.cases, *study.points):
-        was = study.case(name)
-        case = case_of(name, told(settings(study, keys, name)))
-        assert (case.title, case.sample, case.noise, case.sampling) == (
-            *(was.title, was.sample, was.noise, was.sampling),
-        )
-        assert (case.problem, case.parameters) == (was.problem, was.parameters)
-        assert (case.seeds, case.study.study_seed) == (was.seeds, study.study_seed)
+        was, case = study.case(name), case_of(name, told(settings(study, keys, name)))
+        for known in ("title", "sample", "noise", "sampling", "problem", "parameters", "seeds"):
+            assert getattr(case, known) == getattr(was, known)
+        assert case.study.study_seed == study.study_seed
         for method in study.methods:
             assert case.method(method) == was.method(method)
-
-
-def test_a_script_reads_what_its_rule_gives() -> None:
-    one, other = settings(STUDY, ["sample"], NAME), settings(STUDY, ["study_seed"])
-    job = SimpleNamespace(
-        params=[one, other, {"software": {}}],
-        wildcards=SimpleNamespace(case=NAME, batch="seeds_3-5"),
-    )
-    assert (job_case(job).name, job_case(job).study.study_seed) == (NAME, STUDY.study_seed)
-    assert job_seeds(job) == [3, 4, 5]
-    assert job_study(SimpleNamespace(params=[other, {"software": {}}])).study_seed == 1
-    assert paths("a.csv") == [Path("a.csv")]
-    assert paths(["a", "b"]) == [Path("a"), Path("b")]
 
 
 def test_the_log_has_what_a_user_can_correct_alone_and_else_a_traceback(tmp_path: Path) -> None:
@@ -162,10 +136,3 @@ def test_every_seed_is_covered_once_whatever_there_is(
         assert covered == list(range(seeds))
         # Half-way through, the plan does not change: a restarted run continues.
         assert batch_names(seeds, size, made(folder, *plan[::2])) == plan
-
-
-def test_very_many_seeds_make_larger_batches_not_more() -> None:
-    assert len(batch_names(500)) == 1
-    assert {len(batch_names(seeds)) for seeds in (4_001, 6_001, 8_000)} == {8}
-    # But none that would take much memory.
-    assert len(batch_names(1_000_000)) == 1000

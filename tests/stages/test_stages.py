@@ -7,18 +7,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import Phase, Sampling, hold
 from biogrip.records.identifications import columns
 from biogrip.records.rows import write_rows
-from biogrip.records.traces import read_jaw_force, read_measurements, read_target
+from biogrip.records.traces import read_jaw_force, read_target
 from biogrip.stages import identification as identifications
 from biogrip.stages import judgement, recording
 from biogrip.stages import targets as target
-from biogrip.traces.columns import Columns
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import EXAMPLE
 
@@ -46,7 +44,6 @@ def test_arms_cannot_turn_further_than_their_combs(tmp_path: Path) -> None:
         target.simulate(drop(4e-8), tmp_path / "t.csv")
     assert not list(tmp_path.iterdir())
     target.simulate(drop(3e-8), tmp_path / "t.csv")
-    assert len((tmp_path / "t.csv").read_text().splitlines()) == 102
 
 
 def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
@@ -77,25 +74,6 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     )
 
 
-def test_rows_of_a_recording_without_a_number_are_counted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    case = STUDY.cases["liquid_drop_2"]
-    columns = Columns("time_s", "rotation_rad")
-    read = seen(gripper=case.gripper, problem=case.problem, columns=columns)
-    # The example is a trace of this gripper under this protocol.
-    text, rows = EXAMPLE.read_text(), 1 + np.arange(3) / 10
-    for gaps in ("", "".join(f"{400 + row:g},nan\n" for row in rows)):
-        trace, made = tmp_path / "trace.csv", tmp_path / "made.parquet"
-        trace.write_text(text + gaps)
-        recording.record(read, trace, made)
-        samples = len(read_measurements(made).time_s)
-        said = capsys.readouterr().out
-        warned = f"{trace}: Left out for want of a number: 3 rows of {samples + 3}."
-        assert (warned in said) == bool(gaps)
-        assert np.isfinite(read_measurements(made).rotation_rad[0]).all()
-
-
 def test_what_is_left_from_a_larger_study_is_not_joined(tmp_path: Path) -> None:
     """Methods may have batches that end at different seeds; their files then have as many rows."""
     model = MODELS["maxwell"]
@@ -123,21 +101,6 @@ def test_what_is_left_from_a_larger_study_is_not_joined(tmp_path: Path) -> None:
     written(((0, 1), (1, 2), (0, 1, 2)))
     with pytest.raises(BiogripError, match="do not hold each of the seeds 0 to 2 once for each"):
         joined()
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_target_that_is_not_finite_is_refused_where_it_arises(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, value: float
-) -> None:
-    def odd(*_: object, **__: object) -> Array:
-        return np.where(np.arange(101) < 7, 1e-5, value)[None]
-
-    monkeypatch.setattr(target, "simulated_rotation", odd)
-    with pytest.raises(BiogripError) as error:
-        target.simulate(drop(1e-9), tmp_path / "t.csv")
-    said = str(error.value)
-    assert f"the simulated rotation of Maxwell liquid with k = 1, c = 1 is {value} at 7 s" in said
-    assert not list(tmp_path.iterdir())
 
 
 def test_all_stages_weight_the_readings(tmp_path: Path) -> None:

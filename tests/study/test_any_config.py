@@ -92,7 +92,7 @@ def some_keys(draw: st.DrawFn, paths: list[str], *, junk: bool) -> dict[str, Any
 
 @st.composite
 def overlays(draw: st.DrawFn) -> dict[str, Any]:
-    """Some keys of the study, perhaps a case with keys of its own, and perhaps a sweep over it."""
+    """Some keys of the study, and perhaps a case with keys of its own."""
     wrong = draw(st.sampled_from(["", "", "study", "case"]))
     config = draw(some_keys(sorted(SINGLE), junk=wrong == "study"))
     if draw(st.booleans()):
@@ -101,12 +101,6 @@ def overlays(draw: st.DrawFn) -> dict[str, Any]:
         parameters = {name: draw(st.floats(1e-6, 1e6)) for name in MODELS[model].names}
         name = draw(st.sampled_from(["unit", "title", "label", "my-case_1", "x" * 65]))
         config["cases"] = {name: {**case, "sample": {"model": model, **parameters}}}
-        if draw(st.booleans()):
-            levels = draw(st.lists(st.floats(0, 11), min_size=1, max_size=3, unique=True))
-            key = draw(st.sampled_from(["measurement.noise.level", "least_squares.starts"]))
-            rows = {"label": "a", "key": key, "values": levels}
-            columns = {"label": "b", "key": "gripper.arm_length_m", "values": [1e-3, 2e-3]}
-            config["sweeps"] = {"s": {"cases": [name], "rows": rows, "columns": columns}}
     return config
 
 

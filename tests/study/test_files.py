@@ -15,26 +15,15 @@ BOMB = "\n".join(f"a{i}: &a{i} [{f'*a{i - 1}, ' * 10 if i else 'x'}]" for i in r
 
 UNREADABLE: dict[str, tuple[str | bytes, str]] = {
     "latin 1": (b"seeds: 1\n# \xe9\n", r"line 2: found the byte 0xe9, allowed is text in UTF-8"),
-    "UTF-16": ("seeds: 3\n".encode("utf-16"), r"line 1: found the byte 0xff, allowed is text"),
     "a program": (b"\x7fELF\x02\x01\x01" + bytes(99), r"not valid YAML: .*not allowed"),
     "aliases of aliases": (BOMB, r"line \d+: found more than 50 levels or 100000 values, those of"),
-    "alias of itself": ("a: &a [*a]", r"line 1: found more than 50 levels"),
-    "unknown alias": ("a: *b", r"line 1: not valid YAML: found undefined alias"),
     "large": ("# " + "x" * LARGEST_BYTES, r"my.yaml: found more than 1000000 bytes; allowed are"),
-    "tag": (
-        "a: !!python/object/apply:os.system [x]",
-        r"line 1: not valid YAML: could not",
-    ),
-    "tag of a number": ("seeds: !!int many", r"not valid YAML: invalid literal for int"),
+    "tag": ("a: !!python/object/apply:os.system [x]", r"line 1: not valid YAML: could not"),
     "sexagesimal": (
         "study_seed: 2\nseeds: 1:30",
         r"line 2: seeds: found 1:30, which YAML reads in base 60; allowed is a number without col",
     ),
     "octal": ("seeds: 010", r"line 1: seeds: found 010, which YAML reads in base 8; allowed is a"),
-    "octal in a list": (
-        "measurement:\n  times_s: [1, 017]",
-        r"line 2: measurement.times_s\[1\]",
-    ),
     "date": ("cases: {x: {title: 2020-01-01}}", r"cases.x.title: found 2020-01-01, which YAML re"),
     "number as a key": ("cases: {1: {}}", r"line 1: cases.1: is no text: YAML reads on, off, yes"),
     "list as a key": ("? [a, b]\n: c", r"line 1: .* is no text"),
@@ -42,7 +31,6 @@ UNREADABLE: dict[str, tuple[str | bytes, str]] = {
     "list of all": ("[1, 2]", r"line 1: found no keys, allowed is a config"),
     "given twice": ("seeds: 1\nseeds: 2", r"line 2: seeds: is given twice, first in line 1"),
     "code": ("__use_yte__: true\nseeds: ?1+1", r"line 1: __use_yte__ makes Snakemake run code"),
-    "tab": ("gripper:\n\tleft: 3", r"line 2: not valid YAML"),
     "open": ("seeds: [1\n", r"line 2: not valid YAML"),
 }
 
@@ -76,17 +64,7 @@ def test_what_is_unusual_but_clear_works(tmp_path: Path, text: str) -> None:
     assert {case.seeds for case in load(tmp_path, text).cases.values()} == {90}
 
 
-def test_an_empty_config_changes_nothing(tmp_path: Path) -> None:
-    assert load(tmp_path, "# nothing\n").plain == load_study(read_config(CONFIG), []).plain
-
-
 @pytest.mark.parametrize("file", sorted((ROOT / "config").glob("*.yaml")), ids=lambda it: it.stem)
 def test_the_shipped_studies_load(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     assert load_study(overlaid(read_config(CONFIG), read_config(file)), [CONFIG, file]).cases
-
-
-def test_more_than_two_thousand_cases_are_too_many(tmp_path: Path) -> None:
-    cases = "".join(f"  c{i}: {{sample: {{model: damper, c_p: 1.0}}}}\n" for i in range(2001 - 3))
-    with pytest.raises(BiogripError, match="cases: found a block of keys of 2001 items, allowed a"):
-        load(tmp_path, f"cases:\n{cases}")

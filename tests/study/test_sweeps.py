@@ -74,19 +74,13 @@ def test_a_whole_number_is_the_same_point_however_it_is_written(tmp_path: Path) 
 def test_values_are_shown_in_the_axis_unit(tmp_path: Path) -> None:
     text = SWEEP.replace("{label: level,", '{label: level, unit: "%", unit_in_si: 0.01,')
     axis = load(tmp_path, text).sweeps["noise"].rows
-    assert (axis.title, {it.text: it.shown for it in axis.levels}) == (
-        "level (%)",
-        {"0.1": "10", "0.02": "2"},
-    )
+    assert axis.title == "level (%)"
+    assert {it.text: it.shown for it in axis.levels} == {"0.1": "10", "0.02": "2"}
 
 
 LEVEL = "key: measurement.noise.level"
 BAD = {
-    ("    rows:", "    rwos:"): r"my.yaml, line 4: sweeps.noise.rwos: unknown key. "
-    r"Did you mean 'rows'\?",
     ("  noise:\n", "  no-ise:\n"): r"line 2: sweeps.no-ise: not a usable sweep name: a letter",
-    ("[liquid_drop_2,", "[liquid_drop_3,"): r"my.yaml, line 3: sweeps.noise.cases\[0\]: found "
-    r"'liquid_drop_3', allowed are endothelial_cell, .* Did you mean 'liquid_drop_",
     (LEVEL, "key: measurement.noise.levle"): r"line 4: sweeps.noise.rows.values\[0\]: gives "
     r"measurement.noise.levle: unknown key. Did you mean 'level'",
     (LEVEL, "key: sample.k"): r"found 'sample.k', allowed is a key in a block that a case",
@@ -94,21 +88,14 @@ BAD = {
     r"gives measurement.rate_Hz: found a block of keys, allowed is a number",
     ("[0.1, 2e-2]", "[0.1, -2]"): r"my.yaml, line 4: sweeps.noise.rows.values\[1\]: gives "
     r"measurement.noise.level: found -2, allowed is at least 0",
-    ("[0.1, 2e-2]", "[]"): r"rows.values: found a list of 0 items, allowed are at least 1",
-    ("[0.1, 2e-2]", "[0.1, 0.1]"): r"rows.values: holds something twice",
     ("[0.1, 2e-2]", "[0.1, 0.1000000000000000001]"): r"rows.values: holds something twice",
-    ("[0.1, 2e-2]", "[0.1, true]"): r"rows.values\[1\]: found True, allowed is a number or text",
     ("label: b, reference: signal, kind: gaussian", "label: b, reference: peak, kind: uniform"): r""
     r"line 2: sweeps.noise: has the point liquid_drop_2--noise--0_1--uniform-peak, a name that",
     ("label: b,", "label: a,"): r"line 10: sweeps.noise.columns.values\[1\]: is called 'a' like",
     ("label: a, kind: uniform", "label: a, kind: unifrom"): r"my.yaml, line 9: "
     r"sweeps.noise.columns.values\[0\]: gives .*kind: found 'unifrom'. Did you mean 'uniform'",
-    ("label: a, kind", "label: a, kidn"): r"gives measurement.noise.kidn: unknown key",
-    ("label: a, kind", "kind"): r"columns.values\[0\].label: is missing and has no default",
     ("label: a, kind", "label: a, level: 1, kind"): r"columns.values\[0\]: sets "
     r"measurement.noise.level, which the rows do too",
-    ("- {label: b, reference: signal, kind: gaussian}", "- 3"): r"\[1\]: gives "
-    r"measurement.noise: found 3, allowed is a block of keys",
     (LEVEL + ", values: [0.1, 2e-2]", "key: measurement.rate_Hz, values: [1e-3]"): r"my.yaml, "
     r"line 4: sweeps.noise.rows.values\[0\]: gives measurement.rate_Hz: found 0.001, which gives",
 }  # fmt: skip

@@ -22,8 +22,9 @@ def test_what_nobody_notices_is_taken_for_the_sample() -> None:
         """
     )
     # The cell is pressed throughout, and what is not linear is left out.
-    assert {case for case, _ in found} == {"liquid_drop_1", "liquid_drop_2"}
-    for case in ("liquid_drop_1", "liquid_drop_2"):
+    drops = {"liquid_drop_1", "liquid_drop_2"}
+    assert {case for case, _ in found} == drops
+    for case in drops:
         total, misfit = found[case, "c + c_p"], found[case, "misfit"]
         assert total["lost_at_s"] == pytest.approx(200)
         # Of 2001 samples with 10 % noise the sum is known to 1 %; four times that is allowed.
@@ -38,16 +39,10 @@ def test_a_sample_that_is_lost_at_once_tells_nothing() -> None:
     found = rows_of(
         """
         measurement: {rate_Hz: 0.1}
-        cases:
-          endothelial_cell: null
-          liquid_drop_1: null
-          liquid_drop_2: null
-          brief:
-            sample: {model: damper, c_p: 9.0}
-            protocol:
-              phases:
-                - {duration_s: 5, torque_Nm: 1.6e-9}
-                - {duration_s: 300, torque_Nm: 0}
+        only: [brief]
+        protocol:
+          phases: [{duration_s: 5, torque_Nm: 1.6e-9}, {duration_s: 300, torque_Nm: 0}]
+        cases: {brief: {sample: {model: damper, c_p: 9.0}}}
         """
     )
     assert "until_lost" not in found["brief", "c_p"]

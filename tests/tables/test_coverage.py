@@ -50,12 +50,10 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
     assert (k["seeds"], k["confidence_percent"]) == (3, 90.0)
     assert k["coverage_percent"] == pytest.approx(100 * 2 / 3)
     assert k["bias_percent"] == pytest.approx(100 * np.mean(np.log([1.01, 1.02, 1.3])))
-    shown = ["shown_seeds", "shown_determined", "shown_determined_true"]
-    shown += ["shown_one_sided", "shown_one_sided_true"]
-    assert [k[name] for name in shown] == [2, 1, 0, 1, 1]
-    assert [c_p[name] for name in shown] == [2, 0, 0, 2, 1]
+    shown = ("seeds", "determined", "determined_true", "one_sided", "one_sided_true")
+    assert [k[f"shown_{name}"] for name in shown] == [2, 1, 0, 1, 1]
+    assert [c_p[f"shown_{name}"] for name in shown] == [2, 0, 0, 2, 1]
     assert "bound_percent" not in c_p
-    assert "95" not in made.caption
 
 
 def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
@@ -89,9 +87,7 @@ def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
     assert "at 90 %" in made.caption
 
 
-@pytest.mark.parametrize(
-    ("every", "seeds", "judged"), [(1, (9, 11), [9, 10]), (10, (9, 11), [10]), (25, (24, 27), [25])]
-)
+@pytest.mark.parametrize(("every", "seeds", "judged"), [(10, (9, 11), [10]), (25, (24, 27), [25])])
 def test_some_seeds_are_judged_in_full(
     tmp_path: Path, target: Path, every: int, seeds: tuple[int, int], judged: list[int]
 ) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
 from biogrip.physics.models import MODELS, UNPUBLISHED, Published, Sample, Truth
 from biogrip.records.identifications import MODEL_FITS, columns
@@ -63,7 +62,6 @@ def test_error_table_is_the_arithmetic_it_says(eleven_seeds: Path) -> None:
     assert k["median_absolute_error_percent"] == pytest.approx(37.5)
     # 1.001 + 0.0036 seed is at most 1.02 up to seed 5.
     assert k["near_noise_share"] == pytest.approx(6 / 11)
-    assert made.columns[-1].heading == "Share within 2 % of the noise"
     assert (k["paper_identified"], k["paper_error_percent"]) == (9.0, "10")
     assert (total["target"], total["paper_identified"], total["paper_error_percent"]) == (5, 5, 0)
     assert total["median_absolute_error_percent"] == pytest.approx(0.0, abs=1e-12)
@@ -75,22 +73,13 @@ def test_joined_errors_are_within_the_tolerance_that_their_heading_names(
 ) -> None:
     case = case_of(0.005)
     made = errors_of_case(case, eleven_seeds)
-    assert made.columns[-1].heading == "Share within 0.5 % of the noise"
     # 1.001 and 1.0046.
     assert made.rows[0]["near_noise_share"] == pytest.approx(2 / 11)
     write(made, tmp_path / "t.csv")
     joined = errors(case.study, [tmp_path / "t.csv"])
     assert joined.columns == made.columns
+    assert joined.columns[-1].heading == "Share within 0.5 % of the noise"
     assert joined.rows[0]["typical_seed"] == 5
-    assert joined.rows[3]["paper_error_percent"] == ">100"
-
-
-def test_files_that_are_no_identifications_are_named(tmp_path: Path) -> None:
-    with pytest.raises(BiogripError, match=r"gone.csv: cannot be read as identifications"):
-        errors_of_case(case_of(), tmp_path / "gone.csv")
-    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(BiogripError, match=r"other.csv, line 1: wanted the columns case"):
-        errors_of_case(case_of(), tmp_path / "other.csv")
 
 
 def study(parameters: dict[str, float], samples: int) -> Any:
@@ -119,8 +108,7 @@ def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
 
 def test_the_lowest_known_may_be_the_truth(tmp_path: Path) -> None:
     path = identified(tmp_path / "d.csv", [["genetic", 0, 8.0, 1.0, 3.0, 2.0, 1.1, 1.0, 100]])
-    parameters = dict.fromkeys(["k", "k_p", "c", "c_p"], 1.0)
-    (made,) = methods(study(parameters, 100), [path]).rows
+    (made,) = methods(study(TRUE, 100), [path]).rows
     assert made["median_rise"] == pytest.approx(100 * (1.1**2 - 1))
 
 
@@ -149,12 +137,9 @@ cases:
   two: {sample: {model: generalized_maxwell, branches: 2,
                  k_1: 30, k_2: 10, k_p: 12.3, c_1: 150, c_2: 600, c_p: 0}}
 """).cases["two"]
-    assert tuple(two.models) == ("damper", "generalized_maxwell", "generalized_maxwell_2")
-    fits = [("two", name, 0, 4, 1000, 1.0) for name in two.models]
-    MODEL_FITS.write(tmp_path / "fits.csv", fits)
-    found = models(seen(cases={"two": two}), [tmp_path / "fits.csv"]).rows
-    marked = [row["model"] for row in found if "made the traces" in row["model"]]
-    assert marked == ["generalized Maxwell-Wiechert model, 2 branches (made the traces)"]
+    MODEL_FITS.write(tmp_path / "f.csv", [("two", name, 0, 4, 1000, 1.0) for name in two.models])
+    found = models(seen(cases={"two": two}), [tmp_path / "f.csv"]).rows
+    assert ["made the traces" in row["model"] for row in found] == [False, False, True]
     assert [row["parameters"] for row in found] == [1, 4, 6]
 
 
@@ -185,11 +170,6 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     assert (total["target"], total["value"], total["high"]) == (1.5, None, 3.0)
     assert total["expected_verdict"] is None
     assert "c and c_p trade against each other: determined is c + c_p." in table.caption
-    recorded = seen(**vars(known) | {"parameters": {}})
-    assert verdicts(recorded, files[0], []).rows[0]["target"] is None
-    files[0].write_text("{}")
-    with pytest.raises(BiogripError, match=r"a\.json: holds no verdicts"):
-        verdicts(known, files[0], files[1:])
 
 
 def test_timings_are_summed(tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """The paper held against what can be written down by hand."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -59,13 +58,3 @@ def test_errors_are_held_against_bounds_of_what_the_traces_determine() -> None:
         # more is seen of k.
         if np.isfinite(bounds[1]):
             assert bounds[1] / bounds[2] == pytest.approx(np.sqrt(10), rel=0.05)
-
-
-def test_what_the_paper_does_not_give_has_no_row() -> None:
-    case = CASES.cases["liquid_drop_2"]
-    published = replace(case.truth.published, identified={"k": 0.97, "c": 9.7})
-    truth = replace(case.truth, published=published)
-    changed = seen(truth=truth, problem=case.problem, noise=case.noise)
-    rows = sampling_evidence(seen(cases={"liquid_drop_2": changed})).rows
-    assert [row["parameter"] for row in rows] == ["k", "c", "error / bound"]
-    assert sampling_evidence(seen(cases={})).rows == []

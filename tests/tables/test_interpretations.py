@@ -67,12 +67,10 @@ def test_only_seeds_that_are_close_in_all_parameters_count(rows: list[dict[str, 
 
 
 def test_as_improbable_counts_combinations_of_seeds(rows: list[dict[str, str]]) -> None:
-    cell = np.abs(np.array(CELL)[:, :3] / (35.0, 12.3, 299.9) - 1)
-    drop = np.abs(np.array(DROP)[:, :3] / (9.5, 1e-4, 10.0) - 1)
-    shares = [
-        [np.mean([np.all(other <= mine) for other in errors]) for mine in errors]
-        for errors in (cell, drop)
-    ]
+    shares = []
+    for found, true in ((CELL, (35.0, 12.3, 299.9)), (DROP, (9.5, 1e-4, 10.0))):
+        errors = np.abs(np.array(found)[:, :3] / true - 1)
+        shares.append([np.mean([np.all(other <= mine) for other in errors]) for mine in errors])
     not_larger = np.mean([a * b <= 0.125 for a, b in product(*shares)])
     assert float(rows[2]["as_improbable"]) == pytest.approx(not_larger)
     assert rows[0]["as_improbable"] == rows[5]["as_improbable"] == ""

@@ -1,15 +1,13 @@
 """Tables as files, in four formats, and regenerated ones beside the published."""
 
-import csv
 import re
 from pathlib import Path
 
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.records.rows import escape_formula, read_rows
+from biogrip.records.rows import read_rows
 from biogrip.tables.layout import Column, Table, compare, write
-from tests.helpers.places import ROOT
 
 
 def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
@@ -22,13 +20,7 @@ def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
     assert "1.23e+03" in markdown
     assert "None" not in markdown + latex + page
     assert r"Fifty \% of a\_b." in latex
-    assert r"c \& d" in latex
     assert "c &amp; d" in page
-
-
-def test_a_cell_of_no_column_is_refused() -> None:
-    with pytest.raises(ValueError, match="no column: vlaue"):
-        Table("", (Column("value", "Value"),), [{"vlaue": 1.0}])
 
 
 def test_markup_in_a_cell_is_text_in_every_format(tmp_path: Path) -> None:
@@ -42,15 +34,6 @@ def test_markup_in_a_cell_is_text_in_every_format(tmp_path: Path) -> None:
     assert "<script>" not in page
     assert "<b>" not in page
     assert r"50 \% \& 3\_4 \$x\$ \#1 \{y\}" in (tmp_path / "t.tex").read_text()
-
-
-def test_the_published_tables_hold_nothing_that_is_escaped() -> None:
-    files = sorted((ROOT / "results" / "published" / "tables").glob("*.csv"))
-    assert len(files) > 10
-    for file in files:
-        with file.open(newline="") as stream:
-            cells = [cell for row in csv.reader(stream) for cell in row]
-        assert [cell for cell in cells if escape_formula(cell) != cell or "|" in cell] == []
 
 
 def test_regenerated_tables_are_the_same_bytes_or_their_lines_are_shown(tmp_path: Path) -> None:
@@ -68,10 +51,5 @@ def test_regenerated_tables_are_the_same_bytes_or_their_lines_are_shown(tmp_path
     said = str(error.value).splitlines()
     assert said[0] == f"the regenerated tables differ from {published}."
     assert said[-3:] == ["-3,4", "+3,5", "c.csv: is not published."]
-    assert "text" not in str(error.value)
-    (made / "a.csv").write_text("".join(f"{n}\n" for n in range(1000)))
-    with pytest.raises(BiogripError) as error:
-        compare(published, [made / "a.csv"])
-    assert len(str(error.value).splitlines()) == 41
     with pytest.raises(BiogripError, match="holds no tables to compare with"):
         compare(published, [])

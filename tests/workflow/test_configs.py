@@ -2,31 +2,21 @@
 
 from pathlib import Path
 
-from tests.helpers.runs import snakemake
+from tests.helpers.runs import TINY, snakemake
 
-DROP = {"model": "liquid_drop", "k": 1.0, "k_p": 0.1, "c": 10.0}
 CASES = {
     "crept": {
         "instrument": "creep",
         "sample": {"model": "zener_maxwell", "k": 300.0, "k_p": 200.0, "c": 900.0},
         "protocol": {"phases": [{"duration_s": 30, "stress_Pa": 40}]},
     },
-    "sized": {"sample": DROP | {"size_m": 60e-6}, "assumed_gripper": "calibrated"},
-    "in_volts": {"sample": DROP, "protocol": {"phases": [{"duration_s": 50, "voltage_V": 12}]}},
-}
-CONFIG = {
-    "seeds": 1,
-    "methods": ["genetic"],
-    "identifiability": {"coverage_seeds": 0},
-    "genetic_algorithm": {
-        "population": 20,
-        "survivors": 10,
-        "min_generations": 2,
-        "max_generations": 4,
+    "sized_in_volts": {
+        "sample": {"model": "liquid_drop", "k": 1.0, "k_p": 0.1, "c": 10.0, "size_m": 60e-6},
+        "protocol": {"phases": [{"duration_s": 50, "voltage_V": 12}]},
+        "assumed_gripper": "calibrated",
     },
-    "only": list(CASES),
-    "cases": CASES,
 }
+CONFIG = TINY | {"seeds": 1, "only": list(CASES), "cases": CASES}
 
 
 def test_every_kind_of_case_is_identified(tmp_path: Path) -> None:
@@ -34,7 +24,7 @@ def test_every_kind_of_case_is_identified(tmp_path: Path) -> None:
     files = [f"results/identifications/{case}/genetic/seeds_0-0.csv" for case in CASES]
     run = snakemake(tmp_path, "--", *files, config=CONFIG)
     assert run.status == 0, run.output
-    assert (tmp_path / "results/calibrations/sized.yaml").is_file()
+    assert (tmp_path / "results/calibrations/sized_in_volts.yaml").is_file()
 
 
 def test_a_wrong_config_stops_with_one_message(tmp_path: Path) -> None:

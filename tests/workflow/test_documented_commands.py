@@ -103,6 +103,8 @@ def test_what_is_said_can_be_done(document: str, place: Path) -> None:
             (place / title).parent.mkdir(parents=True, exist_ok=True)
             content = re.sub(r"candidates: \d+", "candidates: 128", content)
             content = re.sub(r"most_steps: \d+", "most_steps: 3", content)
+            if title == "lab/my.yaml":
+                content = yaml.safe_dump(SMALL | yaml.safe_load(content))
             (place / title).write_text(content + (TINY_FIT if of_a_fit else ""))
         elif language == "sh":
             for line in content.splitlines():

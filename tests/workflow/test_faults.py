@@ -1,12 +1,9 @@
-"""Runs that are killed end with the undisturbed bytes when run again."""
+"""A run that is killed ends with the undisturbed bytes when it is run again."""
 
-import os
 import shutil
-import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -35,55 +32,24 @@ def started(folder: Path) -> "subprocess.Popen[bytes]":
         cwd=folder,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        # By which its jobs are found.
-        process_group=0,
     )
 
 
-def wait_for(found: Callable[[], object], process: "subprocess.Popen[bytes]") -> None:
-    """Wait until there is something, while a process runs."""
-    give_up = time.monotonic() + 120
-    while not found():
+def test_after_a_kill_the_same_command_ends_with_the_undisturbed_bytes(
+    tiny: Path, tiny_copy: Path
+) -> None:
+    """Kill -9 of Snakemake when there is a result; it asks to be unlocked."""
+    process, give_up = started(tiny_copy), time.monotonic() + 120
+    while not [*tiny_copy.glob("results/identifications/liquid_drop_2/*/*.csv")]:
         assert time.monotonic() < give_up
         assert process.poll() is None
         time.sleep(0.02)
-
-
-def jobs_below(parent: int) -> list[int]:
-    """Return the processes of scripts of a run."""
-    listed = subprocess.check_output(["ps", "-ww", "-eo", "pid=,pgid=,args="], text=True)
-    rows = [line.split(maxsplit=2) for line in listed.splitlines()]
-    return [
-        int(pid)
-        for pid, group, command in rows
-        if int(group) == parent and "identification.py" in command and " -c" not in command
-    ]
-
-
-def kill_a_job(process: "subprocess.Popen[bytes]", folder: Path) -> None:
-    """Kill -9 of an identification."""
-    wait_for(lambda: jobs_below(process.pid), process)
-    for job in jobs_below(process.pid):
-        os.kill(job, signal.SIGKILL)
-    assert process.wait(120) != 0
-
-
-def kill_snakemake(process: "subprocess.Popen[bytes]", folder: Path) -> None:
-    """Kill -9 of Snakemake when there is a result; it asks to be unlocked."""
-    wait_for(lambda: [*folder.glob("results/identifications/liquid_drop_2/*/*.csv")], process)
     process.kill()
     process.wait()
-    again = snakemake(folder, "--", ERRORS, config=TINY)
+    again = snakemake(tiny_copy, "--", ERRORS, config=TINY)
     assert again.status == 1
     assert "--unlock" in again.output
-    assert snakemake(folder, "--unlock", config=TINY).status == 0
-
-
-@pytest.mark.parametrize("fault", [kill_snakemake, kill_a_job])
-def test_the_same_command_ends_with_the_undisturbed_bytes(
-    tiny: Path, tiny_copy: Path, fault: Callable[["subprocess.Popen[bytes]", Path], None]
-) -> None:
-    fault(started(tiny_copy), tiny_copy)
+    assert snakemake(tiny_copy, "--unlock", config=TINY).status == 0
     run = snakemake(tiny_copy, "--", *AGAIN, config=TINY)
     assert run.status == 0, run.output
     ours, theirs = results_of(tiny_copy), results_of(tiny)

@@ -24,11 +24,6 @@ MODULE = f"""
 module biogrip:
     snakefile: {str(ROOT / "workflow" / "Snakefile")!r}
 """
-OWN_RULE = """
-rule mine:
-    output: "mine.txt"
-    shell: "command -v python > {output}"
-"""
 
 
 def host(folder: Path, text: str, *arguments: str) -> Run:
@@ -45,64 +40,47 @@ def test_without_config_it_is_the_papers_study(tmp_path: Path) -> None:
         assert rule in run.output
 
 
-def test_rules_are_used_twice_and_changed_and_the_host_is_as_it_was(tmp_path: Path) -> None:
+def test_rules_are_changed_under_a_prefix_and_the_host_is_as_it_was(tmp_path: Path) -> None:
     """With a config of the host's, and resources and outputs of its own."""
     text = f"""
 config["lab"] = {{"seeds": 1}}
 BEFORE = dict(config)
 {MODULE}
     config: {CONFIG!r}
-
-use rule * from biogrip as biogrip_*
-
-use rule identification from biogrip as biogrip_identification with:
-    resources: mem_mb=4321
-
-use rule target from biogrip as biogrip_target with:
-    output: target="elsewhere/{{case}}.csv"
-
-assert config == BEFORE
-{OWN_RULE}"""
-    made = "elsewhere/liquid_drop_2.csv"
-    run = host(tmp_path, text, "--", made)
-    assert run.status == 0, run.output
-    assert (tmp_path / made).is_file()
-    assert not (tmp_path / "results/targets").exists()
-
-
-def test_a_prefix_is_where_jobs_write(tmp_path: Path) -> None:
-    text = f"""{MODULE}
-    config: {CONFIG!r}
     prefix: "sub"
 
 use rule * from biogrip as biogrip_*
 
-use rule identification from biogrip as biogrip_identification with:
+use rule measurement from biogrip as biogrip_measurement with:
     resources: mem_mb=4321
-    message: "Identifying with {{resources.mem_mb}} MB"
-{OWN_RULE}"""
-    run = host(tmp_path, text, "--", f"sub/{ERRORS}", "mine.txt")
+    message: "Measuring with {{resources.mem_mb}} MB"
+    output: measurements="elsewhere/{{case}}/{{batch}}.parquet"
+
+assert config == BEFORE
+
+rule mine:
+    output: "mine.txt"
+    shell: "command -v python > {{output}}"
+"""
+    run = host(tmp_path, text, "--", "elsewhere/liquid_drop_2/seeds_0-0.parquet", "mine.txt")
     assert run.status == 0, run.output
-    assert "Identifying with 4321 MB" in run.output
-    assert (tmp_path / "sub" / ERRORS).is_file()
+    assert "Measuring with 4321 MB" in run.output
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        *(".snakemake", "Snakefile", "mine.txt", "sub")
+        *(".snakemake", "Snakefile", "elsewhere", "mine.txt", "sub")
     ]
+    assert (tmp_path / "sub/results/targets/liquid_drop_2.csv").is_file()
     # The host's rules find what they found before.
     assert (tmp_path / "mine.txt").read_text().strip() == shutil.which(
         "python", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}"
     )
 
 
-def test_a_wrong_value_in_a_module_is_one_message_and_nothing_is_published(tmp_path: Path) -> None:
-    text = "{MODULE}    config: {config!r}\n\nuse rule * from biogrip as biogrip_*\n"
-    wrong = host(tmp_path, text.format(MODULE=MODULE, config={"seedz": 2}), "-n")
+def test_a_wrong_value_in_a_module_is_one_message(tmp_path: Path) -> None:
+    text = f"{MODULE}    config: {{'seedz': 2}}\n\nuse rule * from biogrip as biogrip_*\n"
+    wrong = host(tmp_path, text, "-n")
     assert wrong.status == 1
     assert "seedz: unknown key. Did you mean 'seeds'?" in wrong.output
     assert "Traceback" not in wrong.output
-    used = text.format(MODULE=MODULE, config=CONFIG)
-    assert host(tmp_path, used, "--", "biogrip_publish").status == 1
-    assert "nothing in whose place" in (tmp_path / "results/logs/publish.log").read_text()
 
 
 @pytest.mark.nightly

