@@ -1,5 +1,7 @@
 """Creep under a load, and relaxation under a deformation, without a gripper."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -92,30 +94,36 @@ def test_derivatives_are_those_of_finite_differences(model: SampleModel, deforms
         assert found[1 + i] == pytest.approx((up - down) / (2 * step), abs=1e-6 * scale)
 
 
+HELD = {"mixed": PHASES, "steps": (hold(5.0, 1.0), hold(2.5, 0.3))}
+READ_S = np.linspace(0.004, 7.5, 1801)
+
+
+@functools.cache
+def condensed(held: str, deforms: bool) -> Condensed:
+    history = torque_history(HELD[held], deforms=deforms)
+    return Condensed(history, READ_S, np.zeros((0, len(READ_S))))
+
+
 @DRIVEN
-@pytest.mark.parametrize("held", [PHASES, (hold(5.0, 1.0), hold(2.5, 0.3))], ids=["mixed", "steps"])
+@pytest.mark.parametrize("held", HELD)
 @EVERY_MODEL
 def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
-    model: SampleModel, held: tuple[Phase, ...], deforms: bool
+    model: SampleModel, held: str, deforms: bool
 ) -> None:
-    history = torque_history(held, deforms=deforms)
-    times = np.linspace(0.004, 7.5, 1801)
-    true = simulated(example(model), history, times)
-    trace = true + 0.01 * (np.ptp(true) or 1.0) * np.random.default_rng(5).standard_normal(
-        len(times)
-    )
-    condensed = Condensed(history, times, np.zeros((0, len(times))))
-    given = Trace(times, trace, condensed)
-    residuals = Residuals(NO_ARMS, model, history, given, instrument=GRIPPER)
+    rows = condensed(held, deforms)
+    true = simulated(example(model), rows.torque, READ_S)
+    noise = np.random.default_rng(5).standard_normal(len(READ_S))
+    given = Trace(READ_S, true + 0.01 * (np.ptp(true) or 1.0) * noise, rows)
+    residuals = Residuals(NO_ARMS, model, rows.torque, given, instrument=GRIPPER)
     # Exponents stay below one.
     moved = [parameter.kind != "exponent" for parameter in model.parameters]
     logs = np.log([model.example]) + np.linspace(-0.3, 0.4, 5)[:, None] * moved
     found = residuals.condensed_misfit(np.exp(logs))
     expected = [np.sqrt(np.mean(residuals(at)[0] ** 2)) for at in logs]
     assert found == pytest.approx(expected, rel=1e-10)
-    rows = residuals.condensed_responses(logs)
-    residual = rows[:, 0] - residuals.condensed_trace
-    gradient = np.einsum("npr,nr->np", rows[:, 1:], residual)
+    responses = residuals.condensed_responses(logs)
+    residual = responses[:, 0] - residuals.condensed_trace
+    gradient = np.einsum("npr,nr->np", responses[:, 1:], residual)
     for at, own in zip(logs, gradient, strict=True):
         left, slopes = residuals(at)
         scale = float(np.linalg.norm(slopes) * np.linalg.norm(left))
