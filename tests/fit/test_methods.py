@@ -1,8 +1,5 @@
 """All identifiers on the same problems, and which run is typical, which near the noise."""
 
-import re
-from dataclasses import is_dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -13,7 +10,6 @@ from biogrip.arrays import Array
 from biogrip.fit import multi_start
 from biogrip.fit.methods import (
     METHODS,
-    block_class,
     identifier,
     near_noise,
     near_noise_words,
@@ -105,18 +101,15 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
 def test_what_is_sure_of_it_reaches_the_global_optimum(case: str) -> None:
     """Against the best of both and SciPy's fit from the truth, at the study's sampling.
 
-    In 100 seeds of each case neither missed once, so a rate of misses above 3 % is
-    excluded at 95 %, and two misses in 8 seeds would be one in 300.
+    In 100 seeds of each case neither missed once.
     """
-    misses = 0
-    for seed in range(8):
+    for seed in range(4):
         case_problem = problem(case, seed, rate_Hz=10.0)
         truth = np.log([SAMPLES[case][name] for name in MODEL.names])
         found = [run(method, case_problem, seed).misfit_rad for method in SURE]
         best = min(*found, scipy_fit(case_problem, truth).misfit_rad)
         increases = case_problem.residuals.samples * ((np.array(found) / best) ** 2 - 1)
-        misses += int(np.sum(increases > 1))
-    assert misses <= 1
+        assert np.all(increases < 1)
 
 
 @pytest.mark.parametrize("method", EXACT)
@@ -155,15 +148,6 @@ def test_offset_and_drift_are_fitted_along() -> None:
             k, _, c, c_p = answer.parameters
             assert k == pytest.approx(1.0, rel=0.05 if method in EXACT else 0.15)
             assert c + c_p == pytest.approx(10.0, rel=0.03)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_method_is_named_like_its_module_and_its_files(method: str) -> None:
-    assert METHODS[method].name == method
-    assert re.fullmatch(r"\w+", method)
-    assert hasattr(import_module(METHODS[method].module), "identify_many")
-    for block in METHODS[method].blocks:
-        assert is_dataclass(block_class(block))
 
 
 def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:
