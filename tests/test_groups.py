@@ -241,7 +241,6 @@ def test_several_groups_are_compared_with_the_first(
 @pytest.mark.parametrize(
     ("change", "by", "words"),
     [
-        ({}, "dich", "found no column 'dich'; allowed is a table that `biogrip identify --csv`"),
         ({}, "dich", "Did you mean 'dish'?"),
         ({"trace": None}, "dish", "found no column 'trace'"),
         ({"dish": ""}, "dish", "found limits of no trace of a group"),

@@ -67,17 +67,10 @@ def test_an_infinitesimal_imaginary_part_carries_the_derivative() -> None:
             pole, beyond = float(tilted.pole[i, n]), float(tilted.beyond[i, n].real)
             with ctx.workdps(60):
                 step = arb(10) ** -15
-                ends = [
-                    refined_along(weights[:, n], along[:, n], sign * step, rates[:, n], level[n],
-                                  pole, beyond)
-                    for sign in (1, -1)
-                ]  # fmt: skip
-                exact = ((ends[0] - ends[1]) / (2 * step)).mid()
+                both = list(zip(weights[:, n].tolist(), along[:, n].tolist(), strict=True))
+                ahead, behind = (
+                    refined([w + by * a for w, a in both], rates[:, n], level[n], pole, beyond)
+                    for by in (step, -step)
+                )
+                exact = ((ahead - behind) / (2 * step)).mid()
             assert float(tilted.beyond[i, n].imag) / 1e-30 == pytest.approx(float(exact), rel=1e-8)
-
-
-def refined_along(
-    weights: Array, along: Array, by: arb, poles: Array, level: float, pole: float, beyond: float
-) -> arb:
-    moved = [w + by * a for w, a in zip(weights.tolist(), along.tolist(), strict=True)]
-    return refined(moved, poles, level, pole, beyond)

@@ -160,12 +160,3 @@ def test_polished_populations_are_as_if_alone() -> None:
     alone = [polished([p], settings, [rng_of(s)])[0] for s, p in enumerate(problems)]
     found = polished(problems, settings, [rng_of(0), rng_of(1)])
     assert [content(answer) for answer in found] == [content(answer) for answer in alone]
-
-
-def test_progress_is_of_all_together() -> None:
-    told: list[tuple[int, float]] = []
-    rngs = [rng_of(seed) for seed in range(3)]
-    found = genetic.identify_many(posed(3), SMALL, rngs, lambda *now: told.append(now))
-    assert told[-1][0] == sum(answer.evaluations for answer in found)
-    assert len(told) == max(answer.generations for answer in found)
-    assert told[0][1] >= min(answer.misfit_rad for answer in found)

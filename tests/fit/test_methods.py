@@ -151,22 +151,26 @@ def test_offset_and_drift_are_fitted_along() -> None:
 
 
 def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:
-    return pd.DataFrame({"seed": range(len(misfit)), "misfit": misfit, "noise_rms": noise}).astype(
-        {"noise_rms": float}
-    )
+    runs = pd.DataFrame({"seed": range(len(misfit)), "misfit": misfit, "noise_rms": noise})
+    return runs.astype({"noise_rms": float})
 
 
-def test_the_typical_run_is_that_of_median_excess_and_not_of_the_quietest_trace() -> None:
-    runs = found([0.90, 1.05, 1.10, 1.20, 1.01], [0.70, 1.04, 1.00, 1.01, 1.00])
-    # Misfit over noise: 1.29, 1.01, 1.10, 1.19, 1.01.
-    assert typical(runs)["seed"] == 2
-    assert typical(runs.iloc[:4])["seed"] == 2
-    assert typical(runs.iloc[[0]])["seed"] == 0
-
-
-@pytest.mark.parametrize("noise", [None, 0.0])
-def test_without_known_noise_the_typical_run_is_of_median_misfit(noise: float | None) -> None:
-    assert typical(found([3.0, 1.0, 2.0], [noise] * 3))["seed"] == 2
+@pytest.mark.parametrize(
+    ("misfit", "noise", "seed"),
+    [
+        # Misfit over noise: 1.29, 1.01, 1.10, 1.19, 1.01.
+        ([0.90, 1.05, 1.10, 1.20, 1.01], [0.70, 1.04, 1.00, 1.01, 1.00], 2),
+        ([0.90, 1.05, 1.10, 1.20], [0.70, 1.04, 1.00, 1.01], 2),
+        ([0.90], [0.70], 0),
+        # Of unknown noise, or none.
+        ([3.0, 1.0, 2.0], [None] * 3, 2),
+        ([3.0, 1.0, 2.0], [0.0] * 3, 2),
+    ],
+)
+def test_the_typical_run_is_that_of_median_excess_and_not_of_the_quietest_trace(
+    misfit: list[float], noise: list[float | None], seed: int
+) -> None:
+    assert typical(found(misfit, noise))["seed"] == seed
 
 
 def test_near_the_noise_is_a_share_of_it() -> None:

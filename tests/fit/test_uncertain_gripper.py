@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ def simulated(case_problem: CaseProblem, logs: Array = TRUTH, torque: float = 1.
     return simulated_rotation(case_problem.gripper, network, history, TIMES, nonlinear=False)[0]
 
 
-def functions(uncertainty: Mapping[str, Mapping[str, float]], **changes: float) -> Array:
+def functions(uncertainty: Mapping[str, Mapping[str, float]], **changes: Any) -> Array:
     gripper = replace(EXPERIMENT.gripper, **changes)
     case_problem = replace(EXPERIMENT, gripper=gripper, uncertainty=uncertainty)
     return gripper_functions(case_problem, TIMES, np.exp(TRUTH))

@@ -14,7 +14,7 @@ from biogrip.physics.contact import (
     mass_of_sample,
     rolling_of_contact,
 )
-from biogrip.physics.gripper import Gripper, displacement_of_tip, rotation_of_tip
+from biogrip.physics.gripper import Gripper
 from tests.physics.test_actuator import TABLE_2
 
 
@@ -56,16 +56,6 @@ def test_the_gripper_yields_as_two_springs_in_a_row(unequal_gripper: Gripper) ->
     force, b = 1e-6, unequal_gripper.lever_m
     opening = sum(b * force * b / k for k in (4.4e-7, 5.5e-7))
     assert unequal_gripper.jaw_stiffness_N_per_m == pytest.approx(force / opening)
-
-
-def test_a_tip_goes_where_its_rotation_takes_it(gripper: Gripper) -> None:
-    turns = np.array([1e-9, 1e-3, 0.07])
-    there = displacement_of_tip(gripper, turns)
-    np.testing.assert_allclose(rotation_of_tip(gripper, there), turns, rtol=1e-14)
-    coordinates = [
-        1.5e-3 * (math.cos(math.radians(75) - t) - math.cos(math.radians(75))) for t in turns
-    ]
-    np.testing.assert_allclose(there[1:], coordinates[1:], rtol=1e-11)
 
 
 def test_fringing_against_charges_on_two_strips() -> None:

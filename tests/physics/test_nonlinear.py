@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
+from biogrip.physics.gripper import Arm, Gripper, displacement_of_tip, rotation_of_tip
 from biogrip.physics.jaw_force import jaw_force
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
@@ -80,7 +80,7 @@ def test_against_radau(case: int) -> None:
     taus = 1.6e-9 * factor, 0.32e-9 * factor
     network, torque = (
         generalized_maxwell(sample),
-        torque_history([hold(200.0, tau) for tau in taus]),
+        torque_history(tuple(hold(200.0, tau) for tau in taus)),
     )
     linear = step_response(gripper, network, inertia=False)
     ours = rotation(linear, torque, TIMES)[0] + correction(gripper, network, torque).at(TIMES)[0]
@@ -103,7 +103,7 @@ def test_unequal_arms_against_radau(case: int, equal_torques: bool) -> None:
     taus = [(1.6, 1.6), (0.3, 0.3)] if equal_torques else [(1.6, 0.9), (0.3, 0.5)]
     held = [(factor * left, factor * right) for left, right in taus]
     network = generalized_maxwell(sample)
-    torque = torque_history([hold(200.0, *each) for each in held])
+    torque = torque_history(tuple(hold(200.0, *each) for each in held))
     linear = step_response(gripper, network, symmetric=False, inertia=False)
     found = correction(gripper, network, torque)
     both = unequal_arms(gripper, sample, [(200.0, *held[0]), (400.0, *held[1])])
@@ -174,6 +174,7 @@ def test_rotation_of_a_tip_against_50_digits(gripper: Gripper) -> None:
             exact = hat - mp.acos(mp.cos(hat) + mpf(size) / mpf(1.5e-3))
             ours = float(rotation_of_tip(gripper, np.array(size)))
             assert ours == pytest.approx(float(exact), rel=4e-15)
+            assert displacement_of_tip(gripper, np.array(ours)) == pytest.approx(size, rel=1e-14)
 
 
 def test_too_large_a_torque_is_refused(gripper: Gripper) -> None:

@@ -36,20 +36,6 @@ def test_equal_arms_against_inversion(
     np.testing.assert_allclose(rotation(response, steps, NEAR)[0], exact, rtol=1e-6)
 
 
-@pytest.mark.parametrize(("model", "sample"), SAMPLES[::3])
-def test_arms_driven_differently_against_inversion(
-    either_gripper: Gripper, model: str, sample: list[float]
-) -> None:
-    torque = torque_history((hold(200.0, 1.6e-9, 1.0e-9), hold(200.0, 0.3e-9, 0.5e-9)))
-    exact = rotations(either_gripper, drawn(model, sample), torque, NEAR[::2], inertia=False)
-    response = step_response(
-        either_gripper, MODELS[model].network(sample), symmetric=False, inertia=False
-    )
-    for arm in (LEFT, RIGHT):
-        ours = rotation(response, torque, NEAR[::2], arm)[0]
-        np.testing.assert_allclose(ours, exact[arm], rtol=0, atol=1e-6 * np.abs(exact).max())
-
-
 def test_the_ring_against_inversion(gripper: Gripper) -> None:
     """The first milliseconds, with inertia: the contour is wide enough for the ring."""
     name, sample = "fractional_kelvin_voigt", [0.3, 0.02, 0.5]

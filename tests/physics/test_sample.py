@@ -42,11 +42,12 @@ def test_storage_and_loss_modulus_are_those_of_the_drawing(name: str) -> None:
 
 
 def test_more_branches_add_up() -> None:
-    model, s = Sample("generalized_maxwell", branches=3).model, 1j * np.geomspace(1e-4, 1e3, 15)
+    model, omega = Sample("generalized_maxwell", branches=3).model, np.geomspace(1e-4, 1e3, 15)
+    s = 1j * omega
     given = {"k_1": 1.0, "k_2": 2.0, "k_3": 3.0, "k_p": 0.5}
     given |= {"c_1": 10.0, "c_2": 0.1, "c_3": 700.0, "c_p": 0.02}
     assert model.names == tuple(given)
-    storage, loss = complex_modulus(model.sample(given), s.imag)
+    storage, loss = complex_modulus(model.sample(given), omega)
     branches = sum(series(given[f"k_{j}"], given[f"c_{j}"] * s) for j in (1, 2, 3))
     np.testing.assert_allclose(storage[0] + 1j * loss[0], 0.5 + 0.02 * s + branches, rtol=1e-12)
 
