@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +19,6 @@ from biogrip.physics.protocol import (
     Harmonic,
     Load,
     Phase,
-    TorqueHistory,
     hold,
     sample_times,
     torque_at,
@@ -97,25 +95,27 @@ def test_phi_functions_against_50_digits() -> None:
                 assert ours == pytest.approx(float(exact), rel=1e-13)
 
 
-def test_the_fastest_way_is_chosen(gripper: Gripper) -> None:
-    model, uniform = MODELS["maxwell"], np.arange(0, 41, 2.0)
-    steps = torque_history((Phase(40.0, Load(1e-9), Load(1e-9)),))
-    ramp = torque_history((Phase(40.0, Load(0.0, 1e-10), Load(0.0, 1e-10)),))
-    swing = Load(1e-9, 0.0, 0.0, (Harmonic(1e-10, 1.0, 0.0),))
-    swings = torque_history((Phase(40.0, swing, swing),))
-    trace = np.zeros_like(uniform)
+HELD, SWING = Load(1e-9), Load(1e-9, 0.0, 0.0, (Harmonic(1e-10, 1.0, 0.0),))
+EVENLY = np.arange(0, 41, 2.0)
 
-    def needs_no_response(torque: TorqueHistory, time_s: Array, **assumed: Any) -> bool:
-        problem = problem_alone(gripper, model, torque, time_s, trace, **assumed)
-        by_series = isinstance(problem.misfit, SeriesMisfit)
-        assert by_series or problem.misfit == problem.residuals.condensed_misfit
-        return by_series
 
-    assert needs_no_response(steps, uniform)
-    assert not needs_no_response(steps, np.sqrt(uniform))
-    assert not needs_no_response(ramp, uniform)
-    assert not needs_no_response(swings, uniform)
-    assert not needs_no_response(steps, uniform, offset=True)
+@pytest.mark.parametrize(
+    ("load", "time_s", "offset", "by_series"),
+    [
+        (HELD, EVENLY, False, True),
+        (HELD, np.sqrt(EVENLY), False, False),
+        (HELD, EVENLY, True, False),
+        (Load(0.0, 1e-10), EVENLY, False, False),
+        (SWING, EVENLY, False, False),
+    ],
+)
+def test_no_response_is_needed_of_steps_that_are_sampled_evenly(
+    gripper: Gripper, load: Load, time_s: Array, offset: bool, by_series: bool
+) -> None:
+    torque, trace = torque_history((Phase(40.0, load, load),)), np.zeros_like(time_s)
+    problem = problem_alone(gripper, MODELS["maxwell"], torque, time_s, trace, offset=offset)
+    assert isinstance(problem.misfit, SeriesMisfit) == by_series
+    assert by_series or problem.misfit == problem.residuals.condensed_misfit
 
 
 def test_rounding_does_not_lose_the_last_sample() -> None:
