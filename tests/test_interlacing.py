@@ -48,15 +48,6 @@ def test_zeros_have_all_digits(poles: int) -> None:
             assert abs(beyond - exact) <= 1e-9 * abs(exact)
 
 
-def test_zeros_do_not_depend_on_the_other_functions() -> None:
-    weights, rates, level = random_functions(40, 20, 0)
-    together = interlaced_zeros(weights, rates, level)
-    for n in (0, 17, 39):
-        alone = interlaced_zeros(weights[:, [n]], rates[:, [n]], level[[n]])
-        np.testing.assert_array_equal(alone.beyond[:, 0], together.beyond[:, n])
-        np.testing.assert_array_equal(alone.pole[:, 0], together.pole[:, n])
-
-
 def test_an_infinitesimal_imaginary_part_carries_the_derivative() -> None:
     weights, rates, level = random_functions(6, 12, 3)
     weights = np.maximum(weights, 1e-8)

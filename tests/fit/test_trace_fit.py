@@ -115,19 +115,6 @@ def test_noise_is_found_and_said() -> None:
     np.testing.assert_array_equal(other.residuals(TRUTH)[0], fit.problem.residuals(TRUTH)[0])
 
 
-def test_a_drift_changes_nothing_of_what_is_found() -> None:
-    """It is fitted along whether it is there or not, so the same noise gives the same limits."""
-    case_problem = replace(POSED, coloured=True, offset=True, drift=True)
-    steady = Noise("gaussian", 0.02, "peak")
-    drift = 3 * 0.02 * CLEAN.max() * TIMES / TIMES[-1]
-    one, other = (
-        trace_fit(case_problem, TIMES, noisy(steady) + added, find) for added in (0 * drift, drift)
-    )
-    np.testing.assert_allclose(one.found.parameters[[0, 2]], other.found.parameters[[0, 2]], 1e-3)
-    first, second = (each.problem.residuals(TRUTH)[1] for each in (one, other))
-    np.testing.assert_allclose(first @ first.T, second @ second.T, rtol=1e-2, atol=1e-18)
-
-
 def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
     """Three spikes are struck, each of fifteen times the noise of its sample."""
     case_problem = replace(POSED, coloured=True, offset=True, drift=True)
