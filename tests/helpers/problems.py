@@ -99,7 +99,6 @@ def condensed_rows(residuals: Residuals, x: Array) -> tuple[Array, Array]:
 
 SETTINGS: Any = STUDY.config.method("least_squares")
 GRIPPER, TORQUE = STUDY.gripper, study_torque()
-RANGES = STUDY.ranges
 
 
 def posed_for(model: SampleModel, times: Array, trace: Array) -> Problem:

@@ -8,7 +8,6 @@ from biogrip.physics.jaw_force import jaw_force
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.protocol import TorqueHistory, hold, torque_history
-from biogrip.physics.sample_model import Network
 from tests.helpers.responses import exact_50_digits, random_samples
 
 # From 0.1 s after the start to the end, close to the step and far from it.
@@ -66,13 +65,3 @@ def test_starts_at_rest_and_ends_at_the_springs(gripper: Gripper, steps: TorqueH
     # At infinity only the arm's spring and k_p carry the torque.
     expected = 1 / (gripper.left.stiffness_Nm_per_rad + 2 * gripper.lever_m**2 * samples[:, 1])
     np.testing.assert_allclose(response.static[:, 0, 0], expected, rtol=1e-14)
-
-
-def test_identical_branches_make_no_trouble(gripper: Gripper, steps: TorqueHistory) -> None:
-    """Two equal Maxwell branches are one of twice the spring and damper: a double root cancels."""
-    one = Network(np.array([1.0]), np.array([0.1]), np.array([[4.0]]), np.array([[20.0]]))
-    two = Network(
-        np.array([1.0]), np.array([0.1]), np.array([[2.0, 2.0]]), np.array([[10.0, 10.0]])
-    )
-    single, double = (rotation(step_response(gripper, n), steps, TIMES)[0] for n in (one, two))
-    np.testing.assert_allclose(double, single, rtol=1e-9)
