@@ -25,20 +25,24 @@ TIMES: Array = 0.1 * np.arange(1.0, 301.0)
 OF_A_GRIPPER = re.compile(
     r"\b(jaws?|torques?|rotations?|gripper|arms?|rad)\b|_rad\b", re.IGNORECASE
 )
+NOT_READ = re.compile(r"<style.*?</style>|<script.*?</script>|data:[^\"]*", re.DOTALL)
 # What is held, SI units, by what is read.
 CONTROLLED = {
     "displacement": 3e-9,
     "strain": 5.0,
-    "compliance": 1.0,
+    "compliance": 40.0,
     "force": 2e-6,
     "stress": 0.02,
-    "modulus": 1.0,
+    "modulus": 0.02,
 }
+# Modulus and compliance are over what is held.
+WHOLE = {"modulus": "stress", "compliance": "strain"}
 
 
-def response(reading: str, held: float, parameters: dict[str, float] = TRUTH) -> Array:
-    experiment = set_up(INSTRUMENTS[reading], (hold(30.0, held),), SOLID)
-    return simulate(experiment, parameters, TIMES)
+def response(reading: str, held: float) -> Array:
+    experiment = set_up(INSTRUMENTS[WHOLE.get(reading, reading)], (hold(30.0, held),), SOLID)
+    whole = simulate(experiment, TRUTH, TIMES)
+    return whole / held if reading in WHOLE else whole
 
 
 def noisy(clean: Array, share: float = 0.01, seed: int = 0) -> Array:
@@ -52,15 +56,15 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
 ) -> None:
     instrument, held = INSTRUMENTS[reading], CONTROLLED[reading]
     column = instrument.read.column
-    trace = write_trace(
-        tmp_path / "trace.csv", TIMES, noisy(response(reading, held)), f"time_s,{column}"
-    )
-    names = ("page.html", "table.csv", "few.yaml", "found.json")
-    page, table, few, output = (tmp_path / name for name in names)
+    clean = response(reading, held)
+    trace = write_trace(tmp_path / "trace.csv", TIMES, noisy(clean), f"time_s,{column}")
+    page, table, few, output = (tmp_path / name for name in ("a.html", "a.csv", "a.yaml", "a.json"))
     few.write_text(FEW)
-    options = ("--model", SOLID.name, "--hold", str(held), "--reading", f"{reading}={column}")
-    outputs = ("--report", page, "--csv", table, "--output", output)
-    status, printed, _ = identify(trace, *options, *outputs, "--config", few)
+    options = ["--model", SOLID.name, "--hold", str(held), "--reading", f"{reading}={column}"]
+    options += ["--csv", str(table), "--output", str(output), "--config", str(few)]
+    # One page for each instrument.
+    options += ["--report", str(page)] if reading in ("displacement", "compliance") else []
+    status, printed, _ = identify(trace, *options)
     assert status == 0
     found = json.loads(output.read_text())
     assert found["fit"] == "ok"
@@ -72,13 +76,11 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
         assert item["unit"].startswith(unit[:2].strip("/"))
     assert found["instrument"] == instrument.kind
     assert found["reads"] == {"quantity": reading, "unit": instrument.read.unit}
-    share = found["noise" + instrument.read.suffix] / np.max(np.abs(response(reading, held)))
+    share = found["noise" + instrument.read.suffix] / np.max(np.abs(clean))
     assert share == pytest.approx(0.01, rel=0.2)
-    text = re.sub(
-        r"<style.*?</style>|<script.*?</script>|data:[^\"]*", "", page.read_text(), flags=re.S
-    )
     assert f"noise{instrument.read.suffix},misfit{instrument.read.suffix}," in table.read_text()
-    for said in (printed, json.dumps(found), text, table.read_text()):
+    written = page.read_text() if page.exists() else ""
+    for said in (printed, json.dumps(found), NOT_READ.sub("", written), table.read_text()):
         assert not OF_A_GRIPPER.search(said), OF_A_GRIPPER.search(said)
 
 
@@ -144,24 +146,10 @@ def test_a_study_mixes_instruments() -> None:
     assert not study.cases["pipette"].problem.torque.deforms
 
 
-def test_a_compliance_is_the_strain_over_the_stress(tmp_path: Path) -> None:
-    strain = noisy(response("strain", 40.0), seed=3)
-    protocol = "instrument: creep\nprotocol: {phases: [{duration_s: 30, stress_Pa: 40}]}\n"
-    options = ("--model", SOLID.name, "--reading")
-    compliance = write_trace(tmp_path / "j.csv", TIMES, 1e3 * strain / 40, "time_s,J (1/kPa)")
-    trace = write_trace(tmp_path / "s.csv", TIMES, strain, "time_s,strain")
-    one = identified(tmp_path, trace, *options, "strain=strain", config=protocol + FEW)
-    other = identified(
-        tmp_path, compliance, *options, "compliance=J (1/kPa)", config=protocol + FEW
-    )
-    for name, item in by_quantity(one).items():
-        assert by_quantity(other)[name]["value"] == pytest.approx(item["value"], rel=1e-4)
-
-
 def test_readings_at_the_instant_of_a_step_are_left_out(tmp_path: Path) -> None:
     """A rheometer's first row is at 0, with the modulus that it jumped to."""
     times = np.append(0.0, TIMES)
-    values = np.append(500.0, noisy(response("modulus", 1.0)))
+    values = np.append(500.0, noisy(response("stress", 1.0)))
     trace = write_trace(tmp_path / "g.csv", times, values, "time_s,modulus_Pa")
     found = identified(tmp_path, trace, "--reading", "modulus=modulus_Pa", "--model", SOLID.name)
     assert found["fit"] == "ok"
@@ -171,19 +159,17 @@ def test_readings_at_the_instant_of_a_step_are_left_out(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("reading", ["stress", "modulus"])
-def test_oscillations_about_zero_are_identified(tmp_path: Path, reading: str) -> None:
-    """Nothing is held at the ends of the phase: the amplitude is what is."""
+def test_oscillations_about_zero_are_identified(tmp_path: Path) -> None:
+    """Nothing is held at the ends of the phase: the amplitude is what a modulus is over."""
     amplitude = 0.02
     swing = Load(0.0, harmonics=(Harmonic(amplitude, np.pi, -np.pi / 2),))
     experiment = set_up(INSTRUMENTS["stress"], (Phase(20.0, swing, swing),), SOLID)
     times: Array = 0.02 * np.arange(1.0, 1000.0)
-    values = noisy(simulate(experiment, TRUTH, times)) / (1 if reading == "stress" else amplitude)
-    column = INSTRUMENTS[reading].read.column
-    trace = write_trace(tmp_path / "t.csv", times, values, f"time_s,{column}")
+    values = noisy(simulate(experiment, TRUTH, times)) / amplitude
+    trace = write_trace(tmp_path / "t.csv", times, values, "time_s,modulus_Pa")
     phase = "{duration_s: 20, strain: 0, amplitude_strain: 0.02, frequency_Hz: 0.5}"
     config = f"instrument: relaxation\nprotocol: {{phases: [{phase}]}}\n"
-    options = ["--reading", f"{reading}={column}", "--model", SOLID.name]
+    options = ["--reading", "modulus=modulus_Pa", "--model", SOLID.name]
     for name, item in by_quantity(
         identified(tmp_path, trace, *options, config=config + FEW)
     ).items():

@@ -10,7 +10,8 @@ from biogrip import library
 from biogrip.judging.verdicts import DETERMINED
 from tests.helpers.default import STUDY
 from tests.helpers.places import ROOT
-from tests.physics.test_nonlinear import ARM, TIMES, symmetric_radau
+from tests.helpers.radau import equal_arms
+from tests.physics.test_nonlinear import ARM, TIMES
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "library.md"
 POSTERIOR = DOCUMENT.parent / "howto" / "posterior.md"
@@ -66,7 +67,7 @@ def test_what_is_simulated_by_the_nonlinear_model_is_not_what_the_linear_one_giv
     )
     ends = [(200.0, 1.6e-8), (400.0, 3.2e-9)]
     peak = float(nonlinear.max())
-    expected = symmetric_radau(gripper, np.array(list(sample.values())), ends, TIMES, peak)
+    expected = equal_arms(gripper, np.array(list(sample.values())), ends, TIMES, peak)[0]
     np.testing.assert_allclose(nonlinear, expected, rtol=0, atol=1e-6 * peak)
     assert np.max(np.abs(linear - expected)) > 1e-4 * peak
 

@@ -1,9 +1,8 @@
-import json
 from pathlib import Path
 
 import pytest
 
-from tests.published_numbers import BENCHMARKS, renewed_numbers
+from tests.published_numbers import renewed_numbers
 
 TABLE = """case,method,share,evaluations
 drop,genetic,0.46,18000
@@ -38,14 +37,6 @@ def test_numbers_come_from_the_published_tables(what: str, shown: str, published
     found = renewed_numbers(text, published)
     assert found == f"It is <!--= {what} -->{shown}<!--/--> here."
     assert renewed_numbers(found, published) == found
-
-
-def test_so_do_those_of_benchmarks(published: Path) -> None:
-    rows = json.loads(BENCHMARKS.read_text(encoding="utf-8"))["identification"]
-    wanted = [row["times_ours"] for row in rows if row["library"] in ("DEAP", "pymoo")]
-    mark = "<!--= identification[library=DEAP|pymoo].times_ours | .0f | each -->"
-    found = renewed_numbers(f"{mark}some<!--/-->", published)
-    assert found == f"{mark}{wanted[0]:.0f} and {wanted[1]:.0f}<!--/-->"
 
 
 @pytest.mark.parametrize(

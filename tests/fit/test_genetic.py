@@ -8,7 +8,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit import genetic, genetic_refined
-from biogrip.fit.genetic import GeneticSettings, cross, evolve_many, mutate, select
+from biogrip.fit.genetic import GeneticSettings, evolve_many, select
 from biogrip.fit.genome import GeneRange, make_genome
 from biogrip.fit.problem import Identification, Problem
 from biogrip.physics.misfit import Misfit, combine_misfits
@@ -30,6 +30,8 @@ READINGS = {
     "few": replace(SMALL, population=9, survivors=8, min_generations=0, max_generations=40),
     "limit": replace(SMALL, max_generations=5),
     "no generation": replace(SMALL, min_generations=0, max_generations=0),
+    "misfits of their own": replace(SMALL, population=10, survivors=5, max_generations=7),
+    "the paper's population": replace(PAPER, min_generations=10, patience=5),
 }
 MAXWELL = MODELS["generalized_maxwell"]
 MODELS_SEARCHED = {
@@ -37,6 +39,7 @@ MODELS_SEARCHED = {
     "two branches": Sample("generalized_maxwell", 2).model,
     "k_p known": with_fixed(MAXWELL, {"k_p": 12.3}),
 }
+POPULATIONS = [*READINGS, *MODELS_SEARCHED]
 STIFFNESS, DAMPING = GeneRange((-3, 8), (1, 9)), GeneRange((-4, 5), (1, 9))
 GENOME = make_genome(MAXWELL, {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING})
 BOWL = np.log10([35.0, 5.5, 290.0, 4.4e-3])
@@ -51,38 +54,6 @@ def bowl(parameters: Array) -> Array:
 def run(settings: GeneticSettings = PAPER, seed: int = 0, misfit: Misfit = bowl) -> Identification:
     rngs = [np.random.default_rng(seed)]
     return evolve_many(combine_misfits([misfit]), GENOME, settings, rngs)[0].identification
-
-
-def test_finds_the_bottom_of_a_bowl() -> None:
-    answer = run(replace(PAPER, patience=60))
-    np.testing.assert_allclose(np.log10(answer.parameters), BOWL, atol=1e-12)
-
-
-def test_children_are_cut_and_swapped_parents() -> None:
-    # All genes are the number of the parent.
-    parents = np.repeat(np.arange(250)[:, None], 12, axis=1)
-    (children,) = cross(parents[None], PAPER, [np.random.default_rng(3)])
-    assert children.shape == (250, 12)
-    mothers, fathers = children[:, 0], children[:, -1]
-    # Disjoint pairs, both children: every parent opens one child and closes one.
-    assert sorted(mothers) == sorted(fathers) == list(range(250))
-    cuts = np.sum(children == mothers[:, None], axis=1)
-    assert np.all(
-        children == np.where(np.arange(12) < cuts[:, None], mothers[:, None], fathers[:, None])
-    )
-    assert set(cuts) == set(range(1, 12))
-    np.testing.assert_array_equal(cuts[:125], cuts[125:])
-
-
-def test_half_of_the_children_have_one_gene_redrawn() -> None:
-    children = np.tile(GENOME.low, (1, 4000, 1))
-    mutate(children, GENOME, PAPER, [np.random.default_rng(5)])
-    changed = np.sum(children[0] != GENOME.low, axis=1)
-    assert changed.max() == 1
-    # A redrawn gene keeps its value with probability 1/values.
-    expected = 4000 * 0.5 * np.mean(1 - 1 / (GENOME.high - GENOME.low + 1))
-    assert abs(changed.sum() - expected) < 5 * np.sqrt(expected)
-    assert np.all((children >= GENOME.low) & (children <= GENOME.high))
 
 
 @pytest.mark.parametrize("digits", [2, 6])
@@ -160,46 +131,25 @@ def content(answer: Identification) -> tuple[bytes | float | str, ...]:
     )
 
 
-def assert_same_in_groups(problems: list[Problem], settings: GeneticSettings) -> None:
-    alone = [
-        content(genetic.identify_many([each], settings, [rng_of(seed)])[0])
+@pytest.mark.parametrize("name", POPULATIONS)
+def test_populations_are_what_they_are_alone_and_gene_by_gene(name: str) -> None:
+    """Children are cut and swapped parents, of half of which a gene is drawn anew; and so on."""
+    settings, problems = READINGS.get(name, SMALL), posed(3, MODELS_SEARCHED.get(name, MAXWELL))
+    if name == "the paper's population":
+        # Larger than what is looked at together: seeds stop one after the other.
+        problems = posed(5)
+    if name == "misfits of their own":
+        problems = posed(3, offset=True, drift=True)
+    plain = [
+        content(identified(each.misfit, each.genome, settings, rng_of(seed)))
         for seed, each in enumerate(problems)
     ]
     everyone = list(range(len(problems)))
-    for group in (everyone[::-1], everyone[1:]):
+    for group in (everyone[::-1], everyone[1:], everyone[:1]):
         found = genetic.identify_many(
             [problems[seed] for seed in group], settings, [rng_of(seed) for seed in group]
         )
-        assert [content(answer) for answer in found] == [alone[seed] for seed in group]
-
-
-@pytest.mark.parametrize("reading", READINGS)
-def test_every_reading_is_what_it_is_gene_by_gene(reading: str) -> None:
-    problems = posed(3)
-    assert_same_in_groups(problems, READINGS[reading])
-    for seed, each in enumerate(problems):
-        plain = identified(each.misfit, each.genome, READINGS[reading], rng_of(seed))
-        (found,) = genetic.identify_many([each], READINGS[reading], [rng_of(seed)])
-        assert content(found) == content(plain)
-
-
-@pytest.mark.parametrize("name", MODELS_SEARCHED)
-def test_every_model_is_what_it_is_gene_by_gene(name: str) -> None:
-    problems = posed(2, MODELS_SEARCHED[name])
-    assert_same_in_groups(problems, SMALL)
-    plain = identified(problems[0].misfit, problems[0].genome, SMALL, rng_of(0))
-    (found,) = genetic.identify_many(problems[:1], SMALL, [rng_of(0)])
-    assert content(found) == content(plain)
-
-
-def test_populations_with_misfits_of_their_own_are_as_if_alone() -> None:
-    few = replace(SMALL, population=10, survivors=5, max_generations=7)
-    assert_same_in_groups(posed(3, offset=True, drift=True), few)
-
-
-def test_populations_of_the_papers_budget_are_as_if_alone() -> None:
-    """Larger than what is looked at together: seeds stop one after the other."""
-    assert_same_in_groups(posed(5), PAPER)
+        assert [content(answer) for answer in found] == [plain[seed] for seed in group]
 
 
 def test_polished_populations_are_as_if_alone() -> None:
@@ -210,12 +160,3 @@ def test_polished_populations_are_as_if_alone() -> None:
     alone = [polished([p], settings, [rng_of(s)])[0] for s, p in enumerate(problems)]
     found = polished(problems, settings, [rng_of(0), rng_of(1)])
     assert [content(answer) for answer in found] == [content(answer) for answer in alone]
-
-
-def test_progress_is_of_all_together() -> None:
-    told: list[tuple[int, float]] = []
-    rngs = [rng_of(seed) for seed in range(3)]
-    found = genetic.identify_many(posed(3), SMALL, rngs, lambda *now: told.append(now))
-    assert told[-1][0] == sum(answer.evaluations for answer in found)
-    assert len(told) == max(answer.generations for answer in found)
-    assert told[0][1] >= min(answer.misfit_rad for answer in found)

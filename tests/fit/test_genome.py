@@ -11,22 +11,14 @@ RANGES = {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING}
 GENOME = make_genome(MODELS["generalized_maxwell"], RANGES)
 
 
-def test_ranges_are_those_of_table_4() -> None:
-    assert (STIFFNESS.low, STIFFNESS.high) == (1.1e-4, 9.9e7)
-    assert (DAMPING.low, DAMPING.high) == (1.1e-5, 9.9e4)
-
-
 def test_genes_are_drawn_uniformly_from_their_whole_range() -> None:
     chromosomes = GENOME.draw(20_000, np.random.default_rng(1))
+    assert (GENOME.low[:3].tolist(), GENOME.high[:3].tolist()) == ([-3, 1, 1], [8, 9, 9])
     for gene in range(GENOME.genes):
         values, counts = np.unique(chromosomes[:, gene], return_counts=True)
         assert values.tolist() == list(range(GENOME.low[gene], GENOME.high[gene] + 1))
         expected = 20_000 / len(values)
         assert np.abs(counts - expected).max() < 5 * np.sqrt(expected)
-
-
-def test_a_model_with_fewer_parameters_has_fewer_genes() -> None:
-    assert make_genome(MODELS["liquid_drop"], RANGES).genes == 9
 
 
 @pytest.mark.parametrize("digits", range(1, 7))
@@ -38,6 +30,8 @@ def test_any_number_of_digits_is_decoded_as_the_decimal_number_it_is(
     genome = make_genome(MODELS["generalized_maxwell"], ranges)
     assert genome.genes == 9 + 1 + digits
     chromosomes = genome.draw(300, np.random.default_rng(digits))
+    # Lest numbers were encoded twice.
+    assert np.all(chromosomes[:, 1] > 0)
     decoded = genome.decode(chromosomes)
     for genes, value in zip(chromosomes[:, : 1 + digits].tolist(), decoded[:, 0], strict=True):
         share = sum(Decimal(g) * Decimal(10) ** -place for place, g in enumerate(genes[1:], 1))
@@ -46,12 +40,6 @@ def test_any_number_of_digits_is_decoded_as_the_decimal_number_it_is(
         ranges["k"].low,
         ranges["k"].high,
     ]
-
-
-def test_a_first_digit_is_never_zero_lest_numbers_were_encoded_twice() -> None:
-    genome = make_genome(MODELS["damper"], {"c_p": GeneRange((0, 0), (0, 9), 3)})
-    first, second, third = (genome.draw(5000, np.random.default_rng(0))[:, g] for g in (1, 2, 3))
-    assert (set(first), set(second), set(third)) == ({*range(1, 10)}, *[{*range(10)}] * 2)
 
 
 @pytest.mark.parametrize("value", [1e-9, 0.0999, 10.0, 12.34567, 302.5, 1.0e12])

@@ -8,9 +8,9 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.fit import least_squares
 from biogrip.fit.levenberg_marquardt import Normal, bounded_step
-from biogrip.fit.local_fits import FINE, ROUGH, LocalFits, alike
-from biogrip.fit.multi_start import screened
-from biogrip.fit.problem import Identification, Problem
+from biogrip.fit.local_fits import ROUGH, LocalFits, alike
+from biogrip.fit.multi_start import best_of_starts, screened
+from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
 from tests.helpers.problems import (
@@ -21,7 +21,6 @@ from tests.helpers.problems import (
     TORQUE,
     case_problem,
     clean,
-    identified,
     of_case,
     problem_alone,
 )
@@ -49,14 +48,19 @@ def test_the_best_of_the_study_s_starts_is_that_of_scipy(case: str) -> None:
     assert reached[0] >= 0.7 * reached[1]
 
 
-@pytest.mark.parametrize("case", SAMPLES)
-def test_fits_from_near_by_are_those_of_scipy(case: str) -> None:
-    problems = of_case(case, 4)
-    truth = np.log([SAMPLES[case][name] for name in MODEL.names])
-    found = LocalFits(problems).fitted(np.tile(truth, (4, 1)), np.arange(4), FINE)
-    for problem, misfit_rad in zip(problems, found.misfit_rad, strict=True):
-        best = scipy_fit(problem, truth, prior=True).misfit_rad
-        assert problem.residuals.samples * ((misfit_rad / best) ** 2 - 1) < 1e-3
+def test_a_history_is_of_the_fits_so_far() -> None:
+    """Their lowest and their median misfit."""
+    (problem,) = of_case("liquid_drop_2", 1)
+    starts = starts_of(problem, 6)
+    fitted = LocalFits([problem]).fitted(starts, np.zeros(6, dtype=np.int64), ROUGH)
+    row = np.exp(starts[0]), 1.0, 1.0, 10
+    history = best_of_starts([problem], [starts], [row], silent)[0].history
+    for count in range(1, 6):
+        so_far = fitted.misfit_rad[:count]
+        # In single precision, in which fits are compared.
+        assert history.best_misfit[count] == pytest.approx(so_far.min(), rel=1e-7)
+        assert history.median_misfit[count] == pytest.approx(np.median(so_far), rel=1e-12)
+        assert history.evaluations[count] == 10 + fitted.evaluations[:count].sum()
 
 
 def test_steps_within_a_box_are_those_of_exhaustive_search() -> None:
@@ -100,15 +104,6 @@ def same(one: Identification, other: Identification) -> bool:
     return all(np.array_equal(a, b) for a, b in histories)
 
 
-def test_answers_do_not_depend_on_the_batch() -> None:
-    """Byte for byte, in any order and in batches of any size."""
-    problems = of_case("endothelial_cell", 7)
-    together = identified(problems, list(range(7)))
-    for chosen in ([0], [6], [3, 1], [5, 0, 2, 6, 4]):
-        apart = identified([problems[i] for i in chosen], chosen)
-        assert all(same(one, together[i]) for one, i in zip(apart, chosen, strict=True))
-
-
 def mixed() -> list[Problem]:
     """Traces of which some differ in more than the noise, in no order."""
     times, response = clean("liquid_drop_2")
@@ -129,7 +124,7 @@ def mixed() -> list[Problem]:
     return [linear[0], linear[1], sparse, *other, narrow, linear[2], simple]
 
 
-def test_what_cannot_be_fitted_together_is_fitted_in_groups() -> None:
+def test_answers_do_not_depend_on_the_batch_byte_for_byte() -> None:
     """Fits share responses: of one model, at the same times; search ranges may differ."""
     problems = mixed()
     groups = alike(problems)

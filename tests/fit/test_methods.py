@@ -1,8 +1,6 @@
 """All identifiers on the same problems, and which run is typical, which near the noise."""
 
-import re
-from dataclasses import is_dataclass
-from importlib import import_module
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,14 +11,12 @@ from biogrip.arrays import Array
 from biogrip.fit import multi_start
 from biogrip.fit.methods import (
     METHODS,
-    block_class,
     identifier,
     near_noise,
     near_noise_words,
     typical,
 )
 from biogrip.fit.multi_start import refine_optima
-from biogrip.fit.problem import Problem
 from biogrip.physics.noise import rms
 from biogrip.physics.residuals import Residuals
 from tests.helpers.default import STUDY
@@ -68,8 +64,7 @@ def test_an_answer_is_what_it_says(method: str) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """All but those that settle an optimum: their number depends on the processor."""
-    case_problem = problem("liquid_drop_2", 1)
-    counted = [0]
+    posed, counted = problem("liquid_drop_2", 1), [0]
 
     def settled_silently(*given: Any) -> Any:
         before = counted[0]
@@ -77,46 +72,38 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
         counted[0] = before
         return found
 
-    monkeypatch.setattr(multi_start, "refine_optima", settled_silently)
-
     def misfit(parameters: Array) -> Array:
         counted[0] += len(parameters)
-        return case_problem.misfit(parameters)
+        return posed.misfit(parameters)
 
-    class Counting(Residuals):
-        def __init__(self) -> None:
-            self.__dict__.update(case_problem.residuals.__dict__)
+    def at_one(residuals: Residuals, x: Array) -> tuple[Array, Array]:
+        counted[0] += 1
+        return of_one(residuals, x)
 
-        def __call__(self, x: Array) -> tuple[Array, Array]:
-            counted[0] += 1
-            return super().__call__(x)
+    def at_many(residuals: Residuals, x: Array, *, slopes: bool = True) -> Array:
+        counted[0] += len(x)
+        return of_many(residuals, x, slopes=slopes)
 
-        def condensed_responses(self, x: Array, *, slopes: bool = True) -> Array:
-            counted[0] += len(x)
-            return super().condensed_responses(x, slopes=slopes)
-
-    watch_writes = Problem(
-        misfit, Counting(), case_problem.genome, case_problem.low, case_problem.high
-    )
-    assert run(method, watch_writes).evaluations == counted[0]
+    of_one, of_many = Residuals.__call__, Residuals.condensed_responses
+    monkeypatch.setattr(multi_start, "refine_optima", settled_silently)
+    monkeypatch.setattr(Residuals, "__call__", at_one)
+    monkeypatch.setattr(Residuals, "condensed_responses", at_many)
+    assert run(method, replace(posed, misfit=misfit)).evaluations == counted[0]
 
 
 @pytest.mark.parametrize("case", SAMPLES)
 def test_what_is_sure_of_it_reaches_the_global_optimum(case: str) -> None:
     """Against the best of both and SciPy's fit from the truth, at the study's sampling.
 
-    In 100 seeds of each case neither missed once, so a rate of misses above 3 % is
-    excluded at 95 %, and two misses in 8 seeds would be one in 300.
+    In 100 seeds of each case neither missed once.
     """
-    misses = 0
-    for seed in range(8):
+    for seed in range(4):
         case_problem = problem(case, seed, rate_Hz=10.0)
         truth = np.log([SAMPLES[case][name] for name in MODEL.names])
         found = [run(method, case_problem, seed).misfit_rad for method in SURE]
         best = min(*found, scipy_fit(case_problem, truth).misfit_rad)
         increases = case_problem.residuals.samples * ((np.array(found) / best) ** 2 - 1)
-        misses += int(np.sum(increases > 1))
-    assert misses <= 1
+        assert np.all(increases < 1)
 
 
 @pytest.mark.parametrize("method", EXACT)
@@ -146,43 +133,35 @@ def test_offset_and_drift_are_fitted_along() -> None:
     case_problem = problem_alone(GRIPPER, MODEL, TORQUE, times, trace, offset=True, drift=True)
     without = run("least_squares", posed_for(MODEL, times, trace)).misfit_rad
     assert without > 10 * rms(noise)
-    for method in METHODS:
+    for method in EXACT:
         answer = run(method, case_problem)
-        assert answer.misfit_rad < (1.1 * rms(noise) if method in EXACT else without)
-        # The genetic algorithm has two digits a parameter, and misses the noise floor by more.
-        if method in (*EXACT, "genetic"):
-            assert answer.misfit_rad < 2.0 * rms(noise)
-            k, _, c, c_p = answer.parameters
-            assert k == pytest.approx(1.0, rel=0.05 if method in EXACT else 0.15)
-            assert c + c_p == pytest.approx(10.0, rel=0.03)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_method_is_named_like_its_module_and_its_files(method: str) -> None:
-    assert METHODS[method].name == method
-    assert re.fullmatch(r"\w+", method)
-    assert hasattr(import_module(METHODS[method].module), "identify_many")
-    for block in METHODS[method].blocks:
-        assert is_dataclass(block_class(block))
+        assert answer.misfit_rad < 1.1 * rms(noise)
+        k, _, c, c_p = answer.parameters
+        assert k == pytest.approx(1.0, rel=0.05)
+        assert c + c_p == pytest.approx(10.0, rel=0.03)
 
 
 def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:
-    return pd.DataFrame({"seed": range(len(misfit)), "misfit": misfit, "noise_rms": noise}).astype(
-        {"noise_rms": float}
-    )
+    runs = pd.DataFrame({"seed": range(len(misfit)), "misfit": misfit, "noise_rms": noise})
+    return runs.astype({"noise_rms": float})
 
 
-def test_the_typical_run_is_that_of_median_excess_and_not_of_the_quietest_trace() -> None:
-    runs = found([0.90, 1.05, 1.10, 1.20, 1.01], [0.70, 1.04, 1.00, 1.01, 1.00])
-    # Misfit over noise: 1.29, 1.01, 1.10, 1.19, 1.01.
-    assert typical(runs)["seed"] == 2
-    assert typical(runs.iloc[:4])["seed"] == 2
-    assert typical(runs.iloc[[0]])["seed"] == 0
-
-
-@pytest.mark.parametrize("noise", [None, 0.0])
-def test_without_known_noise_the_typical_run_is_of_median_misfit(noise: float | None) -> None:
-    assert typical(found([3.0, 1.0, 2.0], [noise] * 3))["seed"] == 2
+@pytest.mark.parametrize(
+    ("misfit", "noise", "seed"),
+    [
+        # Misfit over noise: 1.29, 1.01, 1.10, 1.19, 1.01.
+        ([0.90, 1.05, 1.10, 1.20, 1.01], [0.70, 1.04, 1.00, 1.01, 1.00], 2),
+        ([0.90, 1.05, 1.10, 1.20], [0.70, 1.04, 1.00, 1.01], 2),
+        ([0.90], [0.70], 0),
+        # Of unknown noise, or none.
+        ([3.0, 1.0, 2.0], [None] * 3, 2),
+        ([3.0, 1.0, 2.0], [0.0] * 3, 2),
+    ],
+)
+def test_the_typical_run_is_that_of_median_excess_and_not_of_the_quietest_trace(
+    misfit: list[float], noise: list[float | None], seed: int
+) -> None:
+    assert typical(found(misfit, noise))["seed"] == seed
 
 
 def test_near_the_noise_is_a_share_of_it() -> None:

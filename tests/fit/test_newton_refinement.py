@@ -29,7 +29,7 @@ TIMES = np.linspace(0.0, 400.0, 201)
 
 
 def noisy(model: SampleModel, count: int) -> list[tuple[Problem, Array]]:
-    """Traces of samples from the middle of the search range, with some noise, or much."""
+    """Traces of samples from the middle of the search range, with some noise."""
     low, high = np.array([LOG_RANGES[each.kind] for each in model.parameters]).T
     rng = np.random.default_rng(len(low))
     problems = []
@@ -37,25 +37,10 @@ def noisy(model: SampleModel, count: int) -> list[tuple[Problem, Array]]:
         sample = 0.5 * (low + high) + 0.25 * rng.uniform(-1, 1, len(low)) * (high - low)
         response = step_response(GRIPPER, model.network(np.exp(sample)[None]), inertia=False)
         trace = rotation(response, TORQUE, TIMES)[0]
-        noise_rad = 10 ** rng.uniform(-6, -1) * np.abs(trace).max()
+        noise_rad = 10 ** rng.uniform(-3, -1) * np.abs(trace).max()
         trace = trace + noise_rad * rng.normal(size=len(TIMES))
         problems.append((posed_for(model, TIMES, trace), sample))
     return problems
-
-
-def cost(problem: Problem, x: Array) -> tuple[float, float]:
-    """Sum of squares on all samples, and the prior's, in units of the noise; and the misfit."""
-    residual, _ = problem.residuals(x)
-    away = (x - 0.5 * (problem.low + problem.high)) / PRIOR_WIDTH
-    square_sum = float(residual @ residual) / problem.residuals.noise_scale_rad**2
-    return square_sum + float(away @ away), float(np.sqrt(np.mean(residual**2)))
-
-
-def rounding(problem: Problem, square_sum: float) -> float:
-    """What of a sum of squares is rounding: samples are known to a few 1e-15 of the largest."""
-    residuals = problem.residuals
-    of_noise = 4e-15 * residuals.peak_rad / residuals.noise_scale_rad
-    return float(of_noise * np.sqrt(residuals.samples * square_sum) + 1e-12 * square_sum)
 
 
 # What `biogrip.identify_sample` was asked when its parameters were not those of the misfit told:
@@ -82,7 +67,7 @@ def test_parameters_are_those_of_the_misfit_told() -> None:
     noise = NOISE_RAD * np.random.default_rng(0).standard_normal(len(time_s))
     trace = library.simulate(made_by, {"k_p": 11.6, "c_p": 0.0125}, time_s) + noise
     chi2 = []
-    for seed in range(3):
+    for seed in range(2):
         found = library.identify_sample(fitted, time_s, trace, seed=seed)
         parameters = dict(zip(fitted.searched.names, found.parameters.tolist(), strict=True))
         residual = library.simulate(fitted, parameters, time_s) - trace
@@ -112,9 +97,7 @@ def test_curvatures_are_those_of_what_is_minimized(name: str) -> None:
         )
         second = [(gradient(x + 1e-4 * u) - gradient(x - 1e-4 * u)) / 2e-4 for u in unit]
         # Of what the trace says nothing of, nearly all is rounding.
-        allowed = (
-            1e-6 * np.abs(second).max() + rounding(case_problem, cost(case_problem, x)[0]) / 2e-4
-        )
+        allowed = 1e-6 * np.abs(second).max() + 1e-8
         np.testing.assert_allclose(found.information[0], second, rtol=0, atol=allowed)
 
 

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.fit.nested_fits import ranked
 from biogrip.judging.likelihood import make_likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.models import CANDIDATES, MODELS
+from biogrip.physics.models import MODELS
 from biogrip.physics.sample_model import SampleModel
 from tests.helpers.problems import (
     GRIPPER,
@@ -19,7 +18,6 @@ from tests.helpers.problems import (
     TORQUE,
     case_problem,
     identified,
-    posed_for,
 )
 
 SOLID, LIQUID = MODELS["fractional_kelvin_voigt"], MODELS["fractional_maxwell"]
@@ -61,27 +59,3 @@ def test_intervals_hold_the_exponent(model: SampleModel, truth: list[float], lev
     # And are of use: the exponent's are a fifth of it wide, or less.
     index = model.names.index("alpha")
     assert np.median(limits[:, index, 1] - limits[:, index, 0]) < 0.2
-
-
-@pytest.mark.parametrize(
-    ("made_by", "truth"),
-    [
-        ("fractional_kelvin_voigt", [0.3, 10.0, 0.3]),
-        ("fractional_maxwell", [10.0, 0.3, 300.0]),
-        ("liquid_drop", [9.0, 1.0, 300.0]),
-    ],
-)
-@pytest.mark.nightly
-def test_the_model_that_made_a_trace_is_preferred(made_by: str, truth: list[float]) -> None:
-    """By AIC, each of three kinds against the others and against a simpler one."""
-    names = ["kelvin_voigt", "liquid_drop", "fractional_kelvin_voigt", "fractional_maxwell"]
-    clean = response(MODELS[made_by], truth)
-    for seed in range(3):
-        noise = 0.03 * clean.max() * np.random.default_rng(seed).normal(size=len(TIMES))
-        problems = [posed_for(CANDIDATES[name].model, TIMES, clean + noise) for name in names]
-        misfits = [identified([problem], [seed], FEW)[0].misfit_rad for problem in problems]
-        tried = ranked(names, misfits, len(TIMES))
-        best = min(tried, key=lambda each: each.delta_aic)
-        assert best.candidate == made_by
-        # Of as many parameters the others are far behind: no matter of chance.
-        assert sorted(each.delta_aic for each in tried)[1] > 5

@@ -10,7 +10,7 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.multi_start import identify_from
-from biogrip.fit.noise_model_fit import FAR, outliers_of
+from biogrip.fit.noise_model_fit import FAR
 from biogrip.fit.problem import Identification, Problem
 from biogrip.fit.trace_fit import trace_fit
 from biogrip.physics.gripper import Gripper
@@ -115,19 +115,6 @@ def test_noise_is_found_and_said() -> None:
     np.testing.assert_array_equal(other.residuals(TRUTH)[0], fit.problem.residuals(TRUTH)[0])
 
 
-def test_a_drift_changes_nothing_of_what_is_found() -> None:
-    """It is fitted along whether it is there or not, so the same noise gives the same limits."""
-    case_problem = replace(POSED, coloured=True, offset=True, drift=True)
-    steady = Noise("gaussian", 0.02, "peak")
-    drift = 3 * 0.02 * CLEAN.max() * TIMES / TIMES[-1]
-    one, other = (
-        trace_fit(case_problem, TIMES, noisy(steady) + added, find) for added in (0 * drift, drift)
-    )
-    np.testing.assert_allclose(one.found.parameters[[0, 2]], other.found.parameters[[0, 2]], 1e-3)
-    first, second = (each.problem.residuals(TRUTH)[1] for each in (one, other))
-    np.testing.assert_allclose(first @ first.T, second @ second.T, rtol=1e-2, atol=1e-18)
-
-
 def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
     """Three spikes are struck, each of fifteen times the noise of its sample."""
     case_problem = replace(POSED, coloured=True, offset=True, drift=True)
@@ -144,26 +131,8 @@ def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
     assert fit.noise_data()["proportional"] > 0.9  # type: ignore[index, operator]
 
 
-def test_what_is_fitted_along_is_said() -> None:
-    case_problem = replace(POSED, coloured=True, offset=True)
-    fit = trace_fit(case_problem, TIMES, noisy(Noise("gaussian", 0.02, "peak")), find)
-    assert fit.problem.residuals.free == len(TIMES) - 1
-    assert "an offset of the instrument is fitted along, and the intervals" in fit.notes()[0]
-
-
 def test_too_many_samples_for_a_colour_are_refused() -> None:
     case_problem: CaseProblem = replace(POSED, coloured=True, offset=True, drift=True)
     times = np.linspace(0, 400, MOST_SAMPLES + 1)
     with pytest.raises(BiogripError, match="allowed are at most 50000 with a coloured"):
         trace_fit(case_problem, times, times, find)
-
-
-def test_outliers_are_as_rare_as_gaussian_noise_has_them() -> None:
-    """Of a million samples beyond 4.5 standard deviations there are 7."""
-    rng = np.random.default_rng(0)
-    found = sum(int(outliers_of(rng.standard_normal(10_000)).sum()) for _ in range(100))
-    assert found <= 20
-    trace = rng.standard_normal(1000) + 100 * np.sin(np.arange(1000) / 100)
-    trace[[30, 500]] += 9.0
-    np.testing.assert_array_equal(np.flatnonzero(outliers_of(trace)), [30, 500])
-    assert not outliers_of(np.zeros(100)).any()

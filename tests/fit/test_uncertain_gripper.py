@@ -33,12 +33,9 @@ def simulated(case_problem: CaseProblem, logs: Array = TRUTH, torque: float = 1.
     return simulated_rotation(case_problem.gripper, network, history, TIMES, nonlinear=False)[0]
 
 
-def with_gripper(**changes: Any) -> CaseProblem:
-    return replace(EXPERIMENT, gripper=replace(EXPERIMENT.gripper, **changes))
-
-
-def functions(uncertainty: Mapping[str, Mapping[str, float]], **changes: float) -> Array:
-    case_problem = replace(with_gripper(**changes), uncertainty=uncertainty)
+def functions(uncertainty: Mapping[str, Mapping[str, float]], **changes: Any) -> Array:
+    gripper = replace(EXPERIMENT.gripper, **changes)
+    case_problem = replace(EXPERIMENT, gripper=gripper, uncertainty=uncertainty)
     return gripper_functions(case_problem, TIMES, np.exp(TRUTH))
 
 
@@ -77,7 +74,8 @@ def drawn(uncertainty: Mapping[str, Mapping[str, float]], rng: np.random.Generat
     gripper, own = EXPERIMENT.gripper, uncertainty["gripper"]
     changed = {key: getattr(gripper, key) + own[key] * rng.standard_normal() for key in own}
     torque = 1 + uncertainty["torque"]["share"] * rng.standard_normal()
-    clean = simulated(with_gripper(**changed), torque=torque)
+    wrong = replace(EXPERIMENT, gripper=replace(gripper, **changed))
+    clean = simulated(wrong, torque=torque)
     return add_noise(clean, Noise("gaussian", 0.001, "peak"), rng, TIMES)
 
 

@@ -71,10 +71,13 @@ def problem_alone(
     rotation_rad: Array,
     *,
     noise_rad: float | None = None,
+    condensed: Condensed | None = None,
     **assumed: Any,
 ) -> Problem:
-    """The problem of a trace that shares its rows with no other; assumed is as `condensed_of`'s."""
-    condensed = condensed_of(torque, time_s, **assumed)
+    """The problem of a trace that by default shares its rows with no other.
+
+    Assumed is as `condensed_of`'s.
+    """
     return make_problem(
         gripper,
         model,
@@ -82,7 +85,7 @@ def problem_alone(
         time_s,
         rotation_rad,
         STUDY.ranges,
-        condensed,
+        condensed or condensed_of(torque, time_s, **assumed),
         noise_rad=noise_rad,
         instrument=INSTRUMENTS["rotation"],
     )
@@ -96,7 +99,6 @@ def condensed_rows(residuals: Residuals, x: Array) -> tuple[Array, Array]:
 
 SETTINGS: Any = STUDY.config.method("least_squares")
 GRIPPER, TORQUE = STUDY.gripper, study_torque()
-RANGES = STUDY.ranges
 
 
 def posed_for(model: SampleModel, times: Array, trace: Array) -> Problem:
@@ -117,17 +119,7 @@ def case_problem(
     noise = Noise("gaussian", level, "peak")
     traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
     return [
-        make_problem(
-            GRIPPER,
-            model,
-            TORQUE,
-            times,
-            trace,
-            RANGES,
-            condensed,
-            instrument=INSTRUMENTS["rotation"],
-        )
-        for trace in traces
+        problem_alone(GRIPPER, model, TORQUE, times, trace, condensed=condensed) for trace in traces
     ]
 
 

@@ -49,32 +49,20 @@ SAMPLING_TIMES = {
 _DIGITS = 120
 
 
-def rotation_50_digits(
+def exact_50_digits(
     gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array
 ) -> Array:
-    """phi_2 of one sample (k, k_p, c, c_p) with inertia, shape (n_times,)."""
+    """phi_2, and the force of springs and dampers on the tips in N, (2, n_times), with inertia.
+
+    Of one sample (k, k_p, c, c_p).
+    """
     with ctx.workdps(_DIGITS):
-        given = [arb(float(value)) for value in parameters]
-        return _checked(_output(gripper, given, steps, time_s, of_force=False))
+        return _solution(gripper, [arb(float(value)) for value in parameters], steps, time_s)
 
 
-def jaw_force_50_digits(
-    gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array
+def _solution(
+    gripper: Gripper, parameters: Sequence[arb], steps: TorqueHistory, time_s: Array
 ) -> Array:
-    """Force of the springs and dampers on the tips in N, shape (n_times,)."""
-    with ctx.workdps(_DIGITS):
-        given = [arb(float(value)) for value in parameters]
-        return _checked(_output(gripper, given, steps, time_s, of_force=True))
-
-
-def _output(
-    gripper: Gripper,
-    parameters: Sequence[arb],
-    steps: TorqueHistory,
-    time_s: Array,
-    *,
-    of_force: bool,
-) -> list[arb]:
     k, k_p, c, c_p = parameters
     b = arb(gripper.arm_length_m) * (arb(gripper.reference_angle_deg) / 180).sin_pi()
     inertia, damping, stiffness = (
@@ -94,22 +82,22 @@ def _output(
     # k (u_B - x) = c (x' - u_C'), u_B = b phi_2, u_C = -b phi_4.
     a[4, 0], a[4, 4], a[4, 3] = k / c * b, -k / c, -b
     rates, vectors = a.eig(right=True)
-    seen = acb_mat([force if of_force else [1, 0, 0, 0, 0]])
+    seen = acb_mat([[1, 0, 0, 0, 0], force])
     of_modes = seen * vectors
-    found = [acb(0)] * len(time_s)
+    found = [[acb(0)] * len(time_s) for _ in range(2)]
     for start, left, right in zip(steps.time_s, steps.left[:, 0], steps.right[:, 0], strict=True):
         load = acb_mat(5, 1)
         load[2, 0], load[3, 0] = arb(float(left)) / inertia[0], arb(float(right)) / inertia[1]
         rest = a.solve(-load)
-        weights = vectors.solve(-rest)
+        weights, settled = vectors.solve(-rest), seen * rest
         for i, t in enumerate(time_s):
             elapsed = arb(float(t)) - arb(float(start))
             if elapsed >= 0:
-                terms = (
-                    of_modes[0, j] * weights[j, 0] * (rates[j] * elapsed).exp() for j in range(5)
-                )
-                found[i] += (seen * rest)[0, 0] + sum(terms, acb(0))
-    return [value.real for value in found]
+                fading = [weights[j, 0] * (rates[j] * elapsed).exp() for j in range(5)]
+                for row in range(2):
+                    terms = (of_modes[row, j] * fading[j] for j in range(5))
+                    found[row][i] += settled[row, 0] + sum(terms, acb(0))
+    return np.array([_checked([value.real for value in own]) for own in found])
 
 
 def _checked(values: Sequence[arb]) -> Array:

@@ -1,5 +1,6 @@
 """Fits by SciPy, of all samples and one at a time: independent of how the study fits."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,25 +41,21 @@ def scipy_fit(
     noise_rad, width = problem.residuals.noise_scale_rad, problem.high - problem.low
     count = len(width)
     weight = 1 / PRIOR_WIDTH if prior else 0.0
-    last: dict[bytes, tuple[Array, Array]] = {}
 
-    def both(x: Array) -> tuple[Array, Array]:
-        """Residuals and slopes; the last are kept, for both are asked for in turn."""
-        key = x.tobytes()
-        if key not in last:
-            residual, slopes = problem.residuals(x)
-            away = weight * (x - problem.low - 0.5 * width)
-            last.clear()
-            last[key] = (
-                np.append(residual / noise_rad, away),
-                np.vstack((slopes.T / noise_rad, weight * np.eye(count))),
-            )
-        return last[key]
+    @functools.lru_cache(maxsize=1)
+    def both(x: tuple[float, ...]) -> tuple[Array, Array]:
+        """Residuals and slopes, which are asked for in turn."""
+        residual, slopes = problem.residuals(np.array(x))
+        away = weight * (x - problem.low - 0.5 * width)
+        return (
+            np.append(residual / noise_rad, away),
+            np.vstack((slopes.T / noise_rad, weight * np.eye(count))),
+        )
 
     found = least_squares(
-        lambda x: both(x)[0],
+        lambda x: both(tuple(x))[0],
         np.clip(start, problem.low + 1e-9 * width, problem.high - 1e-9 * width),
-        lambda x: both(x)[1],
+        lambda x: both(tuple(x))[1],
         (problem.low, problem.high),
         ftol=tolerance,
         xtol=min(tolerance, 1e-8),

@@ -28,31 +28,21 @@ def test_slope_is_the_sum_of_cylindrical_capacitors() -> None:
     assert capacitance_slope(TABLE_2) == pytest.approx(float(expected), rel=1e-13)
 
 
-def test_thin_gaps_become_plate_capacitors() -> None:
-    """For a large radius, a gap's 1/ln(r_outer/r_inner) is r/g, as of parallel plates."""
-    wide = CombDrive(40e-6, 4e-6, 3e-6, 2, 1.0, 6.0, 4.5, 1.5)
-    plates = 8.8541878128e-12 * 40e-6 * 3 * 1.0 / 3e-6
-    assert capacitance_slope(wide) == pytest.approx(plates, rel=3e-5)  # pitch / radius
-
-
 @pytest.mark.parametrize(("torque_Nm", "printed_V"), [(1.6e-9, 17), (0.32e-9, 7)])
 def test_operating_points_of_the_paper(torque_Nm: float, printed_V: float) -> None:
     """Section 3 says "about" 17 and 7 V: half of the last printed digit, and a little."""
     assert abs(float(voltage(TABLE_2, torque_Nm)) - printed_V) < 0.75
 
 
-def test_voltage_inverts_torque() -> None:
+def test_voltage_inverts_torque_and_nothing_pushes() -> None:
     volts = np.linspace(0, 100, 11)
     np.testing.assert_allclose(voltage(TABLE_2, torque(TABLE_2, volts)), volts, rtol=1e-14)
-
-
-def test_a_comb_drive_does_not_push() -> None:
     with pytest.raises(ValueError, match="only pulls"):
         voltage(TABLE_2, -1e-9)
 
 
 def test_the_torque_is_as_uncertain_as_that_of_combs_that_vary() -> None:
-    """Torques of combs drawn at random scatter so, to the standard error of 20 000 draws."""
+    """Torques of combs drawn at random scatter so, to the standard error of 8000 draws."""
     rng = np.random.default_rng(3)
     volts, gap, height = 16.3, 0.06e-6, 0.8e-6
     drawn = [
@@ -60,7 +50,7 @@ def test_the_torque_is_as_uncertain_as_that_of_combs_that_vary() -> None:
             CombDrive(40e-6 + height * z[0], 4e-6 - gap * z[1], 3e-6 + gap * z[1], *REST),
             volts * (1 + 0.01 * z[2]),
         )
-        for z in rng.standard_normal((20_000, 3))
+        for z in rng.standard_normal((8000, 3))
     ]
     scatter = np.std(drawn) / float(torque(TABLE_2, volts))
     found = torque_uncertainty(TABLE_2, 0.01, gap, height)

@@ -12,7 +12,7 @@ from biogrip.physics.protocol import torque_history
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel
 from tests.helpers.problems import condensed_of, condensed_rows
-from tests.helpers.responses import PROTOCOLS, random_samples
+from tests.helpers.responses import MODEL_PARAMETERS, PROTOCOLS, log_range, random_samples
 from tests.helpers.responses import SAMPLING_TIMES as TIMES
 
 MAXWELL = MODELS["generalized_maxwell"]
@@ -53,15 +53,47 @@ def noise(count: int) -> Array:
 @pytest.mark.parametrize("times", TIMES)
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_least_squares_sees_no_difference(
-    either_gripper: Gripper, protocol: str, times: str, nuisance: bool
+    gripper: Gripper, unequal_gripper: Gripper, protocol: str, times: str, nuisance: bool
 ) -> None:
     """To 1e-10 of the trace, over the whole search range; noise is at least 1e-3 of it."""
     torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES[times]
     condensed = condensed_of(torque, time_s, offset=nuisance, drift=nuisance)
-    residuals = posed(either_gripper, MAXWELL, condensed, noise(len(time_s)))
-    for sample in random_samples(8, seed=8):
-        rows = assert_alike(residuals, np.log(sample))
-        assert rows <= min(80 if torque.symmetric else 160, len(time_s) + 1)
+    for arms in (gripper, unequal_gripper):
+        residuals = posed(arms, MAXWELL, condensed, noise(len(time_s)))
+        for sample in random_samples(8, seed=8):
+            rows = assert_alike(residuals, np.log(sample))
+            assert rows <= min(80 if torque.symmetric else 160, len(time_s) + 1)
+
+
+@pytest.mark.parametrize("protocol", ["steps", "ramp, parabola and sinusoid"])
+@pytest.mark.parametrize("name", MODEL_PARAMETERS)
+def test_of_no_model_it_sees_a_difference(gripper: Gripper, name: str, protocol: str) -> None:
+    """Rows without slopes are the same, too, but for last bits: they are real numbers."""
+    torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES["few"]
+    condensed = condensed_of(torque, time_s, offset=True)
+    residuals = posed(gripper, MODELS[name], condensed, noise(len(time_s)))
+    middle, rng = np.log(MODEL_PARAMETERS[name]), np.random.default_rng(5)
+    x = np.clip(middle + rng.normal(size=(10, len(middle))), *log_range(MODELS[name]))
+    for each in x:
+        assert_alike(residuals, each)
+    found = residuals.condensed_responses(x)[:, :1]
+    alone = residuals.condensed_responses(x, slopes=False)
+    assert np.all(np.abs(alone - found) <= 1e-12 * np.abs(found).max(axis=2, keepdims=True))
+
+
+@pytest.mark.parametrize("name", [*MODEL_PARAMETERS, "two branches"])
+def test_rows_do_not_depend_on_who_else_is_there(either_gripper: Gripper, name: str) -> None:
+    """Byte for byte, for any subset in any order, down to a single one."""
+    model = MODELS.get(name, Sample("generalized_maxwell", 2).model)
+    condensed = condensed_of(torque_history(PROTOCOLS["steps"]), TIMES["few"], offset=True)
+    residuals = posed(either_gripper, model, condensed, np.zeros(len(TIMES["few"])))
+    low, high = log_range(model)
+    x = np.random.default_rng(3).uniform(low, high, (40, len(low)))
+    together = residuals.condensed_responses(x)
+    rng = np.random.default_rng(7)
+    for count in (1, 2, 7, 40):
+        chosen = rng.permutation(40)[:count]
+        np.testing.assert_array_equal(residuals.condensed_responses(x[chosen]), together[chosen])
 
 
 def test_a_clean_trace_leaves_no_residual(gripper: Gripper) -> None:

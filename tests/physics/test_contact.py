@@ -13,7 +13,7 @@ from biogrip.physics.contact import (
     mass_of_sample,
     rolling_of_contact,
 )
-from biogrip.physics.gripper import Gripper, displacement_of_tip, rotation_of_tip, torque
+from biogrip.physics.gripper import Gripper, torque
 from tests.physics.test_actuator import TABLE_2
 
 
@@ -32,10 +32,6 @@ def test_of_unequal_arms_the_stiffer_one_asks_for_the_torque(unequal_gripper: Gr
     found = contact(unequal_gripper, 150e-6, TABLE_2, 60e-6)
     assert found.torque_Nm == pytest.approx(5.5e-7 * found.closing_rad)
     assert torque(TABLE_2, found.voltage_V) == pytest.approx(found.torque_Nm)
-
-
-def test_largest_sample_costs_ten_milliradian(gripper: Gripper) -> None:
-    assert contact(gripper, 150e-6, TABLE_2, 120e-6).closing_rad == pytest.approx(0.0104, abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -59,16 +55,6 @@ def test_the_gripper_yields_as_two_springs_in_a_row(unequal_gripper: Gripper) ->
     force, b = 1e-6, unequal_gripper.lever_m
     opening = sum(b * force * b / k for k in (4.4e-7, 5.5e-7))
     assert unequal_gripper.jaw_stiffness_N_per_m == pytest.approx(force / opening)
-
-
-def test_a_tip_goes_where_its_rotation_takes_it(gripper: Gripper) -> None:
-    turns = np.array([1e-9, 1e-3, 0.07])
-    there = displacement_of_tip(gripper, turns)
-    np.testing.assert_allclose(rotation_of_tip(gripper, there), turns, rtol=1e-14)
-    coordinates = [
-        1.5e-3 * (math.cos(math.radians(75) - t) - math.cos(math.radians(75))) for t in turns
-    ]
-    np.testing.assert_allclose(there[1:], coordinates[1:], rtol=1e-11)
 
 
 def test_fringing_against_charges_on_two_strips() -> None:
@@ -100,17 +86,12 @@ def test_small_things(gripper: Gripper) -> None:
     assert rolling_of_contact(gripper, 120e-6, 3e-3) == pytest.approx(60e-6 * 3e-3 / 1.5e-3)
 
 
-@pytest.mark.parametrize(("size_m", "strain"), [(30e-6, 0.02), (120e-6, 0.1)])
-def test_against_the_pressure_in_the_contact(size_m: float, strain: float) -> None:
+@pytest.mark.parametrize(("size_m", "strain", "nu"), [(30e-6, 0.02, 0.5), (120e-6, 0.1, 0.2)])
+def test_against_the_pressure_in_the_contact(size_m: float, strain: float, nu: float) -> None:
     """Hertz' pressure p_0 sqrt(1 - r^2/a^2) with p_0 = 2 E* a/(pi R), summed over the contact."""
     modulus, radius, indentation = 1234.0, size_m / 2, strain * size_m / 2
-    effective = modulus / (1 - 0.5**2)
     a = math.sqrt(radius * indentation)
-    p_0 = 2 * effective * a / (math.pi * radius)
+    p_0 = 2 * modulus / (1 - nu**2) * a / (math.pi * radius)
     force = 2 / 3 * p_0 * math.pi * a**2
-    assert apparent_modulus(force, strain * size_m, size_m) == pytest.approx(modulus, rel=1e-12)
-
-
-def test_a_compressible_sphere_is_of_a_stiffer_material() -> None:
-    ours = (apparent_modulus(1e-6, 1e-6, 50e-6, nu) for nu in (0.5, 0.0))
-    assert next(ours) == pytest.approx(0.75 * next(ours))
+    found = apparent_modulus(force, strain * size_m, size_m, nu)
+    assert found == pytest.approx(modulus, rel=1e-12)

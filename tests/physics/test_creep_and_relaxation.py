@@ -1,11 +1,9 @@
 """Creep under a load, and relaxation under a deformation, without a gripper."""
 
-from collections.abc import Callable
-from typing import Any
+import functools
 
 import numpy as np
 import pytest
-from flint import arb
 
 from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
@@ -17,7 +15,7 @@ from biogrip.physics.protocol import Load, Phase, TorqueHistory, hold, load, tor
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import Network, SampleModel
 from biogrip.physics.simulation import simulated_rotation
-from tests.helpers.power_law import inverted
+from tests.helpers.laplace import Impedance, drawn, inverted
 
 DRIVEN = pytest.mark.parametrize("deforms", [False, True], ids=["creep", "relaxation"])
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
@@ -45,24 +43,16 @@ def example(model: SampleModel) -> Network:
     return model.network([model.example])
 
 
-def impedance(network: Network) -> Callable[[Any], Any]:
-    """Load over deformation of the first sample in the Laplace domain."""
-    branches = list(zip(network.k[0].tolist(), network.c[0].tolist(), strict=True))
-    k_p, c_p = float(network.k_p[0]), float(network.c_p[0])
-    return lambda s: k_p + c_p * s + sum((k * c * s / (k + c * s) for k, c in branches), arb(0))
-
-
-def by_laplace(network: Network, history: TorqueHistory, time_s: float) -> float:
+def by_laplace(given: Impedance, history: TorqueHistory, time_s: float) -> float:
     """Response by numerical inversion: of each change of what is held, by itself."""
-    given = impedance(network)
 
-    def power(height: float, order: int) -> Callable[[Any], Any]:
+    def power(height: float, order: int) -> Impedance:
         return lambda s: height / s ** (order + 1)
 
-    def swing(a: complex, omega: float) -> Callable[[Any], Any]:
+    def swing(a: complex, omega: float) -> Impedance:
         return lambda s: (a.real * s - a.imag * omega) / (s * s + omega * omega)
 
-    def response(held: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def response(held: Impedance) -> Impedance:
         return lambda s: held(s) * given(s) if history.deforms else held(s) / given(s)
 
     changes = [(start, power(height[0], order)) for start, order, height in history.jumps]
@@ -77,11 +67,11 @@ def by_laplace(network: Network, history: TorqueHistory, time_s: float) -> float
 def test_responses_to_ramps_and_sinusoids_are_inverse_laplace_transforms(
     name: str, deforms: bool
 ) -> None:
-    network = example(MODELS[name])
-    history = torque_history(PHASES, deforms=deforms)
+    model, history = MODELS[name], torque_history(PHASES, deforms=deforms)
     times = np.array([0.2, 0.5001, 2.9, 3.5001, 4.4, 6.8])
-    found = simulated(network, history, times)
-    expected = [by_laplace(network, history, float(time)) for time in times]
+    found = simulated(example(model), history, times)
+    given = drawn(name, model.example)
+    expected = [by_laplace(given, history, float(time)) for time in times]
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.max(np.abs(expected)))
 
 
@@ -104,30 +94,36 @@ def test_derivatives_are_those_of_finite_differences(model: SampleModel, deforms
         assert found[1 + i] == pytest.approx((up - down) / (2 * step), abs=1e-6 * scale)
 
 
+HELD = {"mixed": PHASES, "steps": (hold(5.0, 1.0), hold(2.5, 0.3))}
+READ_S = np.linspace(0.004, 7.5, 1801)
+
+
+@functools.cache
+def condensed(held: str, deforms: bool) -> Condensed:
+    history = torque_history(HELD[held], deforms=deforms)
+    return Condensed(history, READ_S, np.zeros((0, len(READ_S))))
+
+
 @DRIVEN
-@pytest.mark.parametrize("held", [PHASES, (hold(5.0, 1.0), hold(2.5, 0.3))], ids=["mixed", "steps"])
+@pytest.mark.parametrize("held", HELD)
 @EVERY_MODEL
 def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
-    model: SampleModel, held: tuple[Phase, ...], deforms: bool
+    model: SampleModel, held: str, deforms: bool
 ) -> None:
-    history = torque_history(held, deforms=deforms)
-    times = np.linspace(0.004, 7.5, 1801)
-    true = simulated(example(model), history, times)
-    trace = true + 0.01 * (np.ptp(true) or 1.0) * np.random.default_rng(5).standard_normal(
-        len(times)
-    )
-    condensed = Condensed(history, times, np.zeros((0, len(times))))
-    given = Trace(times, trace, condensed)
-    residuals = Residuals(NO_ARMS, model, history, given, instrument=GRIPPER)
+    rows = condensed(held, deforms)
+    true = simulated(example(model), rows.torque, READ_S)
+    noise = np.random.default_rng(5).standard_normal(len(READ_S))
+    given = Trace(READ_S, true + 0.01 * (np.ptp(true) or 1.0) * noise, rows)
+    residuals = Residuals(NO_ARMS, model, rows.torque, given, instrument=GRIPPER)
     # Exponents stay below one.
     moved = [parameter.kind != "exponent" for parameter in model.parameters]
     logs = np.log([model.example]) + np.linspace(-0.3, 0.4, 5)[:, None] * moved
     found = residuals.condensed_misfit(np.exp(logs))
     expected = [np.sqrt(np.mean(residuals(at)[0] ** 2)) for at in logs]
     assert found == pytest.approx(expected, rel=1e-10)
-    rows = residuals.condensed_responses(logs)
-    residual = rows[:, 0] - residuals.condensed_trace
-    gradient = np.einsum("npr,nr->np", rows[:, 1:], residual)
+    responses = residuals.condensed_responses(logs)
+    residual = responses[:, 0] - residuals.condensed_trace
+    gradient = np.einsum("npr,nr->np", responses[:, 1:], residual)
     for at, own in zip(logs, gradient, strict=True):
         left, slopes = residuals(at)
         scale = float(np.linalg.norm(slopes) * np.linalg.norm(left))

@@ -42,12 +42,3 @@ def test_agrees_with_direct_sums_at_every_rate(name: str) -> None:
         # Of the last sample alone almost nothing is left; the bound counts it in full.
         scale = 1e-16 * np.abs(trace).max() + 1e-14 * np.abs(terms).sum()
         assert abs(value - math.fsum(terms)) < scale
-
-
-def test_times_between_samples() -> None:
-    """What begins to decay a hundredth after a step is followed to its end."""
-    times, amplitudes = np.array([0.0, 0.01, 3.3, 17.0]), np.array([1.0, -2.0, 3.0, 0.5])
-    table = DecayTable(lambda rates: amplitudes @ np.exp(np.outer(times, rates))[None], 17.0, 0.01)
-    rates = -np.geomspace(1e-9, 1e5, 500)
-    expected = amplitudes @ np.exp(np.outer(times, rates))
-    np.testing.assert_allclose(table(rates)[0], expected, atol=1e-14)

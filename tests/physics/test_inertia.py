@@ -11,7 +11,7 @@ from biogrip.arrays import Array
 from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.protocol import TorqueHistory, hold, torque_history
+from biogrip.physics.protocol import hold, torque_history
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import VISIBLE, elapsed_s, find_ring, ring, ringing_s
 from tests.helpers.default import STUDY
@@ -22,21 +22,6 @@ RINGING = {
     "generalized_maxwell": {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 1e-6},
     "zener_kelvin": {"k_s": 12.0, "k_v": 20.0, "c_v": 100.0},
 }
-
-
-def both_ways(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array) -> Array:
-    """Rotations with inertia and without, (2, n, n_times)."""
-    symmetric = torque.symmetric
-    return np.array(
-        [
-            rotation(
-                step_response(gripper, network, symmetric=symmetric, inertia=inertia),
-                torque,
-                time_s,
-            )
-            for inertia in (True, False)
-        ]
-    )
 
 
 def test_an_empty_gripper_rings_like_a_damped_oscillator() -> None:
@@ -62,7 +47,10 @@ def test_rings_are_over_when_they_are_said_to_be(either_gripper: Gripper, stiffn
     spring = Network(np.array([stiffness]), np.zeros(1), none, none)
     step = torque_history((hold(1.0, 1e-9),))
     after_s = ringing_s(either_gripper) * np.linspace(1.0, 1.5, 500)
-    with_it, without = both_ways(either_gripper, spring, step, after_s)
+    with_it, without = (
+        rotation(step_response(either_gripper, spring, inertia=inertia), step, after_s)
+        for inertia in (True, False)
+    )
     assert np.max(np.abs(with_it - without)) < 1e-14 * np.max(np.abs(without))
 
 
@@ -125,12 +113,17 @@ def test_who_samples_fast_is_told_to_leave_out_the_first_milliseconds(model: str
     assert notes_of(model, kept, 0.02, RINGING[model]) == []
 
 
-def test_a_ring_that_is_taken_for_the_sample_is_told() -> None:
-    """Without inertia a damper between the jaws is the nearest that a fit has to a ring."""
-    time_s = np.unique([start + 0.002 * np.arange(1000) for start in (0.0, 200.0)])
-    assert len(notes_of("zener_kelvin", time_s, 0.003, RINGING["zener_kelvin"])) == 1
-
-
-def test_a_damper_that_is_seen_after_the_ring_ends_it() -> None:
-    time_s = np.unique([start + 0.017 * np.arange(2000) for start in (0.0, 200.0)])
-    assert notes_of("kelvin_voigt", time_s, 0.02, {"k_p": 12.3, "c_p": 30.0}) == []
+@pytest.mark.parametrize(
+    ("model", "truth", "interval_s", "level", "told"),
+    [
+        # Without inertia a damper between the jaws is the nearest that a fit has to a ring.
+        ("zener_kelvin", RINGING["zener_kelvin"], 0.002, 0.003, 1),
+        # A damper that is seen when the ring is over ends it.
+        ("kelvin_voigt", {"k_p": 12.3, "c_p": 30.0}, 0.017, 0.02, 0),
+    ],
+)
+def test_a_damper_ends_a_ring_if_it_is_seen_afterwards(
+    model: str, truth: dict[str, float], interval_s: float, level: float, told: int
+) -> None:
+    time_s = np.unique([start + interval_s * np.arange(1000) for start in (0.0, 200.0)])
+    assert len(notes_of(model, time_s, level, truth)) == told

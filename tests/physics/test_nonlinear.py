@@ -1,6 +1,4 @@
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,34 +7,23 @@ from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
+from biogrip.physics.gripper import Arm, Gripper, displacement_of_tip, rotation_of_tip
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
-from biogrip.physics.nonlinear import (
-    correction,
-    nonlinear_rotation,
-)
-from biogrip.physics.protocol import Harmonic, Load, Phase, TorqueHistory, hold, torque_history
+from biogrip.physics.nonlinear import correction, nonlinear_rotation
+from biogrip.physics.protocol import Harmonic, Load, Phase, hold, torque_history
 from biogrip.physics.simulation import jaw_force
+from tests.helpers.radau import TOLERANCE, equal_arms, tip
 from tests.helpers.responses import random_samples
 
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)
 OTHER = Arm(1.3e-14, 2.5e-12, 5.5e-7)
-# Of a step. What comes out is then 1e-9 of the peak away from where 1e-10 leads, in the worst of
-# all cases here, which is a hundredth of what is asked.
-RADAU = 1e-8
 TIMES = np.concatenate((np.geomspace(0.1, 200, 25), 200 + np.geomspace(0.1, 200, 25)))
 
 
-def tip(gripper: Gripper, phi: float) -> tuple[float, float]:
-    """Displacement and lever of a tip, eq. by eq. as in docs/model.md."""
-    hat, length = math.radians(gripper.reference_angle_deg), gripper.arm_length_m
-    return 2 * length * math.sin(hat - phi / 2) * math.sin(phi / 2), length * math.sin(hat - phi)
-
-
-def radau(
-    gripper: Gripper, sample: Array, torques: list[tuple[float, ...]], time_s: Array
-) -> tuple[Array, Array]:
+def unequal_arms(
+    gripper: Gripper, sample: Array, torques: list[tuple[float, float, float]]
+) -> Array:
     """Corrected eqs. (1)-(3) without inertia, both arms, by SciPy, to 1e-9 of the peak.
 
     The damper c_p couples the rates: [c_2 + c_p b_2^2, c_p b_2 b_4; ...] phi' = rest.
@@ -66,7 +53,7 @@ def radau(
 
     state, found, start = np.zeros(3), [], 0.0
     for end, left, right in torques:
-        here = time_s[(time_s > start) & (time_s <= end)]
+        here = TIMES[(start < TIMES) & (end >= TIMES)]
         solved = solve_ivp(
             slope,
             (start, end),
@@ -74,68 +61,10 @@ def radau(
             "Radau",
             np.unique(np.append(here, end)),
             args=((left, right),),
-            rtol=RADAU,
+            rtol=TOLERANCE,
             atol=[1e-15, 1e-15, 1e-18],
         )
         found.append(solved.y[:2, : len(here)])
-        state, start = solved.y[:, -1], end
-    left_phi, right_phi = np.concatenate(found, axis=1)
-    return left_phi, right_phi
-
-
-def steps_of(torques: list[tuple[float, ...]]) -> TorqueHistory:
-    edges = [0.0, *(end for end, _, _ in torques)]
-    phases = [
-        hold(edges[i + 1] - edges[i], left, right) for i, (_, left, right) in enumerate(torques)
-    ]
-    return torque_history(tuple(phases))
-
-
-def symmetric_radau(
-    gripper: Gripper, sample: Array, torques: list[tuple[float, float]], time_s: Array, peak: float
-) -> Array:
-    """The same for equal arms and torques, where one rotation stands for both."""
-    return symmetric_states(gripper, sample, torques, time_s, peak)[0]
-
-
-def symmetric_states(
-    gripper: Gripper,
-    sample: Array,
-    torques: list[tuple[float, float]] | list[tuple[float, Callable[[float], float]]],
-    time_s: Array,
-    peak: float,
-) -> Array:
-    """Rotation and jaw force, (2, n_times), of equal arms under torques until some times."""
-    k, k_p, c, c_p = (float(value) for value in sample)
-    arm = gripper.left
-
-    def slope(t: float, state: Array | tuple[float, ...], torque: Any) -> list[float]:
-        phi, y = state
-        u, b = tip(gripper, phi)
-        tau = torque(t) if callable(torque) else torque
-        rest = tau - arm.stiffness_Nm_per_rad * phi - b * (k_p * 2 * u + k * (2 * u - y))
-        return [rest / (arm.damping_Nms_per_rad + 2 * c_p * b * b), k / c * (2 * u - y)]
-
-    state, found, start = np.zeros(2), [], 0.0
-    for end, tau in torques:
-        here = time_s[(time_s > start) & (time_s <= end)]
-        grid = np.unique(np.append(here, end))
-        solved = solve_ivp(
-            slope,
-            (start, end),
-            state,
-            "Radau",
-            grid,
-            args=(tau,),
-            rtol=RADAU,
-            atol=[1e-11 * peak, 1e-11 * peak * gripper.arm_length_m],
-        )
-        assert solved.success, solved.message
-        phi, y = solved.y[:, : len(here)]
-        phi_rate = [slope(*at, tau)[0] for at in zip(here, zip(phi, y, strict=True), strict=True)]
-        u, b = np.array([tip(gripper, angle) for angle in phi]).T
-        force = k_p * 2 * u + c_p * 2 * b * phi_rate + k * (2 * u - y)
-        found.append(np.stack((phi, force)))
         state, start = solved.y[:, -1], end
     return np.concatenate(found, axis=1)
 
@@ -148,14 +77,15 @@ def test_against_radau(case: int) -> None:
     rng = np.random.default_rng([50, case])
     gripper = Gripper(1.5e-3, rng.uniform(40, 90), ARM, ARM)
     sample, factor = random_samples(1, 1000 + case)[0], rng.uniform(1, 20)
-    torques = [(200.0, 1.6e-9 * factor, 1.6e-9 * factor), (400.0, *(2 * [0.32e-9 * factor]))]
-    network, torque = generalized_maxwell(sample), steps_of(torques)
+    taus = 1.6e-9 * factor, 0.32e-9 * factor
+    network, torque = (
+        generalized_maxwell(sample),
+        torque_history(tuple(hold(200.0, tau) for tau in taus)),
+    )
     linear = step_response(gripper, network, inertia=False)
     ours = rotation(linear, torque, TIMES)[0] + correction(gripper, network, torque).at(TIMES)[0]
-    peak = float(np.abs(ours).max())
-    expected = symmetric_radau(
-        gripper, sample, [(end, tau) for end, tau, *_ in torques], TIMES, peak
-    )
+    ends = [(200.0, taus[0]), (400.0, taus[1])]
+    expected = equal_arms(gripper, sample, ends, TIMES, float(np.abs(ours).max()))[0]
     assert np.max(np.abs(ours - expected)) < 1e-7 * np.abs(expected).max()
 
 
@@ -169,51 +99,32 @@ def test_unequal_arms_against_radau(case: int, equal_torques: bool) -> None:
     rng = np.random.default_rng([51, case])
     gripper = Gripper(1.5e-3, rng.uniform(40, 90), ARM, OTHER)
     sample = 10 ** rng.uniform([-1, -2, 0, -2], [2, 1, 2, 1])
-    factor = rng.uniform(1, 20)
-    torques: list[tuple[float, ...]] = [
-        (200.0, 1.6e-9 * factor, 0.9e-9 * factor),
-        (400.0, 0.3e-9 * factor, 0.5e-9 * factor),
-    ]
-    if equal_torques:
-        torques = [(end, left, left) for end, left, _ in torques]
-    network, torque = generalized_maxwell(sample), steps_of(torques)
+    factor = 1e-9 * rng.uniform(1, 20)
+    taus = [(1.6, 1.6), (0.3, 0.3)] if equal_torques else [(1.6, 0.9), (0.3, 0.5)]
+    held = [(factor * left, factor * right) for left, right in taus]
+    network = generalized_maxwell(sample)
+    torque = torque_history(tuple(hold(200.0, *each) for each in held))
     linear = step_response(gripper, network, symmetric=False, inertia=False)
     found = correction(gripper, network, torque)
-    both = radau(gripper, sample, torques, TIMES)
-    peak = max(np.abs(phi).max() for phi in both)
+    both = unequal_arms(gripper, sample, [(200.0, *held[0]), (400.0, *held[1])])
     for arm, expected in enumerate(both):
         ours = rotation(linear, torque, TIMES, arm)[0] + found.at(TIMES, arm)[0]
-        assert np.max(np.abs(ours - expected)) < 1e-7 * peak
+        assert np.max(np.abs(ours - expected)) < 1e-7 * np.abs(both).max()
 
 
 def test_with_inertia_against_radau_for_a_damped_gripper() -> None:
     """Arms that do not ring (quality factor 0.2): Radau integrates eqs. (1)-(3) as they are."""
     arm = Arm(1.0e-14, 3.3e-10, 4.4e-7)
-    gripper = Gripper(1.5e-3, 50.0, arm, arm)
-    k, k_p, c, c_p = sample = np.array([2.0, 0.05, 20.0, 0.01])
-    torque = 10 * 1.6e-9
-
-    def slope(_: float, state: Array) -> list[float]:
-        phi, rate, y = state
-        u, b = tip(gripper, phi)
-        force = k_p * 2 * u + c_p * 2 * b * rate + k * (2 * u - y)
-        load = torque - arm.damping_Nms_per_rad * rate - arm.stiffness_Nm_per_rad * phi - b * force
-        return [rate, load / arm.inertia_kgm2, k / c * (2 * u - y)]
-
+    gripper, sample = Gripper(1.5e-3, 50.0, arm, arm), np.array([2.0, 0.05, 20.0, 0.01])
+    network, torque = generalized_maxwell(sample), torque_history((hold(100.0, 1.6e-8),))
     time_s = np.geomspace(0.1, 100, 40)
-    solved = solve_ivp(
-        slope, (0, 100), np.zeros(3), "Radau", time_s, rtol=1e-10, atol=[1e-16, 1e-12, 1e-18]
-    )
-    ours = nonlinear_rotation(
-        gripper, generalized_maxwell(sample), torque_history((hold(100.0, torque),)), time_s
+    ours = nonlinear_rotation(gripper, network, torque, time_s)[0]
+    expected = equal_arms(
+        gripper, sample, [(100.0, 1.6e-8)], time_s, 1e-3 * ours.max(), inertia=True
     )[0]
-    assert np.max(np.abs(ours - solved.y[0])) < 1e-7 * ours.max()
+    assert np.max(np.abs(ours - expected)) < 1e-7 * ours.max()
     # The nonlinearity is there to be seen.
-    linear = rotation(
-        step_response(gripper, generalized_maxwell(sample)),
-        torque_history((hold(100.0, torque),)),
-        time_s,
-    )[0]
+    linear = rotation(step_response(gripper, network), torque, time_s)[0]
     assert np.max(np.abs(ours - linear)) > 1e-3 * ours.max()
 
 
@@ -228,7 +139,7 @@ def test_ramps_and_sinusoids_against_radau() -> None:
         (30.0, lambda _: 5e-9),
     ]
     time_s = np.linspace(0.1, 29.9, 60)
-    expected, force = symmetric_states(gripper, sample, torques, time_s, 0.05)
+    expected, force = equal_arms(gripper, sample, torques, time_s, 0.05)
     network = generalized_maxwell(sample)
     ours = nonlinear_rotation(gripper, network, torque, time_s)[0]
     assert np.max(np.abs(ours - expected)) < 1e-6 * np.abs(expected).max()
@@ -241,13 +152,19 @@ def test_ramps_and_sinusoids_against_radau() -> None:
 def test_the_correction_is_of_second_order(gripper: Gripper) -> None:
     """Ten times the torque, a hundred times the correction."""
     network = generalized_maxwell(random_samples(200, 8))
-    sizes = []
-    for factor in (0.1, 1.0):
-        torque = steps_of([(200.0, *(2 * [1.6e-9 * factor])), (400.0, *(2 * [0.32e-9 * factor]))])
-        sizes.append(np.abs(correction(gripper, network, torque).at(TIMES)).max(axis=1))
+    small, large = (
+        np.abs(
+            correction(
+                gripper,
+                network,
+                torque_history((hold(200.0, 1.6e-9 * times), hold(200.0, 0.32e-9 * times))),
+            ).at(TIMES)
+        ).max(axis=1)
+        for times in (0.1, 1.0)
+    )
     # The third order is a thousandth of it at these rotations.
-    visible = sizes[0] > 1e-15
-    np.testing.assert_allclose((sizes[1] / sizes[0])[visible], 100, rtol=2e-2)
+    visible = small > 1e-15
+    np.testing.assert_allclose((large / small)[visible], 100, rtol=2e-2)
 
 
 def test_rotation_of_a_tip_against_50_digits(gripper: Gripper) -> None:
@@ -257,6 +174,7 @@ def test_rotation_of_a_tip_against_50_digits(gripper: Gripper) -> None:
             exact = hat - mp.acos(mp.cos(hat) + mpf(size) / mpf(1.5e-3))
             ours = float(rotation_of_tip(gripper, np.array(size)))
             assert ours == pytest.approx(float(exact), rel=4e-15)
+            assert displacement_of_tip(gripper, np.array(ours)) == pytest.approx(size, rel=1e-14)
 
 
 def test_too_large_a_torque_is_refused(gripper: Gripper) -> None:

@@ -1,4 +1,4 @@
-"""Power-law samples without the library: Mittag-Leffler functions, and inversion by Talbot.
+"""Samples without the library: impedances drawn by hand, and inversion by Talbot.
 
 References
 ----------
@@ -18,6 +18,39 @@ from biogrip.physics.protocol import TorqueHistory
 
 Impedance = Callable[[Any], Any]
 _NODES = 45
+
+
+def series(*impedances: Any) -> Any:
+    """Elements behind one another: compliances add."""
+    return 1 / sum(1 / impedance for impedance in impedances)
+
+
+IMPEDANCES: dict[str, Callable[..., Any]] = {
+    "generalized_maxwell": lambda s, k, k_p, c, c_p: k_p + c_p * s + series(k, c * s),
+    "liquid_drop": lambda s, k, k_p, c: k_p + series(k, c * s),
+    "damper": lambda s, c_p: c_p * s,
+    "kelvin_voigt": lambda s, k_p, c_p: k_p + c_p * s,
+    "maxwell": lambda s, k, c: series(k, c * s),
+    "zener_maxwell": lambda s, k, k_p, c: k_p + series(k, c * s),
+    "zener_kelvin": lambda s, k_s, k_v, c_v: series(k_s, k_v + c_v * s),
+    "burgers": lambda s, k_s, c_s, k_v, c_v: series(k_s, c_s * s, k_v + c_v * s),
+    "springpot": lambda s, v, a: v * s**a,
+    "fractional_kelvin_voigt": lambda s, k_p, v, a: k_p + v * s**a,
+    "springpot_beside_damper": lambda s, v, a, c_p: v * s**a + c_p * s,
+    "springpots_in_parallel": lambda s, v, a, g, b: v * s**a + g * s**b,
+    "fractional_maxwell": lambda s, v, a, c: series(v * s**a, c * s),
+    "fractional_maxwell_gel": lambda s, k, v, a: series(k, v * s**a),
+    "springpots_in_series": lambda s, v, a, g, b: series(v * s**a, g * s**b),
+    "fractional_zener": lambda s, k, k_p, v, a: k_p + series(k, v * s**a),
+    "fractional_solid": lambda s, k_p, v, a, c: k_p + series(v * s**a, c * s),
+    "fractional_jeffreys": lambda s, v, a, c, c_p: c_p * s + series(v * s**a, c * s),
+}
+"""Load over deformation of every model in the Laplace domain, from its parameters in order."""
+
+
+def drawn(model: str, sample: Any) -> Impedance:
+    """Impedance of one sample, of exact parameters."""
+    return lambda s: IMPEDANCES[model](s, *(arb(float(value)) for value in sample))
 
 
 def mittag_leffler(a: float, b: float, x: float) -> float:
@@ -45,10 +78,6 @@ def inverted(transform: Impedance, t: float) -> float:
             turn = angle + (angle * cotangent - 1) * cotangent
             total += ((s * t).exp() * transform(s) * acb(1, turn)).real
         return float((total * radius / _NODES).mid())
-
-
-def springpot(modulus: float, exponent: float) -> Impedance:
-    return lambda s: modulus * s ** arb(exponent)
 
 
 def rotations(
