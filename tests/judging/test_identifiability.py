@@ -147,7 +147,7 @@ def test_a_bare_damper_is_known_from_one_side_by_a_spring_it_hides() -> None:
     assert c.words().startswith("determined: 10 N s/m (")
 
 
-@pytest.mark.parametrize(("times", "said"), [(0.5, False), (1.5, False), (2.5, True), (200, True)])
+@pytest.mark.parametrize(("times", "said"), [(0.5, True), (1.1, False), (1.5, False), (2.5, True)])
 def test_a_noise_that_leaves_more_than_it_is_is_doubted(times: float, said: bool) -> None:
     """But of a trace without noise nothing is left at all, whatever noise it is held against."""
     (damper_problem,) = case_problem(*clean("liquid_drop_2"), 1, DAMPER)

@@ -83,14 +83,16 @@ _FALSE_ALARM = 0.003
 _TAILS, _GROWTH_LEAST, _GROWTH_MOST = 4.0, -9.0, 20.0
 
 
-def compute_growth(residual: Array, rotation_rad: Array) -> Array:
+def compute_growth(residual: Array, rotation_rad: Array, rounding_rad: float = 0.0) -> Array:
     """Compute how the noise grows with the rotation of a fit, (n_samples,), from its residuals.
 
-    Returns its standard deviation over its root mean square; ones if it does not grow.
+    Returns its standard deviation over its root mean square; ones if it does not grow. Distances
+    below the step of rounded readings are not told apart.
     """
     from scipy.optimize import minimize_scalar
 
-    apart, size = measure_distances(residual), np.abs(rotation_rad)
+    apart = np.maximum(measure_distances(residual), rounding_rad)
+    size = np.abs(rotation_rad)
     if not _grows(apart, size):
         return np.ones(len(residual))
     found = minimize_scalar(

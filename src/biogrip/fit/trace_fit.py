@@ -247,8 +247,9 @@ def _without_outliers(
         plain = case_problem.of(time_s[kept], rotation_rad[kept])
         found = find(plain)
         residual = plain.residuals.left(logs := np.log(found.parameters))
-        growth = compute_growth(residual, plain.residuals.rotation(logs))
-        struck = outliers_of(residual / growth, plain.residuals.rounding_rad)
+        step_rad = plain.residuals.rounding_rad
+        growth = compute_growth(residual, plain.residuals.rotation(logs), step_rad)
+        struck = outliers_of(residual / growth, step_rad)
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
@@ -265,7 +266,8 @@ def _in_turn(
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, noise_model = plain, None
     logs = np.log(found.parameters)
-    growth = compute_growth(plain.residuals.left(logs), plain.residuals.rotation(logs))
+    residuals = plain.residuals
+    growth = compute_growth(residuals.left(logs), residuals.rotation(logs), residuals.rounding_rad)
     grows = case_problem.coloured and np.ptp(growth) > 0
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)

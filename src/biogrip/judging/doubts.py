@@ -107,9 +107,9 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     if misfit_rad < least_rad:
         return Remainder([])
     residual, directions = _left(residuals, likelihood.best)
-    growth = compute_growth(residual, residuals.rotation(likelihood.best))
-    basis = absorbed(directions / growth)
     time_s, rounding_rad = residuals.trace.time_s, residuals.rounding_rad
+    growth = compute_growth(residual, residuals.rotation(likelihood.best), rounding_rad)
+    basis = absorbed(directions / growth)
     struck = outliers_of(residual / growth, rounding_rad)
     if far_out(residual / growth, struck, len(basis)) >= FALSE_ALARM:
         struck[:] = False
@@ -128,8 +128,8 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
         notes += found.notes
     doubts = [
         *_about_growth(growth, residuals.instrument),
-        *([] if found else _about_colour(bulk, basis, residuals.instrument)),
         *_about_outliers(time_s, struck),
+        *([] if found else _about_colour(bulk, basis, residuals.instrument)),
     ]
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and not residuals.coloured and compute_status(notes) == DOUBTFUL:

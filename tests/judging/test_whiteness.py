@@ -1,0 +1,111 @@
+"""Tests of residuals for white noise: how often each is wrong, whatever the readings."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import kstest
+from scipy.stats import t as student
+
+from biogrip.arrays import Array
+from biogrip.fit.noise_model_fit import absorbed, outliers_of
+from biogrip.judging.whiteness import correlated, count_independent, far_out, uneven, wandering
+
+LEVEL = 0.01
+TRACES = 4000
+NOTHING = np.zeros((0, 4000))
+
+
+def directions(times: Array) -> Array:
+    """What fits of a retarded creep with an offset absorb."""
+    retarded = np.exp(-times / 0.2)
+    return np.stack([np.ones_like(times), retarded, times * retarded])
+
+
+@pytest.mark.parametrize("readings", [10, 20, 40, 400])
+@pytest.mark.parametrize("decades", [0, 3, 6])
+def test_of_white_noise_each_test_fails_as_many_as_its_level_says(
+    readings: int, decades: int
+) -> None:
+    """Within four standard deviations. Two of them have bounds of the chance, and fail fewer."""
+    even = np.arange(1, readings + 1) / readings
+    basis = absorbed(directions(np.geomspace(10.0**-decades, 1.0, readings) if decades else even))
+    noise = np.random.default_rng(readings + decades).standard_normal((TRACES, readings))
+    left = noise - noise @ basis.T @ basis
+    chances = np.array(
+        [
+            (
+                correlated(residual, basis)[1],
+                wandering(residual, basis),
+                uneven(residual, basis),
+                far_out(residual, outliers_of(residual), len(basis)),
+            )
+            for residual in left
+        ]
+    )
+    shares = np.mean(chances < LEVEL, axis=0)
+    margin = 4 * np.sqrt(LEVEL / TRACES)
+    assert np.all(shares < LEVEL + margin)
+    exact = [0] if readings < 20 else [0, 1]
+    assert np.all(shares[exact] > LEVEL - margin)
+
+
+def test_the_chance_of_a_correlation_is_that_of_the_quadratic_form() -> None:
+    """By Imhof's integral of the characteristic function, Biometrika 48 (1961), 419-426."""
+    basis = absorbed(directions(np.geomspace(1e-3, 1, 15)))
+    maker = np.eye(15) - basis.T @ basis
+    residual = maker @ np.cumsum(np.random.default_rng(3).standard_normal(15))
+    found, chance = correlated(residual, basis)
+    differences = np.diff(np.eye(15), axis=0)
+    observed = np.sum(np.diff(residual) ** 2) / np.sum(residual**2)
+    weights = np.linalg.eigvalsh(
+        maker @ (differences.T @ differences - observed * np.eye(15)) @ maker
+    )
+
+    def integrand(u: float) -> float:
+        angle = 0.5 * np.sum(np.arctan(weights * u))
+        return float(np.sin(angle) / (u * np.prod((1 + (weights * u) ** 2) ** 0.25)))
+
+    expected = 0.5 - quad(integrand, 0, np.inf, limit=500)[0] / np.pi
+    assert 1e-4 < expected < 0.1
+    assert chance == pytest.approx(expected, rel=0.2)
+    assert found > 0.3
+
+
+def test_the_cumulative_periodogram_is_kolmogorovs() -> None:
+    """SciPy's test of the same shares, as if they were a sample of a uniform distribution."""
+    for seed in range(5):
+        residual = np.random.default_rng(seed).standard_normal(4000)
+        power = np.abs(np.fft.rfft(residual)[1:-1]) ** 2
+        shares = np.cumsum(power)[:-1] / power.sum()
+        expected = kstest(shares, "uniform", method="asymp").pvalue
+        # SciPy has steps of 1/1999 where there are steps of 1/2000.
+        assert uneven(residual, NOTHING) == pytest.approx(expected, rel=0.15, abs=0.02)
+    assert uneven(np.ones(3), NOTHING[:, :3]) == 1.0
+
+
+@pytest.mark.parametrize(("away", "doubted"), [(3.5, False), (5.0, True), (50.0, True)])
+@pytest.mark.parametrize("readings", [100, 600])
+def test_one_outlier_is_told_by_how_far_it_is(readings: int, away: float, doubted: bool) -> None:
+    """Twice the chance of Student's t in as many readings."""
+    residual = np.random.default_rng(1).standard_normal(readings)
+    residual = np.clip(residual, -3, 3)
+    residual[readings // 3] = away * np.std(np.delete(residual, readings // 3))
+    struck = np.arange(readings) == readings // 3
+    chance = far_out(residual, struck, 3)
+    scale = np.sqrt(np.sum(residual[~struck] ** 2) / (readings - 4))
+    expected = 2 * -np.expm1(-2 * readings * student.sf(residual[struck][0] / scale, readings - 4))
+    assert chance == pytest.approx(min(expected, 1.0), rel=1e-6)
+    assert (chance < 0.003) == doubted
+
+
+def test_independent_residuals_are_counted() -> None:
+    """All of white noise, and of an AR(1) process n (1 - a)/(1 + a)."""
+    rng = np.random.default_rng(5)
+    white = rng.standard_normal(20_000)
+    assert count_independent(white) == pytest.approx(20_000, rel=0.05)
+    slow = np.zeros(20_000)
+    for place in range(1, len(slow)):
+        slow[place] = 0.9 * slow[place - 1] + white[place]
+    assert count_independent(slow) == pytest.approx(20_000 / 19, rel=0.2)
+    # Three half waves are about as many independent values.
+    assert 2 < count_independent(np.sin(3 * np.pi * np.linspace(0, 1, 1000))) < 8
