@@ -60,17 +60,20 @@ def test_one_outlier_is_named_by_its_time(place: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("share", "time_s", "weight"),
+    ("share", "time_s", "of_peak", "weight"),
     [
-        (0.6, 10.0, REJECTION),
-        (0.6, 7.0, None),
-        (0.4, 100.0, DOUBT),
-        (0.4, 70.0, None),
-        (0.3, 400.0, None),
+        (0.6, 10.0, 0.03, REJECTION),
+        (0.6, 10.0, 0.01, DOUBT),
+        (0.6, 7.0, 0.03, None),
+        (0.4, 100.0, 0.03, DOUBT),
+        (0.4, 70.0, 0.03, None),
+        (0.3, 400.0, 0.03, None),
     ],
 )
-def test_share_and_time_decide(share: float, time_s: float, weight: str | None) -> None:
-    note = find_slow_misfit(NoiseModel(share, time_s, 0.0), 400.0, instrument=GRIPPER)
+def test_share_and_time_decide(
+    share: float, time_s: float, of_peak: float, weight: str | None
+) -> None:
+    note = find_slow_misfit(NoiseModel(share, time_s, 0.0), 400.0, of_peak, GRIPPER)
     assert (note and note.weight) == weight
 
 

@@ -87,11 +87,12 @@ def compute_growth(residual: Array, rotation_rad: Array, rounding_rad: float = 0
     """Compute how the noise grows with the rotation of a fit, (n_samples,), from its residuals.
 
     Returns its standard deviation over its root mean square; ones if it does not grow. Distances
-    below the step of rounded readings are not told apart.
+    below 1.5 steps of rounded readings are not told apart: how readings on a plateau scatter
+    depends on where it lies between two steps.
     """
     from scipy.optimize import minimize_scalar
 
-    apart = np.maximum(measure_distances(residual), rounding_rad)
+    apart = np.maximum(measure_distances(residual), 1.5 * rounding_rad)
     size = np.abs(rotation_rad)
     if not _grows(apart, size):
         return np.ones(len(residual))

@@ -129,7 +129,8 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     doubts = [
         *_about_growth(growth, residuals.instrument),
         *_about_outliers(time_s, struck),
-        *([] if found else _about_colour(bulk, basis, residuals.instrument)),
+        # Outliers distort a fit, so that all that it leaves is correlated.
+        *([] if found or struck.any() else _about_colour(bulk, basis, residuals.instrument)),
     ]
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and not residuals.coloured and compute_status(notes) == DOUBTFUL:
@@ -276,21 +277,28 @@ _AS_THE_SCATTER = 1.44
 
 
 def find_slow_misfit(
-    noise_model: NoiseModel, duration_s: float, instrument: Instrument
+    noise_model: NoiseModel, duration_s: float, share_of_peak: float, instrument: Instrument
 ) -> Note | None:
-    """Return a note if the autocorrelated part of a noise model is, or may be, misfit."""
+    """Return a note if the autocorrelated part of a noise model is, or may be, misfit.
+
+    `share_of_peak` is the standard deviation of that part over the largest response.
+    """
     share, time_s = noise_model.ar1, noise_model.time_s
     misfit = share > _MOST and time_s > _SLOW * duration_s
     if not misfit and not (share > _NOTICEABLE and time_s > _LONG * duration_s):
         return None
     suspects = instrument.suspects(unit=True).capitalize()
-    meaning = (
-        f"that is misfit, not noise. {suspects} is not the right one."
-        if misfit
-        else f"that may be misfit, of a {instrument.suspects('')} that is not the right one."
-    )
+    if not misfit:
+        meaning = f"that may be misfit, of a {instrument.suspects('')} that is not the right one."
+    elif share_of_peak < _FAR_OFF:
+        meaning = (
+            f"that is misfit, not noise, of {100 * share_of_peak:.2g} % of the peak, which the "
+            f"limits allow for. {suspects} is not quite the right one."
+        )
+    else:
+        meaning = f"that is misfit, not noise. {suspects} is not the right one."
     return Note(
-        REJECTION if misfit else DOUBT,
+        REJECTION if misfit and share_of_peak >= _FAR_OFF else DOUBT,
         f"What the fit leaves is correlated over {time_s:.2g} s of a trace of {duration_s:.3g} s, "
         f"{100 * share:.0f} % of its variance: {meaning}",
     )

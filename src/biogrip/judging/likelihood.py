@@ -72,12 +72,14 @@ class Likelihood:
     def as_misfit(self, independent: float) -> "Likelihood":
         """Return the likelihood if what the fit leaves is misfit, not noise.
 
-        So many residuals count as independent. They estimate the size of the misfit, with at least
-        one degree of freedom; the noise is as much larger as makes all readings worth as many.
+        So many residuals count as independent, less twice the parameters: a fit takes its share of
+        a misfit, and what is left changes its sign faster than the whole. They estimate the size of
+        the misfit, with at least one degree of freedom; the noise is as much larger as makes all
+        readings worth as many.
         """
         from scipy.special import fdtri
 
-        freedom = max(independent - len(self.best), 1.0)
+        freedom = max(independent - 2 * len(self.best), 1.0)
         noise_rad = self.misfit_rad * math.sqrt(self.problem.residuals.samples / freedom)
         threshold, certainty = (fdtri(1, freedom, level) for level in (self.confidence, CERTAIN))
         return replace(

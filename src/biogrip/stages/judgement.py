@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from biogrip.arrays import Array
 from biogrip.files import write_text
 from biogrip.fit.case_problem import CaseProblem
@@ -71,12 +73,14 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
 
 
 def notes_on_fit(fit: TraceFit) -> list[Note]:
-    """Return notes on the noise model of a fit; one that holds misfit rejects the fit."""
+    """Return notes on the noise model of a fit; one that holds much misfit rejects the fit."""
     notes = [Note(HARMLESS, text) for text in fit.notes()]
     if fit.noise_model is None:
         return notes
     residuals = fit.problem.residuals
-    misfit = find_slow_misfit(fit.noise_model, residuals.duration_s, residuals.instrument)
+    peak_rad = np.max(np.abs(residuals.rotation(np.log(fit.found.parameters))))
+    share = float(fit.found.misfit_rad * np.sqrt(fit.noise_model.ar1) / peak_rad)
+    misfit = find_slow_misfit(fit.noise_model, residuals.duration_s, share, residuals.instrument)
     return [misfit, *notes] if misfit else notes
 
 
