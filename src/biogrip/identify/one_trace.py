@@ -34,7 +34,7 @@ from biogrip.identify.other_fits import (
 from biogrip.identify.outputs import WRITTEN_BY, Outcome, in_own_units
 from biogrip.identify.settings import Asked, case_of
 from biogrip.identify.trace_case import TraceCase, read_trace
-from biogrip.judging.diagnosis import Diagnosis, diagnose_all
+from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
 from biogrip.judging.onset_profiles import profile_over_onset
 from biogrip.keys import plain
@@ -215,9 +215,10 @@ def identify_alike(
     progress.doing("trying other sample models")
     models = models_tried(traces, fits, diagnoses)
     again = [judge_again(*each) for each in zip(traces, fits, diagnoses, models, strict=True)]
+    diagnoses = with_times([diagnosis for diagnosis, _ in again], first.problem.searched)
     diagnoses = [
         profile_over_onset(diagnosis, own.recorded.time_s) if own.problem.fit_start else diagnosis
-        for own, (diagnosis, _) in zip(traces, again, strict=True)
+        for own, diagnosis in zip(traces, diagnoses, strict=True)
     ]
     progress.done()
     progress.doing("trying an offset and a drift")

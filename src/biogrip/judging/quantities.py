@@ -132,6 +132,27 @@ def parameters_and_sum(model: SampleModel) -> list[Quantity]:
     return [*single, replace(_sum(model, exchangeable), penalties=within)]
 
 
+def characteristic_times(model: SampleModel) -> list[Quantity]:
+    """Return the relaxation or retardation time tau = c/k of each element with a spring and damper.
+
+    These are Maxwell branches and Kelvin-Voigt elements of which both parameters are searched. A
+    spring and a damper that are parallel to a branch have no time of their own.
+    """
+    places = {p.name: index for index, p in enumerate(model.parameters)}
+    if model.power_law:
+        return []
+    found = []
+    for name, damper in places.items():
+        letter, _, index = name.partition("_")
+        spring = places.get(name.replace("c", "k", 1))
+        if letter != "c" or spring is None or (index == "p" and len(places) > 2):
+            continue
+        label, symbol = (f"tau_{index}", rf"$\tau_{{{index}}}$") if index else ("tau", r"$\tau$")
+        pair = damper, spring
+        found.append(Quantity(label, symbol, "s", pair, sign=(1, -1), penalties=_ordered(model)))
+    return found
+
+
 def find_combinations(model: SampleModel, members: list[int]) -> list[Quantity]:
     """Return combinations of two parameters that may be determined if neither is alone.
 
