@@ -267,10 +267,20 @@ def _data(
         **said,
         "noise_model": fit.noise_data(),
         **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
+        "moduli": None if said["fit"] == REJECTED else _moduli(problem, recorded.time_s, best),
         "assumed": _assumed(case, list(models.answers or case.models)),
         "by_default": _by_default(trace.given) if instrument.has_jaws else [],
         "versions": {name: version(name) for name in ("biogrip", "numpy", "scipy")},
     }
+
+
+def _moduli(problem: CaseProblem, time_s: Array, logs: Array) -> dict[str, list[float]]:
+    """Return moduli of the fit from one over the duration to one over the first interval."""
+    first_s = np.diff(time_s)[np.searchsorted(time_s[:-2], 0.0)]
+    ends = 1 / float(np.ptp(time_s)), 1 / float(first_s)
+    values = dict(zip(problem.searched.names, np.exp(logs).tolist(), strict=True))
+    table = problem.model.moduli({**problem.fixed, **values}, np.geomspace(*ends, 31))
+    return {name: column.tolist() for name, column in table.items()}
 
 
 def _fixed(problem: CaseProblem) -> dict[str, list[str]]:
