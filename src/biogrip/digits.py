@@ -75,11 +75,11 @@ def within_limits(value: float, low: float, high: float, *others: float) -> list
 
     Their last digit is at most a quarter of the width, and at most the third digit of the upper
     limit: 0.000200, 0.000196 and 0.000204. Limits further apart than a factor of ten leave two
-    digits of each number.
+    digits of each, and three of the others.
     """
     numbers = (value, low, high, *others)
     if not 0 < low <= high <= _FAR_APART * low:
-        return [plain(each, 2) for each in numbers]
+        return [*(plain(each, 2) for each in numbers[:3]), *map(plain, others)]
     last = min(_power(high) - 2, _power((high - low) / 4) if high > low else -_LARGEST)
     last = max(last, _power(high) + 1 - _MOST_SHOWN)
     if _SMALLEST_PLAIN <= value < _LARGEST_PLAIN:

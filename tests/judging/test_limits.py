@@ -98,7 +98,7 @@ def test_a_set_in_two_parts_has_a_gap_that_its_verdict_names() -> None:
     parts = replace(whole, gaps=(gap,))
     words = [Finding(QUANTITIES[0], profile, 0.1).words() for profile in (whole, parts)]
     said = "determined only within a factor of 20: 7.4 N/m (0.05 to 20)"
-    assert words == [said, f"{said}, except 0.37 to 2.7 N/m"]
+    assert words == [said, f"{said}, except 0.368 to 2.72 N/m"]
 
 
 def test_no_limit_is_said_only_of_what_has_none() -> None:

@@ -138,17 +138,14 @@ def characteristic_times(model: SampleModel) -> list[Quantity]:
     These are Maxwell branches and Kelvin-Voigt elements of which both parameters are searched. A
     spring and a damper that are parallel to a branch have no time of their own.
     """
-    places = {p.name: index for index, p in enumerate(model.parameters)}
-    if model.power_law:
-        return []
     found = []
-    for name, damper in places.items():
-        letter, _, index = name.partition("_")
-        spring = places.get(name.replace("c", "k", 1))
-        if letter != "c" or spring is None or (index == "p" and len(places) > 2):
+    for damper, (letter, *index) in enumerate(name.split("_") for name in model.names):
+        spring = "_".join(["k", *index])
+        parallel = index == ["p"] and model.name != "kelvin_voigt"
+        if letter != "c" or spring not in model.names or parallel or model.power_law:
             continue
-        label, symbol = (f"tau_{index}", rf"$\tau_{{{index}}}$") if index else ("tau", r"$\tau$")
-        pair = damper, spring
+        pair, of_branch = (damper, model.names.index(spring)), "".join(f"_{{{it}}}" for it in index)
+        label, symbol = "_".join(["tau", *index]), rf"$\tau{of_branch}$"
         found.append(Quantity(label, symbol, "s", pair, sign=(1, -1), penalties=_ordered(model)))
     return found
 

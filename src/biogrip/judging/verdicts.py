@@ -103,8 +103,7 @@ class Finding:
         if low is not None and high is not None:
             factor = math.sqrt(high / low)
             how = f" only within a factor of {factor:.2g}" if factor > WIDE else ""
-            limits = with_limits(self.value, low, high, self.quantity.unit)
-            return f"determined{how}: {limits}"
+            return f"determined{how}: {with_limits(self.value, low, high, self.quantity.unit)}"
         if low is not None:
             return f"only bounded below: at least {plain(low, 2)}{unit}"
         if high is not None:
