@@ -59,6 +59,11 @@ class Diagnosis:
         """Status of the fit by these notes: ok, doubtful or rejected."""
         return compute_status(self.notes)
 
+    def __repr__(self) -> str:
+        """Return status and verdicts, a line each."""
+        lines = (f"  {each.quantity.label}  {each.words()}" for each in self.findings)
+        return "\n".join([f"fit {self.status}", *lines])
+
 
 def diagnose(
     problem: Problem,
