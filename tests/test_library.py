@@ -36,7 +36,9 @@ def test_what_the_documentation_shows_runs(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     names = run(code_in(DOCUMENT))
-    said = dict(line.split(" ", 1) for line in capsys.readouterr().out.splitlines()[:4])
+    creep, *_, gripper = re.split(r"(?m)^(?=k )", capsys.readouterr().out)
+    assert creep in DOCUMENT.read_text(encoding="utf-8")
+    said = dict(line.split(" ", 1) for line in gripper.splitlines()[:4])
     # A damper of 1e-3 cannot be told from none; the others stand out of 5 % of noise.
     assert said["k_p"].startswith("determined: 5.0")
     assert said["c_p"].startswith("only bounded above")
