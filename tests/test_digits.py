@@ -2,7 +2,7 @@
 
 import pytest
 
-from biogrip.digits import rounded
+from biogrip.digits import plain, rounded, with_limits
 
 
 @pytest.mark.parametrize(
@@ -17,3 +17,28 @@ def test_what_is_rounded_again_comes_out_as_if_once(value: float, found: float) 
 def test_a_value_on_the_edge_keeps_few_digits() -> None:
     """Where last bits of a processor would decide, digits end somewhere."""
     assert rounded(1.165 - 1e-14) == 1.165
+
+
+@pytest.mark.parametrize(
+    ("limits", "words"),
+    [
+        ((2e-4, 1.96e-4, 2.04e-4), "0.000200 (0.000196 to 0.000204)"),
+        ((0.32, 0.31968, 0.32051), "0.3200 (0.3197 to 0.3205)"),
+        ((1500, 1490, 1520), "1500 (1490 to 1520)"),
+        ((21.6, 16.9, 26.6), "21.6 (16.9 to 26.6)"),
+        ((2.21e4, 2.2071e4, 2.2132e4), "22100 (22070 to 22130)"),
+        ((3, 0.0512, 41.3), "3 (0.051 to 41)"),
+        ((1.2345e-5, 1.2e-5, 1.3e-5), "1.23e-05 (1.20e-05 to 1.30e-05)"),
+        ((5e8, 4.99999e8, 5.00001e8), "5.000000e+08 (4.999990e+08 to 5.000010e+08)"),
+        ((1.0, 1.0, 1.0), "1.000000 (1.000000 to 1.000000)"),
+    ],
+)
+def test_numbers_are_as_fine_as_the_width_of_their_limits(
+    limits: tuple[float, float, float], words: str
+) -> None:
+    assert with_limits(*limits) == words
+
+
+def test_decimals_are_plain_where_a_person_reads_them() -> None:
+    numbers = [1500.4, 123456, 2.5e6, 1.04e-4, 1.04e-5, -1500, 0]
+    assert " ".join(map(plain, numbers)) == "1500 123000 2.5e+06 0.000104 1.04e-05 -1500 0"

@@ -304,7 +304,7 @@ def test_identify_and_groups_say_the_same_of_a_cell(
     assert f"Left out, the fit is rejected: {folder / 'b5.csv'}." in found
     assert "Averages of several traces: a2 (2)." in found
     ratios = pd.read_csv(table).query("group == 'treated'").set_index("quantity")
-    assert ratios["cells"].tolist() == [5, 5, 5]
+    assert ratios["cells"].tolist() == [5] * 4
     for quantity, ratio in (("k", 1.5), ("k_p", 1.5), ("c", 1.0)):
         row = ratios.loc[quantity]
         assert row["ratio_low"] < ratio < row["ratio_high"]

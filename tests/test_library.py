@@ -3,12 +3,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
+import yaml
 
 import biogrip
 from biogrip import library
 from biogrip.judging.verdicts import DETERMINED
 from tests.helpers.default import STUDY
+from tests.helpers.identified import identified
 from tests.helpers.places import ROOT
 from tests.helpers.radau import equal_arms
 from tests.physics.test_nonlinear import ARM, TIMES
@@ -18,8 +21,9 @@ POSTERIOR = DOCUMENT.parent / "howto" / "posterior.md"
 
 
 def code_in(document: Path) -> str:
-    (code,) = re.findall(r"```python\n(.*?)```", document.read_text(encoding="utf-8"), re.DOTALL)
-    return str(code)
+    """All code of a document, but for that of another program."""
+    codes = re.findall(r"```python\n(.*?)```", document.read_text(encoding="utf-8"), re.DOTALL)
+    return "\n".join(code for code in codes if "import lmfit" not in code)
 
 
 def run(code: str) -> dict[str, Any]:
@@ -33,7 +37,9 @@ def test_what_the_documentation_shows_runs(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     names = run(code_in(DOCUMENT))
-    said = dict(line.split(" ", 1) for line in capsys.readouterr().out.splitlines()[:4])
+    creep, *_, gripper = re.split(r"(?m)^(?=k )", capsys.readouterr().out)
+    assert creep in DOCUMENT.read_text(encoding="utf-8")
+    said = dict(line.split(" ", 1) for line in gripper.splitlines()[:4])
     # A damper of 1e-3 cannot be told from none; the others stand out of 5 % of noise.
     assert said["k_p"].startswith("determined: 5.0")
     assert said["c_p"].startswith("only bounded above")
@@ -72,9 +78,99 @@ def test_what_is_simulated_by_the_nonlinear_model_is_not_what_the_linear_one_giv
     assert np.max(np.abs(linear - expected)) > 1e-4 * peak
 
 
+# A strain of 5 Pa on a clock that starts at 85 s, with a tare.
+TRUTH = {"k_s": 300.0, "k_v": 200.0, "c_v": 900.0}
+CREEP = library.set_up(
+    library.INSTRUMENTS["strain"], (library.hold(60.0, level=5.0),), library.Sample("zener_kelvin")
+)
+SECONDS = np.arange(-4.9, 60.0, 0.2)
+SCATTER = 2e-4 * np.random.default_rng(0).standard_normal(len(SECONDS))
+FRAME = pd.DataFrame(
+    {"t": SECONDS + 85, "strain": library.simulate(CREEP, TRUTH, SECONDS) + SCATTER + 0.001},
+    index=range(7, 7 + len(SECONDS)),
+)
+
+
+def compared(*models: str) -> dict[str, Any]:
+    return {"config": {"model_selection": {"models": [*models] or ["zener_kelvin"]}}}
+
+
+HELD: dict[str, Any] = {"reads": "strain", "hold": 5.0, "model": "zener_kelvin"}
+
+
+def test_columns_of_pandas_are_identified_as_by_the_command(tmp_path: Path) -> None:
+    own: dict[str, Any] = {"start": 85, "offset": True, "noise": 2e-4}
+    models = ["maxwell", "zener_kelvin"]
+    config = compared(*models)
+    result = library.identify_trace(FRAME["t"], FRAME[["strain"]], **HELD, **own, **config)
+    FRAME.to_csv(tmp_path / "trace.csv", index=False)
+    options = "--time t --set measurement.time_unit=s --reading strain=strain --hold 5 --start 85"
+    options += " --model zener_kelvin --offset --noise 2e-4"
+    given = yaml.safe_dump(config["config"])
+    found = identified(tmp_path, tmp_path / "trace.csv", *options.split(), config=given)
+    frame = result.to_frame()
+    assert list(frame.index) == [*TRUTH, "tau_v"]
+    for quantity in found["quantities"]:
+        row = frame.loc[quantity["quantity"]]
+        assert [row[key] for key in ("unit", "verdict")] == [quantity["unit"], "determined"]
+        assert row["low"] == pytest.approx(quantity["low"], rel=1e-4)
+        assert abs(row["value"] - {**TRUTH, "tau_v": 4.5}[row.name]) < row["high"] - row["low"]
+    assert all(quantity["in_words"] in str(result) for quantity in found["quantities"])
+    assert len(repr(result).splitlines()) == 5
+    assert list(result.to_frame("models")["model"]) == models
+    # J = 1/k_s + 1/(k_v + i omega c_v)
+    omega, storage, loss = result.to_frame("moduli").to_numpy().T
+    assert omega[[0, -1]] == pytest.approx([1 / np.ptp(SECONDS), 1 / 0.2])
+    modulus = 1 / (1 / 300 + 1 / (200 + 900j * omega))
+    np.testing.assert_allclose(storage + 1j * loss, modulus, rtol=0.03)
+    assert found["moduli"]["loss_Pa"] == pytest.approx(loss, rel=1e-4)
+
+
+def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read() -> None:
+    told = library.identify_trace(FRAME["t"], FRAME["strain"], **HELD, **compared(), start=85)
+    above, below = told.plot().axes
+    assert below.get_xlim() == pytest.approx((80.1, 144.9))
+    assert above.get_ylabel().startswith("strain")
+    found = library.identify_sample(CREEP, SECONDS, FRAME["strain"])
+    assert len(repr(found)) < 300
+    assert library.plot(CREEP, SECONDS, FRAME["strain"], found).axes[0].get_ylabel() == "strain"
+
+
+def test_readings_over_decades_are_drawn_over_the_time_since_the_start() -> None:
+    times = np.geomspace(0.1, 60, 40)
+    strain = library.simulate(CREEP, TRUTH, times) + SCATTER[:40]
+    drawn = library.identify_trace(times + 85, strain, **HELD, **compared(), start=85).plot()
+    assert drawn.axes[1].get_xscale() == "log"
+    assert drawn.axes[1].get_xlabel() == "time since 85 s of the clock (s)"
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"reads": "strian"}, "reads: found 'strian', allowed are rotation, displacement, strain,"),
+        ({"hold": None}, "hold: is missing; allowed is the stress in Pa that was held"),
+        ({"model": "zener"}, "model: .*found 'zener'. Did you mean 'zener_kelvin'"),
+        ({"sd": [1.0]}, "found 325 of time_s and 325 of strain and 1 of sd; allowed are as many"),
+        ({"config": {"protocol": {}}}, "hold: does not go with config's protocol"),
+        ({"config": {"protocl": {}}}, "protocl"),
+        ({"time_s": FRAME}, r"time_s: found the shape \(325, 2\), allowed is one column"),
+        ({"time_s": ["a"]}, "time_s: could not convert .*; allowed are numbers"),
+        ({"time_s": FRAME["t"][::-1]}, "trace.csv, line 3, .* allowed are times that increase"),
+    ],
+)
+def test_what_cannot_be_used_is_said_by_the_name_of_the_argument(
+    given: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(library.BiogripError, match=said):
+        library.identify_trace(
+            **({"time_s": FRAME["t"], "readings": FRAME["strain"]} | HELD | given)
+        )
+
+
 def test_all_of_the_library_can_be_had_from_the_package() -> None:
     assert set(library.__all__) == biogrip._LIBRARY
     assert all(getattr(biogrip, name) is getattr(library, name) for name in library.__all__)
+    assert set(library.__all__) <= set(dir(biogrip))
 
 
 def test_it_identifies_as_the_default_study() -> None:

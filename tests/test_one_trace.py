@@ -299,7 +299,7 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) 
     told = json.loads((tmp_path / "a.identified.json").read_text())
     first, second = (rows.loc[str(each)] for each in good)
     assert first["k value (N/m)"] == str(told["quantities"][0]["value"])
-    assert first["c high (N s/m)"] == str(told["quantities"][-1]["high"])
+    assert first["tau high (s)"] == str(told["quantities"][-1]["high"])
     (lowest,) = (row["model"] for row in told["models"] if row["delta_bic"] == 0)
     assert first["preferred_model"] == lowest
     # The same trace under another name is the same trace.
@@ -309,7 +309,7 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) 
         assert "bad.csv, line" in text
     assert "5 traces: 2 ok, 0 doubtful, 0 rejected, 3 not identified." in page.read_text()
     # Fit and profiles of each, and a strip of each quantity.
-    assert page.read_text().count("<img") == 2 * 2 + 3
+    assert page.read_text().count("<img") == 2 * 2 + 4
     # What biogrip wrote is replaced, be there nothing to draw.
     assert identify(bad, missing, *options)[0] == 1
     assert "2 traces: 0 ok, 0 doubtful, 0 rejected, 2 not identified." in page.read_text()

@@ -53,7 +53,7 @@ def identified(folder: Path, times: Array, values: Array, *options: str) -> dict
 
 def holding(found: dict[str, Any]) -> list[str]:
     """Name the quantities whose limits hold the truth."""
-    truth = TRUTH | {"c + c_p": TRUTH["c"] + TRUTH["c_p"]}
+    truth = TRUTH | {"c + c_p": TRUTH["c"] + TRUTH["c_p"], "tau": TRUTH["c"] / TRUTH["k"]}
     return [
         each["quantity"]
         for each in found["quantities"]
@@ -176,7 +176,7 @@ def test_a_fitted_onset_widens_limits_that_hold_the_truth(tmp_path: Path) -> Non
         identified(tmp_path, *late(2), "--start", start) for start in (f"{ONSET_S}", "fit")
     )
     for found in (given, fitted):
-        assert (found["fit"], found["samples"], len(holding(found))) == ("ok", 301, 5)
+        assert (found["fit"], found["samples"], len(holding(found))) == ("ok", 301, 6)
     assert given["assumed"]["measurement"]["start_s"] == ONSET_S
     assert fitted["onset_s"] == pytest.approx(ONSET_S, abs=0.1)
     ratios = {
@@ -205,7 +205,7 @@ def test_readings_before_the_onset_tell_the_zero(tmp_path: Path) -> None:
     whole = identified(tmp_path, times - ONSET_S, values + 2e-6, *declared)
     cut = times >= ONSET_S
     without = identified(tmp_path, times[cut] - ONSET_S, values[cut] + 2e-6, *declared)
-    assert len(holding(whole)) == 5
+    assert len(holding(whole)) == 6
     assert whole["offset_rad"] == pytest.approx(2e-6, abs=5 * NOISE_RAD / np.sqrt(40))
     widths = [
         own["high"] - own["low"]

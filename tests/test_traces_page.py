@@ -12,6 +12,7 @@ from typing import Any
 import PIL.Image
 import pytest
 
+from biogrip.digits import within_limits
 from biogrip.figures.style import BLUE
 from biogrip.identify import identify as command
 from biogrip.identify.one_trace import identify_batch
@@ -87,9 +88,9 @@ def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path
     assert r"95\,\%" not in unfolded
     (told,) = example.found
     for item in told["quantities"]:
-        limits = f"{item['low'] or 0:.3g} to {item['high'] or 0:.3g}"
-        line = f"<p>{item['quantity']} = {item['value']:.3g} {item['unit']} (95 % "
-        line += f"profile-likelihood interval {limits}, n = 1 trace)</p>"
+        value, *ends = within_limits(item["value"], item["low"] or 0, item["high"] or 0)
+        line = f"<p>{item['quantity']} = {value} {item['unit']} (95 % profile-likelihood "
+        line += f"interval {' to '.join(ends)}, n = 1 trace)</p>"
         assert (line in text) == (item["verdict"] == "determined")
     assert r"$k_{p} = 5.01\,\mathrm{N/m}$ (95\,\% profile-likelihood interval $" in text
 
@@ -98,7 +99,7 @@ def test_pictures_are_small_and_in_the_page(page: Path) -> None:
     text = page.read_text()
     pictures = re.findall('src="data:image/png;base64,([^"]+)"', text)
     # Two a trace, and one a quantity.
-    assert len(pictures) == 2 * 12 + 5 == len(re.findall("<img", text))
+    assert len(pictures) == 2 * 12 + 6 == len(re.findall("<img", text))
     for encoded in pictures:
         content = base64.b64decode(encoded)
         assert len(content) < 60_000
@@ -134,7 +135,7 @@ def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(
     model = [Setting("--model", ("sample", "model"), "liquid_drop")]
     assert command.identify(traces, few, model, report=tmp_path / "page.html") == 0
     text = (tmp_path / "page.html").read_text()
-    assert text.count("<img") == 3
+    assert text.count("<img") == 4
     assert "too many traces for pictures" in text
     assert 'href="#trace-' not in text
 

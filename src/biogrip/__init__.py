@@ -4,7 +4,7 @@
 
     import biogrip
 
-    experiment = biogrip.set_up(gripper, protocol, biogrip.Sample("liquid_drop"))
+    result = biogrip.identify_trace(time_s, strain, reads="strain", hold=1.3)
 """
 
 __version__ = "0.1.0"
@@ -12,8 +12,8 @@ __version__ = "0.1.0"
 
 _LIBRARY = frozenset(
     (
-        *("INSTRUMENTS", "Arm", "CaseProblem", "Diagnosis", "GeneRange", "Gripper"),
-        *("Identification", "Noise"),
+        *("BiogripError", "INSTRUMENTS", "Arm", "CaseProblem", "Diagnosis", "GeneRange", "Gripper"),
+        *("Identification", "Noise", "TraceResult", "identify_trace"),
         *("Phase", "Sample", "add_noise", "hold", "identify_sample", "judge", "plot", "set_up"),
         "simulate",
     )
@@ -28,3 +28,7 @@ def __getattr__(name: str) -> object:
 
         return getattr(import_module("biogrip.library"), name)
     raise AttributeError(f"module 'biogrip' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LIBRARY})

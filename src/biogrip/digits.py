@@ -1,5 +1,6 @@
 """Formatting and rounding of numbers, with units."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,46 @@ def significant(values: Array, digits: int) -> Array:
     up, down = np.maximum(shift, 0) + _LARGEST, np.maximum(-shift, 0) + _LARGEST
     values[usual] = np.rint(values[usual] / _TENS[down] * _TENS[up]) / _TENS[up] * _TENS[down]
     return values
+
+
+# Ends of the numbers that a person reads as plain decimals, and ratio of limits far apart.
+_SMALLEST_PLAIN, _LARGEST_PLAIN, _FAR_APART = 1e-4, 1e6, 10.0
+# Most digits of numbers with limits: those of a trace without noise coincide.
+_MOST_SHOWN = 7
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """Return a number with significant digits as a person reads it: 1500, not 1.5e+03."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(float(text)) < _LARGEST_PLAIN else text
+
+
+def within_limits(value: float, low: float, high: float, *others: float) -> list[str]:
+    """Return numbers with as many digits as the width of the limits leaves sense to.
+
+    Their last digit is at most a quarter of the width, and at most the third digit of the upper
+    limit: 0.000200, 0.000196 and 0.000204. Limits further apart than a factor of ten leave two
+    digits of each, and three of the others.
+    """
+    numbers = (value, low, high, *others)
+    if not 0 < low <= high <= _FAR_APART * low:
+        return [*(plain(each, 2) for each in numbers[:3]), *map(plain, others)]
+    last = min(_power(high) - 2, _power((high - low) / 4) if high > low else -_LARGEST)
+    last = max(last, _power(high) + 1 - _MOST_SHOWN)
+    if _SMALLEST_PLAIN <= value < _LARGEST_PLAIN:
+        return [f"{round(each, -last):.{max(-last, 0)}f}" for each in numbers]
+    return [f"{each:.{max(_power(each) - last, 0)}e}" for each in numbers]
+
+
+def with_limits(value: float, low: float, high: float, unit: str = "") -> str:
+    """Return a number and its limits, `within_limits`: ``1504 Pa (1489 to 1519)``."""
+    number, *ends = within_limits(value, low, high)
+    return f"{number} {unit}".rstrip() + f" ({' to '.join(ends)})"
+
+
+def _power(value: float) -> int:
+    """Return the power of ten of a number's first digit."""
+    return math.floor(math.log10(value))
 
 
 def counted(count: object, noun: str) -> str:

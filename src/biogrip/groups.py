@@ -21,7 +21,7 @@ from scipy.special import ndtri, stdtr, stdtrit
 
 from biogrip import __version__
 from biogrip.arrays import Array
-from biogrip.digits import counted, rounded_numbers, with_unit
+from biogrip.digits import counted, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs
 from biogrip.identify.outputs import FAILED, WRITTEN_BY, check_output
@@ -216,9 +216,9 @@ def _printed(compared: Compared, first: str, units: Mapping[str, str]) -> str:
     for (name, group), row in compared.items():
         median, ratio, p = "too few", "", ""
         if "median" in row:
-            median = "{median:.3g} ({low:.3g} to {high:.3g})".format(**row)
+            median = with_limits(row["median"], row["low"], row["high"])
         if "p" in row:
-            ratio = "{ratio:.3g} ({ratio_low:.3g} to {ratio_high:.3g})".format(**row)
+            ratio = with_limits(row["ratio"], row["ratio_low"], row["ratio_high"])
             p = f"{row['p']:.2g}"
         determined = f"{row['determined']} of {row['cells']}"
         rows.append((with_unit(name, units[name]), group, determined, median, ratio, p))

@@ -1,6 +1,6 @@
-"""Functions for notebooks: simulate, add noise, identify, judge, plot.
+"""Functions for notebooks: identify a trace; simulate, add noise, identify, judge, plot.
 
-The commands and the workflow use the same functions.
+The commands and the workflow use the same functions. Columns of pandas do as arrays.
 """
 
 from collections.abc import Mapping
@@ -8,13 +8,16 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, as_column
+from biogrip.errors import BiogripError
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.problem import Identification, silent
-from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.identify.notebook import TraceResult, identify_trace
+from biogrip.judging.diagnosis import Diagnosis, diagnose, with_times
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import Sample
@@ -74,7 +77,7 @@ def set_up(
 def simulate(
     experiment: CaseProblem,
     parameters: Mapping[str, float],
-    time_s: Array,
+    time_s: ArrayLike,
     *,
     nonlinear: bool = False,
 ) -> Array:
@@ -97,11 +100,12 @@ def simulate(
         In SI units; of a rotation, rad.
     """
     network, torque = experiment.model.sample(parameters), experiment.torque
-    return simulated_rotation(experiment.gripper, network, torque, time_s, nonlinear=nonlinear)[0]
+    times = as_column(time_s, "time_s")
+    return simulated_rotation(experiment.gripper, network, torque, times, nonlinear=nonlinear)[0]
 
 
 def identify_sample(
-    experiment: CaseProblem, time_s: Array, rotation_rad: Array, seed: int = 0
+    experiment: CaseProblem, time_s: ArrayLike, readings: ArrayLike, seed: int = 0
 ) -> Identification:
     """Identify the sample by least squares from many starts.
 
@@ -109,19 +113,19 @@ def identify_sample(
     ----------
     experiment
         Experiment from `set_up`.
-    time_s, rotation_rad : (n_samples,)
-        Trace.
+    time_s, readings : (n_samples,)
+        Trace in SI units.
     seed
         Seed of the starts.
     """
-    problem = experiment.of(time_s, rotation_rad)
+    problem = experiment.of(as_column(time_s, "time_s"), as_column(readings, "readings"))
     return identify_many([problem], _BUDGET, [np.random.default_rng(seed)], silent)[0]
 
 
 def judge(
     experiment: CaseProblem,
-    time_s: Array,
-    rotation_rad: Array,
+    time_s: ArrayLike,
+    readings: ArrayLike,
     found: Identification,
     confidence: float = 0.95,
 ) -> Diagnosis:
@@ -131,35 +135,39 @@ def judge(
     ----------
     experiment
         Experiment from `set_up`.
-    time_s, rotation_rad : (n_samples,)
-        Trace.
+    time_s, readings : (n_samples,)
+        Trace in SI units.
     found
         Result of `identify_sample`.
     confidence
         Confidence level of the limits.
     """
-    problem = experiment.of(time_s, rotation_rad)
-    return diagnose(problem, experiment.searched, found, confidence=confidence)
+    problem = experiment.of(as_column(time_s, "time_s"), as_column(readings, "readings"))
+    diagnosis = diagnose(problem, experiment.searched, found, confidence=confidence)
+    return with_times([diagnosis], experiment.searched)[0]
 
 
 def plot(
-    experiment: CaseProblem, time_s: Array, rotation_rad: Array, found: Identification
+    experiment: CaseProblem, time_s: ArrayLike, readings: ArrayLike, found: Identification
 ) -> "Figure":
     """Draw a trace, its fit and the residuals."""
     from biogrip.figures.fit import draw_fit
-    from biogrip.figures.results import Fit
+    from biogrip.figures.results import fit_of
     from biogrip.figures.style import styled
+    from biogrip.records.traces import Measurements
 
     names = experiment.searched.names
     values = {**experiment.fixed, **dict(zip(names, map(float, found.parameters), strict=True))}
-    fitted = simulate(experiment, values, time_s)
+    times, read = as_column(time_s, "time_s"), as_column(readings, "readings")
+    fit = fit_of(experiment, values, Measurements(times, None, {0: read}), 0)
     with styled():
-        return draw_fit(Fit(time_s, None, rotation_rad, fitted), "best fit", "")
+        return draw_fit(fit, "best fit", "")
 
 
 __all__ = [
     "INSTRUMENTS",
     "Arm",
+    "BiogripError",
     "CaseProblem",
     "Diagnosis",
     "GeneRange",
@@ -168,9 +176,11 @@ __all__ = [
     "Noise",
     "Phase",
     "Sample",
+    "TraceResult",
     "add_noise",
     "hold",
     "identify_sample",
+    "identify_trace",
     "judge",
     "plot",
     "set_up",

@@ -97,7 +97,7 @@ def test_a_set_in_two_parts_has_a_gap_that_its_verdict_names() -> None:
     whole = Profile(values, parabolas(values), 2.0, -3.0, 3.0, np.zeros(4))
     parts = replace(whole, gaps=(gap,))
     words = [Finding(QUANTITIES[0], profile, 0.1).words() for profile in (whole, parts)]
-    said = "determined only within a factor of 20: 7.39 N/m (0.0498 to 20.1)"
+    said = "determined only within a factor of 20: 7.4 N/m (0.05 to 20)"
     assert words == [said, f"{said}, except 0.368 to 2.72 N/m"]
 
 

@@ -36,6 +36,7 @@ LEFT = {
     ],
     "howto/creep.md": ["mucus.json", "hl60.json"],
     "howto/relaxation.md": ["fish.json", "dwell.json"],
+    "howto/modulus.md": ["pipette.json"],
     "howto/noise.md": [
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),
         "results/tables/robustness_levels.md",

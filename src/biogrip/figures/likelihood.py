@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
+from string import ascii_letters
 from typing import Any
 
 import numpy as np
@@ -77,7 +78,7 @@ def draw_profiles_of(
             axes.xaxis.set_major_locator(MaxNLocator(2, steps=[1, 2, 5, 10]))
         axes.set(xlim=(low, high), ylim=(0, HIGHEST_INCREASE))
         axes.set_xlabel(with_unit(item["symbol"], item["unit"]))
-        panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], item["verdict"], 40)
+        panel(axes, ascii_letters[index], item["verdict"], 40)
     grid[0].set_ylabel("rise of χ²")
     handles, labels = grid[0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside lower right", ncols=5)

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.digits import plain
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.multi_start import descend_from, fit_from
 from biogrip.fit.problem import Identification, Problem, silent
@@ -316,7 +317,7 @@ def advice(tried: Sequence[FittedModel], chosen: str) -> str:
     title = own.model.title[0].upper() + own.model.title[1:]
     if own.delta_bic < WORTH_A_MENTION:
         return f"{title}: none of the {len(tried)} models tried suits the trace better."
-    lead = f"{best.model.title} is preferred, with a BIC lower by {own.delta_bic:.3g}."
+    lead = f"{best.model.title} is preferred, with a BIC lower by {plain(own.delta_bic)}."
     if preferred_simpler(tried, chosen):
         return f"{title} is richer than the trace asks for: {lead}"
     if len(best.model.names) == len(own.model.names):

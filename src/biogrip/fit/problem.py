@@ -1,7 +1,7 @@
 """The identification problem of one trace, and the result that every method returns."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -63,7 +63,7 @@ class Identification:
     final Newton refinement are not counted."""
     stop_reason: str
     """Reason why the method stopped."""
-    history: History
+    history: History = field(repr=False)
     """Course of the identification."""
     converged: bool = True
     """False if the final Newton refinement of the optimum did not converge."""

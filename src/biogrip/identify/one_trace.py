@@ -34,7 +34,7 @@ from biogrip.identify.other_fits import (
 from biogrip.identify.outputs import WRITTEN_BY, Outcome, in_own_units
 from biogrip.identify.settings import Asked, case_of
 from biogrip.identify.trace_case import TraceCase, read_trace
-from biogrip.judging.diagnosis import Diagnosis, diagnose_all
+from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
 from biogrip.judging.onset_profiles import profile_over_onset
 from biogrip.keys import plain
@@ -215,9 +215,10 @@ def identify_alike(
     progress.doing("trying other sample models")
     models = models_tried(traces, fits, diagnoses)
     again = [judge_again(*each) for each in zip(traces, fits, diagnoses, models, strict=True)]
+    diagnoses = with_times([diagnosis for diagnosis, _ in again], first.problem.searched)
     diagnoses = [
         profile_over_onset(diagnosis, own.recorded.time_s) if own.problem.fit_start else diagnosis
-        for own, (diagnosis, _) in zip(traces, again, strict=True)
+        for own, diagnosis in zip(traces, diagnoses, strict=True)
     ]
     progress.done()
     progress.doing("trying an offset and a drift")
@@ -266,10 +267,20 @@ def _data(
         **said,
         "noise_model": fit.noise_data(),
         **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
+        "moduli": None if said["fit"] == REJECTED else _moduli(problem, recorded.time_s, best),
         "assumed": _assumed(case, list(models.answers or case.models)),
         "by_default": _by_default(trace.given) if instrument.has_jaws else [],
         "versions": {name: version(name) for name in ("biogrip", "numpy", "scipy")},
     }
+
+
+def _moduli(problem: CaseProblem, time_s: Array, logs: Array) -> dict[str, list[float]]:
+    """Return moduli of the fit from one over the duration to one over the first interval."""
+    first_s = np.diff(time_s)[np.searchsorted(time_s[:-2], 0.0)]
+    ends = 1 / float(np.ptp(time_s)), 1 / float(first_s)
+    values = dict(zip(problem.searched.names, np.exp(logs).tolist(), strict=True))
+    table = problem.model.moduli({**problem.fixed, **values}, np.geomspace(*ends, 31))
+    return {name: column.tolist() for name, column in table.items()}
 
 
 def _fixed(problem: CaseProblem) -> dict[str, list[str]]:

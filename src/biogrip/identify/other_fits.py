@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
+from biogrip.digits import plain
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.methods import identifier
 from biogrip.fit.multi_start import fit_from
@@ -92,7 +93,7 @@ class FittedModels:
         with np.errstate(divide="ignore", invalid="ignore"):
             x = np.log(as_richer(self.chosen, simpler, self.answers[simpler].parameters))
             outside = [
-                f"{each.quantity.label}, {np.exp(each.quantity.log(x)):.3g} {each.quantity.unit}"
+                f"{each.quantity.label}, {plain(np.exp(each.quantity.log(x)))} {each.quantity.unit}"
                 for each in bounded
                 if not each.allows(x)
             ]
@@ -172,8 +173,8 @@ def judge_again(
     gone = _vanished(models.chosen, own)
     where = f", without {' and '.join(gone)}" if gone else ""
     text = (
-        f"Outside the search range{where}, the model fits better: χ² is lower by {-increase:.3g}. "
-        "The limits hold for samples within the range."
+        f"Outside the search range{where}, the model fits better: χ² is lower by "
+        f"{plain(-increase)}. The limits hold for samples within the range."
     )
     return diagnosis, [Note(DOUBT, text)]
 
@@ -263,13 +264,13 @@ def _note(
     case_problem, rejected = trace.problem, diagnosis.status == REJECTED
     changed = [
         f"{after.quantity.label} would be {after.words().removeprefix('determined: ')}"
-        for before, after in zip(diagnosis.findings, other.findings, strict=True)
+        for before, after in zip(diagnosis.findings, other.findings, strict=False)
         if _differ(before, after)
     ]
     changes = "with them it is not rejected" if rejected else "; ".join(changed)
     better = (
         "explain the trace far better "
-        f"(χ² falls by {fall:.3g}; by chance it would {one_in(chance)} traces)"
+        f"(χ² falls by {plain(fall)}; by chance it would {one_in(chance)} traces)"
     )
     controlled = case_problem.instrument.controlled.name
     or_flows = (

@@ -5,6 +5,7 @@ Pictures are Matplotlib's. A page of very many traces has the table and the dist
 
 import base64
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from biogrip.digits import with_unit
 from biogrip.figures.fit import draw_fit
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.figures.results import fit_of
-from biogrip.figures.style import BLUE, COLUMN_IN, figure, save_png, styled
+from biogrip.figures.style import BLUE, COLUMN_IN, figure, is_over_decades, save_png, styled
 from biogrip.files import write_text
 from biogrip.identify import words
 from biogrip.identify.one_trace import Identified
@@ -36,15 +37,29 @@ _WIDE = 5.0
 
 def draw(identified: Identified) -> list[str]:
     """Return pictures of a trace as data URLs: the fit with its residuals, and all profiles."""
-    data, problem = identified.data, identified.problem
-    found = {item["quantity"]: item["value"] for item in data["quantities"]}
-    values = {name: found[name] for name in problem.searched.names}
-    fit = fit_of(problem, {**problem.fixed, **values}, identified.recorded, 0)
+    drawn = draw_best(identified)
     with styled():
-        return [
-            _address(draw_fit(fit, "best fit", "")),
-            _address(draw_profiles_of(data)),
-        ]
+        return [_address(drawn), _address(draw_profiles_of(identified.data))]
+
+
+def draw_best(identified: Identified) -> Figure:
+    """Draw a trace, its best fit and the residuals over the time of the file's clock.
+
+    Where readings spread over decades after the protocol's start, time is counted from there.
+    """
+    problem, recorded = identified.problem, identified.recorded
+    found = {item["quantity"]: item["value"] for item in identified.data["quantities"]}
+    values = {name: found[name] for name in problem.searched.names}
+    fit = fit_of(problem, {**problem.fixed, **values}, recorded, 0)
+    start_s = recorded.onset_s or 0.0
+    spread = is_over_decades(fit.time_s)
+    if not spread:
+        fit = replace(fit, time_s=fit.time_s + start_s)
+    with styled():
+        drawn = draw_fit(fit, "best fit", "")
+        if spread and start_s:
+            drawn.axes[-1].set_xlabel(f"time since {start_s:.6g} s of the clock (s)")
+    return drawn
 
 
 def _address(drawn: Figure) -> str:

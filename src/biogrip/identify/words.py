@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from biogrip.digits import with_unit
+from biogrip.digits import plain, with_limits, with_unit, within_limits
 from biogrip.judging.doubts import OK, REJECTED
 from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
@@ -64,7 +64,7 @@ def noise_in_words(found: Mapping[str, Any]) -> str:
 
 def in_unit(value: float, found: Mapping[str, Any]) -> str:
     """Return a number with the unit of what the instrument reads."""
-    return f"{value:.3g} {found['reads']['unit']}".rstrip()
+    return f"{plain(value)} {found['reads']['unit']}".rstrip()
 
 
 def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
@@ -104,7 +104,7 @@ def for_a_paper(found: Mapping[str, Any]) -> list[tuple[str, str]]:
         if each["low"] is None or each["high"] is None:
             continue
         name, unit, level = each["quantity"], each["unit"], f"{100 * found['confidence']:g}"
-        numbers = [f"{each[key]:.3g}" for key in ("value", "low", "high")]
+        numbers = within_limits(each["value"], each["low"], each["high"])
         value, low, high = numbers
         text = f"{name} = {f'{value} {unit}'.rstrip()} ({level} % profile-likelihood interval "
         text += f"{low} to {high}, n = 1 trace)"
@@ -195,10 +195,10 @@ def limits_in_short(quantity: Mapping[str, Any]) -> str:
     if quantity["verdict"] == FIT_REJECTED:
         return "rejected"
     if low is not None and high is not None:
-        return f"{quantity['value']:.3g} ({low:.3g} to {high:.3g})"
+        return with_limits(quantity["value"], low, high)
     if low is not None:
-        return f"≥ {low:.2g}"
-    return "?" if high is None else f"≤ {high:.2g}"
+        return f"≥ {plain(low, 2)}"
+    return "?" if high is None else f"≤ {plain(high, 2)}"
 
 
 def _coloured(text: str, verdict: str) -> str:

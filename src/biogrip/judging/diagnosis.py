@@ -28,7 +28,7 @@ from biogrip.judging.doubts import (
     examine_residuals,
 )
 from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
-from biogrip.judging.quantities import parameters_and_sum
+from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
@@ -58,6 +58,11 @@ class Diagnosis:
     def status(self) -> str:
         """Status of the fit by these notes: ok, doubtful or rejected."""
         return compute_status(self.notes)
+
+    def __repr__(self) -> str:
+        """Return status and verdicts, a line each."""
+        lines = (f"  {each.quantity.label}  {each.words()}" for each in self.findings)
+        return "\n".join([f"fit {self.status}", *lines])
 
 
 def diagnose(
@@ -126,6 +131,15 @@ def diagnose_all(
             else:
                 best[trace] = lower
     return [done[trace] for trace in range(len(problems))]
+
+
+def with_times(diagnoses: Sequence[Diagnosis], model: SampleModel) -> list[Diagnosis]:
+    """Return diagnoses with findings on relaxation and retardation times after the others."""
+    if not (times := characteristic_times(model)):
+        return [*diagnoses]
+    every = compute_findings([diagnosis.likelihood for diagnosis in diagnoses], times)
+    pairs = zip(diagnoses, every, strict=True)
+    return [replace(own, findings=[*own.findings, *found]) for own, found in pairs]
 
 
 def _lower_optimum(judged: Diagnosis, found: Identification) -> Identification | None:

@@ -132,6 +132,24 @@ def parameters_and_sum(model: SampleModel) -> list[Quantity]:
     return [*single, replace(_sum(model, exchangeable), penalties=within)]
 
 
+def characteristic_times(model: SampleModel) -> list[Quantity]:
+    """Return the relaxation or retardation time tau = c/k of each element with a spring and damper.
+
+    These are Maxwell branches and Kelvin-Voigt elements of which both parameters are searched. A
+    spring and a damper that are parallel to a branch have no time of their own.
+    """
+    found = []
+    for damper, (letter, *index) in enumerate(name.split("_") for name in model.names):
+        spring = "_".join(["k", *index])
+        parallel = index == ["p"] and model.name != "kelvin_voigt"
+        if letter != "c" or spring not in model.names or parallel or model.power_law:
+            continue
+        pair, of_branch = (damper, model.names.index(spring)), "".join(f"_{{{it}}}" for it in index)
+        label, symbol = "_".join(["tau", *index]), rf"$\tau{of_branch}$"
+        found.append(Quantity(label, symbol, "s", pair, sign=(1, -1), penalties=_ordered(model)))
+    return found
+
+
 def find_combinations(model: SampleModel, members: list[int]) -> list[Quantity]:
     """Return combinations of two parameters that may be determined if neither is alone.
 

@@ -14,6 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.digits import plain, with_limits, within_limits
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations
@@ -89,7 +90,9 @@ class Finding:
         """Return the verdict in words, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
         words, unit = self._limits_in_words(), self._unit
         if self.gaps:
-            but = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in self.gaps)
+            ends = (end for gap in self.gaps for end in gap)
+            gaps = within_limits(self.value, self.low or 0.0, self.high or 0.0, *ends)[3:]
+            but = " and ".join(map(" to ".join, zip(gaps[::2], gaps[1::2], strict=True)))
             words += f", except {but}{unit}"
         if self.quantity.provided and self.is_bounded:
             words += f", provided {self.quantity.provided}"
@@ -100,11 +103,11 @@ class Finding:
         if low is not None and high is not None:
             factor = math.sqrt(high / low)
             how = f" only within a factor of {factor:.2g}" if factor > WIDE else ""
-            return f"determined{how}: {self.value:.3g}{unit} ({low:.3g} to {high:.3g})"
+            return f"determined{how}: {with_limits(self.value, low, high, self.quantity.unit)}"
         if low is not None:
-            return f"only bounded below: at least {low:.2g}{unit}"
+            return f"only bounded below: at least {plain(low, 2)}{unit}"
         if high is not None:
-            return f"only bounded above: at most {high:.2g}{unit}"
+            return f"only bounded above: at most {plain(high, 2)}{unit}"
         if self.profile.certainty is None:
             return "not determined: the trace sets no limit within the search range"
         increase = max(self.profile.increases[[0, -1]])
@@ -116,7 +119,7 @@ class Finding:
     @property
     def best_in_words(self) -> str:
         """Best estimate with its unit."""
-        return f"{self.value:.3g}{self._unit}"
+        return f"{plain(self.value)}{self._unit}"
 
     @property
     def _unit(self) -> str:

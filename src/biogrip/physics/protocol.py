@@ -184,10 +184,13 @@ class TorqueHistory:
         return not ramps and len(self.harmonic_time_s) == 0
 
 
-def hold(duration_s: float, torque_left_Nm: float, torque_right_Nm: float | None = None) -> Phase:
-    """Return a phase that holds a torque, the same on both arms unless a right one is given."""
-    right = torque_left_Nm if torque_right_Nm is None else torque_right_Nm
-    return Phase(duration_s, Load(torque_left_Nm), Load(right))
+def hold(duration_s: float, level: float, right: float | None = None) -> Phase:
+    """Return a phase that holds what the instrument controls at a level, in SI units.
+
+    A gripper's level is the torque of both arms, or of the left one if there is a `right`; in creep
+    it is a stress or force, in relaxation a strain or displacement.
+    """
+    return Phase(duration_s, Load(level), Load(level if right is None else right))
 
 
 def load(

@@ -196,6 +196,15 @@ class SampleModel:
         order = self.in_order(values)[0]
         return {**parameters, **dict(zip(self.names, values[0, order].tolist(), strict=True))}
 
+    def moduli(self, parameters: Mapping[str, float], omega: Array) -> dict[str, Array]:
+        """Return storage and loss moduli over angular frequencies in rad/s, in named columns.
+
+        Parameters are by name; all columns are (n_omega,).
+        """
+        storage, loss = complex_modulus(self.sample(parameters), omega)
+        suffix = _SUFFIXES[self.stiffness_unit]
+        return {"omega_per_s": omega, f"storage{suffix}": storage[0], f"loss{suffix}": loss[0]}
+
     def sample(self, parameters: Mapping[str, float]) -> Network:
         """Return the elements of the one sample that has these parameters, by name."""
         return self.network([[parameters[name] for name in self.names]])

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.digits import plain
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFits
 from biogrip.judging.doubts import REJECTION, Note
@@ -123,7 +124,7 @@ def note_late_onset(
         return []
     text = (
         f"The trace is constant until {found.onset_s:.4g} s of its clock, and fits far better if "
-        f"the protocol starts there (χ² falls by {fall:.3g}). If it does, say --start "
+        f"the protocol starts there (χ² falls by {plain(fall)}). If it does, say --start "
         f"{found.onset_s:.4g} (measurement.start_s), or --start fit (measurement.fit_start), which "
         "allows for its uncertainty."
     )

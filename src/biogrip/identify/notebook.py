@@ -1,0 +1,152 @@
+"""A trace in a notebook: identified and told as by the command, from arrays or pandas columns."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike
+
+from biogrip.arrays import as_column
+from biogrip.errors import BiogripError
+from biogrip.identify.one_trace import Identified, identify_alike
+from biogrip.identify.settings import HOLD, MODEL, Asked, Setting, case_of
+from biogrip.identify.trace_case import read_trace
+from biogrip.identify.words import in_words
+from biogrip.physics.instruments import GRIPPER, INSTRUMENTS
+from biogrip.terminal import Progress
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, repr=False)
+class TraceResult(Identified):
+    """What a trace tells; ``print`` says all that the command says."""
+
+    @property
+    def status(self) -> str:
+        """Status of the fit: ok, doubtful or rejected."""
+        return str(self.data["fit"])
+
+    def to_frame(self, what: str = "quantities") -> "pd.DataFrame":
+        """Return a table of what the trace tells, with NaN where there is no limit.
+
+        Instead of ``"quantities"`` it may be of the sample ``"models"`` that were compared, or of
+        the ``"moduli"`` of the best fit over angular frequencies in 1/s.
+        """
+        # Imported here, as below: loading pandas and Matplotlib takes long.
+        import pandas as pd
+
+        limits = {"value": float, "low": float, "high": float}
+        if what != "quantities":
+            return pd.DataFrame(self.data[what])
+        frame = pd.DataFrame(self.data[what], columns=["quantity", "unit", "verdict", *limits])
+        return frame.astype(limits).set_index("quantity")
+
+    def plot(self) -> "Figure":
+        """Draw the trace, its fit and the residuals."""
+        from biogrip.identify.page import draw_best
+
+        return draw_best(self)
+
+    def __repr__(self) -> str:
+        """Return status and verdicts, a line each."""
+        lines = (f"  {item['quantity']}  {item['in_words']}" for item in self.data["quantities"])
+        return "\n".join([f"{self.data['model_title']}: fit {self.status}", *lines])
+
+    def __str__(self) -> str:
+        """Return what the command prints."""
+        return in_words(self.data)
+
+
+def identify_trace(
+    time_s: ArrayLike,
+    readings: ArrayLike,
+    *,
+    reads: str = GRIPPER.read.name,
+    model: str = MODEL,
+    hold: float | None = None,
+    start: float | str | None = None,
+    sd: ArrayLike | None = None,
+    noise: float | None = None,
+    noise_model: str | None = None,
+    offset: bool | None = None,
+    drift: bool | None = None,
+    fixed: Mapping[str, float] | None = None,
+    config: Mapping[str, Any] | None = None,
+) -> TraceResult:
+    """Identify the sample of a trace as ``biogrip identify`` does, with all its tests.
+
+    Parameters
+    ----------
+    time_s, readings : (n_samples,)
+        Ascending times in s, and readings in SI units: arrays, lists, or columns of pandas.
+    reads
+        What is read: rotation (gripper); displacement, strain, compliance (creep); force, stress,
+        modulus (relaxation).
+    model
+        Name of the sample model.
+    hold
+        What is held from 0 to the end, SI units, unless ``config`` has the protocol.
+    start
+        Start of the protocol on the clock of `time_s`, in s, or ``"fit"``.
+    sd : (n_samples,), optional
+        Standard deviations of the readings; weights are 1/sd^2.
+    noise
+        Standard deviation of the noise, SI units, if it is known.
+    noise_model
+        ``"white"`` or ``"coloured"``.
+    offset, drift
+        Whether the instrument may have added a constant, and a line in time.
+    fixed
+        Known parameters by name.
+    config
+        Blocks of the config: gripper, protocol, search_range, model_selection, ...
+
+    Raises
+    ------
+    BiogripError
+        If a setting or the trace cannot be used; the message says what is allowed.
+    """
+    if reads not in INSTRUMENTS:
+        raise BiogripError(f"reads: found '{reads}', allowed are {', '.join(INSTRUMENTS)}.")
+    if hold is not None and "protocol" in (config or {}):
+        raise BiogripError("hold: does not go with config's protocol; allowed is one of them.")
+    column = INSTRUMENTS[reads].read.column
+    given = {"time_s": time_s, column: readings, **({} if sd is None else {"sd": sd})}
+    columns = {name: as_column(values, name) for name, values in given.items()}
+    if len({len(values) for values in columns.values()}) > 1:
+        found = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
+        raise BiogripError(f"found {found}; allowed are as many of each.")
+    late = ("fit_start", True) if start == "fit" else ("start_s", start)
+    measured = (
+        *(("reads", reads, column), ("start", *late), ("sd", "sd", None if sd is None else "sd")),
+        *(("noise", "noise_rad", noise), ("noise_model", "noise_model", noise_model)),
+        *(("offset", "offset", offset), ("drift", "drift", drift)),
+    )
+    settings = [
+        *(Setting("config", (block,), value) for block, value in (config or {}).items()),
+        *(Setting("model", ("sample", "model"), model), Setting("hold", HOLD, hold)),
+        *(Setting(by, ("measurement", key), value) for by, key, value in measured),
+        Setting("fixed", ("fixed",), fixed and {**fixed}),
+    ]
+    # Imported here: loading pandas takes long.
+    import pandas as pd
+
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "trace.csv"
+        pd.DataFrame(columns).to_csv(file, index=False)
+        asked = Asked(file, settings=tuple(each for each in settings if each.value is not None))
+        try:
+            trace = read_trace(file, case_of(asked), asked.given, lambda text: None)
+            with Progress("", 5, live=False, quiet=True) as progress:
+                (result,) = identify_alike([Path(file.name)], [trace], None, progress)
+        except BiogripError as error:
+            # Options of the command are arguments here.
+            said = str(error).replace(str(file), file.name).replace("--", "")
+            raise BiogripError(said) from None
+    result.data["assumed"]["measurement"]["file"] = file.name
+    return TraceResult(**vars(result))
