@@ -31,6 +31,7 @@ from biogrip.study.source import (
     default_config,
     keys_in,
     overlaid,
+    read_config,
     scalar_problem,
 )
 from biogrip.study.study import Case
@@ -47,11 +48,13 @@ FILE = "file"
 HOLD = ("--hold",)
 """Path of the only setting that is no key: what is controlled from 0 to the end of the trace."""
 
+LOAD = ("measurement", "load")
+"""Key of the column of what was controlled."""
+
 # Of each group, the key that is set last replaces the others.
 _ONE_OF: Sequence[Sequence[tuple[str, ...]]] = (
     [("measurement", "start_s"), ("measurement", "fit_start")],
     [("measurement", name) for name in READINGS],
-    [HOLD, ("protocol",)],
 )
 _MOST_SHOWN = 10
 _SEPARATORS = ",;\t"
@@ -137,6 +140,7 @@ def case_of(asked: Asked) -> Case:
     files = [default_config(), *([asked.config] if asked.config else [])]
     below = read_configs(files)
     given = asked.given
+    _refuse_two_protocols(asked)
     merged = _with_instrument(overlaid(below, given), given, asked.trace)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
@@ -151,6 +155,24 @@ def case_of(asked: Asked) -> Case:
         _, *problems = str(error).replace(f"cases.{case}.", "").split("\n")
         raise BiogripError("\n".join(problems)) from error
     return study.cases[case]
+
+
+def _refuse_two_protocols(asked: Asked) -> None:
+    """Refuse what was held, a column of it and a protocol beside one another."""
+    said: dict[str, str] = {}
+    if asked.config is not None:
+        own, name = read_config(asked.config), visible(asked.config)
+        blocks = (("protocol",), own), (LOAD, own.get("measurement"))
+        said |= {path[-1]: name for path, it in blocks if isinstance(it, dict) and path[-1] in it}
+    for setting in asked.settings:
+        for path in (HOLD, LOAD, ("protocol",)):
+            if setting.path[: len(path)] == path:
+                line = f", line {setting.line}" if setting.line else ""
+                said[path[-1]] = f"{setting.by}{line}"
+    if len(said) > 1:
+        names = {HOLD[0]: "a hold", "load": "a column of the load", "protocol": "a protocol"}
+        found = " and ".join(names[key] for key in said)
+        raise BiogripError(f"{' and '.join(said.values())}: found {found}; allowed is one of them.")
 
 
 def _source(

@@ -5,18 +5,17 @@ its columns with their units, and what is known of its noise; what identificatio
 with the sample is the same for both.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
-from biogrip.errors import nearest
 from biogrip.keys import Block, OneOf, Problem
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION
 from biogrip.physics.noise import Noise
 from biogrip.physics.protocol import Burst, Sampling
-from biogrip.traces.columns import TIME_UNITS, Columns, trace_file_problem
+from biogrip.traces.columns import TIME_UNITS, Columns, known_unit, trace_file_problem
 
 COLOURED = "coloured"
 NOISE_MODELS = ("white", COLOURED)
@@ -30,6 +29,15 @@ _OF_FILE = (
     *("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "scale", "block"),
     *("average_repeated", "from_s", "until_s", *KNOWN_NOISE, "start_s", "fit_start"),
 )
+
+
+def _unit(allowed: Mapping[str, float]) -> BeforeValidator:
+    """Return what makes a unit, as µs, the allowed one that it is."""
+    return BeforeValidator(
+        lambda it: (known_unit(it, allowed) if isinstance(it, str) else it) or it
+    )
+
+
 _Name = Annotated[str | None, Field(min_length=1, max_length=4000)]
 
 
@@ -67,9 +75,9 @@ class MeasurementBlock(Block):
     modulus: _Name = None
     """Name of that of relaxation moduli: stresses over the largest strain that is held
     (relaxation)."""
-    time_unit: Annotated[str | None, OneOf(TIME_UNITS)] = None
+    time_unit: Annotated[str | None, OneOf(TIME_UNITS), _unit(TIME_UNITS)] = None
     """Unit of the times, where the column's name does not end in it."""
-    rotation_unit: Annotated[str | None, OneOf(ROTATION.units)] = None
+    rotation_unit: Annotated[str | None, OneOf(ROTATION.units), _unit(ROTATION.units)] = None
     """Unit of the rotations, where the column's name does not end in it."""
     reading_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
     """Unit of what another instrument reads, where the column's name does not end in it; of strains
@@ -192,6 +200,8 @@ class MeasurementBlock(Block):
         if getattr(self, wrong) is not None:
             yield (wrong,), f"does not go with {name}; allowed is {right}."
         allowed = INSTRUMENTS[name].read.units
-        if self.reading_unit is not None and self.reading_unit not in allowed:
-            text = f"found '{self.reading_unit}', allowed are {', '.join(allowed)}."
-            yield ("reading_unit",), text + nearest(self.reading_unit, allowed)
+        if self.reading_unit is not None and known_unit(self.reading_unit, allowed) is None:
+            yield (
+                ("reading_unit",),
+                f"found '{self.reading_unit}', allowed are {', '.join(allowed)}.",
+            )
