@@ -124,7 +124,7 @@ def _any_key(text: str) -> tuple[tuple[str, ...], Any]:
         text = f"found '{text}', allowed is KEY=VALUE, as in measurement.time_unit=ms"
         raise argparse.ArgumentTypeError(text)
     try:
-        return tuple(key.split(".")), value_of(value)
+        return tuple(key.split(".")), value_of(value, key)
     except BiogripError as error:
         raise argparse.ArgumentTypeError(f"{key}: {error}") from error
 
@@ -138,7 +138,6 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
             "force, stress, modulus (relaxation)",
         ),
         ("--sd", "measurement.sd", "COLUMN", "of the readings' standard deviations"),
-        ("--block", "measurement.block", "N", "table to read, where a file has several"),
     ],
     "what was done": [
         (
@@ -167,7 +166,12 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
         ("--fix", _fix, "NAME=VALUE", "known parameter, SI units; 0 for no element; repeatable"),
     ],
     "any other key of the config": [
-        ("--set", _any_key, "KEY=VALUE", "as in measurement.time_unit=ms, YAML; repeatable"),
+        (
+            "--set",
+            _any_key,
+            "KEY=VALUE",
+            "as in measurement.time_unit=ms or measurement.block=2, YAML; repeatable",
+        ),
     ],
 }
 """Options of `identify` by what they are about: name; key of the config, or what reads the value

@@ -36,7 +36,7 @@ from biogrip.study.source import (
 )
 from biogrip.study.study import Case
 from biogrip.terminal import visible
-from biogrip.traces.columns import listed, place
+from biogrip.traces.columns import listed, place, trace_file_problem
 from biogrip.traces.reader import read_recording
 
 MODEL = "generalized_maxwell"
@@ -100,8 +100,10 @@ class Asked:
         return blocks
 
 
-def value_of(text: str) -> Any:
-    """Read the value of a key as YAML; refuse what YAML reads otherwise than it looks."""
+def value_of(text: str, key: str = "") -> Any:
+    """Read the value of a key as YAML, units as text; refuse what is not read as it looks."""
+    if key.endswith("_unit"):
+        return text
     try:
         node = yaml.compose(text, yaml.SafeLoader)
         problem = scalar_problem(node) if isinstance(node, yaml.ScalarNode) else None
@@ -317,7 +319,7 @@ def read_table(
         for name, cell in by_name.items():
             if "." in name and cell:
                 try:
-                    value = value_of(cell)
+                    value = value_of(cell, name)
                     settings.append(Setting(visible(path), tuple(name.split(".")), value, line))
                 except BiogripError as error:
                     problems.append(f"{place(path, line, name)}: {error}")
@@ -334,6 +336,8 @@ def _cells(path: Path) -> list[list[str]]:
     # Imported here: loading pandas takes long.
     import pandas as pd
 
+    if problem := trace_file_problem(path):
+        raise BiogripError(f"{place(path)}: {problem}")
     try:
         with path.open(encoding="utf-8-sig") as stream:
             header = stream.readline()

@@ -1,6 +1,7 @@
 """Reader of recorded traces in the user's own files, with gaps, units and line numbers."""
 
 from dataclasses import asdict, dataclass, replace
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +19,13 @@ from biogrip.traces.columns import (
     shortened,
     unit_of,
 )
-from biogrip.traces.tables import Sheet, Table, find_tables, number_or_inf, read_sheet
+from biogrip.traces.tables import BLANKS, Sheet, Table, find_tables, number_or_inf, read_sheet
 
 FEWEST_SAMPLES = 10
 
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
-_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
 
 
 @dataclass(frozen=True)
@@ -34,11 +35,11 @@ class Recognised:
     encoding: str
     """Name of the encoding."""
     separator: str
-    """``commas``, ``semicolons`` or ``tabs``."""
+    """``commas``, ``semicolons``, ``tabs`` or ``blanks``."""
     decimal: str
     """``point`` or ``comma``."""
-    header_line: int
-    """Line of the names."""
+    header_line: int | None
+    """Line of the names, if there is one."""
     units_line: int | None
     """Line of the row of units, if there is one."""
     block: int | None
@@ -141,9 +142,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     sheet = read_sheet(path, columns)
     tables, index = find_tables(path, sheet, columns)
     table = tables[index]
-    header_line = int(sheet.numbers[table.at])
-    indices = _indices(path, header_line, table, columns)
-    units = _units(path, table, indices, columns)
+    header_line = int(sheet.numbers[table.at]) or None
+    indices, units = _columns_of(path, header_line, table, columns)
     values, decimal = _numbers(path, sheet, table, indices)
     gaps = np.any(np.isnan(values), axis=1)
     kept, lines = values[~gaps], sheet.numbers[table.first : table.end][~gaps]
@@ -187,38 +187,55 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     return Recording(time_s, rotation_rad, lines, without_number, sd_rad, recognised)
 
 
-def _indices(path: Path, line: int, table: Table, columns: Columns) -> list[int]:
-    """Return where the columns to read are in a table."""
+def _columns_of(
+    path: Path, line: int | None, table: Table, columns: Columns
+) -> tuple[list[int], list[str]]:
+    """Return where the columns to read are in a table, and their units; or list what is wrong."""
     found: dict[int, str] = {}
+    units: list[str] = []
+    problems: list[str] = []
+    ways = columns.said_by(*columns.named)
+    if not any(table.indices(it) for it in columns.named.values()) and all(
+        isfinite(number_or_inf(name.replace(",", "."))) for name in table.names if name
+    ):
+        raise BiogripError(
+            f"{place(path, line)}: found numbers, allowed is a line with the names of the columns; "
+            f"or say their numbers, 1 to {len(table.names)}, by {ways}, and their units."
+        )
     for key, column in columns.named.items():
         same, where = table.indices(column), place(path, line, column)
         if not same:
-            raise BiogripError(
+            problems.append(
                 f"{where}: found no such column, allowed are {listed(table.names)}."
-                f"{nearest(column, table.names)} Say which is which by "
-                f"{columns.said_by(*columns.named)}."
+                f"{nearest(column, table.names)} Say which is which by {ways}."
             )
+            continue
         if len(same) > 1:
-            raise BiogripError(f"{where}: found {len(same)} columns of this name, allowed is one.")
-        if same[0] in found:
-            raise BiogripError(
-                f"{where}: found {found[same[0]]} and {key} in one column, allowed are two."
-            )
+            text = f"{where}: found {len(same)} columns of this name, allowed is one."
+            problems.append(text)
+        elif same[0] in found:
+            text = f"{where}: found {found[same[0]]} and {key} in one column, allowed are two."
+            problems.append(text)
         found[same[0]] = key
-    return list(found)
+        below = table.units[same[0]] if table.units else ""
+        try:
+            units.append(_unit(path, key, below, columns, units))
+        except BiogripError as error:
+            problems.append(str(error))
+    if problems:
+        raise BiogripError("\n".join(problems))
+    return list(found), units
 
 
-def _units(path: Path, table: Table, indices: list[int], columns: Columns) -> list[str]:
-    """Return the units of the columns to read."""
-    below = [table.units[i] if table.units else "" for i in indices]
-    said_by = columns.said_by("time_unit"), columns.said_by(columns.unit_key)
-    time = unit_of(path, columns.time, columns.time_unit, TIME_UNITS, said_by[0], below[0])
-    units, unit = [time], columns.reading_unit
-    for column, cell in zip(list(columns.named.values())[1:], below[1:], strict=True):
-        # Standard deviations are in the unit of the readings.
-        unit = unit_of(path, column, unit, columns.quantity.units, said_by[1], cell)
-        units.append(unit)
-    return units
+def _unit(path: Path, key: str, below: str, columns: Columns, units: list[str]) -> str:
+    """Return the unit of a column; standard deviations have that of the readings before them."""
+    name, given, unit_key = columns.named[key], columns.reading_unit, columns.unit_key
+    allowed = columns.quantity.units
+    if key == "time":
+        given, unit_key, allowed = columns.time_unit, "time_unit", TIME_UNITS
+    elif key == "sd":
+        given = units[1] if len(units) > 1 else given
+    return unit_of(path, name, given, allowed, columns.said_by(unit_key), below)
 
 
 def _numbers(path: Path, sheet: Sheet, table: Table, indices: list[int]) -> tuple[Array, str]:
