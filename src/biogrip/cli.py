@@ -145,6 +145,7 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
             "what was held from 0 to the end, without a config: a stress in Pa for a strain, a "
             "force in N for a displacement, and the reverse; 1 for a compliance or a modulus",
         ),
+        ("--load", "measurement.load", "COLUMN", "of what was held, as recorded, instead"),
         ("--start", _start, "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
         ("--from", "measurement.from_s", "SECONDS", "first time of the clock to use [all]"),
         ("--until", "measurement.until_s", "SECONDS", "last time of the clock to use [all]"),

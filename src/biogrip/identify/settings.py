@@ -5,19 +5,23 @@ that the options of the command, and over these the cells of a table of traces. 
 a config is; messages name the file and line, the option, or the row of the table.
 
 What is read tells the instrument. What is controlled comes from the protocol or, from 0 to the end
-of the trace, from ``--hold``; where a compliance or a modulus is read, that is 1.
+of the trace, from ``--hold``, or from a column of the file, ``--load``; where a compliance or a
+modulus is read, a hold of 1 needs no option.
 """
 
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
+from biogrip.arrays import Array
 from biogrip.errors import BiogripError, nearest
 from biogrip.identify.outputs import COLUMNS
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
@@ -37,7 +41,7 @@ from biogrip.study.source import (
 from biogrip.study.study import Case
 from biogrip.terminal import visible
 from biogrip.traces.columns import listed, place, trace_file_problem
-from biogrip.traces.reader import read_recording
+from biogrip.traces.reader import Recording, read_recording
 
 MODEL = "generalized_maxwell"
 """Sample model of traces of which nothing says another."""
@@ -57,6 +61,7 @@ _ONE_OF: Sequence[Sequence[tuple[str, ...]]] = (
     [("measurement", name) for name in READINGS],
 )
 _MOST_SHOWN = 10
+_ENDS = (slice(-1), slice(1, None))
 _SEPARATORS = ",;\t"
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
 _HEAD_BYTES = 100_000
@@ -187,6 +192,10 @@ def _source(
         path, value = ("protocol",), merged["protocol"]
     elif path[0] == "sample":
         path = ("cases", case, *path)
+    elif path == LOAD:
+        return setting.by, dict.fromkeys(
+            [path, *keys_in(merged["protocol"], ("protocol",))], setting.line
+        )
     known = set(keys_in(below))
     above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
     return setting.by, dict.fromkeys([*above, path, *keys_in(value, path)], setting.line)
@@ -201,23 +210,38 @@ def _with_instrument(
         return merged
     instrument = _instrument(merged, given)
     usual = {"time": "time_s", instrument.read.name: instrument.read.column}
-    measurement = usual | merged["measurement"] | {"file": str(trace)}
-    kind = given.get("instrument", instrument.kind)
+    measurement: dict[str, Any] = usual | merged["measurement"] | {"file": str(trace)}
+    kind, controlled = given.get("instrument", instrument.kind), instrument.controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
-    if level is None:
+    of_column = measurement.get(LOAD[-1]) is not None
+    if level is None and not of_column:
         if "protocol" in given or instrument.has_jaws:
             return found
         if not instrument.relative:
-            controlled = instrument.controlled
             unit = f" in {controlled.unit}" if controlled.unit else ""
             raise BiogripError(
-                f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, or a "
-                "protocol in --config."
+                f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, a "
+                "column of it by --load, or a protocol in --config."
             )
-        level = 1.0
-    duration_s = _duration_s(trace, measurement)
-    phase = {"duration_s": duration_s, instrument.controlled.column: level}
-    return {**found, "protocol": {"phases": [phase]}}
+    own = _recording(trace, measurement)
+    phases = [{"duration_s": 1.0, controlled.column: level or 1.0}]
+    start_s = measurement.get("start_s")
+    if own is not None and own.load is not None:
+        start_s = own.load[0, 0] if start_s is None else start_s
+        measurement["start_s"] = float(start_s) or None
+        phases = _phases(own.load, start_s, controlled.column) or phases
+    elif own is not None:
+        lasts = float(own.time_s[-1]) - (start_s or min(float(own.time_s[0]), 0.0))
+        phases[0]["duration_s"] = lasts if lasts > 0 else 1.0
+    return {**found, "protocol": {"phases": phases}}
+
+
+def _phases(load: Array, start_s: float, key: str) -> list[dict[str, float]]:
+    """Return the phases of ramps, (n, 2) times and loads, from a time on."""
+    times, loads = load[load[:, 0] > start_s].T
+    times, loads = np.r_[start_s, times], np.r_[np.interp(start_s, *load.T), loads]
+    pairs = zip(np.diff(times).tolist(), *(loads[some].tolist() for some in _ENDS), strict=True)
+    return [{"duration_s": lasts, key: of, f"to_{key}": to} for lasts, of, to in pairs]
 
 
 def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrument:
@@ -231,18 +255,12 @@ def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrume
     return next((each for each in some if each.controlled.column in keys), some[0])
 
 
-def _duration_s(trace: Path, measurement: Mapping[str, Any]) -> float:
-    """Return the time from the start of the protocol to the end of a trace."""
+def _recording(trace: Path, measurement: Mapping[str, Any]) -> Recording | None:
+    """Read a trace; return None if whoever uses it will say what is wrong."""
     block = checked(MeasurementBlock, schema_of(MeasurementBlock).with_numbers(measurement))[0]
-    if block is None:
-        return 1.0
-    try:
-        time_s = read_recording(trace, block.columns).time_s
-    except BiogripError:
-        # Whoever uses the trace reads it again, and says what is wrong with it.
-        return 1.0
-    lasts = float(time_s[-1]) - (block.start_s or min(float(time_s[0]), 0.0))
-    return lasts if lasts > 0 else 1.0
+    with suppress(BiogripError):
+        return None if block is None else read_recording(trace, block.columns)
+    return None
 
 
 def check_settings(traces: Sequence[Asked]) -> None:

@@ -56,6 +56,7 @@ _BY_SET = {
     "time_unit": "UNIT",
     "rotation_unit": "UNIT",
     "reading_unit": "UNIT",
+    "load_unit": "UNIT",
     "block": "N",
     "average_repeated": "true",
     "scale": "-1",
@@ -95,6 +96,12 @@ class Columns:
     """First time of the clock to use; None for all."""
     until_s: float | None = None
     """Last time of the clock to use."""
+    rows: Mapping[str, str | float] | None = None
+    """Values of other columns in the rows to use; None for all."""
+    load: str | None = None
+    """Name of the column of what was controlled, if that is to be read."""
+    load_unit: str | None = None
+    """Key of its units."""
 
     @property
     def unit_key(self) -> str:
@@ -105,7 +112,13 @@ class Columns:
     def named(self) -> dict[str, str]:
         """Names of the columns by the key that says them, in the order of reading."""
         names = {"time": self.time, self.quantity.name: self.reading}
-        return names if self.sd is None else {**names, "sd": self.sd}
+        more = {"sd": self.sd, "load": self.load}
+        return names | {key: name for key, name in more.items() if name is not None}
+
+    @property
+    def controlled(self) -> Quantity:
+        """What was controlled."""
+        return INSTRUMENTS[self.quantity.name].controlled
 
     def said_by(self, *keys: str) -> str:
         """Return the options or config keys that say something, for messages."""

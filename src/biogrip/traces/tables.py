@@ -217,12 +217,9 @@ def _with_names(lines: Sequence[str], wanted: set[str]) -> list[tuple[str, int]]
         widest = range(1, len(_split(first[0], separator)) + 1)
         names = (separator.join(map(str, widest)), 0)
         return [*(own for own in plain if own[1] < first[1]), names, *plain[plain.index(first) :]]
-    found, above, named, widths = (
-        [],
-        [],
-        False,
-        [len(it) if len(it) > 1 else 0 for it in _splits(first[0])],
-    )
+    found: list[tuple[str, int]] = []
+    above: list[tuple[str, int]] = []
+    named, widths = False, [len(it) if len(it) > 1 else 0 for it in _splits(first[0])]
     said = [
         (_BEFORE_NAMES.sub("", line[mark.end() :]), number)
         for number, line in enumerate(lines, 1)
