@@ -100,7 +100,10 @@ def test_a_declared_offset_and_drift_are_fitted_along(tmp_path: Path) -> None:
         ("--start fit --start -1e1 --no-drift", {"start_s": -10.0, "drift": False}),
         ("--start 3 --set measurement.fit_start=true --until 9", {"fit_start": True, "until_s": 9}),
         ('--set measurement={"noise_share":5e-2} --from 2', {"noise_share": 0.05, "from_s": 2}),
-        ("--reading strain=e --reading rotation_rad --sd s --block 2", {"sd": "s", "block": 2}),
+        (
+            "--reading strain=e --reading rotation_rad --sd s --set measurement.block=2",
+            {"sd": "s", "block": 2},
+        ),
         ("--offset --no-offset --noise 1e-6", {"offset": False, "noise_rad": 1e-6}),
     ],
 )

@@ -210,7 +210,8 @@ def _with_instrument(
         return merged
     instrument = _instrument(merged, given)
     usual = {"time": "time_s", instrument.read.name: instrument.read.column}
-    measurement: dict[str, Any] = usual | merged["measurement"] | {"file": str(trace)}
+    measurement = usual | merged["measurement"] | {"file": str(trace)}
+    measurement = schema_of(MeasurementBlock).with_numbers(measurement)
     kind, controlled = given.get("instrument", instrument.kind), instrument.controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
     of_column = measurement.get(LOAD[-1]) is not None
@@ -257,7 +258,7 @@ def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrume
 
 def _recording(trace: Path, measurement: Mapping[str, Any]) -> Recording | None:
     """Read a trace; return None if whoever uses it will say what is wrong."""
-    block = checked(MeasurementBlock, schema_of(MeasurementBlock).with_numbers(measurement))[0]
+    block = checked(MeasurementBlock, measurement)[0]
     with suppress(BiogripError):
         return None if block is None else read_recording(trace, block.columns)
     return None

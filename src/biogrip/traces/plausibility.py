@@ -121,9 +121,9 @@ def check_recording(
     if weights is None or (np.ptp(trace) == 0 and not instrument.deforms):
         unit = f" {read.unit}".rstrip()
         given = ""
-        if noise_rad is not None and noise_rad > trace.std():
-            given = f" The noise that was given, {noise_rad:g}{unit}, is beside a largest "
-            given += f"{read.name} of {largest:.3g}{unit}: is it in {unit.strip() or 'SI units'}?"
+        if noise_rad is not None:
+            given = f" The noise was given as {noise_rad:g}{unit} (SI units), and the largest "
+            given += f"{read.name} is {largest:.3g}{unit}."
         raise BiogripError(
             f"{where}: found no response to the {controlled}, but {trace.mean():.3g}{unit} "
             f"throughout, give or take {trace.std():.2g}{unit}; allowed is a {read.name} from zero "
