@@ -55,6 +55,7 @@ HOLD = ("--hold",)
 LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
+_PROTOCOLS = {HOLD: "a hold", LOAD: "a column of the load", ("protocol",): "a protocol"}
 # Of each group, the key that is set last replaces the others.
 _ONE_OF: Sequence[Sequence[tuple[str, ...]]] = (
     [("measurement", "start_s"), ("measurement", "fit_start")],
@@ -166,20 +167,20 @@ def case_of(asked: Asked) -> Case:
 
 def _refuse_two_protocols(asked: Asked) -> None:
     """Refuse what was held, a column of it and a protocol beside one another."""
-    said: dict[str, str] = {}
+    sources = [
+        (setting.by, setting.line, setting.path, setting.value) for setting in asked.settings
+    ]
     if asked.config is not None:
-        own, name = read_config(asked.config), visible(asked.config)
-        blocks = (("protocol",), own), (LOAD, own.get("measurement"))
-        said |= {path[-1]: name for path, it in blocks if isinstance(it, dict) and path[-1] in it}
-    for setting in asked.settings:
-        for path in (HOLD, LOAD, ("protocol",)):
-            if setting.path[: len(path)] == path:
-                line = f", line {setting.line}" if setting.line else ""
-                said[path[-1]] = f"{setting.by}{line}"
+        sources.insert(0, (visible(asked.config), None, (), read_config(asked.config)))
+    said = {
+        name: f"{by}, line {line}" if line else by
+        for by, line, path, value in sources
+        for key, name in _PROTOCOLS.items()
+        if any(own[: len(key)] == key for own in (path, *keys_in(value, path)))
+    }
     if len(said) > 1:
-        names = {HOLD[0]: "a hold", "load": "a column of the load", "protocol": "a protocol"}
-        found = " and ".join(names[key] for key in said)
-        raise BiogripError(f"{' and '.join(said.values())}: found {found}; allowed is one of them.")
+        text = f"found {' and '.join(said)}; allowed is one of them."
+        raise BiogripError(f"{' and '.join(said.values())}: {text}")
 
 
 def _source(

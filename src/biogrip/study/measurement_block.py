@@ -41,6 +41,8 @@ def _unit(allowed: Mapping[str, float]) -> BeforeValidator:
 
 _Name = Annotated[str | None, Field(min_length=1, max_length=4000)]
 
+_Value = Annotated[Annotated[float, Tag("a number")] | Annotated[str, Tag("text")], BY_KIND]
+
 
 @dataclass(frozen=True, kw_only=True)
 class MeasurementBlock(Block):
@@ -85,20 +87,7 @@ class MeasurementBlock(Block):
     by default 1."""
     block: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
     """Number of the block to read, where several tables follow one another in the file."""
-    rows: (
-        Annotated[
-            Mapping[
-                Annotated[str, Field(min_length=1, max_length=4000)],
-                Annotated[
-                    Annotated[float, Tag("a number")]
-                    | Annotated[str, Field(max_length=4000), Tag("text")],
-                    BY_KIND,
-                ],
-            ],
-            Field(min_length=1, max_length=10),
-        ]
-        | None
-    ) = None
+    rows: Annotated[Mapping[str, _Value], Field(min_length=1)] | None = None
     """Values of other columns in the rows to use, as `{Segment: dwell}`; the others are left
     out."""
     load: _Name = None
@@ -197,8 +186,7 @@ class MeasurementBlock(Block):
                 yield (key,), "does not go with sd, which says all of the noise."
         if self.scale == 0:
             yield ("scale",), "found 0, allowed is another number."
-        pairs = ("bursts", "times_s"), ("fit_start", "start_s"), ("fit_start", "load")
-        for key, other in pairs:
+        for key, other in (("bursts", "times_s"), ("fit_start", "start_s"), ("fit_start", "load")):
             if getattr(self, key) and getattr(self, other) not in (None, ()):
                 yield (key,), f"does not go with {other}; allowed is one of them."
         if self.file is None:

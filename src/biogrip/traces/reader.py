@@ -227,11 +227,10 @@ def _columns_of(
             )
             continue
         if len(same) > 1:
-            text = f"{where}: found {len(same)} columns of this name, allowed is one."
-            problems.append(text)
+            problems += [f"{where}: found {len(same)} columns of this name, allowed is one."]
         elif same[0] in found:
-            text = f"{where}: found {found[same[0]]} and {key} in one column, allowed are two."
-            problems.append(text)
+            text = f"found {found[same[0]]} and {key} in one column, allowed are two."
+            problems += [f"{where}: {text}"]
         found[same[0]] = key
         below = table.units[same[0]] if table.units else ""
         try:
@@ -316,9 +315,8 @@ def _load(
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
     ends, off = ramps(*history.T)
-    said = (
-        f"{counted(len(ends) - 1, 'ramp')} along {columns.load}, at most {off:.2g} {units[-1]} off"
-    )
+    said = f"{counted(len(ends) - 1, 'ramp')} along {columns.load}, off by {off:.2g} {units[-1]}"
+    said += " at most"
     return ends * [TIME_UNITS[units[0]], columns.controlled.units[units[-1]]], said
 
 

@@ -137,14 +137,9 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
     headers = [i for i, it in enumerate(lines) if i == 0 or kept[i] == 0 or not _ROW.match(it)]
     named = separator = _separator(lines, [lines[i] for i in headers], columns)
     if separator == BLANKS:
-        rows, named = {*range(len(lines))} - {*headers}, "\t"
-        width = min(
-            (len(_CELL.findall(lines[row])) for row in [*rows][:_LINES_SEARCHED]), default=0
-        )
-        wide = {
-            i: cells for i in headers if len(cells := _WIDE_GAP.split(lines[i].strip())) == width
-        }
-        lines = ["\t".join(wide.get(i) or _CELL.findall(line)) for i, line in enumerate(lines)]
+        named, width = "\t", len(_CELL.findall(lines[-1]))
+        parted = [(_WIDE_GAP.split(line.strip()), _CELL.findall(line)) for line in lines]
+        lines = ["\t".join(wide if len(wide) == width else cells) for wide, cells in parted]
     widths = np.array([line.count(named) for line in lines]) + 1
     try:
         frame = pd.read_csv(
@@ -270,15 +265,14 @@ def _has(line: str, wanted: set[str]) -> bool:
 def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -> str:
     """Return the separator by which a line has most columns to read, or which most lines have."""
     wanted = {*map(plain_name, columns.named.values())}
-    some = lines[:_LINES_SEARCHED]
 
     def merit(separator: str) -> tuple[int, int]:
-        common = (len(wanted & _names(_split(row, separator))) for row in headers)
-        if separator != BLANKS:
-            return max(common), sum(separator in line for line in some)
-        wide = (len(wanted & _names(_WIDE_GAP.split(row.strip()))) for row in headers)
-        parted = (not any(it in line for it in SEPARATORS) for line in some if " " in line.strip())
-        return max(*common, *wide), sum(parted)
+        common = 0
+        for row in headers:
+            wide = _WIDE_GAP.split(row.strip()) if separator == BLANKS else []
+            of = (len(wanted & _names(cells)) for cells in (_split(row, separator), wide))
+            common = max(common, *of)
+        return common, sum(len(_split(it, separator)) > 1 for it in lines[:_LINES_SEARCHED])
 
     # Where as many lines have commas as tabs or semicolons, these are decimal commas.
     return max((*SEPARATORS[::-1], BLANKS), key=merit)
