@@ -62,7 +62,6 @@ _ONE_OF: Sequence[Sequence[tuple[str, ...]]] = (
     [("measurement", name) for name in READINGS],
 )
 _MOST_SHOWN = 10
-_ENDS = (slice(-1), slice(1, None))
 _SEPARATORS = ",;\t"
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
 _HEAD_BYTES = 100_000
@@ -167,9 +166,7 @@ def case_of(asked: Asked) -> Case:
 
 def _refuse_two_protocols(asked: Asked) -> None:
     """Refuse what was held, a column of it and a protocol beside one another."""
-    sources = [
-        (setting.by, setting.line, setting.path, setting.value) for setting in asked.settings
-    ]
+    sources = [(own.by, own.line, own.path, own.value) for own in asked.settings]
     if asked.config is not None:
         sources.insert(0, (visible(asked.config), None, (), read_config(asked.config)))
     said = {
@@ -188,18 +185,13 @@ def _source(
 ) -> Source:
     """Return the keys that a setting is to be named for: its own, and blocks that it adds."""
     path: KeyPath = setting.path
-    value = setting.value
-    if path == HOLD:
-        path, value = ("protocol",), merged["protocol"]
-    elif path[0] == "sample":
+    if path[0] == "sample":
         path = ("cases", case, *path)
-    elif path == LOAD:
-        return setting.by, dict.fromkeys(
-            [path, *keys_in(merged["protocol"], ("protocol",))], setting.line
-        )
+    held = {"protocol": merged["protocol"]}
+    own = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
     known = set(keys_in(below))
     above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
-    return setting.by, dict.fromkeys([*above, path, *keys_in(value, path)], setting.line)
+    return setting.by, dict.fromkeys([*above, path, *own], setting.line)
 
 
 def _with_instrument(
@@ -242,8 +234,8 @@ def _phases(load: Array, start_s: float, key: str) -> list[dict[str, float]]:
     """Return the phases of ramps, (n, 2) times and loads, from a time on."""
     times, loads = load[load[:, 0] > start_s].T
     times, loads = np.r_[start_s, times], np.r_[np.interp(start_s, *load.T), loads]
-    pairs = zip(np.diff(times).tolist(), *(loads[some].tolist() for some in _ENDS), strict=True)
-    return [{"duration_s": lasts, key: of, f"to_{key}": to} for lasts, of, to in pairs]
+    ramps = np.c_[np.diff(times), loads[:-1], loads[1:]].tolist()
+    return [{"duration_s": lasts, key: of, f"to_{key}": to} for lasts, of, to in ramps]
 
 
 def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrument:

@@ -34,8 +34,7 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
         With file, line and column, if the trace cannot be used.
     """
     if case.columns.load is not None:
-        text = "measurement.load is only for biogrip identify, allowed here is a protocol."
-        raise BiogripError(f"{place(recorded)}: {text}")
+        raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
     trace = read_checked(recorded, case.gripper, case.problem, case.columns)
     trace = with_fitted_onset(trace, case.problem)
     for note in notes_on_recording(trace):

@@ -122,8 +122,7 @@ def check_recording(
         unit = f" {read.unit}".rstrip()
         given = ""
         if noise_rad is not None:
-            given = f" The noise was given as {noise_rad:g}{unit} (SI units), and the largest "
-            given += f"{read.name} is {largest:.3g}{unit}."
+            given = f" Given were {noise_rad:g}{unit} as noise; the peak is {largest:.3g}{unit}."
         raise BiogripError(
             f"{where}: found no response to the {controlled}, but {trace.mean():.3g}{unit} "
             f"throughout, give or take {trace.std():.2g}{unit}; allowed is a {read.name} from zero "

@@ -315,8 +315,7 @@ def _load(
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
     ends, off = ramps(*history.T)
-    said = f"{counted(len(ends) - 1, 'ramp')} along {columns.load}, off by {off:.2g} {units[-1]}"
-    said += " at most"
+    said = f"{counted(len(ends) - 1, 'ramp')} along {columns.load}, within {off:.2g} {units[-1]}"
     return ends * [TIME_UNITS[units[0]], columns.controlled.units[units[-1]]], said
 
 

@@ -212,8 +212,7 @@ def _with_names(lines: Sequence[str], wanted: set[str]) -> list[tuple[str, int]]
         widest = range(1, len(_split(first[0], separator)) + 1)
         names = (separator.join(map(str, widest)), 0)
         return [*(own for own in plain if own[1] < first[1]), names, *plain[plain.index(first) :]]
-    found: list[tuple[str, int]] = []
-    above: list[tuple[str, int]] = []
+    found, above = list[tuple[str, int]](), list[tuple[str, int]]()
     named, widths = False, [len(it) if len(it) > 1 else 0 for it in _splits(first[0])]
     said = [
         (_BEFORE_NAMES.sub("", line[mark.end() :]), number)
@@ -221,12 +220,10 @@ def _with_names(lines: Sequence[str], wanted: set[str]) -> list[tuple[str, int]]
         if (mark := _COMMENT.match(line))
     ]
     texts = {number: text for text, number in said if _has(text, wanted)}
-    likely, others = (
-        [it for it in some if it[1] < first[1] and any(map(eq, map(len, _splits(it[0])), widths))]
-        for some in (said, plain)
-    )
-    if not (texts or others):
-        texts = {number: text for text, number in likely[-1:]}
+    before = [own for own in (*said, *plain) if own[1] < first[1]]
+    likely = [own for own in before if any(map(eq, map(len, _splits(own[0])), widths))]
+    if not texts and likely and likely[-1] in said:
+        texts = {likely[-1][1]: likely[-1][0]}
     for number, line in enumerate(lines, 1):
         mark = _COMMENT.match(line)
         text = line[mark.end() :].strip() if mark else line
@@ -254,12 +251,12 @@ def _splits(line: str) -> list[list[str]]:
     return [*(_split(line, it) for it in (*SEPARATORS, BLANKS)), _WIDE_GAP.split(line.strip())]
 
 
-def _names(cells: Sequence[str]) -> set[str]:
-    return {plain_name(cell.strip('" ')) for cell in cells}
-
-
 def _has(line: str, wanted: set[str]) -> bool:
     return any(wanted <= _names(cells) for cells in _splits(line))
+
+
+def _names(cells: Sequence[str]) -> set[str]:
+    return {plain_name(cell.strip('" ')) for cell in cells}
 
 
 def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -> str:
