@@ -50,7 +50,7 @@ def test_the_block_that_is_asked_for_is_identified(
     assert status == 1
     assert "found 2 blocks with the columns 'Time', 'Relaxation Modulus'" in said
     assert "\n  2: line 23, Interval: 2; Point No., Time, Relaxation Modulus; 60 rows, 7,25" in said
-    status, _, said = identify(*command, "--block", "2", "--start", str(BEGINS_S))
+    status, _, said = identify(*command, "--set", "measurement.block=2", "--start", str(BEGINS_S))
     assert status == 0
     assert "gel.csv is read as\n  encoding     UTF-16\n  separator    tabs\n" in said
     assert "\n  modulus      Relaxation Modulus, in kPa\n" in said
@@ -71,7 +71,16 @@ def test_the_block_that_is_asked_for_is_identified(
 def test_readings_of_a_rounded_clock_are_averaged_and_counted(tmp_path: Path) -> None:
     trace = exported(tmp_path / "gel.csv", np.floor(TIMES / 0.5) * 0.5)
     few = config(tmp_path / "few.yaml")
-    command: list[str | Path] = [trace, *READ, "--config", few, "--block", "2", "--start", "7"]
+    command: list[str | Path] = [
+        trace,
+        *READ,
+        "--config",
+        few,
+        "--set",
+        "measurement.block=2",
+        "--start",
+        "7",
+    ]
     status, _, said = identify(*command)
     assert status == 1
     assert "are averaged by --set measurement.average_repeated=true." in said

@@ -19,6 +19,7 @@ import yaml
 
 from biogrip.arrays import Array
 from biogrip.cli import _parser, main
+from biogrip.errors import BiogripError
 from biogrip.fit.nested_fits import ranked
 from biogrip.fit.problem import History, Identification
 from biogrip.identify import one_trace
@@ -99,7 +100,10 @@ def test_a_declared_offset_and_drift_are_fitted_along(tmp_path: Path) -> None:
         ("--start fit --start -1e1 --no-drift", {"start_s": -10.0, "drift": False}),
         ("--start 3 --set measurement.fit_start=true --until 9", {"fit_start": True, "until_s": 9}),
         ('--set measurement={"noise_share":5e-2} --from 2', {"noise_share": 0.05, "from_s": 2}),
-        ("--reading strain=e --reading rotation_rad --sd s --block 2", {"sd": "s", "block": 2}),
+        (
+            "--reading strain=e --reading rotation_rad --sd s --set measurement.block=2",
+            {"sd": "s", "block": 2},
+        ),
         ("--offset --no-offset --noise 1e-6", {"offset": False, "noise_rad": 1e-6}),
     ],
 )
@@ -115,13 +119,25 @@ def test_options_are_keys_of_the_config_and_the_last_one_counts(
     assert by_options.sample.candidate == "generalized_maxwell_2"
 
 
-def test_a_protocol_replaces_what_was_held_and_the_reverse() -> None:
-    held = Setting("--hold", HOLD, 3e-9)
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("beside", ["--load", "cells.tsv", "held.yaml"])
+def test_what_was_held_is_stated_once(tmp_path: Path, beside: str, order: int) -> None:
+    """By an option, a row of a table or a config, in any order."""
     phases = [{"duration_s": 100.0, "torque_Nm": 1e-9}, {"duration_s": 300.0, "torque_Nm": 2e-9}]
-    protocol = Setting("cells.tsv", ("protocol", "phases"), phases, 2)
-    for settings, durations_s in (((held, protocol), [100.0, 300.0]), ((protocol, held), [400.0])):
-        case = case_of(Asked(EXAMPLE, None, settings))
-        assert [phase.duration_s for phase in case.phases] == durations_s
+    others = {
+        "--load": Setting("--load", ("measurement", "load"), "torque_Nm"),
+        "cells.tsv": Setting("cells.tsv", ("protocol", "phases"), phases, 2),
+    }
+    (config := tmp_path / "held.yaml").write_text(yaml.safe_dump({"protocol": {"phases": phases}}))
+    held = Setting("--hold", HOLD, 3e-9)
+    settings = (held, others[beside]) if beside in others else (held,)
+    given = config if beside == "held.yaml" else None
+    with pytest.raises(BiogripError) as error:
+        case_of(Asked(EXAMPLE, given, settings[::order]))
+    assert str(error.value).count("\n") == 0
+    where = "cells.tsv, line 2" if beside == "cells.tsv" else beside
+    for said in ("--hold", where, "allowed is one of them"):
+        assert said in str(error.value)
 
 
 def test_known_deviations_are_weights_of_the_fit(tmp_path: Path) -> None:
@@ -144,7 +160,7 @@ OPTIONS = {
     "--noise-model pink": "found 'pink'. Allowed: white, coloured.",
     "--noise-model coloured --noise 1e-6": "--noise: measurement.noise_rad: is that of white noise",
     "--sd sd_rad --noise 1e-6": "--noise: measurement.noise_rad: does not go with sd",
-    "--set measurement.time_unit=hours": "--set: measurement.time_unit: found 'hours'. Did you",
+    "--set measurement.time_unit=ns": "--set: measurement.time_unit: found 'ns'. Allowed: s, ms",
     "--set measurment.skip=1": "--set: measurment: unknown key. Did you mean 'measurement'?",
     '--set protocol.phases=[{"duration_s":0}]': "--set: protocol.phases[0].duration_s: found 0",
     "--fix k=0": "--fix: fixed.k: found 0, allowed is at least 1e-18 and at most 1e+12 N/m.",
@@ -185,8 +201,8 @@ REFUSED = {
     **{f"identify a.csv --csv {name}": said for name, said in WRITTEN.items()},
     **dict.fromkeys(PIPES, "no regular file; allowed is one."),
     "identify .": "TRACE: found the folder '.', allowed is a file.",
-    "identify tabel.csv": "found 'tabel.csv', allowed is a file that exists. Did you mean 'table.",
-    f"identify {'x/' * 3000}": "allowed is a file that exists.",
+    "identify tabel.csv": "found 'tabel.csv', allowed is a file that exists in the folder /",
+    f"identify {'x/' * 3000}": "allowed is a file that exists in",
     "identify a.csv b.csv --output x.json": "--output: only for one trace",
     "identify table.csv --output x.json": "--output: only for one trace",
     "identify table.csv --csv a.csv": "a.csv: is read; allowed is another file to write.",

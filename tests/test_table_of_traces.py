@@ -193,6 +193,14 @@ def test_settings_that_cannot_be_used_are_said_at_once(here: Path) -> None:
     assert not list(here.glob("*.json"))
 
 
+def test_a_table_that_is_nowhere_is_looked_for_in_a_folder_that_is_named(here: Path) -> None:
+    with pytest.raises(BiogripError) as error:
+        read_table(Path("gone.tsv"))
+    assert str(error.value).startswith(
+        f"gone.tsv: found 'gone.tsv', allowed is a file that exists in the folder {here}."
+    )
+
+
 def test_traces_of_a_command_read_one_quantity(here: Path) -> None:
     protocol = {"phases": [{"duration_s": 400, "strain": 1}]}
     lab = FEW | {"instrument": "relaxation", "protocol": protocol}
@@ -210,7 +218,7 @@ def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
     status, printed, _ = identify("cells.tsv", "--csv", "found.csv", "--report", "page.html")
     assert status == 1
     assert "Not identified, 1 of 2:" in printed
-    assert "cells.tsv, line 2: found 'gone.csv', allowed is a file that exists." in printed
+    assert "cells.tsv, line 2: found 'gone.csv', allowed is a file that exists in the" in printed
     assert [(row["trace"], row["dish"], row["fit"]) for row in listed()] == [
         ("gone.csv", "lost", "failed"),
         ("usual.csv", "left", "ok"),

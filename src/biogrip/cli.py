@@ -124,7 +124,7 @@ def _any_key(text: str) -> tuple[tuple[str, ...], Any]:
         text = f"found '{text}', allowed is KEY=VALUE, as in measurement.time_unit=ms"
         raise argparse.ArgumentTypeError(text)
     try:
-        return tuple(key.split(".")), value_of(value)
+        return tuple(key.split(".")), value_of(value, key)
     except BiogripError as error:
         raise argparse.ArgumentTypeError(f"{key}: {error}") from error
 
@@ -138,7 +138,6 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
             "force, stress, modulus (relaxation)",
         ),
         ("--sd", "measurement.sd", "COLUMN", "of the readings' standard deviations"),
-        ("--block", "measurement.block", "N", "table to read, where a file has several"),
     ],
     "what was done": [
         (
@@ -146,6 +145,7 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
             "what was held from 0 to the end, without a config: a stress in Pa for a strain, a "
             "force in N for a displacement, and the reverse; 1 for a compliance or a modulus",
         ),
+        ("--load", "measurement.load", "COLUMN", "of what was held, as recorded, instead"),
         ("--start", _start, "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
         ("--from", "measurement.from_s", "SECONDS", "first time of the clock to use [all]"),
         ("--until", "measurement.until_s", "SECONDS", "last time of the clock to use [all]"),
@@ -167,7 +167,12 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
         ("--fix", _fix, "NAME=VALUE", "known parameter, SI units; 0 for no element; repeatable"),
     ],
     "any other key of the config": [
-        ("--set", _any_key, "KEY=VALUE", "as in measurement.time_unit=ms, YAML; repeatable"),
+        (
+            "--set",
+            _any_key,
+            "KEY=VALUE",
+            "as in measurement.time_unit=ms or measurement.block=2, YAML; repeatable",
+        ),
     ],
 }
 """Options of `identify` by what they are about: name; key of the config, or what reads the value

@@ -153,6 +153,12 @@ def test_mere_noise_is_refused(rate_Hz: float, sigma_rad: float) -> None:
             assert said(times, values, noise_rad=noise_rad).startswith(where)
 
 
+def test_a_noise_in_another_unit_is_named_beside_the_readings() -> None:
+    text = said(TIMES, trace(SAMPLES["liquid_drop_1"]), noise_rad=0.045)
+    assert NO_RESPONSE in text
+    assert re.search(r"Given were 0.045 rad as noise; the peak is \S+ rad\.", text)
+
+
 @pytest.mark.nightly
 def test_noise_is_taken_for_a_response_as_rarely_as_said() -> None:
     times, rng = sample_times(400.0, 0.1), np.random.default_rng(6)
@@ -236,7 +242,7 @@ def test_no_sample_lets_the_arm_turn_further_than_the_free_rotation() -> None:
         ("s", 1 / 60, "lines 2 to 402, column 'time_s': found only 0 to 6.66667 s", "60 times (is"),
         ("s", 1 / 3600, "lines 2 to 402, column 'time_s': found only 0 to 0.111111", "3600 times"),
         ("min", 60.0, "line 9, column 'time_min': found 420 s", "0.01667 times (is it in s?)."),
-        ("ms", 1e3, "line 3, column 'time_ms': found 1000 s", "0.001 times."),
+        ("ms", 1e3, "line 3, column 'time_ms': found 1000 s", "0.001 times (is"),
     ],
 )
 def test_times_in_a_wrong_unit_are_refused(unit: str, factor: float, found: str, hint: str) -> None:

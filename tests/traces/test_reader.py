@@ -1,7 +1,6 @@
 """Files of traces: kept ones, with what is read of them or said of them, and any other ones."""
 
 import csv
-import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from contextlib import suppress
 from pathlib import Path
@@ -15,7 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from biogrip.errors import BiogripError
-from biogrip.physics.instruments import COMPLIANCE, INSTRUMENTS, MODULUS, ROTATION, STRAIN
+from biogrip.physics.instruments import (
+    COMPLIANCE,
+    DISPLACEMENT,
+    FORCE,
+    INSTRUMENTS,
+    MODULUS,
+    ROTATION,
+    STRAIN,
+    TORQUE,
+)
 from biogrip.traces.columns import TIME_UNITS, Columns, unit_of
 from biogrip.traces.reader import read_recording
 
@@ -67,7 +75,7 @@ def test_a_kept_file_is_read_or_refused_as_its_table_says(
     form: dict[str, Any] = PLAIN_FORM | kept.get("form", {})
     form["columns"] = dict(zip(columns.named, names_and_units, strict=True))
     assert found.recognised is not None
-    assert found.recognised.data() == form
+    assert found.recognised.data() == {key: it for key, it in form.items() if it is not None}
     assert found.without_number == form["gaps"]
     assert found.time_s[[0, -1]].tolist() == [form["first_s"], form["last_s"]]
     assert first_last_sum(found.rotation_rad) == pytest.approx(kept["reading"], rel=1e-14)
@@ -195,6 +203,24 @@ UNITS = {
     "Pa-1": (1.0, COMPLIANCE.units),
     "Pa\u207b\u00b9": (1.0, COMPLIANCE.units),
     "%": (0.01, STRAIN.units),
+    "pct": (0.01, STRAIN.units),
+    "mstrain": (1e-3, STRAIN.units),
+    "ppm": (1e-6, STRAIN.units),
+    "microstrain": (1e-6, STRAIN.units),
+    "\u00b5\u03b5": (1e-6, STRAIN.units),
+    "mm/mm": (1.0, STRAIN.units),
+    "us": (1e-6, TIME_UNITS),
+    "Sec": (1.0, TIME_UNITS),
+    "S": (1.0, TIME_UNITS),
+    "days": (86400.0, TIME_UNITS),
+    "\u00b5m": (1e-6, DISPLACEMENT.units),
+    "um": (1e-6, DISPLACEMENT.units),
+    "kgf": (9.80665, FORCE.units),
+    "kN": (1e3, FORCE.units),
+    "MN": (1e6, FORCE.units),
+    "mN m": (1e-3, TORQUE.units),
+    "mN\u00b7m": (1e-3, TORQUE.units),
+    "uNm": (1e-6, TORQUE.units),
 }
 
 
@@ -206,8 +232,11 @@ def unit(column: str, given: str | None, allowed: Any, below: str = "") -> str:
 def test_a_unit_is_read_off_a_name_or_a_row_of_units_or_stated(written: str) -> None:
     size, allowed = UNITS[written]
     names = [f"x ({written})", f"x [{written}]", f"x( {written} )", f"2 [{written}]"]
+    names += [f"x{{{written}}}", f"x <{written}>"]
+    if " " not in written:
+        names += [f"x {written}", f"x, {written}", f"x in {written}"]
     if written.isalpha():
-        names += [f"x_{written}", f"x_2_{written}"]
+        names += [f"x_{written}", f"x_2_{written}", f"x/{written}", f"x / {written}"]
     if written.startswith("1/"):
         names += [f"x_per_{written[2:]}"]
     found = {unit(name, None, allowed) for name in names}
@@ -222,7 +251,13 @@ def test_a_unit_is_read_off_a_name_or_a_row_of_units_or_stated(written: str) -> 
     [
         ("x_s", None, "", "found no unit, neither stated (by HOW) nor"),
         ("phi_left", None, "", "found no unit"),
-        ("phi (rad/s)", None, "", "found no unit"),
+        (
+            "phi (rad/s)",
+            None,
+            "",
+            "found the unit 'rad/s' at the end of the name; allowed are rad,",
+        ),
+        ("phi / mm", None, "", "found the unit 'mm' at the end of the name; allowed are rad, mrad"),
         ("phi_Mrad", None, "", "found no unit"),
         ("phi", None, "[V]", "found no unit (but '[V]' below it)"),
         ("phi", None, "m", "found no unit (but 'm' below it)"),
@@ -238,14 +273,37 @@ def test_a_unit_is_never_guessed(column: str, given: str | None, below: str, mes
     assert str(error.value).startswith(f"t.csv, column '{column}': {message}")
 
 
-@pytest.mark.parametrize("given", ["hours", "hour", "HR", "h "])
-def test_a_unit_that_is_spelled_out_is_a_unit_in_a_row_and_a_hint_elsewhere(given: str) -> None:
-    assert unit("t", None, TIME_UNITS, f"[{given}]") == "h"
-    if given.strip() != "h":
-        with pytest.raises(BiogripError, match=re.escape("Did you mean 'h'?")):
-            unit("t", given, TIME_UNITS)
-    with pytest.raises(BiogripError, match="found no unit"):
-        unit("t", None, TIME_UNITS, "[m]")
+@pytest.mark.parametrize("name", ["strain", "Step", "Shear Strain", "strain_2", "γ", "strain (-)"])
+def test_a_strain_without_a_unit_is_a_pure_number(name: str) -> None:
+    assert unit(name, None, STRAIN.units) == "1"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Strain (a.u.)",
+        "Strain [10^-6]",
+        "strain_foo",
+        "1000*strain",
+        "Strain x1000",
+        "Strain/V",
+        "2",
+    ],
+)
+def test_a_strain_that_may_have_an_unknown_unit_is_refused(name: str) -> None:
+    with pytest.raises(BiogripError, match=r"allowed are 1, %, ‰, ppm"):
+        unit(name, None, STRAIN.units)
+    assert unit(name, "1", STRAIN.units) == "1"
+
+
+@pytest.mark.parametrize(
+    ("given", "allowed"),
+    [("ns", TIME_UNITS), ("MS", TIME_UNITS), ("pm", DISPLACEMENT.units), ("lbf", FORCE.units)],
+)
+def test_an_unknown_unit_is_refused_without_one_of_another_size(given: str, allowed: Any) -> None:
+    with pytest.raises(BiogripError) as error:
+        unit("x", given, allowed)
+    assert str(error.value).endswith(f"found the unit '{given}', allowed are {', '.join(allowed)}.")
 
 
 @pytest.mark.parametrize("sd", [{"sd": "sd"}, {}])

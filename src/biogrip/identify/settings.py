@@ -5,19 +5,23 @@ that the options of the command, and over these the cells of a table of traces. 
 a config is; messages name the file and line, the option, or the row of the table.
 
 What is read tells the instrument. What is controlled comes from the protocol or, from 0 to the end
-of the trace, from ``--hold``; where a compliance or a modulus is read, that is 1.
+of the trace, from ``--hold``, or from a column of the file, ``--load``; where a compliance or a
+modulus is read, a hold of 1 needs no option.
 """
 
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
+from biogrip.arrays import Array
 from biogrip.errors import BiogripError, nearest
 from biogrip.identify.outputs import COLUMNS
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
@@ -31,12 +35,13 @@ from biogrip.study.source import (
     default_config,
     keys_in,
     overlaid,
+    read_config,
     scalar_problem,
 )
 from biogrip.study.study import Case
 from biogrip.terminal import visible
-from biogrip.traces.columns import listed, place
-from biogrip.traces.reader import read_recording
+from biogrip.traces.columns import listed, place, trace_file_problem
+from biogrip.traces.reader import Recording, read_recording
 
 MODEL = "generalized_maxwell"
 """Sample model of traces of which nothing says another."""
@@ -47,11 +52,14 @@ FILE = "file"
 HOLD = ("--hold",)
 """Path of the only setting that is no key: what is controlled from 0 to the end of the trace."""
 
+LOAD = ("measurement", "load")
+"""Key of the column of what was controlled."""
+
+_PROTOCOLS = {HOLD: "a hold", LOAD: "a column of the load", ("protocol",): "a protocol"}
 # Of each group, the key that is set last replaces the others.
 _ONE_OF: Sequence[Sequence[tuple[str, ...]]] = (
     [("measurement", "start_s"), ("measurement", "fit_start")],
     [("measurement", name) for name in READINGS],
-    [HOLD, ("protocol",)],
 )
 _MOST_SHOWN = 10
 _SEPARATORS = ",;\t"
@@ -97,8 +105,10 @@ class Asked:
         return blocks
 
 
-def value_of(text: str) -> Any:
-    """Read the value of a key as YAML; refuse what YAML reads otherwise than it looks."""
+def value_of(text: str, key: str = "") -> Any:
+    """Read the value of a key as YAML, units as text; refuse what is not read as it looks."""
+    if key.endswith("_unit"):
+        return text
     try:
         node = yaml.compose(text, yaml.SafeLoader)
         problem = scalar_problem(node) if isinstance(node, yaml.ScalarNode) else None
@@ -137,6 +147,7 @@ def case_of(asked: Asked) -> Case:
     files = [default_config(), *([asked.config] if asked.config else [])]
     below = read_configs(files)
     given = asked.given
+    _refuse_two_protocols(asked)
     merged = _with_instrument(overlaid(below, given), given, asked.trace)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
@@ -153,19 +164,34 @@ def case_of(asked: Asked) -> Case:
     return study.cases[case]
 
 
+def _refuse_two_protocols(asked: Asked) -> None:
+    """Refuse what was held, a column of it and a protocol beside one another."""
+    sources = [(own.by, own.line, own.path, own.value) for own in asked.settings]
+    if asked.config is not None:
+        sources.insert(0, (visible(asked.config), None, (), read_config(asked.config)))
+    said = {
+        name: f"{by}, line {line}" if line else by
+        for by, line, path, value in sources
+        for key, name in _PROTOCOLS.items()
+        if any(own[: len(key)] == key for own in (path, *keys_in(value, path)))
+    }
+    if len(said) > 1:
+        text = f"found {' and '.join(said)}; allowed is one of them."
+        raise BiogripError(f"{' and '.join(said.values())}: {text}")
+
+
 def _source(
     setting: Setting, below: Mapping[str, Any], merged: Mapping[str, Any], case: str
 ) -> Source:
     """Return the keys that a setting is to be named for: its own, and blocks that it adds."""
     path: KeyPath = setting.path
-    value = setting.value
-    if path == HOLD:
-        path, value = ("protocol",), merged["protocol"]
-    elif path[0] == "sample":
+    if path[0] == "sample":
         path = ("cases", case, *path)
+    held = {"protocol": merged["protocol"]}
+    own = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
     known = set(keys_in(below))
     above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
-    return setting.by, dict.fromkeys([*above, path, *keys_in(value, path)], setting.line)
+    return setting.by, dict.fromkeys([*above, path, *own], setting.line)
 
 
 def _with_instrument(
@@ -178,22 +204,38 @@ def _with_instrument(
     instrument = _instrument(merged, given)
     usual = {"time": "time_s", instrument.read.name: instrument.read.column}
     measurement = usual | merged["measurement"] | {"file": str(trace)}
-    kind = given.get("instrument", instrument.kind)
+    measurement = schema_of(MeasurementBlock).with_numbers(measurement)
+    kind, controlled = given.get("instrument", instrument.kind), instrument.controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
-    if level is None:
+    of_column = measurement.get(LOAD[-1]) is not None
+    if level is None and not of_column:
         if "protocol" in given or instrument.has_jaws:
             return found
         if not instrument.relative:
-            controlled = instrument.controlled
             unit = f" in {controlled.unit}" if controlled.unit else ""
             raise BiogripError(
-                f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, or a "
-                "protocol in --config."
+                f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, a "
+                "column of it by --load, or a protocol in --config."
             )
-        level = 1.0
-    duration_s = _duration_s(trace, measurement)
-    phase = {"duration_s": duration_s, instrument.controlled.column: level}
-    return {**found, "protocol": {"phases": [phase]}}
+    own = _recording(trace, measurement)
+    phases = [{"duration_s": 1.0, controlled.column: level or 1.0}]
+    start_s = measurement.get("start_s")
+    if own is not None and own.load is not None:
+        start_s = own.load[0, 0] if start_s is None else start_s
+        measurement["start_s"] = float(start_s) or None
+        phases = _phases(own.load, start_s, controlled.column) or phases
+    elif own is not None:
+        lasts = float(own.time_s[-1]) - (start_s or min(float(own.time_s[0]), 0.0))
+        phases[0]["duration_s"] = lasts if lasts > 0 else 1.0
+    return {**found, "protocol": {"phases": phases}}
+
+
+def _phases(load: Array, start_s: float, key: str) -> list[dict[str, float]]:
+    """Return the phases of ramps, (n, 2) times and loads, from a time on."""
+    times, loads = load[load[:, 0] > start_s].T
+    times, loads = np.r_[start_s, times], np.r_[np.interp(start_s, *load.T), loads]
+    ramps = np.c_[np.diff(times), loads[:-1], loads[1:]].tolist()
+    return [{"duration_s": lasts, key: of, f"to_{key}": to} for lasts, of, to in ramps]
 
 
 def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrument:
@@ -207,18 +249,12 @@ def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrume
     return next((each for each in some if each.controlled.column in keys), some[0])
 
 
-def _duration_s(trace: Path, measurement: Mapping[str, Any]) -> float:
-    """Return the time from the start of the protocol to the end of a trace."""
-    block = checked(MeasurementBlock, schema_of(MeasurementBlock).with_numbers(measurement))[0]
-    if block is None:
-        return 1.0
-    try:
-        time_s = read_recording(trace, block.columns).time_s
-    except BiogripError:
-        # Whoever uses the trace reads it again, and says what is wrong with it.
-        return 1.0
-    lasts = float(time_s[-1]) - (block.start_s or min(float(time_s[0]), 0.0))
-    return lasts if lasts > 0 else 1.0
+def _recording(trace: Path, measurement: Mapping[str, Any]) -> Recording | None:
+    """Read a trace; return None if whoever uses it will say what is wrong."""
+    block = checked(MeasurementBlock, measurement)[0]
+    with suppress(BiogripError):
+        return None if block is None else read_recording(trace, block.columns)
+    return None
 
 
 def check_settings(traces: Sequence[Asked]) -> None:
@@ -295,7 +331,7 @@ def read_table(
         for name, cell in by_name.items():
             if "." in name and cell:
                 try:
-                    value = value_of(cell)
+                    value = value_of(cell, name)
                     settings.append(Setting(visible(path), tuple(name.split(".")), value, line))
                 except BiogripError as error:
                     problems.append(f"{place(path, line, name)}: {error}")
@@ -312,6 +348,8 @@ def _cells(path: Path) -> list[list[str]]:
     # Imported here: loading pandas takes long.
     import pandas as pd
 
+    if problem := trace_file_problem(path):
+        raise BiogripError(f"{place(path)}: {problem}")
     try:
         with path.open(encoding="utf-8-sig") as stream:
             header = stream.readline()

@@ -73,7 +73,9 @@ class Instrument:
         return self.kind == "gripper"
 
 
-TORQUE = Quantity("torque", "N m", {"N m": 1.0})
+TORQUE = Quantity(
+    "torque", "N m", {"N m": 1.0, "mN m": 1e-3, "uN m": 1e-6, "nN m": 1e-9, "pN m": 1e-12}
+)
 ROTATION = Quantity(
     "rotation",
     "rad",
@@ -86,11 +88,13 @@ GRIPPER = Instrument("gripper", TORQUE, ROTATION)
 STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "mPa": 1e-3}
 """Units of stresses and moduli."""
 
-FORCE = Quantity("force", "N", {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "pN": 1e-12})
-DISPLACEMENT = Quantity("displacement", "m", {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9})
+_FORCES = {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "pN": 1e-12, "kN": 1e3, "MN": 1e6}
+FORCE = Quantity("force", "N", _FORCES | {"gf": 9.80665e-3, "kgf": 9.80665})
+DISPLACEMENT = Quantity(
+    "displacement", "m", {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
+)
 STRESS = Quantity("stress", "Pa", STRESS_UNITS)
-STRAIN = Quantity("strain", "", {"1": 1.0, "%": 1e-2})
-
+STRAIN = Quantity("strain", "", {"1": 1.0, "%": 1e-2, "‰": 1e-3, "ppm": 1e-6})
 
 COMPLIANCE = Quantity(
     "compliance", "1/Pa", {f"1/{unit}": 1 / size for unit, size in STRESS_UNITS.items()}

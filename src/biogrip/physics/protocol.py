@@ -17,6 +17,9 @@ from pydantic import Field
 from biogrip.arrays import Array, ComplexArray
 from biogrip.keys import Block
 
+# Share of the largest load that a step is more than.
+_ROUNDING = 1e-13
+
 
 @dataclass(frozen=True)
 class Harmonic:
@@ -240,7 +243,11 @@ def torque_history(phases: tuple[Phase, ...], *, deforms: bool = False) -> Torqu
     value, slope, curvature = np.moveaxis(jumps, 2, 0)
     t = durations[:, None]
     reached = value + slope * t + curvature * t**2 / 2, slope + curvature * t, curvature
+    least = _ROUNDING * np.max(np.abs(value))
     jumps[1:] -= np.stack(reached, axis=2)[:-1]
+    # A ramp that ends where the next one begins makes no step, but for rounding.
+    steps = jumps[1:, :, 0]
+    steps[np.abs(steps) < least] = 0.0
     events = [
         event
         for start, phase in zip(starts, phases, strict=True)

@@ -33,6 +33,8 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
     BiogripError
         With file, line and column, if the trace cannot be used.
     """
+    if case.columns.load is not None:
+        raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
     trace = read_checked(recorded, case.gripper, case.problem, case.columns)
     trace = with_fitted_onset(trace, case.problem)
     for note in notes_on_recording(trace):
@@ -167,6 +169,10 @@ def notes_on_recording(trace: Measurements) -> list[str]:
         notes.append(f"Averaged at repeated times: {counted(form.averaged, 'reading')}.")
     if form is not None and form.outside:
         notes.append(f"Left out by from_s and until_s: {counted(form.outside, 'reading')}.")
+    if form is not None and form.others:
+        notes.append(f"Left out, for rows asks for others: {counted(form.others, 'row')}.")
+    if form is not None and form.load:
+        notes.append(f"The protocol is {form.load}.")
     if trace.at_steps:
         notes.append(
             f"Left out at the instant of a step: {counted(trace.at_steps, 'reading')}, of which "

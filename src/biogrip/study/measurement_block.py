@@ -5,18 +5,17 @@ its columns with their units, and what is known of its noise; what identificatio
 with the sample is the same for both.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, Tag
 
-from biogrip.errors import nearest
-from biogrip.keys import Block, OneOf, Problem
+from biogrip.keys import BY_KIND, Block, OneOf, Problem
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION
 from biogrip.physics.noise import Noise
 from biogrip.physics.protocol import Burst, Sampling
-from biogrip.traces.columns import TIME_UNITS, Columns, trace_file_problem
+from biogrip.traces.columns import TIME_UNITS, Columns, known_unit, trace_file_problem
 
 COLOURED = "coloured"
 NOISE_MODELS = ("white", COLOURED)
@@ -28,9 +27,21 @@ READINGS = tuple(INSTRUMENTS)
 
 _OF_FILE = (
     *("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "scale", "block"),
+    *("rows", "load", "load_unit"),
     *("average_repeated", "from_s", "until_s", *KNOWN_NOISE, "start_s", "fit_start"),
 )
+
+
+def _unit(allowed: Mapping[str, float]) -> BeforeValidator:
+    """Return what makes a unit, as µs, the allowed one that it is."""
+    return BeforeValidator(
+        lambda it: (known_unit(it, allowed) if isinstance(it, str) else it) or it
+    )
+
+
 _Name = Annotated[str | None, Field(min_length=1, max_length=4000)]
+
+_Value = Annotated[Annotated[float, Tag("a number")] | Annotated[str, Tag("text")], BY_KIND]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,15 +78,24 @@ class MeasurementBlock(Block):
     modulus: _Name = None
     """Name of that of relaxation moduli: stresses over the largest strain that is held
     (relaxation)."""
-    time_unit: Annotated[str | None, OneOf(TIME_UNITS)] = None
+    time_unit: Annotated[str | None, OneOf(TIME_UNITS), _unit(TIME_UNITS)] = None
     """Unit of the times, where the column's name does not end in it."""
-    rotation_unit: Annotated[str | None, OneOf(ROTATION.units)] = None
+    rotation_unit: Annotated[str | None, OneOf(ROTATION.units), _unit(ROTATION.units)] = None
     """Unit of the rotations, where the column's name does not end in it."""
     reading_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
     """Unit of what another instrument reads, where the column's name does not end in it; of strains
     by default 1."""
     block: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
     """Number of the block to read, where several tables follow one another in the file."""
+    rows: Annotated[Mapping[str, _Value], Field(min_length=1)] | None = None
+    """Values of other columns in the rows to use, as `{Segment: dwell}`; the others are left
+    out."""
+    load: _Name = None
+    """Name of the file's column of what was controlled: torques, or the forces, stresses,
+    displacements or strains under which the readings were taken. Ramps that follow it are the
+    protocol, which starts with it or at start_s. Only for `biogrip identify`."""
+    load_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
+    """Unit of that column, where its name does not end in it."""
     average_repeated: bool = False
     """If true, average the readings of equal times, as a rounded clock writes them."""
     from_s: Annotated[float | None, Field(ge=-1e9, le=1e9)] = None
@@ -124,7 +144,10 @@ class MeasurementBlock(Block):
         """Columns of a recorded trace's file."""
         (name,) = self.readings
         assert self.time is not None
-        same = ("time_unit", "start_s", "sd", "block", "average_repeated", "from_s", "until_s")
+        same = (
+            *("time_unit", "start_s", "sd", "block", "average_repeated", "from_s", "until_s"),
+            *("rows", "load", "load_unit"),
+        )
         return Columns(
             self.time,
             getattr(self, name),
@@ -163,7 +186,7 @@ class MeasurementBlock(Block):
                 yield (key,), "does not go with sd, which says all of the noise."
         if self.scale == 0:
             yield ("scale",), "found 0, allowed is another number."
-        for key, other in (("bursts", "times_s"), ("fit_start", "start_s")):
+        for key, other in (("bursts", "times_s"), ("fit_start", "start_s"), ("fit_start", "load")):
             if getattr(self, key) and getattr(self, other) not in (None, ()):
                 yield (key,), f"does not go with {other}; allowed is one of them."
         if self.file is None:
@@ -191,7 +214,8 @@ class MeasurementBlock(Block):
             right, wrong = wrong, right
         if getattr(self, wrong) is not None:
             yield (wrong,), f"does not go with {name}; allowed is {right}."
-        allowed = INSTRUMENTS[name].read.units
-        if self.reading_unit is not None and self.reading_unit not in allowed:
-            text = f"found '{self.reading_unit}', allowed are {', '.join(allowed)}."
-            yield ("reading_unit",), text + nearest(self.reading_unit, allowed)
+        instrument = INSTRUMENTS[name]
+        for key, of in (("reading_unit", instrument.read), ("load_unit", instrument.controlled)):
+            unit = getattr(self, key)
+            if unit is not None and known_unit(unit, of.units) is None:
+                yield (key,), f"found '{unit}', allowed are {', '.join(of.units)}."

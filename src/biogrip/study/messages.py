@@ -17,14 +17,14 @@ from biogrip.digits import counted
 from biogrip.errors import nearest
 from biogrip.keys import CONFLICT, TWICE, Problem, adapter, built, kind_of
 from biogrip.physics.instruments import ROTATION
-from biogrip.traces.columns import TIME_UNITS, nearest_unit
+from biogrip.traces.columns import TIME_UNITS
 
 T = TypeVar("T")
 
 MISSING = "is missing and has no default."
 
-# Choices of which an unknown one has a nearest by its meaning.
-_BY_MEANING = ([*TIME_UNITS], [*ROTATION.units])
+# Choices without a nearest one: a unit of almost the same name is a thousand times another.
+_UNITS_OF_FILES = ([*TIME_UNITS], [*ROTATION.units])
 _BOUNDS = {"exclusiveMinimum": "greater than", "minimum": "at least", "maximum": "at most"}
 # Most errors that are explained, and most characters of a value that are shown.
 _MOST, _LONGEST = 1000, 40
@@ -94,7 +94,7 @@ def _text(
             return MISSING
         case "literal_error":
             choices = leaf.get("enum")
-            hint = (nearest_unit if choices in _BY_MEANING else nearest)(found, choices)
+            hint = "" if choices in _UNITS_OF_FILES else nearest(found, choices)
             return f"found {_shown(found)}.{hint} Allowed: {', '.join(choices)}."
         case "string_pattern_mismatch" if of_name:
             kind = str(path[-2]).removesuffix("s")

@@ -125,7 +125,9 @@ def _read(file: Path) -> tuple[Lines, dict[str, Any]]:
         with file.open("rb") as stream:
             content = stream.read(LARGEST_BYTES + 1)
     except OSError as error:
-        raise BiogripError(f"{shown_path(file)}: cannot be read: {error.strerror}.") from error
+        where = f" in the folder {visible(file.parent.absolute())}"
+        text = f"cannot be read: {error.strerror}{'' if file.exists() else where}."
+        raise BiogripError(f"{shown_path(file)}: {text}") from error
     if len(content) > LARGEST_BYTES:
         raise _wrong(file, None, f"found more than {LARGEST_BYTES} bytes; allowed are fewer.")
     try:

@@ -1,7 +1,7 @@
 """What the user says of a recording's file: the columns to read, and their units.
 
-A unit is stated, stands at the end of the column's name, as in ``rotation_urad``, ``phi (mrad)`` or
-``time [s]``, or in a row below the names. It is never guessed, and no two of these may differ.
+A unit is stated, stands at the end of the column's name, as in ``rotation_urad``, ``phi (mrad)``,
+``t in s`` or ``F/N``, or in a row below the names. It is never guessed, and no two may differ.
 """
 
 import re
@@ -14,27 +14,50 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Quantity
 from biogrip.terminal import visible
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86_400.0}
 
+# In any case of letters; no time has a unit with a capital.
 _SPELLED_OUT = {
-    "s": ("sec", "secs", "second", "seconds"),
+    "s": ("s", "sec", "secs", "second", "seconds"),
     "ms": ("msec", "millisecond", "milliseconds"),
-    "min": ("mins", "minute", "minutes"),
-    "h": ("hr", "hrs", "hour", "hours"),
+    "us": ("usec", "microsecond", "microseconds"),
+    "min": ("min", "mins", "minute", "minutes"),
+    "h": ("h", "hr", "hrs", "hour", "hours"),
+    "d": ("day", "days"),
     "rad": ("radian", "radians"),
     "mrad": ("milliradian", "milliradians"),
     "urad": ("microrad", "microradian", "microradians"),
     "deg": ("degree", "degrees"),
+    "1": ("-", "mm/mm", "m/m", "um/um", "nm/nm"),
+    "%": ("percent", "pct"),
+    "‰": ("permille", "mstrain", "millistrain", "mε"),
+    "ppm": ("ustrain", "microstrain", "uε", "um/m"),
 }
-_UNIT_AT_END = re.compile(r"(?:(_per)?_([^\W_]+)|\(([^()]*)\)|\[([^\[\]]*)\])$")
-_IN_BRACKETS = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)")
+_IN_BRACKETS = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\}|<([^<>]*)>")
+# Where a unit ends a name; the first few are nothing else. After a digit, / makes a reciprocal.
+_UNIT_AT_END = [
+    re.compile(f"(?:{_IN_BRACKETS.pattern})$"),
+    re.compile(r"(?<![\d\s])\s*/\s*([^\W\d]+|%)$"),
+    re.compile(r"(?:\sin|,)\s+(\S+)$"),
+    re.compile(r"_per_([^\W_]+)$"),
+    re.compile(r"[_\s]([^\s_]+)$"),
+    re.compile(r"(%|‰|percent|pct|(?:micro|milli|[um])strain)$", re.I),
+]
+_SURELY = 3
 # Pa^-1, Pa**-1, Pa-1, and with digits above the line, which `plain_name` brings down.
 _RECIPROCAL = re.compile(r"([A-Za-z]+)(?:\^|\*\*)?\(?[-\u2212]1\)?")
+# Names of pure numbers that have no unit: a word, or more that end with one for a strain.
+_PURE = re.compile(
+    r"[^\W\d_]+|(?:[\w.,-]*[\w.,]?[ _-])*(?:strain|deformation|gamma|epsilon|eps|[γεϵ])", re.I
+)
+_NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
 # Keys that no option of the command sets but `--set`, with what they may say.
 _BY_SET = {
     "time_unit": "UNIT",
     "rotation_unit": "UNIT",
     "reading_unit": "UNIT",
+    "load_unit": "UNIT",
+    "block": "N",
     "average_repeated": "true",
     "scale": "-1",
 }
@@ -73,6 +96,12 @@ class Columns:
     """First time of the clock to use; None for all."""
     until_s: float | None = None
     """Last time of the clock to use."""
+    rows: Mapping[str, str | float] | None = None
+    """Values of other columns in the rows to use; None for all."""
+    load: str | None = None
+    """Name of the column of what was controlled, if that is to be read."""
+    load_unit: str | None = None
+    """Key of its units."""
 
     @property
     def unit_key(self) -> str:
@@ -83,7 +112,13 @@ class Columns:
     def named(self) -> dict[str, str]:
         """Names of the columns by the key that says them, in the order of reading."""
         names = {"time": self.time, self.quantity.name: self.reading}
-        return names if self.sd is None else {**names, "sd": self.sd}
+        more = {"sd": self.sd, "load": self.load}
+        return names | {key: name for key, name in more.items() if name is not None}
+
+    @property
+    def controlled(self) -> Quantity:
+        """What was controlled."""
+        return INSTRUMENTS[self.quantity.name].controlled
 
     def said_by(self, *keys: str) -> str:
         """Return the options or config keys that say something, for messages."""
@@ -129,20 +164,19 @@ def unit_of(
     """
     where, choices = place(path, column=column), ", ".join(allowed)
     at_end, in_row = _unit_at_end(column, allowed), unit_in_cell(below, allowed)
-    unit = (at_end or in_row) if given is None else plain_name(given)
-    if unit is None and "1" in allowed and _bare(below) in ("", "-"):
+    unit = (at_end or in_row) if given is None else known_unit(given, allowed)
+    if given is not None and unit is None:
+        raise BiogripError(f"{where}: found the unit '{given}', allowed are {choices}.")
+    if unit is None and "1" in allowed and _bare(below) in ("", "-") and _is_pure(column):
         return "1"
     if unit is None:
+        end = _said_at_end(column)
+        found = f"the unit '{shortened(end)}' at the end of the name" if end else "no unit"
         row = f" (but '{shortened(below)}' below it)" if below else ""
-        raise BiogripError(
-            f"{where}: found no unit{row}, neither stated (by {said_by}) nor at the end of the "
-            f"name; allowed are {choices}."
-        )
-    if unit not in allowed:
-        raise BiogripError(
-            f"{where}: found the unit '{given}', allowed are {choices}."
-            + nearest_unit(given, allowed)
-        )
+        how = f", or state one by {said_by}"
+        if not end:
+            row, how = f"{row}, neither stated (by {said_by}) nor at the end of the name", ""
+        raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.")
     for other, said in ((at_end, "the name"), (in_row, "the row of units")):
         if other not in (None, unit):
             raise BiogripError(
@@ -152,15 +186,9 @@ def unit_of(
     return unit
 
 
-def nearest_unit(name: object, allowed: Collection[str]) -> str:
-    """Return a hint like ``" Did you mean 'h'?"`` for ``hours``; otherwise that of `nearest`."""
-    unit = _spelled_out(str(name), allowed)
-    return f" Did you mean '{unit}'?" if unit else nearest(name, allowed)
-
-
 def unit_in_cell(cell: str, allowed: Collection[str]) -> str | None:
     """Return the unit in a cell of a row of units, with brackets or without; None for others."""
-    return _known(_bare(cell), allowed) or _spelled_out(_bare(cell), allowed)
+    return known_unit(_bare(cell), allowed)
 
 
 def in_brackets(cell: str) -> bool:
@@ -173,30 +201,44 @@ def plain_name(name: str) -> str:
     return normalize("NFKC", name).strip().replace("\u03bc", "u").replace("°", "deg")
 
 
+def known_unit(written: str, allowed: Collection[str]) -> str | None:
+    """Return the allowed unit that is written, as µm, sec or Pa^-1; None if there is none."""
+    plain = plain_name(written)
+    power = _RECIPROCAL.fullmatch(plain)
+    for name in (plain, f"1/{power[1]}" if power else plain, re.sub(r"[ ·.*⋅]", "", plain)):
+        for unit in allowed:
+            if name in (unit, unit.replace(" ", "")):
+                return unit
+    return next((unit for unit in allowed if plain.lower() in _SPELLED_OUT.get(unit, ())), None)
+
+
+def _endings(column: str) -> list[str]:
+    """Return what may be a unit at the end of a name, empty where there is no such ending."""
+    name = plain_name(column)
+    found = [pattern.search(name) for pattern in _UNIT_AT_END]
+    ends = ["".join(filter(None, match.groups())).strip() if match else "" for match in found]
+    return [f"1/{end}" if end and at == _SURELY else end for at, end in enumerate(ends)]
+
+
 def _unit_at_end(column: str, allowed: Collection[str]) -> str | None:
-    ending = _UNIT_AT_END.search(plain_name(column))
-    if ending is None:
-        return None
     # A name may end with something other than a unit, as in rotation_left or phi (2).
-    per, *units = ending.groups()
-    unit = "".join(filter(None, units)).strip()
-    return _known(f"1/{unit}" if per else unit, allowed)
+    return next(filter(None, (known_unit(end, allowed) for end in _endings(column) if end)), None)
+
+
+def _said_at_end(column: str) -> str | None:
+    """Return what can be nothing but a unit at the end of a name, or None."""
+    return next((end for end in _endings(column)[:_SURELY] if end and not end.isdigit()), None)
+
+
+def _is_pure(column: str) -> bool:
+    """Return True if a name has no ending, but perhaps a number, that could be a unit."""
+    name = plain_name(column)
+    return not name.isdigit() and _PURE.fullmatch(_NUMBERED.sub("", name)) is not None
 
 
 def _bare(cell: str) -> str:
     plain = plain_name(cell)
     return plain[1:-1].strip() if in_brackets(plain) else plain
-
-
-def _known(unit: str, allowed: Collection[str]) -> str | None:
-    power = _RECIPROCAL.fullmatch(unit)
-    written = f"1/{power[1]}" if power else unit
-    return written if written in allowed else None
-
-
-def _spelled_out(word: str, allowed: Collection[str]) -> str | None:
-    plain = plain_name(word).lower()
-    return next((unit for unit in allowed if plain in _SPELLED_OUT.get(unit, ())), None)
 
 
 def place(path: Path, line: int | None = None, column: str | None = None) -> str:
@@ -221,7 +263,8 @@ def trace_file_problem(path: str | Path) -> str | None:
     """Return what is wrong with the path of a trace, or None if it is a file."""
     file, shown = Path(path), visible(path)
     shown = shown if len(shown) <= _LONGEST_PATH else f"{shown[:_LONGEST_PATH]}..."
-    found = f"found '{shown}', allowed is a file that exists."
+    folder = "" if file.is_absolute() else f" in the folder {visible(file.parent.absolute())}"
+    found = f"found '{shown}', allowed is a file that exists{folder[:_LONGEST_PATH]}."
     try:
         if file.is_file():
             return None

@@ -120,10 +120,13 @@ def check_recording(
     # Only the force of a spring is constant, as long as its deformation is.
     if weights is None or (np.ptp(trace) == 0 and not instrument.deforms):
         unit = f" {read.unit}".rstrip()
+        given = ""
+        if noise_rad is not None:
+            given = f" Given were {noise_rad:g}{unit} as noise; the peak is {largest:.3g}{unit}."
         raise BiogripError(
             f"{where}: found no response to the {controlled}, but {trace.mean():.3g}{unit} "
             f"throughout, give or take {trace.std():.2g}{unit}; allowed is a {read.name} from zero "
-            f"that follows the {controlled} and stands out of the noise."
+            f"that follows the {controlled} and stands out of the noise.{given}"
         )
     if _is_mirrored(functions, len(trace), gripper, noise_rad):
         sign = "one of the same sign"

@@ -1,12 +1,13 @@
 """Reader of recorded traces in the user's own files, with gaps, units and line numbers."""
 
 from dataclasses import asdict, dataclass, replace
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
 from biogrip.terminal import visible
@@ -18,13 +19,14 @@ from biogrip.traces.columns import (
     shortened,
     unit_of,
 )
-from biogrip.traces.tables import Sheet, Table, find_tables, number_or_inf, read_sheet
+from biogrip.traces.loads import ramps
+from biogrip.traces.tables import BLANKS, Sheet, Table, find_tables, number_or_inf, read_sheet
 
 FEWEST_SAMPLES = 10
 
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
-_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
 
 
 @dataclass(frozen=True)
@@ -34,11 +36,11 @@ class Recognised:
     encoding: str
     """Name of the encoding."""
     separator: str
-    """``commas``, ``semicolons`` or ``tabs``."""
+    """``commas``, ``semicolons``, ``tabs`` or ``blanks``."""
     decimal: str
     """``point`` or ``comma``."""
-    header_line: int
-    """Line of the names."""
+    header_line: int | None
+    """Line of the names, if there is one."""
     units_line: int | None
     """Line of the row of units, if there is one."""
     block: int | None
@@ -57,6 +59,10 @@ class Recognised:
     """Number of readings that were averaged, for they have equal times, if any."""
     outside: int | None
     """Number of readings that were left out, for they are not among the times to use, if any."""
+    others: int | None
+    """Number of rows that were left out, for `rows` says so, if any."""
+    load: str | None
+    """How the column of what was controlled is followed, if it is read."""
     first_s: float
     """First time."""
     last_s: float
@@ -67,7 +73,7 @@ class Recognised:
         odd = (self.units_line, self.block, self.preamble, self.averaged, self.outside)
         return (
             (self.encoding, self.separator, self.decimal) == ("UTF-8", "commas", "point")
-            and not any((*odd, columns.block))
+            and not any((*odd, self.others, self.load, columns.block))
             and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
         )
 
@@ -105,6 +111,9 @@ class Recording:
     """Standard deviations of the rotations, (n_samples,), where the file has them."""
     recognised: Recognised | None = None
     """What was recognised in the file."""
+    load: Array | None = None
+    """Times and loads, or deformations, in SI units, linear between them, (n, 2), where they are
+    read: of all rows, used or not. See `ramps`."""
 
 
 def read_recording(path: Path, columns: Columns) -> Recording:
@@ -141,12 +150,17 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     sheet = read_sheet(path, columns)
     tables, index = find_tables(path, sheet, columns)
     table = tables[index]
-    header_line = int(sheet.numbers[table.at])
-    indices = _indices(path, header_line, table, columns)
-    units = _units(path, table, indices, columns)
+    header_line = int(sheet.numbers[table.at]) or None
+    indices, units = _columns_of(path, header_line, table, columns)
     values, decimal = _numbers(path, sheet, table, indices)
-    gaps = np.any(np.isnan(values), axis=1)
-    kept, lines = values[~gaps], sheet.numbers[table.first : table.end][~gaps]
+    lines, load, followed = sheet.numbers[table.first : table.end], None, None
+    if columns.load is not None:
+        history, values = values[:, [0, -1]], values[:, :-1]
+        numbers = ~np.any(np.isnan(history), axis=1)
+        load, followed = _load(path, columns, history[numbers], lines[numbers], units)
+    chosen = _chosen(path, sheet, table, columns)
+    gaps = chosen & np.any(np.isnan(values), axis=1)
+    kept, lines = values[chosen & ~gaps], lines[chosen & ~gaps]
     without_number = int(np.count_nonzero(gaps))
     _check_count(path, columns, len(kept), without_number)
     if columns.sd is not None:
@@ -178,47 +192,67 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         gaps=without_number,
         averaged=averaged or None,
         outside=int(np.count_nonzero(~used)) or None,
+        others=int(np.count_nonzero(~chosen)) or None,
+        load=followed,
         first_s=float(time_s[0]),
         last_s=float(time_s[-1]),
     )
     unit = columns.quantity.units[units[1]]
     sd_rad = None if columns.sd is None else kept[:, 2] * (unit * abs(columns.scale))
     rotation_rad = kept[:, 1] * (unit * columns.scale)
-    return Recording(time_s, rotation_rad, lines, without_number, sd_rad, recognised)
+    return Recording(time_s, rotation_rad, lines, without_number, sd_rad, recognised, load)
 
 
-def _indices(path: Path, line: int, table: Table, columns: Columns) -> list[int]:
-    """Return where the columns to read are in a table."""
+def _columns_of(
+    path: Path, line: int | None, table: Table, columns: Columns
+) -> tuple[list[int], list[str]]:
+    """Return where the columns to read are in a table, and their units; or list what is wrong."""
     found: dict[int, str] = {}
+    units: list[str] = []
+    problems: list[str] = []
+    ways = columns.said_by(*columns.named)
+    if not any(table.indices(it) for it in columns.named.values()) and all(
+        isfinite(number_or_inf(name.replace(",", "."))) for name in table.names if name
+    ):
+        raise BiogripError(
+            f"{place(path, line)}: found numbers, allowed is a line with the names of the columns; "
+            f"or say their numbers, 1 to {len(table.names)}, by {ways}, and their units."
+        )
     for key, column in columns.named.items():
         same, where = table.indices(column), place(path, line, column)
         if not same:
-            raise BiogripError(
+            problems.append(
                 f"{where}: found no such column, allowed are {listed(table.names)}."
-                f"{nearest(column, table.names)} Say which is which by "
-                f"{columns.said_by(*columns.named)}."
+                f"{nearest(column, table.names)} Say which is which by {ways}."
             )
+            continue
         if len(same) > 1:
-            raise BiogripError(f"{where}: found {len(same)} columns of this name, allowed is one.")
-        if same[0] in found:
-            raise BiogripError(
-                f"{where}: found {found[same[0]]} and {key} in one column, allowed are two."
-            )
+            problems += [f"{where}: found {len(same)} columns of this name, allowed is one."]
+        elif same[0] in found:
+            text = f"found {found[same[0]]} and {key} in one column, allowed are two."
+            problems += [f"{where}: {text}"]
         found[same[0]] = key
-    return list(found)
+        below = table.units[same[0]] if table.units else ""
+        try:
+            units.append(_unit(path, key, below, columns, units))
+        except BiogripError as error:
+            problems.append(str(error))
+    if problems:
+        raise BiogripError("\n".join(problems))
+    return list(found), units
 
 
-def _units(path: Path, table: Table, indices: list[int], columns: Columns) -> list[str]:
-    """Return the units of the columns to read."""
-    below = [table.units[i] if table.units else "" for i in indices]
-    said_by = columns.said_by("time_unit"), columns.said_by(columns.unit_key)
-    time = unit_of(path, columns.time, columns.time_unit, TIME_UNITS, said_by[0], below[0])
-    units, unit = [time], columns.reading_unit
-    for column, cell in zip(list(columns.named.values())[1:], below[1:], strict=True):
-        # Standard deviations are in the unit of the readings.
-        unit = unit_of(path, column, unit, columns.quantity.units, said_by[1], cell)
-        units.append(unit)
-    return units
+def _unit(path: Path, key: str, below: str, columns: Columns, units: list[str]) -> str:
+    """Return the unit of a column; standard deviations have that of the readings before them."""
+    name, given, unit_key = columns.named[key], columns.reading_unit, columns.unit_key
+    allowed = columns.quantity.units
+    if key == "time":
+        given, unit_key, allowed = columns.time_unit, "time_unit", TIME_UNITS
+    elif key == "load":
+        given, unit_key, allowed = columns.load_unit, "load_unit", columns.controlled.units
+    elif key == "sd":
+        given = units[1] if len(units) > 1 else given
+    return unit_of(path, name, given, allowed, columns.said_by(unit_key), below)
 
 
 def _numbers(path: Path, sheet: Sheet, table: Table, indices: list[int]) -> tuple[Array, str]:
@@ -252,6 +286,37 @@ def _numbers(path: Path, sheet: Sheet, table: Table, indices: list[int]) -> tupl
                 "or nothing where there is none."
             )
     return values, decimal
+
+
+def _chosen(path: Path, sheet: Sheet, table: Table, columns: Columns) -> BoolArray:
+    """Return which rows have the values of other columns that are asked for, (n_rows,)."""
+    chosen = np.ones(table.end - table.first, bool)
+    for column, wanted in (columns.rows or {}).items():
+        where = place(path, int(sheet.numbers[table.at]) or None, column)
+        if not (same := table.indices(column)):
+            text = f"found no such column, allowed are {listed(table.names)}."
+            raise BiogripError(f"{where}: {text}{nearest(column, table.names)}")
+        cells = [str(cell) for cell in sheet.cells[table.first : table.end, same[0]]]
+        values = [*dict.fromkeys(cells)]
+        fits = {it for it in values if it == str(wanted) or number_or_inf(it) == wanted}
+        if not fits:
+            text = f"found no row with '{wanted}', allowed are {listed(values, 10)}."
+            raise BiogripError(f"{where}: {text}{nearest(wanted, values)}")
+        chosen &= [cell in fits for cell in cells]
+    return chosen
+
+
+def _load(
+    path: Path, columns: Columns, history: Array, lines: IntArray, units: list[str]
+) -> tuple[Array, str]:
+    """Return ramps in SI units that follow times and loads, (n, 2), and how they do in words."""
+    _check_count(path, columns, len(history), 0)
+    if columns.average_repeated:
+        history, lines, _ = _averaged(history, lines)
+    _check_order(path, columns, history[:, 0], lines)
+    ends, off = ramps(*history.T)
+    said = f"{counted(len(ends) - 1, 'ramp')} along {columns.load}, within {off:.2g} {units[-1]}"
+    return ends * [TIME_UNITS[units[0]], columns.controlled.units[units[-1]]], said
 
 
 def _averaged(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:

@@ -3,6 +3,8 @@
 A table is a row of names, perhaps a row of units, and rows of cells, perhaps below a preamble.
 Anton Paar's programs write lines like ``Interval:``, a row of names, perhaps an empty row, and a
 row of units in brackets. TRIOS writes ``[step]``, the name of the step, names, and bare units.
+NumPy and AFM programs write the names in a comment above the rows, and blanks between cells; and a
+table without names has numbers of columns.
 """
 
 import re
@@ -12,6 +14,7 @@ from dataclasses import dataclass, replace
 from io import BytesIO
 from itertools import pairwise
 from math import inf, isfinite, nan
+from operator import eq
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +36,9 @@ from biogrip.traces.columns import (
     unit_in_cell,
 )
 
+BLANKS = " "
 SEPARATORS = (",", ";", "\t")
+"""What parts cells, but for `BLANKS`."""
 
 # Guesses among all encodings take µ for Chinese.
 _ENCODINGS = {
@@ -46,6 +51,13 @@ _ENCODINGS = {
 _LINE_END = re.compile(r"\r\n|\r|\n")
 # Empty lines and comments; #REF!, #DIV/0! or #NAME? followed by a separator are cells.
 _LEFT_OUT = re.compile(r" *(?:$|#(?!(?:[A-Z0-9/_]+[!?]|N/A|NV)\s*[,;\t]))")
+_COMMENT = re.compile(r"\s*(?:[#%]+|//+)[ \t]*")
+_BEFORE_NAMES = re.compile(r"(?:columns|names|fields|header)\s*[:=]\s*", re.I)
+_BEFORE_UNITS = re.compile(r"units?\s*[:=]\s*", re.I)
+# Cells between blanks: quoted, or with a unit in brackets after a blank.
+_CELL = re.compile(r'"[^"]*"|[^\s"]+(?:[ \t]+[\[(][^\])\s]*[\])])?')
+_OTHERWISE = re.compile(r"[,;\t][\"\s]|[\"\s][,;\t]")
+_WIDE_GAP = re.compile(r"\s{2,}|\t")
 # Begins like a row of numbers.
 _ROW = re.compile(r'[\s",;]*[-+]?[.\d][\d.,eE+-]*[\s",;]')
 _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
@@ -63,13 +75,13 @@ class Sheet:
     encoding: str
     """Name of the encoding."""
     separator: str
-    """Cell separator."""
+    """What parts cells, `BLANKS` for any number of blanks."""
     cells: NDArray[Any]
     """Cells without padding, (n_lines, n_columns), empty where a line is shorter."""
     widths: IntArray
     """Numbers of separators and one, (n_lines,)."""
     numbers: IntArray
-    """Line numbers in the file, from 1, (n_lines,)."""
+    """Line numbers in the file, from 1, (n_lines,); 0 of names that are numbers of columns."""
     headers: list[int]
     """Places of lines that may be headers: of the first, and of those that begin with words."""
 
@@ -118,17 +130,21 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
     import pandas as pd
 
     encoding, lines = _read_lines(path)
-    kept = np.flatnonzero([not _LEFT_OUT.match(line) for line in lines])
-    if not len(kept):
+    numbered = _with_names(lines, {*map(plain_name, columns.named.values())})
+    if not numbered:
         raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
-    lines = [lines[i] for i in kept]
-    headers = [i for i, line in enumerate(lines) if i == 0 or not _ROW.match(line)]
-    separator = _separator(lines, [lines[i] for i in headers], columns)
-    widths = np.array([line.count(separator) for line in lines]) + 1
+    lines, kept = [line for line, _ in numbered], np.array([number for _, number in numbered])
+    headers = [i for i, it in enumerate(lines) if i == 0 or kept[i] == 0 or not _ROW.match(it)]
+    named = separator = _separator(lines, [lines[i] for i in headers], columns)
+    if separator == BLANKS:
+        named, width = "\t", len(_CELL.findall(lines[-1]))
+        parted = [(_WIDE_GAP.split(line.strip()), _CELL.findall(line)) for line in lines]
+        lines = ["\t".join(wide if len(wide) == width else cells) for wide, cells in parted]
+    widths = np.array([line.count(named) for line in lines]) + 1
     try:
         frame = pd.read_csv(
             BytesIO("\n".join(lines).encode()),
-            sep=separator,
+            sep=named,
             header=None,
             names=range(widths.max()),
             index_col=False,
@@ -141,14 +157,14 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
         # A quote is open to the end.
         frame = pd.DataFrame()
     if len(frame) != len(lines):
-        is_open = re.compile(rf'(?:^|{separator}) *"(?:[^"]|"")*$')
+        is_open = re.compile(rf'(?:^|{named}) *"(?:[^"]|"")*$')
         row = next((i for i, line in enumerate(lines) if is_open.search(line)), 0)
         raise BiogripError(
-            f"{place(path, kept[row] + 1)}: found a quote without its end, allowed are quoted "
+            f"{place(path, kept[row])}: found a quote without its end, allowed are quoted "
             "cells that end on their line."
         )
     cells = np.vectorize(str.strip, otypes=[object])(frame.to_numpy())
-    return Sheet(encoding, separator, cells, widths, kept + 1, headers)
+    return Sheet(encoding, separator, cells, widths, kept, headers)
 
 
 def _read_lines(path: Path) -> tuple[str, list[str]]:
@@ -178,17 +194,85 @@ def _read_lines(path: Path) -> tuple[str, list[str]]:
     )
 
 
+def _with_names(lines: Sequence[str], wanted: set[str]) -> list[tuple[str, int]]:
+    """Return lines with numbers from 1, without comments and empty ones, but with those of names.
+
+    Where no other line has the wanted names, comments may have them, also behind ``columns:``, or
+    the last before the first row is as long as that; then comments like ``key: value`` above are
+    a preamble, and one with ``units:`` below is kept. Numbers of columns are names above the first
+    row.
+    """
+    kept = [(line, number) for number, line in enumerate(lines, 1) if not _LEFT_OUT.match(line)]
+    plain = [own for own in kept if not _COMMENT.match(own[0])]
+    first = next((own for own in plain if _ROW.match(own[0] + " ")), None)
+    if any(_has(line, wanted) for line, _ in plain if not _ROW.match(line)) or first is None:
+        return kept
+    if all(map(str.isdecimal, wanted)):
+        separator = max((*SEPARATORS[::-1], BLANKS), key=lambda it: len(_split(first[0], it)))
+        widest = range(1, len(_split(first[0], separator)) + 1)
+        names = (separator.join(map(str, widest)), 0)
+        return [*(own for own in plain if own[1] < first[1]), names, *plain[plain.index(first) :]]
+    found, above = list[tuple[str, int]](), list[tuple[str, int]]()
+    named, widths = False, [len(it) if len(it) > 1 else 0 for it in _splits(first[0])]
+    said = [
+        (_BEFORE_NAMES.sub("", line[mark.end() :]), number)
+        for number, line in enumerate(lines, 1)
+        if (mark := _COMMENT.match(line))
+    ]
+    texts = {number: text for text, number in said if _has(text, wanted)}
+    before = [own for own in (*said, *plain) if own[1] < first[1]]
+    likely = [own for own in before if any(map(eq, map(len, _splits(own[0])), widths))]
+    if not texts and likely and likely[-1] in said:
+        texts = {likely[-1][1]: likely[-1][0]}
+    for number, line in enumerate(lines, 1):
+        mark = _COMMENT.match(line)
+        text = line[mark.end() :].strip() if mark else line
+        if number in texts:
+            found += [*above, (texts[number], number)]
+            above, named = [], True
+        elif mark and named and _BEFORE_UNITS.match(text):
+            found.append((_BEFORE_UNITS.sub("", text), number))
+        elif mark and not named and ":" in text:
+            above.append((text, number))
+        elif not mark and text.strip():
+            found.append((line, number))
+            named = False
+    return found if texts else kept
+
+
+def _split(line: str, separator: str) -> list[str]:
+    if separator != BLANKS:
+        return line.split(separator)
+    return [line] if _OTHERWISE.search(line) else _CELL.findall(line)
+
+
+def _splits(line: str) -> list[list[str]]:
+    """Return the cells of a line by every separator, and by gaps of at least two blanks."""
+    return [*(_split(line, it) for it in (*SEPARATORS, BLANKS)), _WIDE_GAP.split(line.strip())]
+
+
+def _has(line: str, wanted: set[str]) -> bool:
+    return any(wanted <= _names(cells) for cells in _splits(line))
+
+
+def _names(cells: Sequence[str]) -> set[str]:
+    return {plain_name(cell.strip('" ')) for cell in cells}
+
+
 def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -> str:
     """Return the separator by which a line has most columns to read, or which most lines have."""
     wanted = {*map(plain_name, columns.named.values())}
 
     def merit(separator: str) -> tuple[int, int]:
-        rows = ({plain_name(cell.strip('" ')) for cell in row.split(separator)} for row in headers)
-        common = max(len(wanted & row) for row in rows)
-        return common, sum(separator in line for line in lines[:_LINES_SEARCHED])
+        common = 0
+        for row in headers:
+            wide = _WIDE_GAP.split(row.strip()) if separator == BLANKS else []
+            of = (len(wanted & _names(cells)) for cells in (_split(row, separator), wide))
+            common = max(common, *of)
+        return common, sum(len(_split(it, separator)) > 1 for it in lines[:_LINES_SEARCHED])
 
     # Where as many lines have commas as tabs or semicolons, these are decimal commas.
-    return max(reversed(SEPARATORS), key=merit)
+    return max((*SEPARATORS[::-1], BLANKS), key=merit)
 
 
 def find_tables(path: Path, sheet: Sheet, columns: Columns) -> tuple[list[Table], int]:
