@@ -305,10 +305,10 @@ def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
     return best.candidate if worth_it and more > 0 and worse <= WORTH_A_MENTION else None
 
 
-def asks_for_more(tried: Sequence[FittedModel], chosen: str) -> bool:
-    """Return True if BIC prefers another model that is no simpler than the chosen one."""
-    own, best = _own_and_best(tried, chosen)
-    return own.delta_bic >= WORTH_A_MENTION and len(best.model.names) >= len(own.model.names)
+def prefers_another(tried: Sequence[FittedModel], chosen: str) -> bool:
+    """Return True if BIC prefers another model to the chosen one, simpler or richer."""
+    own, _ = _own_and_best(tried, chosen)
+    return own.delta_bic >= WORTH_A_MENTION
 
 
 def advice(tried: Sequence[FittedModel], chosen: str) -> str:
@@ -317,7 +317,10 @@ def advice(tried: Sequence[FittedModel], chosen: str) -> str:
     title = own.model.title[0].upper() + own.model.title[1:]
     if own.delta_bic < WORTH_A_MENTION:
         return f"{title}: none of the {len(tried)} models tried suits the trace better."
-    lead = f"{best.model.title} is preferred, with a BIC lower by {plain(own.delta_bic)}."
+    lead = (
+        f"{best.model.title} (--model {best.candidate}) is preferred, with a BIC lower by "
+        f"{plain(own.delta_bic)}."
+    )
     if preferred_simpler(tried, chosen):
         return f"{title} is richer than the trace asks for: {lead}"
     if len(best.model.names) == len(own.model.names):

@@ -23,10 +23,10 @@ from biogrip.fit.multi_start import fit_from
 from biogrip.fit.nested_fits import (
     FittedModel,
     advice,
-    asks_for_more,
     fit_models,
     is_within,
     preferred_simpler,
+    prefers_another,
     ranked,
 )
 from biogrip.fit.problem import Identification, Problem, Progress
@@ -61,7 +61,7 @@ class FittedModels:
         """Return one row per model, and advice in words, as plain data.
 
         Findings are those on the quantities of the chosen model; None if its fit is rejected.
-        Advice is then only another model that may be the reason.
+        Advice is then only another model, simpler or richer, that may suit the trace.
         """
         if not self.tried:
             return {"models": [], "advice": None}
@@ -81,8 +81,8 @@ class FittedModels:
         words = advice(self.tried, self.chosen)
         if findings is not None:
             return {"models": rows, "advice": f"{words} {self._compared(findings)}".rstrip()}
-        more = asks_for_more(self.tried, self.chosen)
-        return {"models": rows, "advice": words if more else None}
+        better = prefers_another(self.tried, self.chosen)
+        return {"models": rows, "advice": words if better else None}
 
     def _compared(self, findings: Sequence[Finding]) -> str:
         """Return a sentence on where a preferred simpler model's values are, if it is nested."""

@@ -201,6 +201,8 @@ def _about_growth(growth: Array, instrument: Instrument) -> Iterator[str]:
         read = instrument.read.name
         many = f"{read}s" if instrument.has_jaws else "readings"
         low, high = np.quantile(growth, (0.05, 0.95))
+        if high < _TOO_MUCH * low:
+            return
         yield (
             f"The noise grows with the {read}: it is {high / low:.2g} times as large for the "
             f"largest tenth of the {many} as for the smallest, and neither the weights of the "

@@ -17,7 +17,7 @@ from biogrip.arrays import Array
 from biogrip.fit.multi_start import fit_from
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.profiles import Profile, compute_profiles, find_gaps
+from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.verdicts import Finding
 
 _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
@@ -50,7 +50,7 @@ def profile_over_onset(diagnosis: Diagnosis, time_s: Array) -> Diagnosis:
     ]
     costs = [best.threshold - each.threshold for each in others]
     merged = [
-        _merged(finding, [own[place] for own in of_others], costs, best.threshold)
+        _merged(finding, [own[place] for own in of_others], costs)
         for place, finding in enumerate(found)
     ]
     kept = len(diagnosis.findings)
@@ -89,10 +89,11 @@ def _end(best: Likelihood, step_s: float) -> float:
     return float(brentq(lambda s: _at(best, s).threshold, inside, outside, xtol=accuracy))
 
 
-def _merged(
-    finding: Finding, profiles: list[Profile], costs: list[float], threshold: float
-) -> Finding:
-    """Return a finding with the lowest of its profile and of those of other onsets."""
+def _merged(finding: Finding, profiles: list[Profile], costs: list[float]) -> Finding:
+    """Return a finding with the lowest of its profile and of those of other onsets.
+
+    It has no gaps: between two of the onsets nothing is known to be excluded.
+    """
     own = finding.profile
     values: Array = np.unique(np.concatenate([p.log_values for p in (own, *profiles)]))
     rows = [
@@ -110,6 +111,6 @@ def _merged(
             increases=increases,
             low=min(lows) if len(lows) == len(ends) else None,
             high=max(highs) if len(highs) == len(ends) else None,
-            gaps=find_gaps(values, increases, threshold),
+            gaps=(),
         ),
     )
