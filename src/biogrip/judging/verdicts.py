@@ -102,7 +102,7 @@ class Finding:
         low, high, unit = self.low, self.high, self._unit
         if low is not None and high is not None:
             factor = math.sqrt(high / low)
-            how = f" only within a factor of {factor:.2g}" if factor > WIDE else ""
+            how = f" only within a factor of {plain(factor, 2)}" if factor > WIDE else ""
             return f"determined{how}: {with_limits(self.value, low, high, self.quantity.unit)}"
         if low is not None:
             return f"only bounded below: at least {plain(low, 2)}{unit}"
