@@ -305,10 +305,10 @@ def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
     return best.candidate if worth_it and more > 0 and worse <= WORTH_A_MENTION else None
 
 
-def prefers_another(tried: Sequence[FittedModel], chosen: str) -> bool:
-    """Return True if BIC prefers another model to the chosen one, simpler or richer."""
+def fits_far_better(tried: Sequence[FittedModel], chosen: str) -> bool:
+    """Return True if BIC prefers another model, simpler or richer, and not for its size alone."""
     own, _ = _own_and_best(tried, chosen)
-    return own.delta_bic >= WORTH_A_MENTION
+    return own.delta_bic >= WORTH_A_MENTION and preferred_simpler(tried, chosen) is None
 
 
 def advice(tried: Sequence[FittedModel], chosen: str) -> str:

@@ -24,9 +24,9 @@ from biogrip.fit.nested_fits import (
     FittedModel,
     advice,
     fit_models,
+    fits_far_better,
     is_within,
     preferred_simpler,
-    prefers_another,
     ranked,
 )
 from biogrip.fit.problem import Identification, Problem, Progress
@@ -81,7 +81,7 @@ class FittedModels:
         words = advice(self.tried, self.chosen)
         if findings is not None:
             return {"models": rows, "advice": f"{words} {self._compared(findings)}".rstrip()}
-        better = prefers_another(self.tried, self.chosen)
+        better = fits_far_better(self.tried, self.chosen)
         return {"models": rows, "advice": words if better else None}
 
     def _compared(self, findings: Sequence[Finding]) -> str:
