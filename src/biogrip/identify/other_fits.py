@@ -262,6 +262,7 @@ def _note(
 ) -> Note:
     """Return the warning, with the verdicts that an offset and a drift would change."""
     case_problem, rejected = trace.problem, diagnosis.status == REJECTED
+    # Characteristic times, at the end of the former, are not among the latter.
     changed = [
         f"{after.quantity.label} would be {after.words().removeprefix('determined: ')}"
         for before, after in zip(diagnosis.findings, other.findings, strict=False)

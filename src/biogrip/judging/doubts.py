@@ -106,9 +106,10 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     least_rad = min(_NOISE_FREE * likelihood.noise_rad, _NOISE_FREE_OF_PEAK * residuals.peak_rad)
     if misfit_rad < least_rad:
         return Remainder([])
-    residual, directions = _left(residuals, likelihood.best)
+    residual, slopes = _left(residuals, likelihood.best)
     time_s, rounding_rad = residuals.trace.time_s, residuals.rounding_rad
     growth = compute_growth(residual, residuals.rotation(likelihood.best), rounding_rad)
+    directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
     basis = absorbed(directions / growth)
     struck = outliers_of(residual / growth, rounding_rad)
     if far_out(residual / growth, struck, len(basis)) >= FALSE_ALARM:
@@ -120,18 +121,16 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     if np.ptp(growth):
         scale = max(scale, estimate_noise(residual / growth, rounding_rad))
     times = float(np.sqrt(np.mean(bulk**2))) / scale
-    _, chance = correlated(bulk, basis)
+    correlation, chance = correlated(bulk, basis)
     notes: list[Note] = []
     found = None
     if chance < CERTAIN_MISFIT and times > _TOO_MUCH:
-        found = _misfit(likelihood, residual, bulk, times, scale)
+        found = _misfit(residuals, (residual, slopes), bulk, times, scale)
         notes += found.notes
-    doubts = [
-        *_about_growth(growth, residuals.instrument),
-        *_about_outliers(time_s, struck),
-        # Outliers distort a fit, so that all that it leaves is correlated.
-        *([] if found or struck.any() else _about_colour(bulk, basis, residuals.instrument)),
-    ]
+    doubts = [*_about_growth(growth, residuals.instrument), *_about_outliers(time_s, struck)]
+    # Outliers distort a fit, so that all that it leaves is correlated.
+    if not (found or struck.any()):
+        doubts += _about_colour(bulk, basis, correlation, chance, residuals.instrument)
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         notes.append(
@@ -153,19 +152,17 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
 
 
 def _left(residuals: Residuals, log_parameters: Array) -> tuple[Array, Array]:
-    """Return residuals, and the directions that the fit absorbs, (n_directions, n_samples)."""
+    """Return residuals, and their slopes by the parameters, none of very many readings."""
     if residuals.samples > _MANY:
         return residuals.left(log_parameters), np.zeros((0, residuals.samples))
-    residual, slopes = residuals(log_parameters)
-    return residual, np.vstack((slopes, residuals.trace.condensed.nuisance))
+    return residuals(log_parameters)
 
 
 def _misfit(
-    likelihood: Likelihood, residual: Array, bulk: Array, times: float, scale: float
+    residuals: Residuals, left: tuple[Array, Array], bulk: Array, times: float, scale: float
 ) -> Remainder:
     """Return the note on a misfit that is some times the noise, and whether it widens limits."""
-    residuals = likelihood.problem.residuals
-    if has_uneven_noise(residual, residuals.rounding_rad):
+    if has_uneven_noise(left[0], residuals.rounding_rad):
         text = (
             "The noise differs from one part of the trace to another, and the intervals do not "
             "allow for that: leave out the readings that scatter most (--from, --until), or give "
@@ -174,7 +171,7 @@ def _misfit(
         return Remainder([Note(DOUBT, text)])
     independent = count_independent(bulk)
     allowed = f"The limits count {max(independent, 1):.2g} of {len(bulk)} residuals as independent."
-    if has_fast_noise(residuals, likelihood.best):
+    if has_fast_noise(residuals, *left):
         text = (
             f"The misfit is {times:.2g} times the noise of neighbouring readings, as of noise that "
             f"is correlated for a short time. {allowed}"
@@ -210,10 +207,14 @@ def _about_growth(growth: Array, instrument: Instrument) -> Iterator[str]:
         )
 
 
-def _about_colour(residual: Array, basis: Array, instrument: Instrument) -> Iterator[str]:
-    """Yield a sentence for each test of white noise that residuals, (n_samples,), fail."""
+def _about_colour(
+    residual: Array, basis: Array, correlation: float, chance: float, instrument: Instrument
+) -> Iterator[str]:
+    """Yield a sentence for each test of white noise that residuals, (n_samples,), fail.
+
+    The correlation of neighbours and its chance are given.
+    """
     wrong = instrument.suspects()
-    correlation, chance = correlated(residual, basis)
     if chance < FALSE_ALARM:
         yield (
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
@@ -306,19 +307,19 @@ def find_slow_misfit(
     )
 
 
-def has_fast_noise(residuals: Residuals, log_parameters: Array) -> bool:
+def has_fast_noise(residuals: Residuals, residual: Array, slopes: Array) -> bool:
     """Return True if what a fit leaves is stationary noise that is correlated for a short time.
 
-    That is not estimated of more than `MOST_SAMPLES` readings, nor of residuals that are white.
+    Given are the residuals, (n_samples,), and their slopes, (n_parameters, n_samples). That is not
+    estimated of more than `MOST_SAMPLES` readings, nor of residuals that are white.
     """
     time_s = residuals.trace.time_s
     if residuals.coloured or len(time_s) > MOST_SAMPLES:
         return False
-    residual, sensitivity = residuals(log_parameters)
     stretches = np.array_split(np.square(residual), min(_SLOW_STRETCHES, len(residual)))
     if max(float(np.sum(each)) for each in stretches) > _IN_ONE * float(residual @ residual):
         return False
-    noise_model = NoiseModelLikelihood(time_s, residual, sensitivity).best()
+    noise_model = NoiseModelLikelihood(time_s, residual, slopes).best()
     fast = noise_model.time_s <= _SLOW * residuals.duration_s
     return fast and noise_model.ar1 > _NOTICEABLE
 

@@ -63,7 +63,6 @@ class Likelihood:
     profile that levels off between `threshold` and this would have a limit by chance alone."""
     freedom: float = inf
     """Degrees of freedom of the noise's estimated variance; infinite if the noise is known."""
-
     confidence: float = 0.95
     """Of the limits."""
     independent: float = inf
@@ -77,16 +76,14 @@ class Likelihood:
         the misfit, with at least one degree of freedom; the noise is as much larger as makes all
         readings worth as many.
         """
-        from scipy.special import fdtri
-
         freedom = max(independent - 2 * len(self.best), 1.0)
         noise_rad = self.misfit_rad * math.sqrt(self.problem.residuals.samples / freedom)
-        threshold, certainty = (fdtri(1, freedom, level) for level in (self.confidence, CERTAIN))
+        threshold, certainty = _thresholds(self.confidence, freedom)
         return replace(
             self,
             noise_rad=noise_rad,
-            threshold=float(threshold),
-            certainty=float(certainty),
+            threshold=threshold,
+            certainty=certainty,
             freedom=freedom,
             independent=independent,
         )
@@ -129,26 +126,27 @@ def make_likelihood(
     noise_rad
         Standard deviation of the noise if it is known.
     """
-    from scipy.special import fdtri
-
-    levels, freedom = (confidence, CERTAIN), inf
-    if noise_rad is not None:
-        threshold, certainty = (NormalDist().inv_cdf((1 + level) / 2) ** 2 for level in levels)
-    else:
+    freedom = inf
+    if noise_rad is None:
         left = problem.residuals.free - len(best)
         noise_rad = misfit_rad * float(np.sqrt(problem.residuals.samples / left))
         freedom = float(min(left, problem.residuals.freedom))
-        threshold, certainty = fdtri(1, freedom, levels)
+    threshold, certainty = _thresholds(confidence, freedom)
     return Likelihood(
-        problem,
-        best,
-        misfit_rad,
-        noise_rad,
-        float(threshold),
-        float(certainty),
-        freedom,
-        confidence,
+        problem, best, misfit_rad, noise_rad, threshold, certainty, freedom, confidence
     )
+
+
+def _thresholds(confidence: float, freedom: float) -> tuple[float, float]:
+    """Return the increases of chi^2 at limits and at `CERTAIN`, by the freedom of the noise."""
+    from scipy.special import fdtri
+
+    levels = confidence, CERTAIN
+    if freedom == inf:
+        at_limits, certain = (NormalDist().inv_cdf((1 + level) / 2) ** 2 for level in levels)
+    else:
+        at_limits, certain = (float(fdtri(1, freedom, level)) for level in levels)
+    return at_limits, certain
 
 
 def compute_fall(
