@@ -149,6 +149,7 @@ def test_readings_over_decades_are_drawn_over_the_time_since_the_start() -> None
     [
         ({"reads": "strian"}, "reads: found 'strian', allowed are rotation, displacement, strain,"),
         ({"hold": None}, "hold: is missing; allowed is the stress in Pa that was held"),
+        ({"hold": 0.0}, "hold: protocol.phases: no phase has a stress"),
         ({"model": "zener"}, "model: .*found 'zener'. Did you mean 'zener_kelvin'"),
         ({"sd": [1.0]}, "found 325 of time_s and 325 of strain and 1 of sd; allowed are as many"),
         ({"config": {"protocol": {}}}, "hold: does not go with config's protocol"),

@@ -218,7 +218,7 @@ def _with_instrument(
                 "column of it by --load, or a protocol in --config."
             )
     own = _recording(trace, measurement)
-    phases = [{"duration_s": 1.0, controlled.column: level or 1.0}]
+    phases = [{"duration_s": 1.0, controlled.column: 1.0 if level is None else level}]
     start_s = measurement.get("start_s")
     if own is not None and own.load is not None:
         start_s = own.load[0, 0] if start_s is None else start_s
