@@ -4,6 +4,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from textwrap import indent
 from typing import Any
 
 from biogrip.digits import plain, with_limits, with_unit, within_limits
@@ -151,7 +152,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         lines += _once(found, lambda it: [taken_for_granted(it)] if it["by_default"] else [])
     if refused:
         lines.append(f"Not identified, {len(refused)} of {len(refused) + len(found)}:")
-        lines += [f"  {visible_lines(reason)}" for reason in refused.values()]
+        lines += [indent(visible_lines(reason), "  ") for reason in refused.values()]
     return "\n".join(lines)
 
 
