@@ -80,8 +80,9 @@ CERTAIN_MISFIT = 0.001
 _TOO_MUCH = 1.2
 # A misfit of this share of the peak is far off.
 _FAR_OFF = 0.02
-# A misfit below these shares of the noise and of the peak is that of a trace without noise.
-_NOISE_FREE, _NOISE_FREE_OF_PEAK = 0.01, 1e-3
+# A misfit below these shares of the noise and of the peak is that of a trace without noise, and so is
+# one below what no sensor resolves.
+_NOISE_FREE, _NOISE_FREE_OF_PEAK, _UNRESOLVED = 0.01, 1e-3, 1e-6
 # A misfit below this share of the given noise is reported: noise is rarely known better.
 _TOO_LITTLE = 0.5
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
@@ -105,7 +106,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     """Test what the best fit of a trace leaves for noise, and for misfit."""
     residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
     least_rad = min(_NOISE_FREE * likelihood.noise_rad, _NOISE_FREE_OF_PEAK * residuals.peak_rad)
-    if misfit_rad < least_rad:
+    if misfit_rad < max(least_rad, _UNRESOLVED * residuals.peak_rad):
         return Remainder([])
     residual, slopes = _left(residuals, likelihood.best)
     time_s, rounding_rad = residuals.trace.time_s, residuals.rounding_rad

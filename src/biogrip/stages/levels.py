@@ -84,8 +84,8 @@ should hold the truth.
 **The set-up is wrong.** None should be ok where the misfit, that of the best fit to a trace without
 noise, is several times the noise. An outlier is 15 standard deviations off; a start is late by 5 %
 of the trace, a ramp that is taken for a step lasts 10 % of it; another model has a second
-relaxation time, ten times as long; the load changes at 60 % of the trace in a wrong protocol, and minutes are
-taken for seconds in a wrong unit, which steps cannot show.
+relaxation time, ten times as long; the load changes at 60 % of the trace in a wrong protocol, and
+minutes are taken for seconds in a wrong unit, which steps cannot show.
 
 {wrong}
 """
@@ -228,7 +228,7 @@ def _cell(instrument: str, readings: int, decades: int, set_up: str, traces: int
             status.update(map(_status_of, problems, found))
             some = cleans[: _SOME if not first else 0]
             exact = [experiment.of(told_s, clean) for clean in some]
-            fits = identify_many(exact, _BUDGET, rngs, silent) if exact else []
+            fits = identify_many(exact, _BUDGET, rngs[: len(exact)], silent) if exact else []
             sds = [_NOISE * float(np.max(np.abs(clean))) for clean in some]
             misfits += [fit.misfit_rad / sd for fit, sd in zip(fits, sds, strict=True)]
     row: dict[str, Any] = {
