@@ -80,8 +80,8 @@ CERTAIN_MISFIT = 0.001
 _TOO_MUCH = 1.2
 # A misfit of this share of the peak is far off.
 _FAR_OFF = 0.02
-# A misfit below these shares of the noise and of the peak is that of a trace without noise, and so is
-# one below what no sensor resolves.
+# A misfit below these shares of the noise and of the peak is that of a trace without noise, and so
+# is one below what no sensor resolves.
 _NOISE_FREE, _NOISE_FREE_OF_PEAK, _UNRESOLVED = 0.01, 1e-3, 1e-6
 # A misfit below this share of the given noise is reported: noise is rarely known better.
 _TOO_LITTLE = 0.5
