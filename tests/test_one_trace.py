@@ -277,10 +277,10 @@ def test_a_trace_whose_fit_fails_costs_no_other_its_result(
     bad.write_text("".join(EXAMPLE.read_text().splitlines(keepends=True)[:-1]))
     whole_length = len(pd.read_csv(EXAMPLE))
 
-    def fails(problem: Any, time_s: Array, values: Array, near: Array) -> Any:
+    def fails(problem: Any, time_s: Array, values: Array, told: Any) -> Any:
         if len(time_s) < whole_length:
             raise ValueError("min() arg is an empty sequence")
-        return note_late_onset(problem, time_s, values, near)
+        return note_late_onset(problem, time_s, values, told)
 
     monkeypatch.setattr(one_trace, "note_late_onset", fails)
     table, options = tmp_path / "found.csv", ("--config", few, "--model", "liquid_drop")

@@ -1,6 +1,7 @@
 """Traces that start before their torque: given onsets, fitted ones, and what is said without."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,14 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit.fitted_onset import OnsetFits
+from biogrip.identify.notebook import identify_trace
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import Phase, hold, load
 from biogrip.stages import judgement, recording
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config
-from biogrip.traces.onset import begins_constant, estimate_onset
+from biogrip.traces.onset import begins_constant, estimate_onset, is_cut_off
 from tests.helpers import identified as command
 from tests.helpers.default import STUDY
 from tests.helpers.identified import by_quantity, identify, write_trace
@@ -234,3 +236,77 @@ def test_a_clock_outside_the_protocol_is_refused(
     (tmp_path / "lab.yaml").write_text(CONFIG)
     status, _, error = identify(trace, "--config", tmp_path / "lab.yaml", *start)
     assert (status, message in error) == (1, True)
+
+
+def told(times: Array, values: Array, **given: Any) -> tuple[str, str]:
+    """Return the status of a trace, and all notes on it."""
+    given["config"] = {"model_selection": {"models": []}, **given.get("config", {})}
+    found = identify_trace(times, values, **given)
+    return found.status, " ".join(note["text"] for note in found.data["notes"])
+
+
+SPACINGS = {
+    "even": np.arange(1, 61.0),
+    "from its first interval": np.arange(5, 61.0),
+    "few": np.geomspace(1.0, 1e3, 10),
+    "three decades": np.geomspace(0.06, 60.0, 4000),
+    "eight decades": np.geomspace(1e-3, 1e5, 80),
+    "three rates": np.r_[np.arange(0.2, 1, 0.01), np.arange(1, 10, 0.1), np.arange(10, 100.0)],
+    "at random": np.sort(np.random.default_rng(0).uniform(0, 60, 200)),
+}
+
+
+@pytest.mark.parametrize("spacing", SPACINGS)
+@pytest.mark.parametrize("unit_s", [1e-3, 1.0, 86_400.0])
+def test_only_readings_on_another_clock_seem_cut_off(spacing: str, unit_s: float) -> None:
+    """Whatever unit their clock has: readings that someone spaced from the step on do not."""
+    times = unit_s * SPACINGS[spacing]
+    assert not is_cut_off(times)
+    assert is_cut_off(times + 20 * (times[-1] - times[0]))
+
+
+HOLD = np.arange(0.4, 44, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("model", "reads", "clean", "said"),
+    [
+        ("maxwell", "force", 2.0 * np.exp(-HOLD / 8), " relaxation times of the fit. If it starts at 16 s"),
+        ("maxwell", "strain", 1 / 100 + HOLD / 5000, "k would be 100"),
+        ("kelvin_voigt", "strain", (1 - np.exp(-HOLD / 8)) / 100, "if it starts at 16 s of the"),
+    ],
+)
+def test_a_hold_on_the_clock_of_the_whole_test_is_not_ok(
+    model: str, reads: str, clean: Array, said: str
+) -> None:
+    """Exponentials look alike from any start; where another is shown, advice is that."""
+    values = clean + 2e-3 * clean.max() * np.random.default_rng(3).standard_normal(len(HOLD))
+    given = {"reads": reads, "model": model, "hold": 1e-3 if reads == "force" else 1.0}
+    status, notes = told(HOLD + 16, values, **given)
+    assert status == ("rejected" if model == "kelvin_voigt" else "doubtful")
+    assert "The readings begin 16.4 s after the step of the protocol" in notes
+    assert said in notes
+    assert "drift" not in notes
+    status, notes = told(HOLD + 16, values, start=16.0, **given)
+    assert (status, "begin" in notes) == ("ok", False)
+    if model == "maxwell":
+        assert told(HOLD + 16, values, start=0.0, **given)[0] == "ok"
+
+
+@pytest.mark.parametrize("ramp_s", [0.0, 1.0])
+def test_a_ramp_before_the_first_reading_is_said_to_change_values(ramp_s: float) -> None:
+    """Not where it is told, nor where the first reading comes soon after a step."""
+    times = np.geomspace(1.01 if ramp_s else 1e-3, 200.0, 200)
+    phases = [{"duration_s": 300.0, "strain": 1.0}]
+    if ramp_s:
+        phases[:0] = [{"duration_s": ramp_s, "strain": 0.0, "to_strain": 1.0}]
+    slope = 3.0 * np.expm1(ramp_s / 3.0) / ramp_s if ramp_s else 1.0
+    values = 100 + 200 * slope * np.exp(-times / 3.0)
+    values += 0.5 * np.random.default_rng(0).standard_normal(len(times))
+    given = {"reads": "stress", "model": "zener_maxwell"}
+    status, notes = told(times, values, hold=1.0, **given)
+    assert (status, "If it was a ramp" in notes) == ("ok", bool(ramp_s))
+    if said := re.search("k would be (.*) Pa; c", notes):
+        assert float(said[1]) == pytest.approx(200.0, rel=0.02)
+    protocol = {"instrument": "relaxation", "protocol": {"phases": phases}}
+    assert "If it was a ramp" not in told(times, values, config=protocol, **given)[1]

@@ -17,6 +17,7 @@ from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.problem import silent
+from biogrip.physics.whitening import estimate_noise
 
 _BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
 # Steps of the pattern search in sampling intervals: first, and last, and most of them.
@@ -61,6 +62,7 @@ class OnsetFits:
         self._case_problem = case_problem.to_identify()
         self._time_s, self._rotation_rad = time_s, rotation_rad
         self.interval_s = float(np.median(np.diff(time_s)))
+        self.noise_rad = estimate_noise(rotation_rad)
 
     def best(self, guess_s: float) -> OnsetFit:
         """Fit the onset along, beginning with a guess in s."""

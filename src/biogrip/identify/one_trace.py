@@ -48,7 +48,7 @@ from biogrip.stages import recording
 from biogrip.stages.judgement import fits_judged, notes_on_fit
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
-from biogrip.traces.onset import note_late_onset
+from biogrip.traces.onset import note_hidden_ramp, note_late_onset
 
 # Most traces of a batch, and most readings of traces that are fitted together.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
@@ -222,10 +222,13 @@ def identify_alike(
     ]
     progress.done()
     progress.doing("trying an offset and a drift")
+    starts = [_about_start(*each) for each in zip(traces, diagnoses, strict=True)]
     opinions = second_opinions(traces, diagnoses, progress.within)
     found = []
     for index, own in enumerate(traces):
-        notes = [*again[index][1], *opinions[index]]
+        # Beside another start, an offset and a drift mean nothing.
+        wrong = any(note.weight != HARMLESS for note in starts[index])
+        notes = [*again[index][1], *starts[index], *([] if wrong else opinions[index])]
         data = _data(own, fits[index], diagnoses[index], models[index], notes)
         data = {WRITTEN_BY: __version__, "trace": str(files[index]), **data}
         found.append(Identified(data, own.problem, own.recorded))
@@ -235,6 +238,13 @@ def identify_alike(
         read = INSTRUMENTS[data["reads"]["quantity"]].read
         write_text(output, json.dumps(in_own_units(rounded, read), indent=1) + "\n")
     return found
+
+
+def _about_start(trace: TraceCase, diagnosis: Diagnosis) -> list[Note]:
+    """Return notes on when the protocol starts, and on a ramp that no reading shows."""
+    given = trace.problem, *trace.readings, diagnosis
+    late = note_late_onset(*given) if trace.case.may_start_late else []
+    return late or note_hidden_ramp(*given)
 
 
 def _data(
@@ -248,10 +258,9 @@ def _data(
     case, problem, recorded = trace.case, trace.problem, trace.recorded
     instrument = problem.instrument
     best = diagnosis.likelihood.best
-    late = note_late_onset(problem, *trace.readings, best) if case.may_start_late else []
     assumptions = [Note(HARMLESS, _NOT_COMPARED)] if problem.fixed else []
     read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
-    said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *notes, *late], read)
+    said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *notes], read)
     form = recorded.recognised
     unusual = form and not form.is_usual(case.columns)
     return {

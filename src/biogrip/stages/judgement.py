@@ -66,8 +66,7 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
         diagnosis = profile_over_onset(diagnosis, recorded.time_s)
     notes = notes_on_fit(fit)
     if case.may_start_late:
-        near = diagnosis.likelihood.best
-        notes += note_late_onset(case_problem, recorded.time_s, trace, near)
+        notes += note_late_onset(case_problem, recorded.time_s, trace, diagnosis)
     said = diagnosis_data(diagnosis, notes)
     _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": valley})
 

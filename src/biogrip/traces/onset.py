@@ -3,8 +3,15 @@
 `estimate_onset` needs no sample model: the trace is fitted by any sample's possible responses to
 the delayed torque, and the delay with the least residual sum of squares is found on ever finer
 grids. That needs some hundred small fits; `biogrip.fit.fitted_onset` refines it with the model.
-`note_late_onset` tests if a trace begins before its protocol where the user did not say so.
+
+`note_late_onset` tests a trace of which nothing says when its protocol starts: if it begins before
+that, or so long after it that the clock may be another's. `note_hidden_ramp` says what a ramp
+changes that ends before the first reading.
 """
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import accumulate
 
 import numpy as np
 from scipy.special import chdtri
@@ -12,12 +19,14 @@ from scipy.special import chdtri
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import plain
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.fitted_onset import OnsetFits
-from biogrip.judging.doubts import REJECTION, Note
+from biogrip.fit.fitted_onset import OnsetFit, OnsetFits
+from biogrip.judging.diagnosis import Diagnosis
+from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import compute_fall
+from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lagged_torques
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Load, Phase, TorqueHistory
 from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
 from biogrip.traces.any_sample import extreme_responses, left_over
 
@@ -33,8 +42,15 @@ _LEAST_AFTER = 0.02
 _FEWEST_BEFORE = 3
 # Standard deviation of readings that are constant, in noise, and in peaks of noise-free traces.
 _CONSTANT, _CONSTANT_OF_PEAK = 2.0, 1e-3
-# So that correlated noise does not look like a late onset.
-_FALSE_ALARM = 1e-9
+# So that correlated noise does not look like a late onset; and level of a fit that is as good.
+_FALSE_ALARM, _AS_GOOD = 1e-9, 1e-3
+# Intervals from a change to the first reading of a trace that is cut off, fewest readings by which
+# their growth is known, and its powers of the time if readings were spaced from the change on.
+_DELAYED, _FEWEST_APART, _PLANNED = 10.0, 3, (0.5, 1.5)
+# Misfit over the scatter of neighbours that a right fit does not exceed.
+_WHITE = 1.5
+# Order of a sinusoid that starts, beside those of steps, ramps and curves.
+_SWING = 3
 
 
 def estimate_onset(
@@ -91,12 +107,14 @@ def guess_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> flo
 
 
 def note_late_onset(
-    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, near: Array
+    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, diagnosis: Diagnosis
 ) -> list[Note]:
-    """Fit the onset of a trace that begins constant, and reject the fit if that is far better.
+    """Test a trace for another start of its protocol than at 0, of which the user says nothing.
 
-    The test is a likelihood ratio. A trace that shows a later onset tells nothing of the sample
-    under the protocol as given, whatever noise model absorbs the misfit.
+    A trace that begins constant, and fits far better with a later start, tells nothing of the
+    sample under the protocol as given, whatever noise model absorbs the misfit: the test is a
+    likelihood ratio. One that begins long after the last change of the load, as if cut off there,
+    may have been recorded on another clock: then it is fitted with that change just before it.
 
     Parameters
     ----------
@@ -104,31 +122,163 @@ def note_late_onset(
         Assumptions of the identification, with a protocol that starts at 0.
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
-    near : (n_parameters,)
-        Log-parameters of the best fit with that protocol.
+    diagnosis
+        That of the best fit with that protocol.
 
     Returns
     -------
     list of Note
         At most one.
     """
+    delay_s = time_s[0] - max([start for start, *_ in _changes(case_problem, time_s)], default=0.0)
+    fits = OnsetFits(case_problem, time_s, rotation_rad)
+    if delay_s > 0 and is_cut_off(time_s - time_s[0] + delay_s):
+        return list(_about_clock(fits, time_s, delay_s, diagnosis))
     if not begins_constant(time_s, rotation_rad):
         return []
     guess_s = guess_onset(case_problem, time_s, rotation_rad)
     if not begins_constant(time_s, rotation_rad, guess_s):
         return []
-    fits = OnsetFits(case_problem, time_s, rotation_rad)
-    found, given = fits.best(guess_s), fits.at(0.0, near)
+    found, given = fits.best(guess_s), fits.at(0.0, diagnosis.likelihood.best)
     fall = compute_fall(len(time_s), given.misfit_rad, found.misfit_rad, case_problem.noise_rad)
     if not begins_constant(time_s, rotation_rad, found.onset_s) or fall < chdtri(1, _FALSE_ALARM):
         return []
     text = (
-        f"The trace is constant until {found.onset_s:.4g} s of its clock, and fits far better if "
-        f"the protocol starts there (χ² falls by {plain(fall)}). If it does, say --start "
-        f"{found.onset_s:.4g} (measurement.start_s), or --start fit (measurement.fit_start), which "
-        "allows for its uncertainty."
+        f"The trace is constant until some {found.onset_s:.2g} s of its clock, and fits far better "
+        f"if the protocol starts there (χ² falls by {plain(fall)}). If it does, say --start fit "
+        "(measurement.fit_start), which finds when, and allows for its uncertainty; or when it "
+        "was, if that is known (measurement.start_s)."
     )
     return [Note(REJECTION, text)]
+
+
+def _changes(case_problem: CaseProblem, time_s: Array) -> list[tuple[float, int]]:
+    """Return when the load changes before the first reading, and the orders of the changes."""
+    torque = case_problem.torque
+    jumps = [(start, order) for start, order, _ in torque.jumps]
+    swings = [(start, _SWING) for start, *_ in torque.swings]
+    return [change for change in (*jumps, *swings) if change[0] < time_s[0]]
+
+
+def is_cut_off(time_s: Array) -> bool:
+    """Return True if readings begin long after 0, (n_samples,), as if there had been earlier ones.
+
+    They begin more than ten of their first intervals after it, and these do not grow in proportion
+    to the time, as of readings that someone spaced from 0 on.
+    """
+    few = max(_FEWEST_APART, len(time_s) // 10)
+    ends = time_s[: few + 1], time_s[-few - 1 :]
+    (first_s, last_s), (early_s, late_s) = (
+        [float(operation(end)) for end in ends]
+        for operation in (lambda end: np.mean(np.diff(end)), np.mean)
+    )
+    growth = np.log(last_s / first_s) / np.log(late_s / early_s) if late_s > early_s else 0.0
+    return bool(time_s[0] > _DELAYED * first_s and not _PLANNED[0] < growth < _PLANNED[1])
+
+
+def _about_clock(
+    fits: OnsetFits, time_s: Array, delay_s: float, diagnosis: Diagnosis
+) -> Iterator[Note]:
+    """Yield a note if a trace may be on another clock, with the last change just before it."""
+    later_s = delay_s - (time_s[1] - time_s[0])
+    given = fits.at(0.0, diagnosis.likelihood.best)
+    rejected = diagnosis.status == REJECTED
+    tau_s = [
+        each.value
+        for each in diagnosis.findings
+        if each.quantity.label.startswith("tau") and each.verdict == DETERMINED
+    ]
+    lapse = ""
+    if tau_s and not rejected:
+        lapse = f", {plain(delay_s / min(tau_s), 2)} relaxation times of the fit"
+    text = f"The readings begin {plain(delay_s)} s after the step of the protocol{lapse}. "
+    ask = (
+        "Say when the protocol started (--start, measurement.start_s), be it at 0, or what came "
+        "before (--config, protocol)."
+    )
+    if rejected:
+        found = fits.best(later_s)
+        fall = compute_fall(len(time_s), given.misfit_rad, found.misfit_rad, None)
+        white = found.misfit_rad < _WHITE * fits.noise_rad
+        if 0 < found.onset_s < time_s[0] and white and fall > chdtri(1, _FALSE_ALARM):
+            yield Note(
+                REJECTION,
+                f"{text}The fit is far better if it starts at {found.onset_s:.4g} s of the clock "
+                f"(χ² falls by {plain(fall)}). {ask}",
+            )
+        return
+    other = fits.at(later_s, diagnosis.likelihood.best)
+    worse = -compute_fall(len(time_s), given.misfit_rad, other.misfit_rad, None)
+    moved = _moved(diagnosis, given, other, 0.5)
+    if moved and worse < chdtri(1, _AS_GOOD):
+        yield Note(
+            DOUBT,
+            f"{text}If it starts at {later_s:.4g} s of the clock, the trace fits as well: {moved}. "
+            f"{ask}",
+        )
+
+
+def _moved(diagnosis: Diagnosis, given: OnsetFit, other: OnsetFit, widths: float) -> str:
+    """Name what another fit moves beyond its limits, by more than so many of their widths."""
+    x = diagnosis.likelihood.best
+    moved = x + other.log_parameters - given.log_parameters
+    said = []
+    for each in diagnosis.findings:
+        before, after = each.quantity.log(x), each.quantity.log(moved)
+        width = np.log(each.high / each.low) if each.high and each.low else 0.0
+        if not each.allows(moved) and abs(after - before) > widths * width:
+            unit = f" {each.quantity.unit}".rstrip()
+            said.append(f"{each.quantity.label} would be {plain(np.exp(after))}{unit}")
+    return "; ".join(said)
+
+
+def note_hidden_ramp(
+    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, diagnosis: Diagnosis
+) -> list[Note]:
+    """Say what changes if the last step before the first reading is a ramp that ends with it.
+
+    A note is due if a value then moves by more than the width of its limits; see `note_late_onset`
+    for the parameters.
+    """
+    phases = _with_ramp(case_problem, time_s)
+    if diagnosis.status == REJECTED or not phases:
+        return []
+    near = diagnosis.likelihood.best
+    given, ramped = (
+        OnsetFits(replace(case_problem, phases=own), time_s, rotation_rad).at(0.0, near)
+        for own in (case_problem.phases, phases)
+    )
+    if not (moved := _moved(diagnosis, given, ramped, 1.0)):
+        return []
+    text = (
+        f"The limits take the load before the first reading for a step. If it was a ramp that ends "
+        f"with that reading, at {time_s[0]:.4g} s of the protocol: {moved}. A ramp is given by a "
+        "protocol (--config), or as recorded (--load)."
+    )
+    return [Note(HARMLESS, text)]
+
+
+def _with_ramp(case_problem: CaseProblem, time_s: Array) -> tuple[Phase, ...]:
+    """Return phases with a ramp up to the first reading, or none if no step is last before it."""
+    changes = _changes(case_problem, time_s)
+    last_s = max([start for start, _ in changes], default=np.nan)
+    phases, starts = case_problem.phases, [0.0]
+    starts += accumulate(phase.duration_s for phase in phases)
+    delay_s = float(time_s[0] - last_s)
+    if {order for start, order in changes if start == last_s} != {0} or last_s not in starts:
+        return ()
+    index = starts.index(last_s)
+    own, rest_s = phases[index], phases[index].duration_s - delay_s
+    before = phases[index - 1] if index else Phase(0.0, Load(0.0), Load(0.0))
+    if rest_s <= 0:
+        return ()
+    from_to = [
+        (float(of.at(before.duration_s)), to.value_Nm)
+        for of, to in ((before.left, own.left), (before.right, own.right))
+    ]
+    ramp = Phase(delay_s, *(Load(of, (to - of) / delay_s) for of, to in from_to))
+    held = replace(own, duration_s=rest_s)
+    return *phases[:index], ramp, held, *phases[index + 1 :]
 
 
 def begins_constant(time_s: Array, rotation_rad: Array, onset_s: float | None = None) -> bool:
