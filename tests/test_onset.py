@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.errors import BiogripError
 from biogrip.fit.fitted_onset import OnsetFits
 from biogrip.identify.notebook import identify_trace
 from biogrip.library import Sample, set_up, simulate
@@ -265,13 +266,61 @@ def test_only_readings_on_another_clock_seem_cut_off(spacing: str, unit_s: float
     assert is_cut_off(times + 20 * (times[-1] - times[0]))
 
 
+def test_a_late_start_is_advised_with_its_limits_and_with_the_tare() -> None:
+    """A ramp from 8.4 to 8.7 s, and a preload: a start without the offset would be biased."""
+    times = np.arange(0, 60, 0.5)
+    since = [np.clip(times - start_s, 0.0, None) for start_s in (8.4, 8.7)]
+    first, second = (60 * s - 800 * -np.expm1(-s / 20) for s in since)
+    values = 42 + (first - second) / 0.3
+    values += 0.3 * np.random.default_rng(2).standard_normal(len(times))
+    given: dict[str, Any] = {"reads": "strain", "model": "zener_kelvin", "hold": 1.0}
+    status, notes = told(times, values, **given)
+    assert status == "rejected"
+    (limits,) = re.findall(r"constant until \S+ s \((\S+) to (\S+)\) of its clock", notes)
+    assert float(limits[0]) < 8.7
+    assert float(limits[1]) > 8.4
+    assert "readings before the start are constant, but 42 and not 0" in notes
+    assert "drift" not in notes
+    found = identify_trace(
+        times, values, start="fit", offset=True, config={"model_selection": {"models": []}}, **given
+    )
+    assert "not 0" not in str(found)
+    low, high = found.data["onset_limits_s"]
+    assert low < 8.7
+    assert high > 8.4
+    assert f"({low:.2f} to {high:.2f}) of the clock, as fitted" in str(found)
+
+
+def test_models_are_compared_each_at_its_own_onset() -> None:
+    """At that of one without a power law, a third branch would seem the best."""
+    times = np.arange(0, 60, 0.5)
+    values = np.where(times > 5, np.clip(times - 5, 1e-9, None) ** 0.32, 0.0)
+    values += 0.02 * np.random.default_rng(4).standard_normal(len(times))
+    models = ["kelvin_voigt", "zener_kelvin", "springpot"]
+    config = {"model_selection": {"models": models}}
+    given: dict[str, Any] = {"reads": "strain", "model": "kelvin_voigt", "hold": 1.0}
+    found = identify_trace(times, values, config=config, start="fit", **given)
+    misfits = {row["model"]: row["misfit_rad"] for row in found.data["models"]}
+    assert misfits["springpot"] == pytest.approx(0.02, rel=0.15)
+
+
+def test_a_start_that_is_no_number_is_refused() -> None:
+    with pytest.raises(BiogripError, match="start: found 'soon', allowed is a number of seconds"):
+        identify_trace(HOLD, HOLD, reads="strain", start="soon")
+
+
 HOLD = np.arange(0.4, 44, 0.4)
 
 
 @pytest.mark.parametrize(
     ("model", "reads", "clean", "said"),
     [
-        ("maxwell", "force", 2.0 * np.exp(-HOLD / 8), " relaxation times of the fit. If it starts at 16 s"),
+        (
+            "maxwell",
+            "force",
+            2.0 * np.exp(-HOLD / 8),
+            " relaxation times of the fit. If it starts at 16 s",
+        ),
         ("maxwell", "strain", 1 / 100 + HOLD / 5000, "k would be 100"),
         ("kelvin_voigt", "strain", (1 - np.exp(-HOLD / 8)) / 100, "if it starts at 16 s of the"),
     ],

@@ -121,6 +121,8 @@ def identify_trace(
     if len({len(values) for values in columns.values()}) > 1:
         found = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
         raise BiogripError(f"found {found}; allowed are as many of each.")
+    if isinstance(start, str) and start != "fit":
+        raise BiogripError(f"start: found '{start}', allowed is a number of seconds, or 'fit'.")
     late = ("fit_start", True) if start == "fit" else ("start_s", start)
     measured = (
         *(("reads", reads, column), ("start", *late), ("sd", "sd", None if sd is None else "sd")),

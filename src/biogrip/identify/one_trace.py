@@ -48,7 +48,7 @@ from biogrip.stages import recording
 from biogrip.stages.judgement import fits_judged, notes_on_fit
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
-from biogrip.traces.onset import note_hidden_ramp, note_late_onset
+from biogrip.traces.onset import note_hidden_ramp, note_late_onset, note_tare
 
 # Most traces of a batch, and most readings of traces that are fitted together.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
@@ -216,10 +216,11 @@ def identify_alike(
     models = models_tried(traces, fits, diagnoses)
     again = [judge_again(*each) for each in zip(traces, fits, diagnoses, models, strict=True)]
     diagnoses = with_times([diagnosis for diagnosis, _ in again], first.problem.searched)
-    diagnoses = [
-        profile_over_onset(diagnosis, own.recorded.time_s) if own.problem.fit_start else diagnosis
-        for own, diagnosis in zip(traces, diagnoses, strict=True)
-    ]
+    onsets_s = {}
+    for index, own in enumerate(traces):
+        if own.problem.fit_start:
+            merged = profile_over_onset(diagnoses[index], own.recorded.time_s)
+            diagnoses[index], onsets_s[index] = merged
     progress.done()
     progress.doing("trying an offset and a drift")
     starts = [_about_start(*each) for each in zip(traces, diagnoses, strict=True)]
@@ -227,9 +228,9 @@ def identify_alike(
     found = []
     for index, own in enumerate(traces):
         # Beside another start, an offset and a drift mean nothing.
-        wrong = any(note.weight != HARMLESS for note in starts[index])
-        notes = [*again[index][1], *starts[index], *([] if wrong else opinions[index])]
-        data = _data(own, fits[index], diagnoses[index], models[index], notes)
+        opinions[index] *= not any(note.weight != HARMLESS for note in starts[index])
+        notes = [*again[index][1], *starts[index], *opinions[index]]
+        data = _data(own, fits[index], diagnoses[index], models[index], notes, onsets_s.get(index))
         data = {WRITTEN_BY: __version__, "trace": str(files[index]), **data}
         found.append(Identified(data, own.problem, own.recorded))
     for data, output in zip((each.data for each in found), outputs or (), strict=False):
@@ -244,7 +245,7 @@ def _about_start(trace: TraceCase, diagnosis: Diagnosis) -> list[Note]:
     """Return notes on when the protocol starts, and on a ramp that no reading shows."""
     given = trace.problem, *trace.readings, diagnosis
     late = note_late_onset(*given) if trace.case.may_start_late else []
-    return late or note_hidden_ramp(*given)
+    return [*(late or note_hidden_ramp(*given)), *note_tare(*given)]
 
 
 def _data(
@@ -253,8 +254,12 @@ def _data(
     diagnosis: Diagnosis,
     models: FittedModels,
     notes: Sequence[Note],
+    onset_limits_s: tuple[float, float] | None,
 ) -> dict[str, Any]:
-    """Return all that is said of a trace, as plain data; notes follow from other fits."""
+    """Return all that is said of a trace, as plain data; notes follow from other fits.
+
+    Limits of a fitted onset are counted from it.
+    """
     case, problem, recorded = trace.case, trace.problem, trace.recorded
     instrument = problem.instrument
     best = diagnosis.likelihood.best
@@ -272,7 +277,7 @@ def _data(
         **({"read_as": form.data()} if form and unusual else {}),
         **_fixed(problem),
         "limits": _gripper_in_limits(problem),
-        **_fitted_along(problem, recorded, np.exp(best)),
+        **_fitted_along(problem, recorded, np.exp(best), onset_limits_s),
         **said,
         "noise_model": fit.noise_data(),
         **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
@@ -309,10 +314,16 @@ def _gripper_in_limits(problem: CaseProblem) -> str:
 
 
 def _fitted_along(
-    problem: CaseProblem, recorded: Measurements, parameters: Array
-) -> dict[str, float | None]:
+    problem: CaseProblem,
+    recorded: Measurements,
+    parameters: Array,
+    onset_limits_s: tuple[float, float] | None,
+) -> dict[str, float | list[float]]:
     """Return onset, offset and drift of the instrument in the best fit, as far as fitted."""
-    found = {"onset_s": recorded.onset_s} if problem.fit_start else {}
+    found: dict[str, float | list[float]] = {}
+    if onset_limits_s and recorded.onset_s is not None:
+        found["onset_s"] = onset_s = recorded.onset_s
+        found["onset_limits_s"] = [onset_s + own_s for own_s in onset_limits_s]
     if not (problem.offset or problem.drift):
         return found
     time_s, measured = recorded.time_s, recorded.rotation_rad[0]

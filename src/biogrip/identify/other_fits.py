@@ -18,6 +18,7 @@ from scipy.special import chdtrc
 
 from biogrip.digits import plain
 from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.fitted_onset import OnsetFits
 from biogrip.fit.methods import identifier
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.nested_fits import (
@@ -28,6 +29,7 @@ from biogrip.fit.nested_fits import (
     is_within,
     preferred_simpler,
     ranked,
+    within_range,
 )
 from biogrip.fit.problem import Identification, Problem, Progress
 from biogrip.fit.trace_fit import TraceFit, fit_traces
@@ -137,10 +139,28 @@ def models_tried(
         found = fit_models(problems, budget, streams, lambda: None, near=near)
         for place, index in enumerate(which):
             answers = {name: found[name][place] for name in names}
+            if traces[index].problem.fit_start and not traces[index].problem.coloured:
+                answers = {
+                    name: _at_own_onset(traces[index], name, problems[name][place], answer)
+                    for name, answer in answers.items()
+                }
             misfits = [answer.misfit_rad for answer in answers.values()]
             samples = fits[index].problem.residuals.samples
             every[index] = FittedModels(chosen, ranked(names, misfits, samples), answers)
     return every
+
+
+def _at_own_onset(
+    trace: TraceCase, name: str, problem: Problem, found: Identification
+) -> Identification:
+    """Return a model's fit with the onset that it fits best with, from that of the chosen model."""
+    if name == trace.case.sample.candidate:
+        return found
+    fits = OnsetFits(replace(trace.problem, sample=CANDIDATES[name], fixed={}), *trace.readings)
+    best = fits.near(fits.at(0.0, within_range(found.parameters, problem)))
+    if best.misfit_rad >= found.misfit_rad:
+        return found
+    return found.replaced(np.exp(best.log_parameters), best.misfit_rad, converged=found.converged)
 
 
 def _candidates(trace: TraceCase, fit: TraceFit) -> tuple[str, ...]:

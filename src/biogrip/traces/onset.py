@@ -14,15 +14,16 @@ from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
-from scipy.special import chdtri
+from scipy.special import chdtri, stdtrit
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.digits import plain
+from biogrip.digits import instant, plain
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFit, OnsetFits
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
-from biogrip.judging.likelihood import compute_fall
+from biogrip.judging.likelihood import compute_fall, make_likelihood
+from biogrip.judging.onset_profiles import onset_limits
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lagged_torques
@@ -30,8 +31,9 @@ from biogrip.physics.protocol import Load, Phase, TorqueHistory
 from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
 from biogrip.traces.any_sample import extreme_responses, left_over
 
-# Relaxation times over the protocol's duration.
-_LAG_SHARES = tuple(np.geomspace(1e-6, 10.0, 16))
+# Longest relaxation time over the protocol's duration, and how many a decade; the shortest is that
+# between the closest readings.
+_LONGEST, _A_DECADE = 10.0, 2
 # Delays on the first grid; finer ones have as many between the neighbours of the best.
 _DELAYS = 65
 # Most readings that a fit takes of the whole trace, and as many of what the grid spans.
@@ -42,7 +44,7 @@ _LEAST_AFTER = 0.02
 _FEWEST_BEFORE = 3
 # Standard deviation of readings that are constant, in noise, and in peaks of noise-free traces.
 _CONSTANT, _CONSTANT_OF_PEAK = 2.0, 1e-3
-# So that correlated noise does not look like a late onset; and level of a fit that is as good.
+# So that correlated noise does not look like a late onset; and level of other tests.
 _FALSE_ALARM, _AS_GOOD = 1e-9, 1e-3
 # Intervals from a change to the first reading of a trace that is cut off, fewest readings by which
 # their growth is known, and its powers of the time if readings were spaced from the change on.
@@ -73,15 +75,17 @@ def estimate_onset(
     offset, drift
         True if the instrument may have added it.
     """
-    lagged = lagged_torques(torque, _LAG_SHARES)
+    shortest = float(np.min(np.diff(time_s)))
+    decades = np.log10(_LONGEST * torque.end_s / shortest)
+    shares = np.geomspace(shortest / torque.end_s, _LONGEST, 2 + int(_A_DECADE * decades))
+    lagged = lagged_torques(torque, shares.tolist())
 
     def square_sum(onset_s: float, some: BoolArray) -> float:
         nuisance = nuisance_basis(time_s[some], offset=offset, drift=drift)
-        own = extreme_responses(lagged(time_s[some] - onset_s), gripper, len(_LAG_SHARES))
+        own = extreme_responses(lagged(time_s[some] - onset_s), gripper, len(shares))
         return left_over(without(nuisance, rotation_rad[some]), without(nuisance, own))
 
     low, high = time_s[0], max(time_s[0], time_s[-1] - _LEAST_AFTER * torque.end_s)
-    shortest = float(np.min(np.diff(time_s)))
     while True:
         onsets = np.linspace(low, high, _DELAYS)
         some = _thinned(len(time_s), np.searchsorted(time_s, [low, high]))
@@ -101,8 +105,12 @@ def _thinned(samples: int, within: IntArray) -> BoolArray:
 
 
 def guess_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> float:
-    """Estimate the onset of a trace, (n_samples,), without a sample model, in s of its clock."""
-    known = {"offset": problem.offset, "drift": problem.drift}
+    """Estimate the onset of a trace, (n_samples,), without a sample model, in s of its clock.
+
+    A trace that begins constant may have an offset.
+    """
+    offset = problem.offset or begins_constant(time_s, rotation_rad)
+    known = {"offset": offset, "drift": problem.drift}
     return estimate_onset(time_s, rotation_rad, problem.gripper, problem.torque, **known)
 
 
@@ -136,20 +144,60 @@ def note_late_onset(
         return list(_about_clock(fits, time_s, delay_s, diagnosis))
     if not begins_constant(time_s, rotation_rad):
         return []
+    # A constant that is not zero is an offset, with which the onset would be biased.
+    case_problem = replace(case_problem, offset=True)
     guess_s = guess_onset(case_problem, time_s, rotation_rad)
     if not begins_constant(time_s, rotation_rad, guess_s):
         return []
+    fits = OnsetFits(case_problem, time_s, rotation_rad)
     found, given = fits.best(guess_s), fits.at(0.0, diagnosis.likelihood.best)
     fall = compute_fall(len(time_s), given.misfit_rad, found.misfit_rad, case_problem.noise_rad)
     if not begins_constant(time_s, rotation_rad, found.onset_s) or fall < chdtri(1, _FALSE_ALARM):
         return []
+    onset_s, later_s = found.onset_s, time_s - found.onset_s
+    best = make_likelihood(
+        case_problem.to_identify().of(later_s, rotation_rad),
+        found.log_parameters,
+        found.misfit_rad,
+        confidence=diagnosis.likelihood.confidence,
+        noise_rad=case_problem.noise_rad,
+    )
+    low_s, high_s = onset_limits(best, later_s)
     text = (
-        f"The trace is constant until some {found.onset_s:.2g} s of its clock, and fits far better "
-        f"if the protocol starts there (χ² falls by {plain(fall)}). If it does, say --start fit "
-        "(measurement.fit_start), which finds when, and allows for its uncertainty; or when it "
-        "was, if that is known (measurement.start_s)."
+        f"The trace is constant until {instant(onset_s, onset_s + low_s, onset_s + high_s)} of its "
+        f"clock, and fits far better if the protocol starts there (χ² falls by {plain(fall)}). If "
+        "it does, say --start fit (measurement.fit_start), which allows for its uncertainty, or "
+        "when it was, if that is known (--start, measurement.start_s)."
     )
     return [Note(REJECTION, text)]
+
+
+def note_tare(
+    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, diagnosis: Diagnosis
+) -> list[Note]:
+    """Say if readings before the protocol are constant and not zero; see `note_late_onset`.
+
+    By a t test at the level 0.001. Of a protocol of which nothing says when it starts, the start is
+    estimated.
+    """
+    if case_problem.offset or not begins_constant(time_s, rotation_rad):
+        return []
+    onset_s = 0.0
+    if time_s[_FEWEST_BEFORE - 1] >= 0 or case_problem.fit_start:
+        onset_s = guess_onset(case_problem, time_s, rotation_rad)
+    before = rotation_rad[time_s < onset_s][:-1]
+    if not begins_constant(time_s, rotation_rad, onset_s):
+        return []
+    mean, error = float(np.mean(before)), float(np.std(before, ddof=1)) / np.sqrt(len(before))
+    freedom = len(before) - 1
+    if abs(mean) <= error * stdtrit(freedom, 1 - _AS_GOOD / 2) or not mean:
+        return []
+    unit = f" {case_problem.instrument.read.unit}".rstrip()
+    text = (
+        f"The {len(before)} readings before the start are constant, but {plain(mean)}{unit} and "
+        "not 0: if that is the zero of the instrument, say --offset (measurement.offset)."
+    )
+    return [Note(REJECTION if diagnosis.status == REJECTED else DOUBT, text)]
 
 
 def _changes(case_problem: CaseProblem, time_s: Array) -> list[tuple[float, int]]:
@@ -284,9 +332,11 @@ def _with_ramp(case_problem: CaseProblem, time_s: Array) -> tuple[Phase, ...]:
 def begins_constant(time_s: Array, rotation_rad: Array, onset_s: float | None = None) -> bool:
     """Return True if the readings before an onset are constant within the noise of the trace.
 
-    Without an onset, the first few readings are looked at.
+    Without an onset, the first few readings are looked at. The last one before it may be on a ramp.
     """
-    before = rotation_rad[:_FEWEST_BEFORE] if onset_s is None else rotation_rad[time_s < onset_s]
+    before = rotation_rad[:_FEWEST_BEFORE]
+    if onset_s is not None:
+        before = rotation_rad[time_s < onset_s][:-1]
     noise_rad, peak_rad = estimate_noise(rotation_rad), float(np.ptp(rotation_rad))
     size = max(_CONSTANT * noise_rad, _CONSTANT_OF_PEAK * peak_rad)
-    return len(before) >= _FEWEST_BEFORE and float(np.std(before)) < size
+    return len(before) >= _FEWEST_BEFORE and bool(np.std(before) < size)
