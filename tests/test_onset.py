@@ -280,7 +280,7 @@ def test_a_late_start_is_advised_with_its_limits_and_with_the_tare() -> None:
     assert float(limits[0]) < 8.7
     assert float(limits[1]) > 8.4
     assert "readings before the start are constant, but 42 and not 0" in notes
-    assert "drift" not in notes
+    assert "drifts" not in notes
     found = identify_trace(
         times, values, start="fit", offset=True, config={"model_selection": {"models": []}}, **given
     )
@@ -335,7 +335,7 @@ def test_a_hold_on_the_clock_of_the_whole_test_is_not_ok(
     assert status == ("rejected" if model == "kelvin_voigt" else "doubtful")
     assert "The readings begin 16.4 s after the step of the protocol" in notes
     assert said in notes
-    assert "drift" not in notes
+    assert "drifts" not in notes
     status, notes = told(HOLD + 16, values, start=16.0, **given)
     assert (status, "begin" in notes) == ("ok", False)
     if model == "maxwell":

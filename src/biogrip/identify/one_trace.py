@@ -29,6 +29,7 @@ from biogrip.identify.other_fits import (
     FittedModels,
     judge_again,
     models_tried,
+    note_flow,
     second_opinions,
 )
 from biogrip.identify.outputs import WRITTEN_BY, Outcome, in_own_units
@@ -224,12 +225,12 @@ def identify_alike(
     progress.done()
     progress.doing("trying an offset and a drift")
     starts = [_about_start(*each) for each in zip(traces, diagnoses, strict=True)]
-    opinions = second_opinions(traces, diagnoses, progress.within)
+    opinions = second_opinions(traces, diagnoses, progress.within, [own.lead for own in models])
     found = []
     for index, own in enumerate(traces):
         # Beside another start, an offset and a drift mean nothing.
         opinions[index] *= not any(note.weight != HARMLESS for note in starts[index])
-        notes = [*again[index][1], *starts[index], *opinions[index]]
+        notes = [*again[index][1], *starts[index], *opinions[index], *note_flow(own)]
         data = _data(own, fits[index], diagnoses[index], models[index], notes, onsets_s.get(index))
         data = {WRITTEN_BY: __version__, "trace": str(files[index]), **data}
         found.append(Identified(data, own.problem, own.recorded))
@@ -245,7 +246,7 @@ def _about_start(trace: TraceCase, diagnosis: Diagnosis) -> list[Note]:
     """Return notes on when the protocol starts, and on a ramp that no reading shows."""
     given = trace.problem, *trace.readings, diagnosis
     late = note_late_onset(*given) if trace.case.may_start_late else []
-    return [*(late or note_hidden_ramp(*given)), *note_tare(*given)]
+    return [*(late or note_hidden_ramp(*given)), *note_tare(*given, late=bool(late))]
 
 
 def _data(

@@ -19,8 +19,6 @@ from scipy.special import chdtrc
 from biogrip.digits import plain
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFits
-from biogrip.fit.methods import identifier
-from biogrip.fit.multi_start import fit_from
 from biogrip.fit.nested_fits import (
     FittedModel,
     advice,
@@ -32,8 +30,8 @@ from biogrip.fit.nested_fits import (
     within_range,
 )
 from biogrip.fit.problem import Identification, Problem, Progress
-from biogrip.fit.trace_fit import TraceFit, fit_traces
-from biogrip.identify.trace_case import TraceCase
+from biogrip.fit.trace_fit import TraceFit
+from biogrip.identify.trace_case import TraceCase, flowing
 from biogrip.judging.diagnosis import Diagnosis, diagnose, diagnose_all
 from biogrip.judging.doubts import DOUBT, FALSE_ALARM, HARMLESS, REJECTED, REJECTION, Note, one_in
 from biogrip.judging.likelihood import MISSED, compute_fall
@@ -41,7 +39,9 @@ from biogrip.judging.verdicts import Finding
 from biogrip.physics.fractional import LONGEST_S
 from biogrip.physics.models import CANDIDATES, as_richer, contained
 from biogrip.physics.noise import stream
+from biogrip.physics.protocol import is_held
 from biogrip.physics.whitening import drift_is_flow
+from biogrip.stages.judgement import fits_judged
 
 _MOST_SAMPLES = 50_000
 # Each of the others would take half a second to five; they are tried where the config names them.
@@ -58,6 +58,13 @@ class FittedModels:
     """Rank of each model."""
     answers: dict[str, Identification] = field(default_factory=dict)
     """Fit of each by its name, in the same order."""
+
+    @property
+    def lead(self) -> float:
+        """How much lower than that of the chosen model the BIC of another is."""
+        return max(
+            (own.delta_bic for own in self.tried if own.candidate == self.chosen), default=0.0
+        )
 
     def data(self, findings: Sequence[Finding] | None) -> dict[str, Any]:
         """Return one row per model, and advice in words, as plain data.
@@ -200,37 +207,40 @@ def judge_again(
 
 
 def second_opinions(
-    traces: Sequence[TraceCase], diagnoses: Sequence[Diagnosis], progress: Progress
+    traces: Sequence[TraceCase],
+    diagnoses: Sequence[Diagnosis],
+    progress: Progress,
+    leads: Sequence[float],
 ) -> list[list[Note]]:
     """Fit an offset and a drift along, and warn if chi^2 falls more than by chance (`FALSE_ALARM`).
 
-    Traces have the same model, budget and confidence. Each gets at most one note; with a rejected
-    fit, only if that with both terms is not rejected. None are tried if both are declared already,
-    or if the noise model is coloured, which fits both unless they are refused.
+    If an offset alone explains as much, it is that; fits are those that the command would make if
+    it were declared. Traces have the same model, budget and confidence. Each gets at most one note;
+    with a rejected fit, only if the other is not rejected. None are tried if both are declared
+    already, or if the noise model is coloured, which fits both unless they are refused.
+
+    Of a rejected fit it is not said either, if BIC prefers another model by more: by its `leads`.
     """
     notes: list[list[Note]] = [[] for _ in traces]
-    tried = [index for index, trace in enumerate(traces) if _may_have_more(trace.problem)]
-    if not tried:
-        return notes
-    some = [traces[index] for index in tried]
-    also = [replace(trace.problem, offset=True, drift=True) for trace in some]
-    fits = _fitted(some, also, [diagnoses[index] for index in tried], progress)
-    better = []
-    for index, fit in zip(tried, fits, strict=True):
-        fall, chance = _decrease(traces[index].problem, diagnoses[index], fit)
-        if chance < FALSE_ALARM:
-            better.append((index, fit, fall, chance))
-    others = diagnose_all(
-        [fit.problem for _, fit, *_ in better],
-        also[0].searched,
-        [fit.found for _, fit, *_ in better],
-        confidence=traces[0].case.confidence,
-        noise_rad=[traces[index].problem.noise_rad for index, *_ in better],
-    )
-    for (index, _, *decrease), other in zip(better, others, strict=True):
-        rejected = diagnoses[index].status == REJECTED
-        if not (rejected and other.status == REJECTED):
-            notes[index].append(_note(traces[index], diagnoses[index], other, *decrease))
+    which = [index for index, trace in enumerate(traces) if _may_have_more(trace.problem)]
+    both = _better(traces, diagnoses, [(index, True) for index in which], progress)
+    alone = [(index, False) for index in both if not traces[index].problem.drift]
+    offsets = _better(traces, diagnoses, alone, progress)
+    for index, other in both.items():
+        one = offsets.get(index)
+        if one and chdtrc(1, max(other.fall - one.fall, 0.0)) >= FALSE_ALARM:
+            other = one
+        (judged,) = diagnose_all(
+            [other.fit.problem],
+            other.trace.problem.searched,
+            [other.fit.found],
+            confidence=other.trace.case.confidence,
+            noise_rad=[other.trace.problem.noise_rad],
+        )
+        terms = np.log(len(traces[index].readings[0])) * other.added
+        led = judged.status == REJECTED or leads[index] > other.fall - terms
+        if not (diagnoses[index].status == REJECTED and led):
+            notes[index].append(_note(traces[index], diagnoses[index], other, judged))
     return notes
 
 
@@ -239,81 +249,110 @@ def _may_have_more(problem: CaseProblem) -> bool:
     return not (both or problem.coloured)
 
 
-def _fitted(
+@dataclass(frozen=True)
+class _Other:
+    """A fit with an offset, or with a drift, too, that is better than without."""
+
+    trace: TraceCase
+    fit: TraceFit
+    fall: float
+    """Decrease of chi^2."""
+    chance: float
+    """Probability of as much."""
+    added: int
+    """How many terms are fitted along."""
+
+
+def _better(
     traces: Sequence[TraceCase],
-    also: Sequence[CaseProblem],
     diagnoses: Sequence[Diagnosis],
+    tried: Sequence[tuple[int, bool]],
     progress: Progress,
-) -> list[TraceFit]:
-    """Fit traces with offset and drift, from random points and from the fits without these."""
-    least_squares = identifier("least_squares", traces[0].case.method("least_squares"))
+) -> dict[int, _Other]:
+    """Return the better ones among fits of traces, by index, with an offset, or with a drift, too.
 
-    def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
-        cases = [traces[index].case for index in which]
-        rngs = [stream(case.study.study_seed, case.name, 0, "instrument") for case in cases]
-        return least_squares(problems, rngs, progress)
-
-    fits = fit_traces(also, [trace.readings for trace in traces], find)
-    # The fit without offset and drift is a start as well: with them, chi^2 cannot be higher.
-    starts = np.array([diagnosis.likelihood.best for diagnosis in diagnoses])
-    again = fit_from([fit.problem for fit in fits], starts)
-    for own, fit in enumerate(fits):
-        both = fit.found, fit.found.at(again, own)
-        # Last bits do not decide.
-        fits[own] = replace(fit, found=min(both, key=lambda each: np.float32(each.misfit_rad)))
-    return fits
-
-
-def _decrease(problem: CaseProblem, diagnosis: Diagnosis, fit: TraceFit) -> tuple[float, float]:
-    """Return the decrease of chi^2 by an offset and a drift, and the probability of as much."""
-    likelihood = diagnosis.likelihood
-    fall = compute_fall(
-        fit.problem.residuals.samples,
-        likelihood.misfit_rad,
-        fit.found.misfit_rad,
-        likelihood.noise_rad if problem.noise_rad is not None else None,
-    )
-    added = 2 - problem.offset - problem.drift
-    return fall, float(chdtrc(added, max(fall, 0.0)))
+    They are the command's with these terms declared.
+    """
+    if not tried:
+        return {}
+    also = [traces[index].with_terms(drift=drift) for index, drift in tried]
+    cases, problems = [own.case for own in also], [own.problem for own in also]
+    fits = fits_judged(cases, problems, [own.readings for own in also], 0, progress)
+    found = {}
+    for (index, _), own, fit in zip(tried, also, fits, strict=True):
+        problem, likelihood = traces[index].problem, diagnoses[index].likelihood
+        fall = compute_fall(
+            fit.problem.residuals.samples,
+            likelihood.misfit_rad,
+            fit.found.misfit_rad,
+            likelihood.noise_rad if problem.noise_rad is not None else None,
+        )
+        added = own.problem.offset + own.problem.drift - problem.offset - problem.drift
+        if added and (chance := float(chdtrc(added, max(fall, 0.0)))) < FALSE_ALARM:
+            found[index] = _Other(own, fit, fall, chance, added)
+    return found
 
 
-def _note(
-    trace: TraceCase, diagnosis: Diagnosis, other: Diagnosis, fall: float, chance: float
-) -> Note:
+def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnosis) -> Note:
     """Return the warning, with the verdicts that an offset and a drift would change."""
     case_problem, rejected = trace.problem, diagnosis.status == REJECTED
     # Characteristic times, at the end of the former, are not among the latter.
     changed = [
         f"{after.quantity.label} would be {after.words().removeprefix('determined: ')}"
-        for before, after in zip(diagnosis.findings, other.findings, strict=False)
+        for before, after in zip(diagnosis.findings, judged.findings, strict=False)
         if _differ(before, after)
     ]
-    changes = "with them it is not rejected" if rejected else "; ".join(changed)
+    changes = "it is not rejected then" if rejected else "; ".join(changed)
+    drifts = other.trace.problem.drift and not case_problem.drift
+    # A constant and a line, if not both are declared already.
+    many = drifts and not case_problem.offset
     better = (
-        "explain the trace far better "
-        f"(χ² falls by {plain(fall)}; by chance it would {one_in(chance)} traces)"
+        f"{'explain' if many else 'explains'} the trace far better "
+        f"(χ² falls by {plain(other.fall)}; by chance it would {one_in(other.chance)} traces)"
     )
-    controlled = case_problem.instrument.controlled.name
-    or_flows = (
-        f" Or the sample flows: as long as the {controlled} is constant, a drift and a damper "
-        "without a spring give the same line."
-    )
-    if case_problem.instrument.deforms:
-        or_flows = ""
-    if not case_problem.drift and drift_is_flow(case_problem.torque, trace.recorded.time_s):
+    controlled, deforms = case_problem.instrument.controlled.name, case_problem.instrument.deforms
+    time_s = trace.recorded.time_s
+    if drifts and drift_is_flow(case_problem.torque, time_s):
         text = (
-            f"A constant and a line in time, fitted along, {better}: the instrument drifts, or the "
-            f"sample flows. Under this {controlled} both give the same line, and the trace cannot "
-            f"tell which it is: a {controlled} that changes would."
+            f"A constant and a line in time, fitted along, {better}: the "
+            f"instrument drifts, or the sample flows. Under this {controlled} both give the same "
+            f"line, and the trace cannot tell which it is: a {controlled} that changes would."
+        )
+    elif not drifts and is_held(case_problem.torque, time_s):
+        text = (
+            f"A constant, fitted along, {better}: the instrument has an offset, or the sample "
+            f"{'holds a load' if deforms else 'yields at once'}. Under this {controlled} both give "
+            "the same constant: readings before the start would tell."
         )
     else:
+        terms = "An offset and a drift" if many else "A drift" if drifts else "An offset"
+        options = " --offset" * other.trace.problem.offset + " --drift" * other.trace.problem.drift
+        or_flows = ""
+        if drifts and not deforms:
+            or_flows = (
+                f" Or the sample flows: as long as the {controlled} is constant, a drift and a "
+                "damper without a spring give the same line."
+            )
         text = (
-            f"An offset and a drift of the instrument, fitted along, {better}: "
-            f"{changes or 'no verdict changes'}. If the instrument may drift, identify the trace "
-            f"with --offset --drift.{or_flows}"
+            f"{terms} of the instrument, fitted along, {better}: {changes or 'no verdict changes'}."
+            f" If the instrument may have that, identify the trace with{options}.{or_flows}"
         )
     weight = DOUBT if changed else HARMLESS
     return Note(REJECTION if rejected else weight, text)
+
+
+def note_flow(trace: TraceCase) -> list[Note]:
+    """Say beside a damper that lets the sample flow that a drift would look the same."""
+    problem = trace.problem
+    dampers = flowing(problem.searched)
+    if problem.drift or not dampers or not drift_is_flow(problem.torque, trace.recorded.time_s):
+        return []
+    names, controlled = " + ".join(dampers), problem.instrument.controlled.name
+    text = (
+        f"Under a constant {controlled} a drift of the instrument and the flow of the sample are "
+        f"one line: {names} holds if the instrument does not drift."
+    )
+    return [Note(HARMLESS, text)]
 
 
 def _differ(before: Finding, after: Finding) -> bool:

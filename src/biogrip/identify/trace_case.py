@@ -17,8 +17,9 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
-from biogrip.physics.protocol import largest_load
-from biogrip.physics.whitening import estimate_noise
+from biogrip.physics.protocol import is_held, largest_load
+from biogrip.physics.sample_model import SampleModel
+from biogrip.physics.whitening import drift_is_flow, estimate_noise
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
 from biogrip.study.study import Case
@@ -27,6 +28,7 @@ from biogrip.traces.reader import Recognised
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
 _CLEAREST, _MARGIN = 1e5, 10.0
 _LEAST, _MOST = -16, 18
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,13 @@ class TraceCase:
             and self.case.least_squares == other.case.least_squares
         )
 
+    def with_terms(self, *, drift: bool) -> "TraceCase":
+        """Return the trace as if the user had declared an offset, or a drift, too."""
+        measured = self.case.block.measurement
+        measured = replace(measured, offset=True, drift=drift or self.problem.drift)
+        case = replace(self.case, block=replace(self.case.block, measurement=measured))
+        return _with_ranges(case, self.recorded, self.given)
+
 
 def read_trace(
     file: Path, case: Case, given: Mapping[str, Any], show: Callable[[str], None]
@@ -74,14 +83,53 @@ def read_trace(
             show(form.in_words(file))
 
     columns = replace(case.columns, by_options=True)
-    trace = recording.read_checked(file, case.gripper, case.problem, columns, show_unusual)
+    declared = {name: bool(getattr(case.block.measurement, name)) for name in ("offset", "drift")}
+    problem = replace(case.problem, **declared)
+    trace = recording.read_checked(file, case.gripper, problem, columns, show_unusual)
+    if case.problem.coloured:
+        case = _without_likenesses(case, trace.time_s)
+    read = _with_ranges(case, trace, given)
+    return replace(read, recorded=recording.with_fitted_onset(trace, read.case.problem))
+
+
+def _with_ranges(case: Case, trace: Measurements, given: Mapping[str, Any]) -> TraceCase:
     ranges = ranges_of(case.problem.weighted(trace.sd_rad), trace.time_s, trace.rotation_rad[0])
     for name in given.get("search_range") or {}:
         ranges.pop(name, None)
     block = replace(case.block, search_range=replace(case.block.search_range, **ranges))
     case = replace(case, block=block)
-    trace = recording.with_fitted_onset(trace, case.problem)
     return TraceCase(case, trace, case.problem.weighted(trace.sd_rad), given)
+
+
+def _without_likenesses(case: Case, time_s: Array) -> Case:
+    """Return a case without a default offset or drift that looks like what its sample does."""
+    measured, problem = case.block.measurement, case.problem
+    network = problem.searched.network([problem.searched.example])
+    own = network.k_p[0] > 0 if problem.instrument.deforms else network.c_p[0] == 0
+    if measured.offset is None and own and is_held(problem.torque, time_s):
+        measured = replace(measured, offset=False)
+    if (
+        measured.drift is None
+        and flowing(problem.searched)
+        and drift_is_flow(problem.torque, time_s)
+    ):
+        measured = replace(measured, drift=False)
+    return replace(case, block=replace(case.block, measurement=measured))
+
+
+def flowing(model: SampleModel) -> list[str]:
+    """Return the dampers on which the viscosity of a model depends, none if it does not flow.
+
+    That of a springpot is no line in time.
+    """
+    sizes = np.array(model.example)
+    rows = [sizes * (1.0 + row) for row in np.vstack((0 * sizes, np.eye(len(sizes))))]
+    network = model.network(rows)
+    if model.power_law or network.k_p[0] > _ROUNDING * np.max(network.k[0], initial=0.0):
+        return []
+    viscosity = network.c_p + np.sum(network.c, axis=1)
+    changed = np.abs(viscosity[1:] / viscosity[0] - 1) > _ROUNDING
+    return [name for name, changes in zip(model.names, changed, strict=True) if changes]
 
 
 def ranges_of(

@@ -173,17 +173,21 @@ def note_late_onset(
 
 
 def note_tare(
-    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, diagnosis: Diagnosis
+    case_problem: CaseProblem,
+    time_s: Array,
+    rotation_rad: Array,
+    diagnosis: Diagnosis,
+    *,
+    late: bool,
 ) -> list[Note]:
     """Say if readings before the protocol are constant and not zero; see `note_late_onset`.
 
-    By a t test at the level 0.001. Of a protocol of which nothing says when it starts, the start is
-    estimated.
+    By a t test at the level 0.001. If it may start late, or its start is fitted, that is estimated.
     """
     if case_problem.offset or not begins_constant(time_s, rotation_rad):
         return []
     onset_s = 0.0
-    if time_s[_FEWEST_BEFORE - 1] >= 0 or case_problem.fit_start:
+    if late or case_problem.fit_start:
         onset_s = guess_onset(case_problem, time_s, rotation_rad)
     before = rotation_rad[time_s < onset_s][:-1]
     if not begins_constant(time_s, rotation_rad, onset_s):
