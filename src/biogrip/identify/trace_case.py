@@ -83,8 +83,8 @@ def read_trace(
             show(form.in_words(file))
 
     columns = replace(case.columns, by_options=True)
-    declared = {name: bool(getattr(case.block.measurement, name)) for name in ("offset", "drift")}
-    problem = replace(case.problem, **declared)
+    declared = case.block.measurement
+    problem = replace(case.problem, offset=bool(declared.offset), drift=bool(declared.drift))
     trace = recording.read_checked(file, case.gripper, problem, columns, show_unusual)
     if case.problem.coloured:
         case = _without_likenesses(case, trace.time_s)

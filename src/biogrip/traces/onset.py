@@ -11,7 +11,6 @@ changes that ends before the first reading.
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import accumulate
 
 import numpy as np
 from scipy.special import chdtri, stdtrit
@@ -51,8 +50,6 @@ _FALSE_ALARM, _AS_GOOD = 1e-9, 1e-3
 _DELAYED, _FEWEST_APART, _PLANNED = 10.0, 3, (0.5, 1.5)
 # Misfit over the scatter of neighbours that a right fit does not exceed.
 _WHITE = 1.5
-# Order of a sinusoid that starts, beside those of steps, ramps and curves.
-_SWING = 3
 
 
 def estimate_onset(
@@ -121,8 +118,8 @@ def note_late_onset(
 
     A trace that begins constant, and fits far better with a later start, tells nothing of the
     sample under the protocol as given, whatever noise model absorbs the misfit: the test is a
-    likelihood ratio. One that begins long after the last change of the load, as if cut off there,
-    may have been recorded on another clock: then it is fitted with that change just before it.
+    likelihood ratio. One that begins long after its first step, as if cut off there, may have been
+    recorded on another clock: then it is fitted with that step just before it.
 
     Parameters
     ----------
@@ -138,10 +135,9 @@ def note_late_onset(
     list of Note
         At most one.
     """
-    delay_s = time_s[0] - max([start for start, *_ in _changes(case_problem, time_s)], default=0.0)
-    fits = OnsetFits(case_problem, time_s, rotation_rad)
-    if delay_s > 0 and is_cut_off(time_s - time_s[0] + delay_s):
-        return list(_about_clock(fits, time_s, delay_s, diagnosis))
+    if _with_ramp(case_problem, time_s) and is_cut_off(time_s):
+        fits = OnsetFits(case_problem, time_s, rotation_rad)
+        return list(_about_clock(fits, time_s, diagnosis))
     if not begins_constant(time_s, rotation_rad):
         return []
     # A constant that is not zero is an offset, with which the onset would be biased.
@@ -204,14 +200,6 @@ def note_tare(
     return [Note(REJECTION if diagnosis.status == REJECTED else DOUBT, text)]
 
 
-def _changes(case_problem: CaseProblem, time_s: Array) -> list[tuple[float, int]]:
-    """Return when the load changes before the first reading, and the orders of the changes."""
-    torque = case_problem.torque
-    jumps = [(start, order) for start, order, _ in torque.jumps]
-    swings = [(start, _SWING) for start, *_ in torque.swings]
-    return [change for change in (*jumps, *swings) if change[0] < time_s[0]]
-
-
 def is_cut_off(time_s: Array) -> bool:
     """Return True if readings begin long after 0, (n_samples,), as if there had been earlier ones.
 
@@ -228,11 +216,9 @@ def is_cut_off(time_s: Array) -> bool:
     return bool(time_s[0] > _DELAYED * first_s and not _PLANNED[0] < growth < _PLANNED[1])
 
 
-def _about_clock(
-    fits: OnsetFits, time_s: Array, delay_s: float, diagnosis: Diagnosis
-) -> Iterator[Note]:
-    """Yield a note if a trace may be on another clock, with the last change just before it."""
-    later_s = delay_s - (time_s[1] - time_s[0])
+def _about_clock(fits: OnsetFits, time_s: Array, diagnosis: Diagnosis) -> Iterator[Note]:
+    """Yield a note if a trace may be on another clock, with its step just before it."""
+    later_s = 2 * time_s[0] - time_s[1]
     given = fits.at(0.0, diagnosis.likelihood.best)
     rejected = diagnosis.status == REJECTED
     tau_s = [
@@ -242,8 +228,8 @@ def _about_clock(
     ]
     lapse = ""
     if tau_s and not rejected:
-        lapse = f", {plain(delay_s / min(tau_s), 2)} relaxation times of the fit"
-    text = f"The readings begin {plain(delay_s)} s after the step of the protocol{lapse}. "
+        lapse = f", {plain(time_s[0] / min(tau_s), 2)} relaxation times of the fit"
+    text = f"The readings begin {plain(time_s[0])} s after the step of the protocol{lapse}. "
     ask = (
         "Say when the protocol started (--start, measurement.start_s), be it at 0, or what came "
         "before (--config, protocol)."
@@ -287,7 +273,7 @@ def _moved(diagnosis: Diagnosis, given: OnsetFit, other: OnsetFit, widths: float
 def note_hidden_ramp(
     case_problem: CaseProblem, time_s: Array, rotation_rad: Array, diagnosis: Diagnosis
 ) -> list[Note]:
-    """Say what changes if the last step before the first reading is a ramp that ends with it.
+    """Say what changes if the first step is a ramp that ends with the first reading.
 
     A note is due if a value then moves by more than the width of its limits; see `note_late_onset`
     for the parameters.
@@ -303,34 +289,21 @@ def note_hidden_ramp(
     if not (moved := _moved(diagnosis, given, ramped, 1.0)):
         return []
     text = (
-        f"The limits take the load before the first reading for a step. If it was a ramp that ends "
-        f"with that reading, at {time_s[0]:.4g} s of the protocol: {moved}. A ramp is given by a "
-        "protocol (--config), or as recorded (--load)."
+        f"If the load was no step but a ramp that ends with the first reading, at "
+        f"{plain(time_s[0])} s: {moved}. A ramp is given by a protocol (--config), or as recorded "
+        "(--load)."
     )
     return [Note(HARMLESS, text)]
 
 
 def _with_ramp(case_problem: CaseProblem, time_s: Array) -> tuple[Phase, ...]:
-    """Return phases with a ramp up to the first reading, or none if no step is last before it."""
-    changes = _changes(case_problem, time_s)
-    last_s = max([start for start, _ in changes], default=np.nan)
-    phases, starts = case_problem.phases, [0.0]
-    starts += accumulate(phase.duration_s for phase in phases)
-    delay_s = float(time_s[0] - last_s)
-    if {order for start, order in changes if start == last_s} != {0} or last_s not in starts:
+    """Return phases with a ramp up to the first reading, none but for a hold until after that."""
+    first, *rest = case_problem.phases
+    loads, delay_s = (first.left, first.right), float(time_s[0])
+    if not 0 < delay_s < first.duration_s or any(own != Load(own.value_Nm) for own in loads):
         return ()
-    index = starts.index(last_s)
-    own, rest_s = phases[index], phases[index].duration_s - delay_s
-    before = phases[index - 1] if index else Phase(0.0, Load(0.0), Load(0.0))
-    if rest_s <= 0:
-        return ()
-    from_to = [
-        (float(of.at(before.duration_s)), to.value_Nm)
-        for of, to in ((before.left, own.left), (before.right, own.right))
-    ]
-    ramp = Phase(delay_s, *(Load(of, (to - of) / delay_s) for of, to in from_to))
-    held = replace(own, duration_s=rest_s)
-    return *phases[:index], ramp, held, *phases[index + 1 :]
+    ramp = Phase(delay_s, *(Load(0.0, own.value_Nm / delay_s) for own in loads))
+    return ramp, replace(first, duration_s=first.duration_s - delay_s), *rest
 
 
 def begins_constant(time_s: Array, rotation_rad: Array, onset_s: float | None = None) -> bool:
