@@ -90,8 +90,7 @@ def test_before_the_protocol_nothing_responds(
 @pytest.mark.parametrize("flat", [True, False])
 def test_an_onset_is_estimated_within_a_reading(onset_s: float, flat: bool) -> None:
     times, values = late(3, onset_s + 5.0, flat=flat)
-    known = STUDY.gripper, EXPERIMENT.torque
-    found = estimate_onset(times - 5.0, values, *known, offset=True, drift=False)
+    found = estimate_onset(replace(EXPERIMENT, offset=True), times - 5.0, values)
     assert found == pytest.approx(onset_s, abs=0.2)
     assert begins_constant(times - 5.0, values, found)
 
@@ -306,6 +305,26 @@ def test_models_are_compared_each_at_its_own_onset() -> None:
     assert misfits["springpot"] == pytest.approx(0.02, rel=0.15)
 
 
+@pytest.mark.parametrize("unit_s", [1e-3, pytest.param(86_400.0, marks=pytest.mark.nightly)])
+def test_a_fitted_onset_lies_between_its_readings_on_any_clock(unit_s: float) -> None:
+    """Log-spaced over five decades on either side, most readings far further apart than there."""
+    apart = np.geomspace(1e-3, 1e2, 60)
+    times = np.r_[-apart[::-3], apart]
+    values = np.where(times > 0, 500 + 1000 * np.exp(-np.clip(times, 0, None)), 0.0)
+    values += 5.0 * np.random.default_rng(7).standard_normal(len(times))
+    found = identify_trace(
+        unit_s * (times + 200),
+        values,
+        reads="modulus",
+        model="zener_maxwell",
+        start="fit",
+        config={"model_selection": {"models": []}},
+    )
+    ends_s = np.array([found.data["onset_s"], *found.data["onset_limits_s"]])
+    assert np.abs(ends_s / unit_s - 200).max() < 1.5e-3
+    assert found.to_frame().loc["k", "value"] == pytest.approx(1000, rel=0.02)
+
+
 def test_a_start_that_is_no_number_is_refused() -> None:
     with pytest.raises(BiogripError, match="start: found 'soon', allowed is a number of seconds"):
         identify_trace(HOLD, HOLD, reads="strain", start="soon")
@@ -324,7 +343,7 @@ HOLD = np.arange(0.4, 44, 0.4)
             " relaxation times of the fit. If it starts at 16 s",
         ),
         ("maxwell", "strain", 1 / 100 + HOLD / 5000, "k would be 100"),
-        ("kelvin_voigt", "strain", (1 - np.exp(-HOLD / 8)) / 100, "if it starts at 16 s of the"),
+        ("kelvin_voigt", "strain", (1 - np.exp(-HOLD / 8)) / 100, "If it starts at 16 s of the"),
     ],
 )
 def test_a_hold_on_the_clock_of_the_whole_test_is_not_ok(

@@ -246,7 +246,8 @@ def _about_start(trace: TraceCase, diagnosis: Diagnosis) -> list[Note]:
     """Return notes on when the protocol starts, and on a ramp that no reading shows."""
     given = trace.problem, *trace.readings, diagnosis
     late = note_late_onset(*given) if trace.case.may_start_late else []
-    return [*(late or note_hidden_ramp(*given)), *note_tare(*given, late=bool(late))]
+    tare = note_tare(trace.problem, trace.readings, diagnosis, late=bool(late))
+    return [*(late or note_hidden_ramp(*given)), *tare]
 
 
 def _data(

@@ -11,7 +11,7 @@ many degrees of freedom as terms are added (Wilks 1938).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc
@@ -31,7 +31,7 @@ from biogrip.fit.nested_fits import (
 )
 from biogrip.fit.problem import Identification, Problem, Progress
 from biogrip.fit.trace_fit import TraceFit
-from biogrip.identify.trace_case import TraceCase, flowing
+from biogrip.identify.trace_case import FLOWS, TraceCase
 from biogrip.judging.diagnosis import Diagnosis, diagnose, diagnose_all
 from biogrip.judging.doubts import DOUBT, FALSE_ALARM, HARMLESS, REJECTED, REJECTION, Note, one_in
 from biogrip.judging.likelihood import MISSED, compute_fall
@@ -223,9 +223,9 @@ def second_opinions(
     """
     notes: list[list[Note]] = [[] for _ in traces]
     which = [index for index, trace in enumerate(traces) if _may_have_more(trace.problem)]
-    both = _better(traces, diagnoses, [(index, True) for index in which], progress)
-    alone = [(index, False) for index in both if not traces[index].problem.drift]
-    offsets = _better(traces, diagnoses, alone, progress)
+    both = _better(traces, diagnoses, which, progress, drift=True)
+    alone = [index for index in both if both[index].added > 1]
+    offsets = _better(traces, diagnoses, alone, progress, drift=False)
     for index, other in both.items():
         one = offsets.get(index)
         if one and chdtrc(1, max(other.fall - one.fall, 0.0)) >= FALSE_ALARM:
@@ -249,37 +249,32 @@ def _may_have_more(problem: CaseProblem) -> bool:
     return not (both or problem.coloured)
 
 
-@dataclass(frozen=True)
-class _Other:
-    """A fit with an offset, or with a drift, too, that is better than without."""
+class _Other(NamedTuple):
+    """A better fit with terms added: decrease of chi^2, its chance, and how many terms."""
 
     trace: TraceCase
     fit: TraceFit
     fall: float
-    """Decrease of chi^2."""
     chance: float
-    """Probability of as much."""
     added: int
-    """How many terms are fitted along."""
 
 
 def _better(
     traces: Sequence[TraceCase],
     diagnoses: Sequence[Diagnosis],
-    tried: Sequence[tuple[int, bool]],
+    which: Sequence[int],
     progress: Progress,
+    *,
+    drift: bool,
 ) -> dict[int, _Other]:
-    """Return the better ones among fits of traces, by index, with an offset, or with a drift, too.
-
-    They are the command's with these terms declared.
-    """
-    if not tried:
+    """Return the command's fits with an offset, or a drift, too, by index, if they are better."""
+    if not which:
         return {}
-    also = [traces[index].with_terms(drift=drift) for index, drift in tried]
+    also = [traces[index].with_terms(drift=drift) for index in which]
     cases, problems = [own.case for own in also], [own.problem for own in also]
     fits = fits_judged(cases, problems, [own.readings for own in also], 0, progress)
     found = {}
-    for (index, _), own, fit in zip(tried, also, fits, strict=True):
+    for index, own, fit in zip(which, also, fits, strict=True):
         problem, likelihood = traces[index].problem, diagnoses[index].likelihood
         fall = compute_fall(
             fit.problem.residuals.samples,
@@ -288,7 +283,7 @@ def _better(
             likelihood.noise_rad if problem.noise_rad is not None else None,
         )
         added = own.problem.offset + own.problem.drift - problem.offset - problem.drift
-        if added and (chance := float(chdtrc(added, max(fall, 0.0)))) < FALSE_ALARM:
+        if (chance := float(chdtrc(added, max(fall, 0.0)))) < FALSE_ALARM:
             found[index] = _Other(own, fit, fall, chance, added)
     return found
 
@@ -343,14 +338,12 @@ def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnos
 
 def note_flow(trace: TraceCase) -> list[Note]:
     """Say beside a damper that lets the sample flow that a drift would look the same."""
-    problem = trace.problem
-    dampers = flowing(problem.searched)
-    if problem.drift or not dampers or not drift_is_flow(problem.torque, trace.recorded.time_s):
+    problem, damper = trace.problem, FLOWS.get(trace.problem.model.name)
+    if problem.drift or not damper or not drift_is_flow(problem.torque, trace.recorded.time_s):
         return []
-    names, controlled = " + ".join(dampers), problem.instrument.controlled.name
     text = (
-        f"Under a constant {controlled} a drift of the instrument and the flow of the sample are "
-        f"one line: {names} holds if the instrument does not drift."
+        f"Under a constant {problem.instrument.controlled.name} a drift of the instrument and the "
+        f"flow of the sample are one line: {damper} holds if the instrument does not drift."
     )
     return [Note(HARMLESS, text)]
 

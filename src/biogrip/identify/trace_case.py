@@ -18,7 +18,6 @@ from biogrip.arrays import Array
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
 from biogrip.physics.protocol import is_held, largest_load
-from biogrip.physics.sample_model import SampleModel
 from biogrip.physics.whitening import drift_is_flow, estimate_noise
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
@@ -28,7 +27,9 @@ from biogrip.traces.reader import Recognised
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
 _CLEAREST, _MARGIN = 1e5, 10.0
 _LEAST, _MOST = -16, 18
-_ROUNDING = 1e-9
+
+FLOWS = {"damper": "c_p", "maxwell": "c", "burgers": "c_s"}
+"""Dampers by which models flow under a constant load, on and on in a line."""
 
 
 @dataclass(frozen=True)
@@ -108,28 +109,10 @@ def _without_likenesses(case: Case, time_s: Array) -> Case:
     own = network.k_p[0] > 0 if problem.instrument.deforms else network.c_p[0] == 0
     if measured.offset is None and own and is_held(problem.torque, time_s):
         measured = replace(measured, offset=False)
-    if (
-        measured.drift is None
-        and flowing(problem.searched)
-        and drift_is_flow(problem.torque, time_s)
-    ):
+    flows = problem.model.name in FLOWS and drift_is_flow(problem.torque, time_s)
+    if measured.drift is None and flows:
         measured = replace(measured, drift=False)
     return replace(case, block=replace(case.block, measurement=measured))
-
-
-def flowing(model: SampleModel) -> list[str]:
-    """Return the dampers on which the viscosity of a model depends, none if it does not flow.
-
-    That of a springpot is no line in time.
-    """
-    sizes = np.array(model.example)
-    rows = [sizes * (1.0 + row) for row in np.vstack((0 * sizes, np.eye(len(sizes))))]
-    network = model.network(rows)
-    if model.power_law or network.k_p[0] > _ROUNDING * np.max(network.k[0], initial=0.0):
-        return []
-    viscosity = network.c_p + np.sum(network.c, axis=1)
-    changed = np.abs(viscosity[1:] / viscosity[0] - 1) > _ROUNDING
-    return [name for name, changes in zip(model.names, changed, strict=True) if changes]
 
 
 def ranges_of(

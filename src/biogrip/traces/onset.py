@@ -24,9 +24,8 @@ from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import compute_fall, make_likelihood
 from biogrip.judging.onset_profiles import onset_limits
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lagged_torques
-from biogrip.physics.protocol import Load, Phase, TorqueHistory
+from biogrip.physics.protocol import Load, Phase
 from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
 from biogrip.traces.any_sample import extreme_responses, left_over
 
@@ -52,33 +51,20 @@ _DELAYED, _FEWEST_APART, _PLANNED = 10.0, 3, (0.5, 1.5)
 _WHITE = 1.5
 
 
-def estimate_onset(
-    time_s: Array,
-    rotation_rad: Array,
-    gripper: Gripper,
-    torque: TorqueHistory,
-    *,
-    offset: bool,
-    drift: bool,
-) -> float:
-    """Estimate from when a trace follows the torque, in s of its clock.
+def estimate_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> float:
+    """Estimate from when a trace follows the torque, without a sample model, in s of its clock.
 
-    Parameters
-    ----------
-    time_s, rotation_rad : (n_samples,)
-        The trace, times ascending.
-    gripper, torque
-        Gripper and protocol.
-    offset, drift
-        True if the instrument may have added it.
+    The trace is (n_samples,), times ascending. One that begins constant may have an offset.
     """
+    gripper, torque = problem.gripper, problem.torque
+    offset = problem.offset or begins_constant(time_s, rotation_rad)
     shortest = float(np.min(np.diff(time_s)))
     decades = np.log10(_LONGEST * torque.end_s / shortest)
     shares = np.geomspace(shortest / torque.end_s, _LONGEST, 2 + int(_A_DECADE * decades))
     lagged = lagged_torques(torque, shares.tolist())
 
     def square_sum(onset_s: float, some: BoolArray) -> float:
-        nuisance = nuisance_basis(time_s[some], offset=offset, drift=drift)
+        nuisance = nuisance_basis(time_s[some], offset=offset, drift=problem.drift)
         own = extreme_responses(lagged(time_s[some] - onset_s), gripper, len(shares))
         return left_over(without(nuisance, rotation_rad[some]), without(nuisance, own))
 
@@ -101,16 +87,6 @@ def _thinned(samples: int, within: IntArray) -> BoolArray:
     return some
 
 
-def guess_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> float:
-    """Estimate the onset of a trace, (n_samples,), without a sample model, in s of its clock.
-
-    A trace that begins constant may have an offset.
-    """
-    offset = problem.offset or begins_constant(time_s, rotation_rad)
-    known = {"offset": offset, "drift": problem.drift}
-    return estimate_onset(time_s, rotation_rad, problem.gripper, problem.torque, **known)
-
-
 def note_late_onset(
     case_problem: CaseProblem, time_s: Array, rotation_rad: Array, diagnosis: Diagnosis
 ) -> list[Note]:
@@ -129,11 +105,6 @@ def note_late_onset(
         The trace, times ascending.
     diagnosis
         That of the best fit with that protocol.
-
-    Returns
-    -------
-    list of Note
-        At most one.
     """
     if _with_ramp(case_problem, time_s) and is_cut_off(time_s):
         fits = OnsetFits(case_problem, time_s, rotation_rad)
@@ -142,7 +113,7 @@ def note_late_onset(
         return []
     # A constant that is not zero is an offset, with which the onset would be biased.
     case_problem = replace(case_problem, offset=True)
-    guess_s = guess_onset(case_problem, time_s, rotation_rad)
+    guess_s = estimate_onset(case_problem, time_s, rotation_rad)
     if not begins_constant(time_s, rotation_rad, guess_s):
         return []
     fits = OnsetFits(case_problem, time_s, rotation_rad)
@@ -150,47 +121,35 @@ def note_late_onset(
     fall = compute_fall(len(time_s), given.misfit_rad, found.misfit_rad, case_problem.noise_rad)
     if not begins_constant(time_s, rotation_rad, found.onset_s) or fall < chdtri(1, _FALSE_ALARM):
         return []
-    onset_s, later_s = found.onset_s, time_s - found.onset_s
-    best = make_likelihood(
-        case_problem.to_identify().of(later_s, rotation_rad),
-        found.log_parameters,
-        found.misfit_rad,
-        confidence=diagnosis.likelihood.confidence,
-        noise_rad=case_problem.noise_rad,
-    )
-    low_s, high_s = onset_limits(best, later_s)
+    later_s = time_s - found.onset_s
+    posed = case_problem.to_identify().of(later_s, rotation_rad)
+    fit = found.log_parameters, found.misfit_rad
+    likelihood = make_likelihood(posed, *fit, confidence=diagnosis.likelihood.confidence)
+    ends_s = [found.onset_s + end_s for end_s in onset_limits(likelihood, later_s)]
     text = (
-        f"The trace is constant until {instant(onset_s, onset_s + low_s, onset_s + high_s)} of its "
-        f"clock, and fits far better if the protocol starts there (χ² falls by {plain(fall)}). If "
-        "it does, say --start fit (measurement.fit_start), which allows for its uncertainty, or "
-        "when it was, if that is known (--start, measurement.start_s)."
+        f"The trace is constant until {instant(found.onset_s, *ends_s)} of its clock, and fits far "
+        f"better if the protocol starts there (χ² falls by {plain(fall)}). If it does, say --start "
+        "fit (measurement.fit_start), which allows for its uncertainty, or when it was, if that is "
+        "known (--start, measurement.start_s)."
     )
     return [Note(REJECTION, text)]
 
 
 def note_tare(
-    case_problem: CaseProblem,
-    time_s: Array,
-    rotation_rad: Array,
-    diagnosis: Diagnosis,
-    *,
-    late: bool,
+    case_problem: CaseProblem, readings: tuple[Array, Array], diagnosis: Diagnosis, *, late: bool
 ) -> list[Note]:
     """Say if readings before the protocol are constant and not zero; see `note_late_onset`.
 
     By a t test at the level 0.001. If it may start late, or its start is fitted, that is estimated.
     """
-    if case_problem.offset or not begins_constant(time_s, rotation_rad):
+    if case_problem.offset or not begins_constant(*readings):
         return []
-    onset_s = 0.0
-    if late or case_problem.fit_start:
-        onset_s = guess_onset(case_problem, time_s, rotation_rad)
-    before = rotation_rad[time_s < onset_s][:-1]
-    if not begins_constant(time_s, rotation_rad, onset_s):
+    onset_s = estimate_onset(case_problem, *readings) if late or case_problem.fit_start else 0.0
+    if not begins_constant(*readings, onset_s):
         return []
+    before = readings[1][readings[0] < onset_s][:-1]
     mean, error = float(np.mean(before)), float(np.std(before, ddof=1)) / np.sqrt(len(before))
-    freedom = len(before) - 1
-    if abs(mean) <= error * stdtrit(freedom, 1 - _AS_GOOD / 2) or not mean:
+    if abs(mean) <= error * stdtrit(len(before) - 1, 1 - _AS_GOOD / 2):
         return []
     unit = f" {case_problem.instrument.read.unit}".rstrip()
     text = (
@@ -207,13 +166,13 @@ def is_cut_off(time_s: Array) -> bool:
     to the time, as of readings that someone spaced from 0 on.
     """
     few = max(_FEWEST_APART, len(time_s) // 10)
-    ends = time_s[: few + 1], time_s[-few - 1 :]
-    (first_s, last_s), (early_s, late_s) = (
-        [float(operation(end)) for end in ends]
-        for operation in (lambda end: np.mean(np.diff(end)), np.mean)
+    first_s, last_s = (
+        float(np.ptp(ends)) / few for ends in (time_s[: few + 1], time_s[-few - 1 :])
     )
-    growth = np.log(last_s / first_s) / np.log(late_s / early_s) if late_s > early_s else 0.0
-    return bool(time_s[0] > _DELAYED * first_s and not _PLANNED[0] < growth < _PLANNED[1])
+    if time_s[0] <= _DELAYED * first_s:
+        return False
+    growth = np.log(last_s / first_s) / np.log(time_s[-1 - few] / time_s[0])
+    return not _PLANNED[0] < growth < _PLANNED[1]
 
 
 def _about_clock(fits: OnsetFits, time_s: Array, diagnosis: Diagnosis) -> Iterator[Note]:
@@ -221,39 +180,25 @@ def _about_clock(fits: OnsetFits, time_s: Array, diagnosis: Diagnosis) -> Iterat
     later_s = 2 * time_s[0] - time_s[1]
     given = fits.at(0.0, diagnosis.likelihood.best)
     rejected = diagnosis.status == REJECTED
-    tau_s = [
-        each.value
-        for each in diagnosis.findings
-        if each.quantity.label.startswith("tau") and each.verdict == DETERMINED
-    ]
-    lapse = ""
-    if tau_s and not rejected:
-        lapse = f", {plain(time_s[0] / min(tau_s), 2)} relaxation times of the fit"
-    text = f"The readings begin {plain(time_s[0])} s after the step of the protocol{lapse}. "
+    known = [each for each in diagnosis.findings if each.verdict == DETERMINED and not rejected]
+    tau_s = [each.value for each in known if each.quantity.unit == "s"]
+    lapses = f", {plain(time_s[0] / min(tau_s), 2)} relaxation times of the fit" if tau_s else ""
+    text = f"The readings begin {plain(time_s[0])} s after the step of the protocol{lapses}. "
     ask = (
         "Say when the protocol started (--start, measurement.start_s), be it at 0, or what came "
         "before (--config, protocol)."
     )
-    if rejected:
-        found = fits.best(later_s)
-        fall = compute_fall(len(time_s), given.misfit_rad, found.misfit_rad, None)
-        white = found.misfit_rad < _WHITE * fits.noise_rad
-        if 0 < found.onset_s < time_s[0] and white and fall > chdtri(1, _FALSE_ALARM):
-            yield Note(
-                REJECTION,
-                f"{text}The fit is far better if it starts at {found.onset_s:.4g} s of the clock "
-                f"(χ² falls by {plain(fall)}). {ask}",
-            )
-        return
-    other = fits.at(later_s, diagnosis.likelihood.best)
-    worse = -compute_fall(len(time_s), given.misfit_rad, other.misfit_rad, None)
-    moved = _moved(diagnosis, given, other, 0.5)
-    if moved and worse < chdtri(1, _AS_GOOD):
-        yield Note(
-            DOUBT,
-            f"{text}If it starts at {later_s:.4g} s of the clock, the trace fits as well: {moved}. "
-            f"{ask}",
-        )
+    other = fits.best(later_s) if rejected else fits.at(later_s, diagnosis.likelihood.best)
+    fall = compute_fall(len(time_s), given.misfit_rad, other.misfit_rad, None)
+    start, moved = f"If it starts at {other.onset_s:.4g} s of the clock, ", ""
+    if rejected and 0 < other.onset_s < time_s[0] and other.misfit_rad < _WHITE * fits.noise_rad:
+        far = fall > chdtri(1, _FALSE_ALARM)
+        moved = f"the fit is far better (χ² falls by {plain(fall)})" if far else ""
+    elif not rejected and fall > -chdtri(1, _AS_GOOD):
+        moved = _moved(diagnosis, given, other, 0.5)
+        moved = f"the trace fits as well: {moved}" if moved else ""
+    if moved:
+        yield Note(REJECTION if rejected else DOUBT, f"{text}{start}{moved}. {ask}")
 
 
 def _moved(diagnosis: Diagnosis, given: OnsetFit, other: OnsetFit, widths: float) -> str:
