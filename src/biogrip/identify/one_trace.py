@@ -231,7 +231,9 @@ def identify_alike(
         # Beside another start, an offset and a drift mean nothing.
         opinions[index] *= not any(note.weight != HARMLESS for note in starts[index])
         notes = [*again[index][1], *starts[index], *opinions[index], *note_flow(own)]
-        data = _data(own, fits[index], diagnoses[index], models[index], notes, onsets_s.get(index))
+        data = _data(own, fits[index], diagnoses[index], models[index], notes)
+        if index in onsets_s:
+            data["onset_limits_s"] = [data["onset_s"] + end_s for end_s in onsets_s[index]]
         data = {WRITTEN_BY: __version__, "trace": str(files[index]), **data}
         found.append(Identified(data, own.problem, own.recorded))
     for data, output in zip((each.data for each in found), outputs or (), strict=False):
@@ -256,12 +258,8 @@ def _data(
     diagnosis: Diagnosis,
     models: FittedModels,
     notes: Sequence[Note],
-    onset_limits_s: tuple[float, float] | None,
 ) -> dict[str, Any]:
-    """Return all that is said of a trace, as plain data; notes follow from other fits.
-
-    Limits of a fitted onset are counted from it.
-    """
+    """Return all that is said of a trace, as plain data; notes follow from other fits."""
     case, problem, recorded = trace.case, trace.problem, trace.recorded
     instrument = problem.instrument
     best = diagnosis.likelihood.best
@@ -279,7 +277,7 @@ def _data(
         **({"read_as": form.data()} if form and unusual else {}),
         **_fixed(problem),
         "limits": _gripper_in_limits(problem),
-        **_fitted_along(problem, recorded, np.exp(best), onset_limits_s),
+        **_fitted_along(problem, recorded, np.exp(best)),
         **said,
         "noise_model": fit.noise_data(),
         **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
@@ -316,16 +314,10 @@ def _gripper_in_limits(problem: CaseProblem) -> str:
 
 
 def _fitted_along(
-    problem: CaseProblem,
-    recorded: Measurements,
-    parameters: Array,
-    onset_limits_s: tuple[float, float] | None,
-) -> dict[str, float | list[float]]:
+    problem: CaseProblem, recorded: Measurements, parameters: Array
+) -> dict[str, float]:
     """Return onset, offset and drift of the instrument in the best fit, as far as fitted."""
-    found: dict[str, float | list[float]] = {}
-    if onset_limits_s and recorded.onset_s is not None:
-        found["onset_s"] = onset_s = recorded.onset_s
-        found["onset_limits_s"] = [onset_s + own_s for own_s in onset_limits_s]
+    found = {"onset_s": float(recorded.onset_s or 0.0)} if problem.fit_start else {}
     if not (problem.offset or problem.drift):
         return found
     time_s, measured = recorded.time_s, recorded.rotation_rad[0]

@@ -17,7 +17,6 @@ import numpy as np
 from scipy.special import chdtrc
 
 from biogrip.digits import plain
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFits
 from biogrip.fit.nested_fits import (
     FittedModel,
@@ -32,7 +31,7 @@ from biogrip.fit.nested_fits import (
 from biogrip.fit.problem import Identification, Problem, Progress
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.identify.trace_case import FLOWS, TraceCase
-from biogrip.judging.diagnosis import Diagnosis, diagnose, diagnose_all
+from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import DOUBT, FALSE_ALARM, HARMLESS, REJECTED, REJECTION, Note, one_in
 from biogrip.judging.likelihood import MISSED, compute_fall
 from biogrip.judging.verdicts import Finding
@@ -222,7 +221,8 @@ def second_opinions(
     Of a rejected fit it is not said either, if BIC prefers another model by more: by its `leads`.
     """
     notes: list[list[Note]] = [[] for _ in traces]
-    which = [index for index, trace in enumerate(traces) if _may_have_more(trace.problem)]
+    problems = enumerate(trace.problem for trace in traces)
+    which = [index for index, own in problems if not (own.coloured or (own.offset and own.drift))]
     both = _better(traces, diagnoses, which, progress, drift=True)
     alone = [index for index in both if both[index].added > 1]
     offsets = _better(traces, diagnoses, alone, progress, drift=False)
@@ -230,23 +230,18 @@ def second_opinions(
         one = offsets.get(index)
         if one and chdtrc(1, max(other.fall - one.fall, 0.0)) >= FALSE_ALARM:
             other = one
-        (judged,) = diagnose_all(
-            [other.fit.problem],
+        judged = diagnose(
+            other.fit.problem,
             other.trace.problem.searched,
-            [other.fit.found],
+            other.fit.found,
             confidence=other.trace.case.confidence,
-            noise_rad=[other.trace.problem.noise_rad],
+            noise_rad=other.trace.problem.noise_rad,
         )
         terms = np.log(len(traces[index].readings[0])) * other.added
         led = judged.status == REJECTED or leads[index] > other.fall - terms
         if not (diagnoses[index].status == REJECTED and led):
             notes[index].append(_note(traces[index], diagnoses[index], other, judged))
     return notes
-
-
-def _may_have_more(problem: CaseProblem) -> bool:
-    both = problem.offset and problem.drift
-    return not (both or problem.coloured)
 
 
 class _Other(NamedTuple):
@@ -301,10 +296,8 @@ def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnos
     drifts = other.trace.problem.drift and not case_problem.drift
     # A constant and a line, if not both are declared already.
     many = drifts and not case_problem.offset
-    better = (
-        f"{'explain' if many else 'explains'} the trace far better "
-        f"(χ² falls by {plain(other.fall)}; by chance it would {one_in(other.chance)} traces)"
-    )
+    better = f"{'explain' if many else 'explains'} the trace far better (χ² falls by "
+    better += f"{plain(other.fall)}; by chance it would {one_in(other.chance)} traces)"
     controlled, deforms = case_problem.instrument.controlled.name, case_problem.instrument.deforms
     time_s = trace.recorded.time_s
     if drifts and drift_is_flow(case_problem.torque, time_s):

@@ -49,6 +49,10 @@ _FALSE_ALARM, _AS_GOOD = 1e-9, 1e-3
 _DELAYED, _FEWEST_APART, _PLANNED = 10.0, 3, (0.5, 1.5)
 # Misfit over the scatter of neighbours that a right fit does not exceed.
 _WHITE = 1.5
+_SAY_WHEN = (
+    "Say when the protocol started (--start, measurement.start_s), be it at 0, or what came before "
+    "(--config, protocol)."
+)
 
 
 def estimate_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> float:
@@ -184,10 +188,6 @@ def _about_clock(fits: OnsetFits, time_s: Array, diagnosis: Diagnosis) -> Iterat
     tau_s = [each.value for each in known if each.quantity.unit == "s"]
     lapses = f", {plain(time_s[0] / min(tau_s), 2)} relaxation times of the fit" if tau_s else ""
     text = f"The readings begin {plain(time_s[0])} s after the step of the protocol{lapses}. "
-    ask = (
-        "Say when the protocol started (--start, measurement.start_s), be it at 0, or what came "
-        "before (--config, protocol)."
-    )
     other = fits.best(later_s) if rejected else fits.at(later_s, diagnosis.likelihood.best)
     fall = compute_fall(len(time_s), given.misfit_rad, other.misfit_rad, None)
     start, moved = f"If it starts at {other.onset_s:.4g} s of the clock, ", ""
@@ -198,7 +198,7 @@ def _about_clock(fits: OnsetFits, time_s: Array, diagnosis: Diagnosis) -> Iterat
         moved = _moved(diagnosis, given, other, 0.5)
         moved = f"the trace fits as well: {moved}" if moved else ""
     if moved:
-        yield Note(REJECTION if rejected else DOUBT, f"{text}{start}{moved}. {ask}")
+        yield Note(REJECTION if rejected else DOUBT, f"{text}{start}{moved}. {_SAY_WHEN}")
 
 
 def _moved(diagnosis: Diagnosis, given: OnsetFit, other: OnsetFit, widths: float) -> str:
