@@ -20,7 +20,7 @@ from biogrip.study.study import Case
 from biogrip.terminal import warn
 from biogrip.traces.any_sample import proportional_deviations
 from biogrip.traces.columns import Columns, place
-from biogrip.traces.onset import guess_onset
+from biogrip.traces.onset import estimate_onset
 from biogrip.traces.plausibility import check_recording
 from biogrip.traces.reader import Recognised, Recording, read_recording
 
@@ -66,7 +66,7 @@ def read_checked(
         )
     onset_s = columns.start_s
     if problem.fit_start:
-        onset_s = guess_onset(problem, trace.time_s, trace.rotation_rad)
+        onset_s = estimate_onset(problem, trace.time_s, trace.rotation_rad)
     if onset_s is not None:
         trace = without_padding(replace(trace, time_s=trace.time_s - onset_s))
     trace, at_steps = without_steps(trace, problem.torque, onset_s or 0.0)
