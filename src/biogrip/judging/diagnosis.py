@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from biogrip.digits import plain
 from biogrip.fit.multi_start import descend_from, fit_from
 from biogrip.fit.problem import Identification, Problem
 from biogrip.judging.doubts import (
@@ -224,8 +225,8 @@ def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
         yield Note(
             REJECTION if rejected else DOUBT,
             "The arms ring: their inertia, which fits leave out, changes readings of this sample "
-            f"by up to {ring.largest:.2g} times the noise. Leave out the readings of the first "
-            f"{_rounded_up(1e3 * ring.lasts_s)} ms after each change of the torque.",
+            f"by up to {plain(ring.largest, 2)} times the noise. Leave out the readings of the "
+            f"first {_rounded_up(1e3 * ring.lasts_s)} ms after each change of the torque.",
         )
 
 

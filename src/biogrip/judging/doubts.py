@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.digits import counted
+from biogrip.digits import counted, plain
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
     absorbed,
@@ -87,6 +87,8 @@ _NOISE_FREE, _NOISE_FREE_OF_PEAK, _UNRESOLVED = 0.01, 1e-3, 1e-6
 _TOO_LITTLE = 0.5
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
 _MANY = 100_000
+# Smaller chances are not told apart.
+_NEVER = 1e-6
 # Most outliers that are named.
 _NAMED = 5
 
@@ -109,7 +111,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     if misfit_rad < max(least_rad, _UNRESOLVED * residuals.peak_rad):
         return Remainder([])
     residual, slopes = _left(residuals, likelihood.best)
-    time_s, rounding_rad = residuals.trace.time_s, residuals.rounding_rad
+    rounding_rad = residuals.rounding_rad
     growth = compute_growth(residual, residuals.rotation(likelihood.best), rounding_rad)
     directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
     basis = absorbed(directions / growth)
@@ -129,7 +131,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     if chance < CERTAIN_MISFIT and times > _TOO_MUCH:
         found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
         notes += found.notes
-    doubts = [*_about_growth(growth, residuals.instrument), *_about_outliers(time_s, struck)]
+    doubts = [*_about_growth(growth, residuals.instrument), *_about_outliers(residuals, struck)]
     # Outliers distort a fit, so that all that it leaves is correlated.
     if not (found or struck.any()):
         doubts += _about_colour(bulk, basis, correlation, chance, residuals.instrument)
@@ -146,8 +148,9 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
         notes.append(
             Note(
                 DOUBT,
-                f"The noise that was given is {likelihood.noise_rad / misfit_rad:.2g} times what "
-                "the fit leaves: its value, or its unit, is not the right one.",
+                "The noise that was given is "
+                f"{plain(likelihood.noise_rad / misfit_rad, 2)} times what the fit leaves: its "
+                "value, or its unit, is not the right one.",
             )
         )
     return Remainder(notes, found.misfit if found else None)
@@ -179,24 +182,28 @@ def _misfit(
         )
         return Remainder([Note(DOUBT, text)])
     misfit = as_correlated(*bulk)
-    allowed = f"The limits count the {len(bulk[0])} residuals as {misfit[0]:.2g} independent ones."
+    allowed = (
+        f"The limits count the {len(bulk[0])} residuals as {plain(misfit[0], 2)} independent ones."
+    )
+    more = plain(times, 2)
     if has_fast_noise(residuals, *left):
         text = (
-            f"The misfit is {times:.2g} times the noise of neighbouring readings, as of noise that "
-            f"is correlated for a short time. {allowed}"
+            f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
+            f"correlated for a short time. {allowed}"
         )
         return Remainder([Note(DOUBT, text)], misfit)
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak_rad
+    of_peak = f"{plain(100 * share, 2)} % of the peak"
     suspects = residuals.instrument.suspects(unit=True)
     if share < _FAR_OFF:
         text = (
-            f"The fit is good to {100 * share:.2g} % of the peak; the rest, {times:.2g} times the "
-            f"noise of the trace, is not noise: {suspects} is not quite the right one. {allowed}"
+            f"The fit is good to {of_peak}; the rest, {more} times the noise of the trace, is not "
+            f"noise: {suspects} is not quite the right one. {allowed}"
         )
         return Remainder([Note(DOUBT, text)], misfit)
     text = (
-        f"The misfit is {times:.2g} times the noise of the trace, and {100 * share:.2g} % of the "
-        f"peak: {suspects} is not the right one."
+        f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects} is not the "
+        "right one."
     )
     return Remainder([Note(REJECTION, text)])
 
@@ -210,7 +217,7 @@ def _about_growth(growth: Array, instrument: Instrument) -> Iterator[str]:
         if high < _TOO_MUCH * low:
             return
         yield (
-            f"The noise grows with the {read}: it is {high / low:.2g} times as large for the "
+            f"The noise grows with the {read}: it is {plain(high / low, 2)} times as large for the "
             f"largest tenth of the {many} as for the smallest, and neither the weights of the "
             "readings nor the intervals allow for that."
         )
@@ -244,15 +251,21 @@ def _about_colour(
         )
 
 
-def _about_outliers(time_s: Array, struck: BoolArray) -> Iterator[str]:
+def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
     """Yield a sentence that names outliers by their times."""
-    far = time_s[struck]
+    far = residuals.trace.time_s[struck]
     if len(far):
         named = ", ".join(f"{each:.6g} s" for each in far[:_NAMED])
         more = f" and {len(far) - _NAMED} more" if len(far) > _NAMED else ""
+        steps = [start for start, order, _ in residuals.torque.jumps if order == 0]
+        at_step = (
+            " Readings at the very instant of a step may be of either side of it: leave them out."
+            if np.isin(far, steps).any()
+            else ""
+        )
         yield (
             f"{counted(len(far), 'outlier')}, at {named}{more} of the protocol: further from the "
-            "fit than noise as that of the other readings is. Outliers distort the fit."
+            f"fit than noise as that of the other readings is. Outliers distort the fit.{at_step}"
         )
 
 
@@ -271,13 +284,17 @@ def _is_far_from_given(likelihood: Likelihood) -> bool:
 
 
 def one_in(chance: float) -> str:
-    """Return a probability in words, e.g. ``"once in 2e+03"``."""
-    return f"once in {1 / max(chance, 1e-300):.1g}"
+    """Return a probability in words, e.g. ``"once in 2000"``."""
+    if chance < _NEVER:
+        return "less than once in a million"
+    return f"once in {plain(1 / chance, 1)}"
 
 
 # Autocorrelated noise with most of the variance, and slower than this share of the trace, is
 # misfit. It may be misfit if it has a noticeable share and lasts for longer.
 _MOST, _SLOW, _NOTICEABLE, _LONG = 0.5, 0.02, 1 / 3, 0.2
+# What scatters by so much more than noise that is correlated for this share would is smooth.
+_SMOOTH = 3.0
 # Of so many stretches of a trace with stationary noise, which is correlated for less than half a
 # stretch, none has so large a share of the sum of squares.
 _SLOW_STRETCHES, _IN_ONE = 20, 0.3
@@ -304,15 +321,15 @@ def find_slow_misfit(
         meaning = f"that may be misfit, of a {instrument.suspects('')} that is not the right one."
     elif share_of_peak < _FAR_OFF:
         meaning = (
-            f"that is misfit, not noise, of {100 * share_of_peak:.2g} % of the peak, which the "
-            f"limits allow for. {suspects} is not quite the right one."
+            f"that is misfit, not noise, of {plain(100 * share_of_peak, 2)} % of the peak, which "
+            f"the limits allow for. {suspects} is not quite the right one."
         )
     else:
         meaning = f"that is misfit, not noise. {suspects} is not the right one."
     return Note(
         REJECTION if misfit and share_of_peak >= _FAR_OFF else DOUBT,
-        f"What the fit leaves is correlated over {time_s:.2g} s of a trace of {duration_s:.3g} s, "
-        f"{100 * share:.0f} % of its variance: {meaning}",
+        f"What the fit leaves is correlated over {plain(time_s, 2)} s of a trace of "
+        f"{plain(duration_s)} s, {100 * share:.0f} % of its variance: {meaning}",
     )
 
 
@@ -330,7 +347,10 @@ def has_fast_noise(residuals: Residuals, residual: Array, slopes: Array) -> bool
         return False
     noise_model = NoiseModelLikelihood(time_s, residual, slopes).best()
     fast = noise_model.time_s <= _SLOW * residuals.duration_s
-    return fast and noise_model.ar1 > _NOTICEABLE
+    # Neighbours of such noise differ by a root of its readings less than all of it scatters.
+    scatter = np.sqrt(np.mean(residual**2)) / max(residuals.noise_scale_rad, 1e-300)
+    rough = scatter < _SMOOTH * np.sqrt(max(_SLOW * len(time_s), 1.0))
+    return fast and bool(rough) and noise_model.ar1 > _NOTICEABLE
 
 
 def has_uneven_noise(residual: Array, rounding_rad: float) -> bool:

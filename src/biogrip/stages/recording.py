@@ -69,7 +69,10 @@ def read_checked(
         onset_s = estimate_onset(problem, trace.time_s, trace.rotation_rad)
     if onset_s is not None:
         trace = without_padding(replace(trace, time_s=trace.time_s - onset_s))
-    trace, at_steps = without_steps(trace, problem.torque, onset_s or 0.0)
+    at_steps: tuple[float, ...] = ()
+    # What a gripper reads does not jump: dampers hold its arms.
+    if not problem.instrument.has_jaws:
+        trace, at_steps = without_steps(trace, problem.torque, onset_s or 0.0)
     nuisance = problem.nuisance(trace.time_s)
     suspicion = check_recording(
         trace,
