@@ -1,6 +1,7 @@
 """Formatting and rounding of numbers, with units."""
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -106,3 +107,20 @@ def counted(count: object, noun: str) -> str:
 def with_unit(name: str, unit: str) -> str:
     """Return a name followed by its unit, if it has one: ``k (N/m)``, ``alpha``."""
     return f"{name} ({unit})" if unit else name
+
+
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_POWER = re.compile(r"(?<=\d)e([+-]?)0*(\d+)\b")
+_MINUS = re.compile(r"(?<![\w.⁻-])-(?=\d)")
+_BEFORE_UNIT = re.compile(
+    r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=%|[kmµn]?(?:N|m|s|rad|Pa|Hz|V)\b)|(?<=N|a) (?=[sm]\b)"
+)
+
+
+def legible(text: str) -> str:
+    """Return text for print: 1.1e-05 as 1.1·10⁻⁵, minus signs, and units that stay on the line."""
+
+    def power(match: re.Match[str]) -> str:
+        return f"·10{(match[1].strip('+') + match[2]).translate(SUPERSCRIPTS)}"
+
+    return _BEFORE_UNIT.sub("\u00a0", _MINUS.sub("−", _POWER.sub(power, text)))
