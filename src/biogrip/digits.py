@@ -110,7 +110,7 @@ def with_unit(name: str, unit: str) -> str:
 
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_POWER = re.compile(r"(?<=\d)e([+-]?)0*(\d+)\b")
+_POWER = re.compile(r"(?<=\d)e\+?(-?)0*(\d+)\b")
 _MINUS = re.compile(r"(?<![\w.⁻-])-(?=\d)")
 _BEFORE_UNIT = re.compile(
     r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=%|[kmµn]?(?:N|m|s|rad|Pa|Hz|V)\b)|(?<=N|a) (?=[sm]\b)"
@@ -119,8 +119,5 @@ _BEFORE_UNIT = re.compile(
 
 def legible(text: str) -> str:
     """Return text for print: 1.1e-05 as 1.1·10⁻⁵, minus signs, and units that stay on the line."""
-
-    def power(match: re.Match[str]) -> str:
-        return f"·10{(match[1].strip('+') + match[2]).translate(SUPERSCRIPTS)}"
-
-    return _BEFORE_UNIT.sub("\u00a0", _MINUS.sub("−", _POWER.sub(power, text)))
+    powers = _POWER.sub(lambda it: f"·10{f'{it[1]}{it[2]}'.translate(SUPERSCRIPTS)}", text)
+    return _BEFORE_UNIT.sub("\u00a0", _MINUS.sub("−", powers))

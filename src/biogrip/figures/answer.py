@@ -32,14 +32,9 @@ def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list
     names = [found["valley"][axis]["name"] for axis in "xy"]
     for number, axes, name in zip("34", profiles, (" + ".join(names), names[1]), strict=True):
         draw_profile(axes, items[name])
-        threshold = found["threshold"]
-        axes.axhline(threshold, color=BLACK, linestyle="--", linewidth=0.7)
-        axes.annotate(
-            f"{100 * found['confidence']:g} %",
-            (0.02, threshold + 0.2),
-            xycoords=("axes fraction", "data"),
-            fontsize=7,
-        )
+        axes.axhline(found["threshold"], color=BLACK, linestyle="--", linewidth=0.7)
+        place = (0.02, found["threshold"] + 0.2, f"{100 * found['confidence']:g} %")
+        axes.text(*place, transform=axes.get_yaxis_transform(), fontsize=7)
         panel(axes, number, f"{items[name]['symbol']}: {items[name]['verdict']}")
     profiles[0].set_ylabel("rise of χ²")
     return drawn

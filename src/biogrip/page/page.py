@@ -94,9 +94,8 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
     titles = {case.name: case.title for case in study.cases.values()}
     owners = titles | {name: sweep.title or name for name, sweep in study.sweeps.items()}
     cases, methods = list(study.cases.values()), list(study.identifiers.values())
-    traces = []
-    of_cases = zip(cases, files["identifications"], files["measurements"], strict=True)
-    for case, found, measured in of_cases:
+    traces, of_cases = [], (cases, files["identifications"], files["measurements"])
+    for case, found, measured in zip(*of_cases, strict=True):
         calibrated = [path for path in files["calibrated"] if path.stem == case.name]
         traces.append((case.title, fits_of(case, methods, found, measured, calibrated)))
     errors, judged, compared = (
@@ -131,9 +130,8 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
             ],
             compared=answers.compared_rows(errors, judged, titles),
             near=near_noise_words(study.near_noise_tolerance),
-            cases=zip(cases, map(read_verdicts, files["verdicts"]), strict=True),
+            cases=list(zip(cases, map(read_verdicts, files["verdicts"]), strict=True)),
             target_of=target_of,
-            titles=titles.values(),
             hero=hero,
             story=story,
             folded=folded,
@@ -166,8 +164,7 @@ def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -
 def entry_of(file: Path, owners: Mapping[str, str], texts: Mapping[tuple[str, str], str]) -> Entry:
     """Return the entry of a file that is named after what it shows, and its case or sweep.
 
-    Cases and sweeps have their titles, captions are by the name of the file's folder and what it
-    shows.
+    Owners are their titles; captions are by the file's folder and what it shows.
     """
     kind, stem = file.parent.name, file.stem
     # One name may end with another, and that of a figure with that of a case.
