@@ -110,7 +110,7 @@ def with_unit(name: str, unit: str) -> str:
 
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_POWER = re.compile(r"(?<=\d)e\+?(-?)0*(\d+)\b")
+_POWER = re.compile(r"(\d[\d.]*)e([+-]\d+)\b")
 _MINUS = re.compile(r"(?<![\w.⁻-])-(?=\d)")
 _BEFORE_UNIT = re.compile(
     r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=%|[kmµn]?(?:N|m|s|rad|Pa|Hz|V)\b)|(?<=N|a) (?=[sm]\b)"
@@ -118,6 +118,10 @@ _BEFORE_UNIT = re.compile(
 
 
 def legible(text: str) -> str:
-    """Return text for print: 1.1e-05 as 1.1·10⁻⁵, minus signs, and units that stay on the line."""
-    powers = _POWER.sub(lambda it: f"·10{f'{it[1]}{it[2]}'.translate(SUPERSCRIPTS)}", text)
-    return _BEFORE_UNIT.sub("\u00a0", _MINUS.sub("−", powers))
+    """Return text for print: 1.1e-05 as 1.1·10⁻⁵, 3.4e+03 as 3400, units on their numbers' line."""
+
+    def power(found: re.Match[str]) -> str:
+        number, tens = plain(float(found[0]), 4), f"{int(found[2])}".translate(SUPERSCRIPTS)
+        return f"{found[1]}·10{tens}" if "e" in number else number
+
+    return _BEFORE_UNIT.sub("\u00a0", _MINUS.sub("−", _POWER.sub(power, text)))

@@ -1,8 +1,4 @@
-"""The pages of a study, each a self-contained HTML file.
-
-The report has the answers, tables, figures, verdicts and an explorer; a summary what one trace of a
-case tells.
-"""
+"""The pages of a study, self-contained HTML: the report, and what one trace of a case tells."""
 
 import base64
 import re
@@ -189,9 +185,7 @@ def _as_in_paper(figures: Sequence[Entry], published: Sequence[Case]) -> list[En
 
 
 def _images(paths: Sequence[Path]) -> Iterator[tuple[str | None, tuple[int, int]]]:
-    """Yield images of at most 256 colours, a third as large, and their sizes.
-
-    None stands for an image when there is no more room.
+    """Yield images of at most 256 colours, None when there is no more room, and their sizes.
 
     Raises
     ------
