@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy.stats import chi2, norm
 
 from biogrip.arrays import Array
 from biogrip.fit.problem import silent
+from biogrip.identify.notebook import TraceResult, identify_trace
 from biogrip.identify.one_trace import identify_batch
 from biogrip.identify.other_fits import second_opinions
 from biogrip.identify.settings import Asked, Setting, case_of
@@ -48,7 +50,7 @@ def suspected(
     told = diagnose(problem, case.problem.searched, run("least_squares", problem), confidence=0.95)
     recorded = Measurements(TIMES, None, {0: rotation})
     read = TraceCase(case, recorded, case.problem, {})
-    (notes,) = second_opinions([read], [told], silent)
+    (notes,) = second_opinions([read], [told], silent, [0.0])
     return told, notes
 
 
@@ -99,7 +101,7 @@ def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(
 
 
 def test_under_a_constant_torque_a_drift_is_not_told_from_flow(tmp_path: Path) -> None:
-    """A drop that flows, read as one that does not, is not said to drift."""
+    """Nor an offset from what yields at once: a drop that does is not said to have one."""
     held = tmp_path / "held.yaml"
     held.write_text(
         "protocol: {phases: [{duration_s: 200.0, torque_Nm: 1.6e-9}]}\n"
@@ -109,6 +111,54 @@ def test_under_a_constant_torque_a_drift_is_not_told_from_flow(tmp_path: Path) -
     file = write_trace(tmp_path / "t.csv", TIMES[first], trace(0, 0 * DRIFT)[first])
     (found,) = identify_batch([asked(file, model="kelvin_voigt", config=held)], None).found
     (said,) = [note["text"] for note in found["notes"] if "χ² falls" in note["text"]]
-    assert "the instrument drifts, or the sample flows" in said
-    assert "--drift" not in said
+    assert "the instrument has an offset, or the sample yields at once" in said
+    assert "--" not in said
     assert "would be" not in said
+
+
+CREEP = np.arange(0.5, 120.5, 0.5)
+
+
+def told(clean: Array, *, model: str, **given: Any) -> TraceResult:
+    values = clean + 1e-2 * clean.max() * np.random.default_rng(5).standard_normal(len(clean))
+    config = {"model_selection": {"models": given.pop("models", [])}}
+    return identify_trace(CREEP, values, config=config, model=model, **given)
+
+
+def test_an_offset_alone_is_advised_if_it_explains_as_much(tmp_path: Path) -> None:
+    """And the fit that is advised is what its command makes of the trace."""
+    seed, added = 0, np.full(len(TIMES), 0.6 * SIGMA)
+    (said,) = suspected(tmp_path, seed, added)[1]
+    assert said.text.startswith("An offset of the instrument, fitted along, explains the trace")
+    assert "with --offset." in said.text
+    file = write_trace(tmp_path / "t.csv", TIMES, trace(seed, added))
+    config = tmp_path / "few.yaml"
+    config.write_text("model_selection: {models: []}\n")
+    (found,) = identify_batch([asked(file, DECLARED[0], config=config)], None).found
+    for quantity in found["quantities"]:
+        would_be = f"{quantity['quantity']} would be "
+        words = quantity["in_words"].removeprefix("determined: ")
+        assert would_be not in said.text or f"{would_be}{words}" in said.text
+
+
+def test_a_better_model_is_not_taken_for_an_offset_and_a_drift() -> None:
+    """A power law: with offset and drift the fit would be as wrong."""
+    found = told(1000 * CREEP**-0.15, model="kelvin_voigt", reads="modulus", models=["springpot"])
+    assert found.status == "rejected"
+    assert "springpot" in found.data["advice"]
+    assert "offset" not in str(found)
+
+
+@pytest.mark.parametrize(("model", "names"), [("burgers", "c_s"), ("maxwell", "c")])
+@pytest.mark.parametrize("noise_model", ["white", "coloured"])
+def test_flow_under_a_constant_load_is_said_to_look_like_a_drift(
+    model: str, names: str, noise_model: str
+) -> None:
+    """Nor is a drift fitted along by default that would take the flow away."""
+    delayed = (1 - np.exp(-CREEP / 6)) / 800 if model == "burgers" else 0.0
+    given: dict[str, Any] = {"reads": "strain", "hold": 1.0, "noise_model": noise_model}
+    found = told(1 / 1000 + CREEP / 3e4 + delayed, model=model, **given)
+    assert f"are one line: {names} holds if the instrument does not drift" in str(found)
+    flow = found.to_frame().loc[names]
+    assert flow["value"] == pytest.approx(3e4, rel=0.1)
+    assert flow["high"] < 2 * flow["low"]

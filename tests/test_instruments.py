@@ -156,9 +156,7 @@ def test_readings_at_the_instant_of_a_step_are_left_out(tmp_path: Path) -> None:
     found = identified(tmp_path, trace, "--reading", "modulus=modulus_Pa", "--model", SOLID.name)
     assert found["fit"] == "ok"
     assert found["samples"] == len(TIMES)
-    assert any(
-        "Left out at the instant of a step: 1 reading" in note["text"] for note in found["notes"]
-    )
+    assert any("they were taken: 1 reading, at " in note["text"] for note in found["notes"])
 
 
 def test_oscillations_about_zero_are_identified(tmp_path: Path) -> None:

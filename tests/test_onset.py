@@ -1,6 +1,7 @@
 """Traces that start before their torque: given onsets, fitted ones, and what is said without."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,14 +10,16 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.errors import BiogripError
 from biogrip.fit.fitted_onset import OnsetFits
+from biogrip.identify.notebook import identify_trace
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import Phase, hold, load
 from biogrip.stages import judgement, recording
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config
-from biogrip.traces.onset import begins_constant, estimate_onset
+from biogrip.traces.onset import begins_constant, estimate_onset, is_cut_off
 from tests.helpers import identified as command
 from tests.helpers.default import STUDY
 from tests.helpers.identified import by_quantity, identify, write_trace
@@ -87,8 +90,7 @@ def test_before_the_protocol_nothing_responds(
 @pytest.mark.parametrize("flat", [True, False])
 def test_an_onset_is_estimated_within_a_reading(onset_s: float, flat: bool) -> None:
     times, values = late(3, onset_s + 5.0, flat=flat)
-    known = STUDY.gripper, EXPERIMENT.torque
-    found = estimate_onset(times - 5.0, values, *known, offset=True, drift=False)
+    found = estimate_onset(replace(EXPERIMENT, offset=True), times - 5.0, values)
     assert found == pytest.approx(onset_s, abs=0.2)
     assert begins_constant(times - 5.0, values, found)
 
@@ -234,3 +236,147 @@ def test_a_clock_outside_the_protocol_is_refused(
     (tmp_path / "lab.yaml").write_text(CONFIG)
     status, _, error = identify(trace, "--config", tmp_path / "lab.yaml", *start)
     assert (status, message in error) == (1, True)
+
+
+def told(times: Array, values: Array, **given: Any) -> tuple[str, str]:
+    """Return the status of a trace, and all notes on it."""
+    given["config"] = {"model_selection": {"models": []}, **given.get("config", {})}
+    found = identify_trace(times, values, **given)
+    notes = " ".join(note["text"] for note in found.data["notes"])
+    assert "--" not in f"{notes} {found}", "options of the command, which are arguments here"
+    return found.status, notes
+
+
+SPACINGS = {
+    "even": np.arange(1, 61.0),
+    "from its first interval": np.arange(5, 61.0),
+    "few": np.geomspace(1.0, 1e3, 10),
+    "three decades": np.geomspace(0.06, 60.0, 4000),
+    "eight decades": np.geomspace(1e-3, 1e5, 80),
+    "three rates": np.r_[np.arange(0.2, 1, 0.01), np.arange(1, 10, 0.1), np.arange(10, 100.0)],
+    "at random": np.sort(np.random.default_rng(0).uniform(0, 60, 200)),
+}
+
+
+@pytest.mark.parametrize("spacing", SPACINGS)
+@pytest.mark.parametrize("unit_s", [1e-3, 1.0, 86_400.0])
+def test_only_readings_on_another_clock_seem_cut_off(spacing: str, unit_s: float) -> None:
+    """Whatever unit their clock has: readings that someone spaced from the step on do not."""
+    times = unit_s * SPACINGS[spacing]
+    assert not is_cut_off(times)
+    assert is_cut_off(times + 20 * (times[-1] - times[0]))
+
+
+def test_a_late_start_is_advised_with_its_limits_and_with_the_tare() -> None:
+    """A ramp from 8.4 to 8.7 s, and a preload: a start without the offset would be biased."""
+    times = np.arange(0, 60, 0.5)
+    since = [np.clip(times - start_s, 0.0, None) for start_s in (8.4, 8.7)]
+    first, second = (60 * s - 800 * -np.expm1(-s / 20) for s in since)
+    values = 42 + (first - second) / 0.3
+    values += 0.3 * np.random.default_rng(2).standard_normal(len(times))
+    given: dict[str, Any] = {"reads": "strain", "model": "zener_kelvin", "hold": 1.0}
+    status, notes = told(times, values, **given)
+    assert status == "rejected"
+    (limits,) = re.findall(r"constant until \S+ s \((\S+) to (\S+)\) of its clock", notes)
+    assert float(limits[0]) < 8.7
+    assert float(limits[1]) > 8.4
+    assert "readings before the start are constant, but 42 and not 0" in notes
+    assert "drifts" not in notes
+    found = identify_trace(
+        times, values, start="fit", offset=True, config={"model_selection": {"models": []}}, **given
+    )
+    assert "not 0" not in str(found)
+    low, high = found.data["onset_limits_s"]
+    assert low < 8.7
+    assert high > 8.4
+    assert f"({low:.2f} to {high:.2f}) of the clock, as fitted" in str(found)
+
+
+def test_models_are_compared_each_at_its_own_onset() -> None:
+    """At that of one without a power law, a third branch would seem the best."""
+    times = np.arange(0, 60, 0.5)
+    values = np.where(times > 5, np.clip(times - 5, 1e-9, None) ** 0.32, 0.0)
+    values += 0.02 * np.random.default_rng(4).standard_normal(len(times))
+    models = ["kelvin_voigt", "zener_kelvin", "springpot"]
+    config = {"model_selection": {"models": models}}
+    given: dict[str, Any] = {"reads": "strain", "model": "kelvin_voigt", "hold": 1.0}
+    found = identify_trace(times, values, config=config, start="fit", **given)
+    misfits = {row["model"]: row["misfit_rad"] for row in found.data["models"]}
+    assert misfits["springpot"] == pytest.approx(0.02, rel=0.15)
+
+
+@pytest.mark.parametrize("unit_s", [1e-3, pytest.param(86_400.0, marks=pytest.mark.nightly)])
+def test_a_fitted_onset_lies_between_its_readings_on_any_clock(unit_s: float) -> None:
+    """Log-spaced over five decades on either side, most readings far further apart than there."""
+    apart = np.geomspace(1e-3, 1e2, 60)
+    times = np.r_[-apart[::-3], apart]
+    values = np.where(times > 0, 500 + 1000 * np.exp(-np.clip(times, 0, None)), 0.0)
+    values += 5.0 * np.random.default_rng(7).standard_normal(len(times))
+    found = identify_trace(
+        unit_s * (times + 200),
+        values,
+        reads="modulus",
+        model="zener_maxwell",
+        start="fit",
+        config={"model_selection": {"models": []}},
+    )
+    ends_s = np.array([found.data["onset_s"], *found.data["onset_limits_s"]])
+    assert np.abs(ends_s / unit_s - 200).max() < 1.5e-3
+    assert found.to_frame().loc["k", "value"] == pytest.approx(1000, rel=0.02)
+
+
+def test_a_start_that_is_no_number_is_refused() -> None:
+    with pytest.raises(BiogripError, match="start: found 'soon', allowed is a number of seconds"):
+        identify_trace(HOLD, HOLD, reads="strain", start="soon")
+
+
+HOLD = np.arange(0.4, 44, 0.4)
+
+
+@pytest.mark.parametrize(
+    ("model", "reads", "clean", "said"),
+    [
+        (
+            "maxwell",
+            "force",
+            2.0 * np.exp(-HOLD / 8),
+            " relaxation times of the fit. If it starts at 16 s",
+        ),
+        ("maxwell", "strain", 1 / 100 + HOLD / 5000, "k would be 100"),
+        ("kelvin_voigt", "strain", (1 - np.exp(-HOLD / 8)) / 100, "If it starts at 16 s of the"),
+    ],
+)
+def test_a_hold_on_the_clock_of_the_whole_test_is_not_ok(
+    model: str, reads: str, clean: Array, said: str
+) -> None:
+    """Exponentials look alike from any start; where another is shown, advice is that."""
+    values = clean + 2e-3 * clean.max() * np.random.default_rng(3).standard_normal(len(HOLD))
+    given = {"reads": reads, "model": model, "hold": 1e-3 if reads == "force" else 1.0}
+    status, notes = told(HOLD + 16, values, **given)
+    assert status == ("rejected" if model == "kelvin_voigt" else "doubtful")
+    assert "The readings begin 16.4 s after the step of the protocol" in notes
+    assert said in notes
+    assert "drifts" not in notes
+    status, notes = told(HOLD + 16, values, start=16.0, **given)
+    assert (status, "begin" in notes) == ("ok", False)
+    if model == "maxwell":
+        assert told(HOLD + 16, values, start=0.0, **given)[0] == "ok"
+
+
+@pytest.mark.parametrize("ramp_s", [0.0, 1.0])
+def test_a_ramp_before_the_first_reading_is_said_to_change_values(ramp_s: float) -> None:
+    """Not where it is told, nor where the first reading comes soon after a step."""
+    times = np.geomspace(1.01 if ramp_s else 1e-3, 200.0, 200)
+    phases = [{"duration_s": 300.0, "strain": 1.0}]
+    if ramp_s:
+        phases[:0] = [{"duration_s": ramp_s, "strain": 0.0, "to_strain": 1.0}]
+    slope = 3.0 * np.expm1(ramp_s / 3.0) / ramp_s if ramp_s else 1.0
+    values = 100 + 200 * slope * np.exp(-times / 3.0)
+    values += 0.5 * np.random.default_rng(0).standard_normal(len(times))
+    given = {"reads": "stress", "model": "zener_maxwell"}
+    status, notes = told(times, values, hold=1.0, **given)
+    assert (status, "If the load was no step" in notes) == ("ok", bool(ramp_s))
+    if said := re.search("k would be (.*) Pa; c", notes):
+        assert float(said[1]) == pytest.approx(200.0, rel=0.02)
+    protocol = {"instrument": "relaxation", "protocol": {"phases": phases}}
+    assert "If the load was no step" not in told(times, values, config=protocol, **given)[1]

@@ -95,8 +95,12 @@ def _reading(text: str) -> tuple[tuple[str, ...], Any]:
 
 
 def _start(text: str) -> tuple[tuple[str, ...], Any]:
-    name, value = ("fit_start", True) if text == "fit" else ("start_s", text)
-    return ("measurement", name), value
+    if text == "fit":
+        return ("measurement", "fit_start"), True
+    with suppress(ValueError):
+        float(text)
+        return ("measurement", "start_s"), text
+    raise argparse.ArgumentTypeError(f"found '{text}', allowed is a number of seconds, or fit")
 
 
 def _hold(text: str) -> tuple[tuple[str, ...], Any]:

@@ -94,6 +94,13 @@ def with_limits(value: float, low: float, high: float, unit: str = "") -> str:
     return f"{number} {unit}".rstrip() + f" ({' to '.join(ends)})"
 
 
+def instant(time_s: float, low_s: float, high_s: float) -> str:
+    """Return a time of any clock and its limits, with two digits of their width."""
+    decimals = max(1 - _power(high_s - low_s), 0) if high_s > low_s else _MOST_SHOWN
+    time, low, high = (f"{each:.{decimals}f}" for each in (time_s, low_s, high_s))
+    return f"{time} s ({low} to {high})"
+
+
 def _power(value: float) -> int:
     """Return the power of ten of a number's first digit."""
     return math.floor(math.log10(value))

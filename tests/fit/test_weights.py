@@ -13,8 +13,10 @@ from biogrip.fit.trace_fit import trace_fit
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.library import set_up, simulate
 from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import hold
+from biogrip.traces.any_sample import proportional_deviations
 from tests.helpers.problems import run
 
 # The fit of polystyrene at 190 degC that pyRheo publishes, with weights of 5 % of the compliance.
@@ -93,6 +95,19 @@ def test_weighted_fits_are_scipys() -> None:
     assert chi_squared == pytest.approx(left @ left, rel=1e-6)
     assert likelihood.threshold == pytest.approx(3.8415, abs=1e-4)
     assert diagnosis.notes == []
+
+
+def test_a_plateau_is_no_noise() -> None:
+    """A relaxation that ends at a plateau, of which deviations are a share as of all else."""
+    times = np.geomspace(1.0, 1e3, 100)
+    smooth = 800 + 700 * np.exp(-times / 20)
+    readings = smooth * (1 + 0.01 * np.random.default_rng(0).standard_normal(len(times)))
+    relaxation = set_up(INSTRUMENTS["modulus"], (hold(1e3, 1.0),), Sample("zener_maxwell"))
+    none = np.zeros((0, len(times)))
+    found = proportional_deviations(
+        times, readings, relaxation.gripper, relaxation.torque, none, 0.01
+    )
+    assert found == pytest.approx(0.01 * smooth, rel=0.02)
 
 
 def test_the_model_is_that_of_the_closed_form() -> None:

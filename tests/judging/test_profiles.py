@@ -196,7 +196,7 @@ def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
     problem = experiment.of(times, trace)
     found = run("least_squares", problem)
     alone = diagnose(problem, experiment.model, found, confidence=0.95)
-    merged = profile_over_onset(alone, times)
+    merged, _ = profile_over_onset(alone, times)
     certainty = alone.likelihood.certainty
     for low_of, diagnosis in (([True, True], alone), ([True, False], merged)):
         assert [finding.low is not None for finding in diagnosis.findings] == low_of

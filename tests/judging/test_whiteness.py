@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.signal import lfilter
 from scipy.stats import kstest
 from scipy.stats import t as student
 
 from biogrip.arrays import Array
 from biogrip.fit.noise_model_fit import absorbed, outliers_of
-from biogrip.judging.whiteness import correlated, count_independent, far_out, uneven, wandering
+from biogrip.judging.whiteness import as_correlated, correlated, far_out, uneven, wandering
 
 LEVEL = 0.01
 TRACES = 4000
@@ -102,10 +103,42 @@ def test_independent_residuals_are_counted() -> None:
     """All of white noise, and of an AR(1) process n (1 - a)/(1 + a)."""
     rng = np.random.default_rng(5)
     white = rng.standard_normal(20_000)
-    assert count_independent(white) == pytest.approx(20_000, rel=0.05)
-    slow = np.zeros(20_000)
-    for place in range(1, len(slow)):
-        slow[place] = 0.9 * slow[place - 1] + white[place]
-    assert count_independent(slow) == pytest.approx(20_000 / 19, rel=0.2)
-    # Three half waves are about as many independent values.
-    assert 2 < count_independent(np.sin(3 * np.pi * np.linspace(0, 1, 1000))) < 8
+    count, freedom = as_correlated(white, NOTHING)
+    assert count == pytest.approx(20_000, rel=0.2)
+    assert freedom > 100
+    slow = lfilter([1.0], [1.0, -0.95], white)
+    # Known no better: a low frequency is as rarely seen as there are sums.
+    assert as_correlated(slow, NOTHING)[0] == pytest.approx(20_000 / 39, rel=0.4)
+
+
+@pytest.mark.parametrize("decades", [0, 3])
+@pytest.mark.parametrize("length", [0.1, 0.04])
+@pytest.mark.parametrize("smooth", [True, False])
+def test_limits_that_allow_for_a_misfit_hold_the_truth(
+    decades: int, length: float, smooth: bool
+) -> None:
+    """A linear fit of a relaxation whose model lacks a random function of the reading's number.
+
+    Only what is certainly no noise counts. Of such limits 95 % are to hold, and at least 87 % do
+    if what is lacking is not smooth.
+    """
+    place = np.arange(1, 81) / 80
+    times = np.geomspace(10.0**-decades, 1.0, 80) if decades else place
+    slopes = directions(times)
+    basis = absorbed(slopes)
+    apart = np.abs(np.subtract.outer(place, place)) / length
+    covariance = np.exp(-0.5 * apart**2) if smooth else np.exp(-apart)
+    root = np.linalg.cholesky(covariance + 0.04 * np.eye(80))
+    lacking = np.random.default_rng(7).standard_normal((100, 80)) @ root.T
+    inverse = np.linalg.inv(slopes @ slopes.T)
+    held = []
+    for misfit in lacking:
+        left = misfit - misfit @ basis.T @ basis
+        if correlated(left, basis)[1] > 0.001:
+            continue
+        count, freedom = as_correlated(left, basis)
+        variance = 80 * np.mean(left**2) / count * np.diag(inverse)
+        away = np.abs(inverse @ (slopes @ misfit)) / np.sqrt(variance)
+        held.append(away < student.ppf(0.975, freedom))
+    assert len(held) > 30
+    assert np.mean(held) > (0.93 if smooth else 0.85)

@@ -17,6 +17,7 @@ from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.problem import silent
+from biogrip.physics.whitening import estimate_noise
 
 _BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
 # Steps of the pattern search in sampling intervals: first, and last, and most of them.
@@ -42,6 +43,12 @@ class OnsetFit:
     """RMS misfit."""
 
 
+def spacing_at(time_s: Array, at_s: float) -> float:
+    """Return how far ascending times, (n,), are apart at one of them, or nearest to it, in s."""
+    after = int(np.clip(np.searchsorted(time_s, at_s), 1, len(time_s) - 1))
+    return float(time_s[after] - time_s[after - 1])
+
+
 def _misfit_rad(fit: OnsetFit) -> float:
     return fit.misfit_rad
 
@@ -60,14 +67,22 @@ class OnsetFits:
     def __init__(self, case_problem: CaseProblem, time_s: Array, rotation_rad: Array) -> None:
         self._case_problem = case_problem.to_identify()
         self._time_s, self._rotation_rad = time_s, rotation_rad
-        self.interval_s = float(np.median(np.diff(time_s)))
+        self._interval_s = float(np.median(np.diff(time_s)))
+        self.noise_rad = estimate_noise(rotation_rad)
 
     def best(self, guess_s: float) -> OnsetFit:
         """Fit the onset along, beginning with a guess in s."""
         problem = self._case_problem.of(self._time_s - guess_s, self._rotation_rad)
         (found,) = identify_many([problem], _BUDGET, [np.random.default_rng(0)], silent)
         start = OnsetFit(guess_s, np.log(found.parameters), found.misfit_rad)
-        return self._between_readings(self._searched(start))
+        return self._between_readings(self._searched(start, _FIRST_STEP))
+
+    def near(self, start: OnsetFit) -> OnsetFit:
+        """Fit the onset along near that of another fit."""
+        best = self._searched(start, 1.0)
+        for ends in self._smooth_intervals(best.onset_s, 1):
+            best = min(self._lowered([best], ends, _FEW), key=_misfit_rad)
+        return best
 
     def at(self, onset_s: float, near: Array) -> OnsetFit:
         """Fit the sample for an onset by a local fit from log-parameters, (n_parameters,)."""
@@ -75,15 +90,17 @@ class OnsetFits:
         fit = fit_from([problem], near)
         return OnsetFit(onset_s, fit.x[0], float(fit.misfit_rad[0]))
 
-    def _searched(self, best: OnsetFit) -> OnsetFit:
+    def _searched(self, best: OnsetFit, first_step: float) -> OnsetFit:
         """Search the onset in steps, halved where neither direction is better.
+
+        The first is some median intervals of the readings.
 
         The last steps are half as long as the readings are apart where the onset is, which of
         times with equal ratios is much less than the median.
         """
-        step_s = _FIRST_STEP * self.interval_s
+        step_s = first_step * self._interval_s
         for _ in range(_MOST_STEPS):
-            if step_s < _LAST_STEP * min(self.interval_s, self._apart_s(best.onset_s)):
+            if step_s < _LAST_STEP * min(self._interval_s, spacing_at(self._time_s, best.onset_s)):
                 break
             sides = (self.at(best.onset_s + s, best.log_parameters) for s in (-step_s, step_s))
             lower = min(sides, key=_misfit_rad)
@@ -98,7 +115,7 @@ class OnsetFits:
 
         Those are left early in which the first fits are all far above the best one.
         """
-        intervals = list(self._smooth_intervals(best.onset_s))
+        intervals = list(self._smooth_intervals(best.onset_s, _NEAR))
         tried = [self._lowered([best], ends, _FEW) for ends in intervals]
         first = min((fit for fits in tried for fit in fits), key=_misfit_rad)
         for fits, ends in zip(tried, intervals, strict=True):
@@ -122,16 +139,11 @@ class OnsetFits:
         minimize_scalar(misfit_rad, bounds=bounds, method="bounded", options={"maxiter": most})
         return list(known.values())
 
-    def _apart_s(self, onset_s: float) -> float:
-        """Return how far readings are apart at an onset, in s."""
-        after = int(np.clip(np.searchsorted(self._time_s, onset_s), 1, len(self._time_s) - 1))
-        return float(self._time_s[after] - self._time_s[after - 1])
-
-    def _smooth_intervals(self, onset_s: float) -> Iterator[tuple[float, float]]:
+    def _smooth_intervals(self, onset_s: float, near: int) -> Iterator[tuple[float, float]]:
         """Yield intervals of onsets around one, within which no reading passes a change of torque.
 
         An onset before the first reading passes none, however early: the first interval then
-        begins as far before it as a search that has come near may be off.
+        begins some times as far before it.
         """
         torque = self._case_problem.torque
         changes_s = np.unique([start for start, *_ in (*torque.jumps, *torque.swings)])
@@ -139,7 +151,7 @@ class OnsetFits:
         equal_s = _ROUNDING * max(np.abs(self._time_s).max(), np.abs(changes_s).max())
         edges = edges[np.diff(edges, prepend=-np.inf) > equal_s]
         after = int(np.searchsorted(edges, onset_s))
-        if after < _NEAR:
-            before_s = min(onset_s, edges[0]) - _NEAR * self.interval_s
-            yield before_s, float(edges[0])
-        yield from pairwise(edges[max(after - _NEAR, 0) : after + _NEAR].tolist())
+        if after < near:
+            before_s = max(edges[0] - onset_s, spacing_at(edges, onset_s))
+            yield float(edges[0] - _NEAR * before_s), float(edges[0])
+        yield from pairwise(edges[max(after - near, 0) : after + near].tolist())

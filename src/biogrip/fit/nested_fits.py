@@ -81,7 +81,7 @@ def fit_models(
         for trace, problem in enumerate(problems[name]):
             longest_s = problem.residuals.duration_s
             of_contained = _of_contained(name, found, trace, longest_s)
-            points = [_within(start, problem) for start in of_contained]
+            points = [within_range(start, problem) for start in of_contained]
             points += [near[name][trace]] if near and name in near else []
             further.append(np.reshape(points, (-1, len(problem.low))))
         own = _fewer(settings) if CANDIDATES[name].model.power_law else settings
@@ -136,7 +136,7 @@ def _add_branches(name: str, problems: Sequence[Problem], found: dict[str, Answe
         inner for inner in fewer if not any(inner in contained(other) for other in fewer)
     ]:
         pairs = [
-            (trace, _within(start, problem))
+            (trace, within_range(start, problem))
             for trace, problem in enumerate(problems)
             for start in _with_a_branch_more(
                 as_richer(name, inner, found[inner][trace].parameters), np.array(branches)
@@ -183,7 +183,9 @@ def _fit_again(problems: Mapping[str, Sequence[Problem]], found: dict[str, Answe
             parameters = as_richer(name, inner, found[inner][trace].parameters)
             if is_within(parameters, problem):
                 before = found[name][trace]
-                found[name][trace] = _better_from(before, problem, _within(parameters, problem))
+                found[name][trace] = _better_from(
+                    before, problem, within_range(parameters, problem)
+                )
                 news |= found[name][trace] is not before
         if not news:
             break
@@ -227,7 +229,7 @@ def _digits(misfit_rad: float) -> float:
     return float(f"{misfit_rad:.8e}")
 
 
-def _within(parameters: Array, problem: Problem) -> Array:
+def within_range(parameters: Array, problem: Problem) -> Array:
     """Return log-parameters, clipped to the search range."""
     with np.errstate(divide="ignore"):
         return np.clip(np.log(parameters), problem.low, problem.high)

@@ -1,5 +1,6 @@
 """A trace in a notebook: identified and told as by the command, from arrays or pandas columns."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,29 @@ from biogrip.terminal import Progress
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+# Options of the command in what it says, and the arguments and keys that they are here.
+_ARGUMENTS = (
+    ("--start fit", 'start="fit"'),
+    ("--offset --drift", "offset=True, drift=True"),
+    ("--(offset|drift)", r"\1=True"),
+    (r"--model (\w+)", r'model="\1"'),
+    (r"--noise-model (\w+)", r'noise_model="\1"'),
+    ("--(from|until)", r"measurement.\1_s in config"),
+    ("--load", "measurement.load of the command"),
+    ("--(?=[a-z])", ""),
+)
+
+
+def _with_arguments(said: Any) -> Any:
+    """Return what the command says, plain data, with arguments in the place of options."""
+    if isinstance(said, dict):
+        return {key: _with_arguments(value) for key, value in said.items()}
+    if isinstance(said, list):
+        return [_with_arguments(value) for value in said]
+    for option, argument in _ARGUMENTS if isinstance(said, str) else ():
+        said = re.sub(option, argument, said)
+    return said
 
 
 @dataclass(frozen=True, repr=False)
@@ -121,6 +145,8 @@ def identify_trace(
     if len({len(values) for values in columns.values()}) > 1:
         found = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
         raise BiogripError(f"found {found}; allowed are as many of each.")
+    if isinstance(start, str) and start != "fit":
+        raise BiogripError(f"start: found '{start}', allowed is a number of seconds, or 'fit'.")
     late = ("fit_start", True) if start == "fit" else ("start_s", start)
     measured = (
         *(("reads", reads, column), ("start", *late), ("sd", "sd", None if sd is None else "sd")),
@@ -145,8 +171,7 @@ def identify_trace(
             with Progress("", 5, live=False, quiet=True) as progress:
                 (result,) = identify_alike([Path(file.name)], [trace], None, progress)
         except BiogripError as error:
-            # Options of the command are arguments here.
-            said = str(error).replace(str(file), file.name).replace("--", "")
+            said = _with_arguments(str(error).replace(str(file), file.name))
             raise BiogripError(said) from None
     result.data["assumed"]["measurement"]["file"] = file.name
-    return TraceResult(**vars(result))
+    return TraceResult(**{**vars(result), "data": _with_arguments(result.data)})

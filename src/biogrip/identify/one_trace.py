@@ -29,6 +29,7 @@ from biogrip.identify.other_fits import (
     FittedModels,
     judge_again,
     models_tried,
+    note_flow,
     second_opinions,
 )
 from biogrip.identify.outputs import WRITTEN_BY, Outcome, in_own_units
@@ -48,7 +49,7 @@ from biogrip.stages import recording
 from biogrip.stages.judgement import fits_judged, notes_on_fit
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
-from biogrip.traces.onset import note_late_onset
+from biogrip.traces.onset import note_hidden_ramp, note_late_onset, note_tare
 
 # Most traces of a batch, and most readings of traces that are fitted together.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
@@ -216,17 +217,23 @@ def identify_alike(
     models = models_tried(traces, fits, diagnoses)
     again = [judge_again(*each) for each in zip(traces, fits, diagnoses, models, strict=True)]
     diagnoses = with_times([diagnosis for diagnosis, _ in again], first.problem.searched)
-    diagnoses = [
-        profile_over_onset(diagnosis, own.recorded.time_s) if own.problem.fit_start else diagnosis
-        for own, diagnosis in zip(traces, diagnoses, strict=True)
-    ]
+    onsets_s = {}
+    for index, own in enumerate(traces):
+        if own.problem.fit_start:
+            merged = profile_over_onset(diagnoses[index], own.recorded.time_s)
+            diagnoses[index], onsets_s[index] = merged
     progress.done()
     progress.doing("trying an offset and a drift")
-    opinions = second_opinions(traces, diagnoses, progress.within)
+    starts = [_about_start(*each) for each in zip(traces, diagnoses, strict=True)]
+    opinions = second_opinions(traces, diagnoses, progress.within, [own.lead for own in models])
     found = []
     for index, own in enumerate(traces):
-        notes = [*again[index][1], *opinions[index]]
+        # Beside another start, an offset and a drift mean nothing.
+        opinions[index] *= not any(note.weight != HARMLESS for note in starts[index])
+        notes = [*again[index][1], *starts[index], *opinions[index], *note_flow(own)]
         data = _data(own, fits[index], diagnoses[index], models[index], notes)
+        if index in onsets_s:
+            data["onset_limits_s"] = [data["onset_s"] + end_s for end_s in onsets_s[index]]
         data = {WRITTEN_BY: __version__, "trace": str(files[index]), **data}
         found.append(Identified(data, own.problem, own.recorded))
     for data, output in zip((each.data for each in found), outputs or (), strict=False):
@@ -235,6 +242,14 @@ def identify_alike(
         read = INSTRUMENTS[data["reads"]["quantity"]].read
         write_text(output, json.dumps(in_own_units(rounded, read), indent=1) + "\n")
     return found
+
+
+def _about_start(trace: TraceCase, diagnosis: Diagnosis) -> list[Note]:
+    """Return notes on when the protocol starts, and on a ramp that no reading shows."""
+    given = trace.problem, *trace.readings, diagnosis
+    late = note_late_onset(*given) if trace.case.may_start_late else []
+    tare = note_tare(trace.problem, trace.readings, diagnosis, late=bool(late))
+    return [*(late or note_hidden_ramp(*given)), *tare]
 
 
 def _data(
@@ -248,10 +263,9 @@ def _data(
     case, problem, recorded = trace.case, trace.problem, trace.recorded
     instrument = problem.instrument
     best = diagnosis.likelihood.best
-    late = note_late_onset(problem, *trace.readings, best) if case.may_start_late else []
     assumptions = [Note(HARMLESS, _NOT_COMPARED)] if problem.fixed else []
     read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
-    said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *notes, *late], read)
+    said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *notes], read)
     form = recorded.recognised
     unusual = form and not form.is_usual(case.columns)
     return {
@@ -301,9 +315,9 @@ def _gripper_in_limits(problem: CaseProblem) -> str:
 
 def _fitted_along(
     problem: CaseProblem, recorded: Measurements, parameters: Array
-) -> dict[str, float | None]:
+) -> dict[str, float]:
     """Return onset, offset and drift of the instrument in the best fit, as far as fitted."""
-    found = {"onset_s": recorded.onset_s} if problem.fit_start else {}
+    found = {"onset_s": float(recorded.onset_s or 0.0)} if problem.fit_start else {}
     if not (problem.offset or problem.drift):
         return found
     time_s, measured = recorded.time_s, recorded.rotation_rad[0]

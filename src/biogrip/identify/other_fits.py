@@ -11,15 +11,13 @@ many degrees of freedom as terms are added (Wilks 1938).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc
 
 from biogrip.digits import plain
-from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.methods import identifier
-from biogrip.fit.multi_start import fit_from
+from biogrip.fit.fitted_onset import OnsetFits
 from biogrip.fit.nested_fits import (
     FittedModel,
     advice,
@@ -28,18 +26,21 @@ from biogrip.fit.nested_fits import (
     is_within,
     preferred_simpler,
     ranked,
+    within_range,
 )
 from biogrip.fit.problem import Identification, Problem, Progress
-from biogrip.fit.trace_fit import TraceFit, fit_traces
-from biogrip.identify.trace_case import TraceCase
-from biogrip.judging.diagnosis import Diagnosis, diagnose, diagnose_all
+from biogrip.fit.trace_fit import TraceFit
+from biogrip.identify.trace_case import FLOWS, TraceCase
+from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import DOUBT, FALSE_ALARM, HARMLESS, REJECTED, REJECTION, Note, one_in
 from biogrip.judging.likelihood import MISSED, compute_fall
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.fractional import LONGEST_S
 from biogrip.physics.models import CANDIDATES, as_richer, contained
 from biogrip.physics.noise import stream
+from biogrip.physics.protocol import is_held
 from biogrip.physics.whitening import drift_is_flow
+from biogrip.stages.judgement import fits_judged
 
 _MOST_SAMPLES = 50_000
 # Each of the others would take half a second to five; they are tried where the config names them.
@@ -56,6 +57,13 @@ class FittedModels:
     """Rank of each model."""
     answers: dict[str, Identification] = field(default_factory=dict)
     """Fit of each by its name, in the same order."""
+
+    @property
+    def lead(self) -> float:
+        """How much lower than that of the chosen model the BIC of another is."""
+        return max(
+            (own.delta_bic for own in self.tried if own.candidate == self.chosen), default=0.0
+        )
 
     def data(self, findings: Sequence[Finding] | None) -> dict[str, Any]:
         """Return one row per model, and advice in words, as plain data.
@@ -137,10 +145,28 @@ def models_tried(
         found = fit_models(problems, budget, streams, lambda: None, near=near)
         for place, index in enumerate(which):
             answers = {name: found[name][place] for name in names}
+            if traces[index].problem.fit_start and not traces[index].problem.coloured:
+                answers = {
+                    name: _at_own_onset(traces[index], name, problems[name][place], answer)
+                    for name, answer in answers.items()
+                }
             misfits = [answer.misfit_rad for answer in answers.values()]
             samples = fits[index].problem.residuals.samples
             every[index] = FittedModels(chosen, ranked(names, misfits, samples), answers)
     return every
+
+
+def _at_own_onset(
+    trace: TraceCase, name: str, problem: Problem, found: Identification
+) -> Identification:
+    """Return a model's fit with the onset that it fits best with, from that of the chosen model."""
+    if name == trace.case.sample.candidate:
+        return found
+    fits = OnsetFits(replace(trace.problem, sample=CANDIDATES[name], fixed={}), *trace.readings)
+    best = fits.near(fits.at(0.0, within_range(found.parameters, problem)))
+    if best.misfit_rad >= found.misfit_rad:
+        return found
+    return found.replaced(np.exp(best.log_parameters), best.misfit_rad, converged=found.converged)
 
 
 def _candidates(trace: TraceCase, fit: TraceFit) -> tuple[str, ...]:
@@ -180,120 +206,139 @@ def judge_again(
 
 
 def second_opinions(
-    traces: Sequence[TraceCase], diagnoses: Sequence[Diagnosis], progress: Progress
+    traces: Sequence[TraceCase],
+    diagnoses: Sequence[Diagnosis],
+    progress: Progress,
+    leads: Sequence[float],
 ) -> list[list[Note]]:
     """Fit an offset and a drift along, and warn if chi^2 falls more than by chance (`FALSE_ALARM`).
 
-    Traces have the same model, budget and confidence. Each gets at most one note; with a rejected
-    fit, only if that with both terms is not rejected. None are tried if both are declared already,
-    or if the noise model is coloured, which fits both unless they are refused.
+    If an offset alone explains as much, it is that; fits are those that the command would make if
+    it were declared. Traces have the same model, budget and confidence. Each gets at most one note;
+    with a rejected fit, only if the other is not rejected. None are tried if both are declared
+    already, or if the noise model is coloured, which fits both unless they are refused.
+
+    Of a rejected fit it is not said either, if BIC prefers another model by more: by its `leads`.
     """
     notes: list[list[Note]] = [[] for _ in traces]
-    tried = [index for index, trace in enumerate(traces) if _may_have_more(trace.problem)]
-    if not tried:
-        return notes
-    some = [traces[index] for index in tried]
-    also = [replace(trace.problem, offset=True, drift=True) for trace in some]
-    fits = _fitted(some, also, [diagnoses[index] for index in tried], progress)
-    better = []
-    for index, fit in zip(tried, fits, strict=True):
-        fall, chance = _decrease(traces[index].problem, diagnoses[index], fit)
-        if chance < FALSE_ALARM:
-            better.append((index, fit, fall, chance))
-    others = diagnose_all(
-        [fit.problem for _, fit, *_ in better],
-        also[0].searched,
-        [fit.found for _, fit, *_ in better],
-        confidence=traces[0].case.confidence,
-        noise_rad=[traces[index].problem.noise_rad for index, *_ in better],
-    )
-    for (index, _, *decrease), other in zip(better, others, strict=True):
-        rejected = diagnoses[index].status == REJECTED
-        if not (rejected and other.status == REJECTED):
-            notes[index].append(_note(traces[index], diagnoses[index], other, *decrease))
+    problems = enumerate(trace.problem for trace in traces)
+    which = [index for index, own in problems if not (own.coloured or (own.offset and own.drift))]
+    both = _better(traces, diagnoses, which, progress, drift=True)
+    alone = [index for index in both if both[index].added > 1]
+    offsets = _better(traces, diagnoses, alone, progress, drift=False)
+    for index, other in both.items():
+        one = offsets.get(index)
+        if one and chdtrc(1, max(other.fall - one.fall, 0.0)) >= FALSE_ALARM:
+            other = one
+        judged = diagnose(
+            other.fit.problem,
+            other.trace.problem.searched,
+            other.fit.found,
+            confidence=other.trace.case.confidence,
+            noise_rad=other.trace.problem.noise_rad,
+        )
+        terms = np.log(len(traces[index].readings[0])) * other.added
+        led = judged.status == REJECTED or leads[index] > other.fall - terms
+        if not (diagnoses[index].status == REJECTED and led):
+            notes[index].append(_note(traces[index], diagnoses[index], other, judged))
     return notes
 
 
-def _may_have_more(problem: CaseProblem) -> bool:
-    both = problem.offset and problem.drift
-    return not (both or problem.coloured)
+class _Other(NamedTuple):
+    """A better fit with terms added: decrease of chi^2, its chance, and how many terms."""
+
+    trace: TraceCase
+    fit: TraceFit
+    fall: float
+    chance: float
+    added: int
 
 
-def _fitted(
+def _better(
     traces: Sequence[TraceCase],
-    also: Sequence[CaseProblem],
     diagnoses: Sequence[Diagnosis],
+    which: Sequence[int],
     progress: Progress,
-) -> list[TraceFit]:
-    """Fit traces with offset and drift, from random points and from the fits without these."""
-    least_squares = identifier("least_squares", traces[0].case.method("least_squares"))
-
-    def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
-        cases = [traces[index].case for index in which]
-        rngs = [stream(case.study.study_seed, case.name, 0, "instrument") for case in cases]
-        return least_squares(problems, rngs, progress)
-
-    fits = fit_traces(also, [trace.readings for trace in traces], find)
-    # The fit without offset and drift is a start as well: with them, chi^2 cannot be higher.
-    starts = np.array([diagnosis.likelihood.best for diagnosis in diagnoses])
-    again = fit_from([fit.problem for fit in fits], starts)
-    for own, fit in enumerate(fits):
-        both = fit.found, fit.found.at(again, own)
-        # Last bits do not decide.
-        fits[own] = replace(fit, found=min(both, key=lambda each: np.float32(each.misfit_rad)))
-    return fits
-
-
-def _decrease(problem: CaseProblem, diagnosis: Diagnosis, fit: TraceFit) -> tuple[float, float]:
-    """Return the decrease of chi^2 by an offset and a drift, and the probability of as much."""
-    likelihood = diagnosis.likelihood
-    fall = compute_fall(
-        fit.problem.residuals.samples,
-        likelihood.misfit_rad,
-        fit.found.misfit_rad,
-        likelihood.noise_rad if problem.noise_rad is not None else None,
-    )
-    added = 2 - problem.offset - problem.drift
-    return fall, float(chdtrc(added, max(fall, 0.0)))
+    *,
+    drift: bool,
+) -> dict[int, _Other]:
+    """Return the command's fits with an offset, or a drift, too, by index, if they are better."""
+    if not which:
+        return {}
+    also = [traces[index].with_terms(drift=drift) for index in which]
+    cases, problems = [own.case for own in also], [own.problem for own in also]
+    fits = fits_judged(cases, problems, [own.readings for own in also], 0, progress)
+    found = {}
+    for index, own, fit in zip(which, also, fits, strict=True):
+        problem, likelihood = traces[index].problem, diagnoses[index].likelihood
+        fall = compute_fall(
+            fit.problem.residuals.samples,
+            likelihood.misfit_rad,
+            fit.found.misfit_rad,
+            likelihood.noise_rad if problem.noise_rad is not None else None,
+        )
+        added = own.problem.offset + own.problem.drift - problem.offset - problem.drift
+        if (chance := float(chdtrc(added, max(fall, 0.0)))) < FALSE_ALARM:
+            found[index] = _Other(own, fit, fall, chance, added)
+    return found
 
 
-def _note(
-    trace: TraceCase, diagnosis: Diagnosis, other: Diagnosis, fall: float, chance: float
-) -> Note:
+def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnosis) -> Note:
     """Return the warning, with the verdicts that an offset and a drift would change."""
     case_problem, rejected = trace.problem, diagnosis.status == REJECTED
     # Characteristic times, at the end of the former, are not among the latter.
     changed = [
         f"{after.quantity.label} would be {after.words().removeprefix('determined: ')}"
-        for before, after in zip(diagnosis.findings, other.findings, strict=False)
+        for before, after in zip(diagnosis.findings, judged.findings, strict=False)
         if _differ(before, after)
     ]
-    changes = "with them it is not rejected" if rejected else "; ".join(changed)
-    better = (
-        "explain the trace far better "
-        f"(χ² falls by {plain(fall)}; by chance it would {one_in(chance)} traces)"
-    )
-    controlled = case_problem.instrument.controlled.name
-    or_flows = (
-        f" Or the sample flows: as long as the {controlled} is constant, a drift and a damper "
-        "without a spring give the same line."
-    )
-    if case_problem.instrument.deforms:
-        or_flows = ""
-    if not case_problem.drift and drift_is_flow(case_problem.torque, trace.recorded.time_s):
+    changes = "it is not rejected then" if rejected else "; ".join(changed)
+    drifts = other.trace.problem.drift and not case_problem.drift
+    # A constant and a line, if not both are declared already.
+    many = drifts and not case_problem.offset
+    better = f"{'explain' if many else 'explains'} the trace far better (χ² falls by "
+    better += f"{plain(other.fall)}; by chance it would {one_in(other.chance)} traces)"
+    controlled, deforms = case_problem.instrument.controlled.name, case_problem.instrument.deforms
+    time_s = trace.recorded.time_s
+    if drifts and drift_is_flow(case_problem.torque, time_s):
         text = (
-            f"A constant and a line in time, fitted along, {better}: the instrument drifts, or the "
-            f"sample flows. Under this {controlled} both give the same line, and the trace cannot "
-            f"tell which it is: a {controlled} that changes would."
+            f"A constant and a line in time, fitted along, {better}: the "
+            f"instrument drifts, or the sample flows. Under this {controlled} both give the same "
+            f"line, and the trace cannot tell which it is: a {controlled} that changes would."
+        )
+    elif not drifts and is_held(case_problem.torque, time_s):
+        text = (
+            f"A constant, fitted along, {better}: the instrument has an offset, or the sample "
+            f"{'holds a load' if deforms else 'yields at once'}. Under this {controlled} both give "
+            "the same constant: readings before the start would tell."
         )
     else:
+        terms = "An offset and a drift" if many else "A drift" if drifts else "An offset"
+        options = " --offset" * other.trace.problem.offset + " --drift" * other.trace.problem.drift
+        or_flows = ""
+        if drifts and not deforms:
+            or_flows = (
+                f" Or the sample flows: as long as the {controlled} is constant, a drift and a "
+                "damper without a spring give the same line."
+            )
         text = (
-            f"An offset and a drift of the instrument, fitted along, {better}: "
-            f"{changes or 'no verdict changes'}. If the instrument may drift, identify the trace "
-            f"with --offset --drift.{or_flows}"
+            f"{terms} of the instrument, fitted along, {better}: {changes or 'no verdict changes'}."
+            f" If the instrument may have that, identify the trace with{options}.{or_flows}"
         )
     weight = DOUBT if changed else HARMLESS
     return Note(REJECTION if rejected else weight, text)
+
+
+def note_flow(trace: TraceCase) -> list[Note]:
+    """Say beside a damper that lets the sample flow that a drift would look the same."""
+    problem, damper = trace.problem, FLOWS.get(trace.problem.model.name)
+    if problem.drift or not damper or not drift_is_flow(problem.torque, trace.recorded.time_s):
+        return []
+    text = (
+        f"Under a constant {problem.instrument.controlled.name} a drift of the instrument and the "
+        f"flow of the sample are one line: {damper} holds if the instrument does not drift."
+    )
+    return [Note(HARMLESS, text)]
 
 
 def _differ(before: Finding, after: Finding) -> bool:

@@ -17,8 +17,8 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
-from biogrip.physics.protocol import largest_load
-from biogrip.physics.whitening import estimate_noise
+from biogrip.physics.protocol import is_held, largest_load
+from biogrip.physics.whitening import drift_is_flow, estimate_noise
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
 from biogrip.study.study import Case
@@ -27,6 +27,9 @@ from biogrip.traces.reader import Recognised
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
 _CLEAREST, _MARGIN = 1e5, 10.0
 _LEAST, _MOST = -16, 18
+
+FLOWS = {"damper": "c_p", "maxwell": "c", "burgers": "c_s"}
+"""Dampers by which models flow under a constant load, on and on in a line."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,13 @@ class TraceCase:
             and self.case.least_squares == other.case.least_squares
         )
 
+    def with_terms(self, *, drift: bool) -> "TraceCase":
+        """Return the trace as if the user had declared an offset, or a drift, too."""
+        measured = self.case.block.measurement
+        measured = replace(measured, offset=True, drift=drift or self.problem.drift)
+        case = replace(self.case, block=replace(self.case.block, measurement=measured))
+        return _with_ranges(case, self.recorded, self.given)
+
 
 def read_trace(
     file: Path, case: Case, given: Mapping[str, Any], show: Callable[[str], None]
@@ -74,14 +84,35 @@ def read_trace(
             show(form.in_words(file))
 
     columns = replace(case.columns, by_options=True)
-    trace = recording.read_checked(file, case.gripper, case.problem, columns, show_unusual)
+    declared = case.block.measurement
+    problem = replace(case.problem, offset=bool(declared.offset), drift=bool(declared.drift))
+    trace = recording.read_checked(file, case.gripper, problem, columns, show_unusual)
+    if case.problem.coloured:
+        case = _without_likenesses(case, trace.time_s)
+    read = _with_ranges(case, trace, given)
+    return replace(read, recorded=recording.with_fitted_onset(trace, read.case.problem))
+
+
+def _with_ranges(case: Case, trace: Measurements, given: Mapping[str, Any]) -> TraceCase:
     ranges = ranges_of(case.problem.weighted(trace.sd_rad), trace.time_s, trace.rotation_rad[0])
     for name in given.get("search_range") or {}:
         ranges.pop(name, None)
     block = replace(case.block, search_range=replace(case.block.search_range, **ranges))
     case = replace(case, block=block)
-    trace = recording.with_fitted_onset(trace, case.problem)
     return TraceCase(case, trace, case.problem.weighted(trace.sd_rad), given)
+
+
+def _without_likenesses(case: Case, time_s: Array) -> Case:
+    """Return a case without a default offset or drift that looks like what its sample does."""
+    measured, problem = case.block.measurement, case.problem
+    network = problem.searched.network([problem.searched.example])
+    own = network.k_p[0] > 0 if problem.instrument.deforms else network.c_p[0] == 0
+    if measured.offset is None and own and is_held(problem.torque, time_s):
+        measured = replace(measured, offset=False)
+    flows = problem.model.name in FLOWS and drift_is_flow(problem.torque, time_s)
+    if measured.drift is None and flows:
+        measured = replace(measured, drift=False)
+    return replace(case, block=replace(case.block, measurement=measured))
 
 
 def ranges_of(

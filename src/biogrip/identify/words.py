@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from textwrap import indent
 from typing import Any
 
-from biogrip.digits import plain, with_limits, with_unit, within_limits
+from biogrip.digits import instant, plain, with_limits, with_unit, within_limits
 from biogrip.judging.doubts import OK, REJECTED
 from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
@@ -72,7 +72,8 @@ def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return lines on fixed parameters, and on onset, offset and drift as far as fitted."""
     lines = fixed_in_words(found)
     if "onset_s" in found:
-        lines.append(f"The protocol starts at {found['onset_s']:.4g} s of the clock, as fitted.")
+        when = instant(found["onset_s"], *found["onset_limits_s"])
+        lines.append(f"The protocol starts at {when} of the clock, as fitted.")
     if "offset_rad" in found:
         lines.append(f"Offset of the instrument: {in_unit(found['offset_rad'], found)}")
     if "drift_rad_per_s" in found:

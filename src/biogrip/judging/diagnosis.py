@@ -117,7 +117,7 @@ def diagnose_all(
         ]
         remainders = [examine_residuals(likelihood) for likelihood in likelihoods]
         likelihoods = [
-            likelihood.as_misfit(remainder.independent) if remainder.independent else likelihood
+            likelihood.as_misfit(*remainder.misfit) if remainder.misfit else likelihood
             for likelihood, remainder in zip(likelihoods, remainders, strict=True)
         ]
         every = compute_findings(likelihoods, parameters_and_sum(model))

@@ -28,7 +28,7 @@ from biogrip.fit.noise_model_fit import (
     outliers_of,
 )
 from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.whiteness import correlated, count_independent, far_out, uneven, wandering
+from biogrip.judging.whiteness import as_correlated, correlated, far_out, uneven, wandering
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, estimate_noise
@@ -80,8 +80,9 @@ CERTAIN_MISFIT = 0.001
 _TOO_MUCH = 1.2
 # A misfit of this share of the peak is far off.
 _FAR_OFF = 0.02
-# A misfit below these shares of the noise and of the peak is that of a trace without noise.
-_NOISE_FREE, _NOISE_FREE_OF_PEAK = 0.01, 1e-3
+# A misfit below these shares of the noise and of the peak is that of a trace without noise, and so
+# is one below what no sensor resolves.
+_NOISE_FREE, _NOISE_FREE_OF_PEAK, _UNRESOLVED = 0.01, 1e-3, 1e-6
 # A misfit below this share of the given noise is reported: noise is rarely known better.
 _TOO_LITTLE = 0.5
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
@@ -96,15 +97,16 @@ class Remainder:
 
     notes: list[Note]
     """Doubts about it and about the noise that was given."""
-    independent: float | None = None
-    """How many residuals count as independent, if those of neighbours depend on each other."""
+    misfit: tuple[float, float] | None = None
+    """If limits allow for a misfit, how many independent residuals it is worth, and its freedom:
+    see `biogrip.judging.whiteness.as_correlated`."""
 
 
 def examine_residuals(likelihood: Likelihood) -> Remainder:
     """Test what the best fit of a trace leaves for noise, and for misfit."""
     residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
     least_rad = min(_NOISE_FREE * likelihood.noise_rad, _NOISE_FREE_OF_PEAK * residuals.peak_rad)
-    if misfit_rad < least_rad:
+    if misfit_rad < max(least_rad, _UNRESOLVED * residuals.peak_rad):
         return Remainder([])
     residual, slopes = _left(residuals, likelihood.best)
     time_s, rounding_rad = residuals.trace.time_s, residuals.rounding_rad
@@ -125,7 +127,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     notes: list[Note] = []
     found = None
     if chance < CERTAIN_MISFIT and times > _TOO_MUCH:
-        found = _misfit(residuals, (residual, slopes), bulk, times, scale)
+        found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
         notes += found.notes
     doubts = [*_about_growth(growth, residuals.instrument), *_about_outliers(time_s, struck)]
     # Outliers distort a fit, so that all that it leaves is correlated.
@@ -148,7 +150,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
                 "the fit leaves: its value, or its unit, is not the right one.",
             )
         )
-    return Remainder(notes, found.independent if found else None)
+    return Remainder(notes, found.misfit if found else None)
 
 
 def _left(residuals: Residuals, log_parameters: Array) -> tuple[Array, Array]:
@@ -159,9 +161,16 @@ def _left(residuals: Residuals, log_parameters: Array) -> tuple[Array, Array]:
 
 
 def _misfit(
-    residuals: Residuals, left: tuple[Array, Array], bulk: Array, times: float, scale: float
+    residuals: Residuals,
+    left: tuple[Array, Array],
+    bulk: tuple[Array, Array],
+    times: float,
+    scale: float,
 ) -> Remainder:
-    """Return the note on a misfit that is some times the noise, and whether it widens limits."""
+    """Return the note on a misfit that is some times the noise, and whether it widens limits.
+
+    Given are residuals with slopes, and those that are no outliers with what the fit absorbs.
+    """
     if has_uneven_noise(left[0], residuals.rounding_rad):
         text = (
             "The noise differs from one part of the trace to another, and the intervals do not "
@@ -169,14 +178,14 @@ def _misfit(
             "standard deviations (--sd)."
         )
         return Remainder([Note(DOUBT, text)])
-    independent = count_independent(bulk)
-    allowed = f"The limits count {max(independent, 1):.2g} of {len(bulk)} residuals as independent."
+    misfit = as_correlated(*bulk)
+    allowed = f"The limits count the {len(bulk[0])} residuals as {misfit[0]:.2g} independent ones."
     if has_fast_noise(residuals, *left):
         text = (
             f"The misfit is {times:.2g} times the noise of neighbouring readings, as of noise that "
             f"is correlated for a short time. {allowed}"
         )
-        return Remainder([Note(DOUBT, text)], independent)
+        return Remainder([Note(DOUBT, text)], misfit)
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak_rad
     suspects = residuals.instrument.suspects(unit=True)
     if share < _FAR_OFF:
@@ -184,7 +193,7 @@ def _misfit(
             f"The fit is good to {100 * share:.2g} % of the peak; the rest, {times:.2g} times the "
             f"noise of the trace, is not noise: {suspects} is not quite the right one. {allowed}"
         )
-        return Remainder([Note(DOUBT, text)], independent)
+        return Remainder([Note(DOUBT, text)], misfit)
     text = (
         f"The misfit is {times:.2g} times the noise of the trace, and {100 * share:.2g} % of the "
         f"peak: {suspects} is not the right one."

@@ -68,16 +68,13 @@ class Likelihood:
     independent: float = inf
     """How many residuals count as independent, if what the fit leaves is misfit."""
 
-    def as_misfit(self, independent: float) -> "Likelihood":
+    def as_misfit(self, independent: float, freedom: float) -> "Likelihood":
         """Return the likelihood if what the fit leaves is misfit, not noise.
 
-        So many residuals count as independent, less twice the parameters: a fit takes its share of
-        a misfit, and what is left changes its sign faster than the whole. They estimate the size of
-        the misfit, with at least one degree of freedom; the noise is as much larger as makes all
-        readings worth as many.
+        All residuals count as so many independent ones, and their variance has this freedom: see
+        `biogrip.judging.whiteness.as_correlated`.
         """
-        freedom = max(independent - 2 * len(self.best), 1.0)
-        noise_rad = self.misfit_rad * math.sqrt(self.problem.residuals.samples / freedom)
+        noise_rad = self.misfit_rad * math.sqrt(self.problem.residuals.samples / independent)
         threshold, certainty = _thresholds(self.confidence, freedom)
         return replace(
             self,

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from biogrip.arrays import Array
+from biogrip.fit.fitted_onset import spacing_at
 from biogrip.fit.multi_start import fit_from
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.likelihood import Likelihood
@@ -21,14 +22,23 @@ from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.verdicts import Finding
 
 _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
-# First change of the onset in sampling intervals, and most of it as a share of the trace.
+# First change of the onset over how far readings are apart there, and most of it as a share of the
+# trace.
 _FIRST_STEP, _MOST = 1 / 64, 0.25
 # Accuracy of an end of the onset's interval, as a share of its distance.
 _ACCURACY = 0.01
 
 
-def profile_over_onset(diagnosis: Diagnosis, time_s: Array) -> Diagnosis:
-    """Return a diagnosis whose limits allow for the uncertainty of a fitted onset.
+def onset_limits(best: Likelihood, time_s: Array) -> tuple[float, float]:
+    """Return the limits of an onset, in s from it, for times from it, (n_samples,)."""
+    step_s = _FIRST_STEP * spacing_at(time_s, 0.0)
+    return _end(best, -step_s), _end(best, step_s)
+
+
+def profile_over_onset(
+    diagnosis: Diagnosis, time_s: Array
+) -> tuple[Diagnosis, tuple[float, float]]:
+    """Return a diagnosis whose limits allow for the uncertainty of a fitted onset, and its limits.
 
     Parameters
     ----------
@@ -38,8 +48,7 @@ def profile_over_onset(diagnosis: Diagnosis, time_s: Array) -> Diagnosis:
         Times from that onset, ascending.
     """
     best = diagnosis.likelihood
-    step_s = _FIRST_STEP * float(np.median(np.diff(time_s)))
-    ends = [_end(best, sign * step_s) for sign in (-1, 1)]
+    ends = onset_limits(best, time_s)
     others = [_at(best, float(change_s)) for end in ends for change_s in end * _SHARES]
     others = [each for each in others if each.threshold > 0]
     trades = diagnosis.trades
@@ -58,7 +67,7 @@ def profile_over_onset(diagnosis: Diagnosis, time_s: Array) -> Diagnosis:
         replace(trade, finding=finding)
         for trade, finding in zip(trades, merged[kept:], strict=True)
     ]
-    return replace(diagnosis, findings=merged[:kept], trades=again)
+    return replace(diagnosis, findings=merged[:kept], trades=again), ends
 
 
 def _at(best: Likelihood, change_s: float) -> Likelihood:

@@ -74,11 +74,11 @@ class Points:
         point = np.flatnonzero(~self._optimum)
         self._try(point, point, FAIR)
 
-    def from_neighbours(self) -> None:
-        """Fit points from their neighbours' fits, as long as these have improved."""
+    def from_neighbours(self, news: BoolArray | None = None) -> None:
+        """Fit points from their neighbours' fits, of all or of some, as long as these improve."""
         # Optima, and places beyond the ends, belong to no profile here: they are not fitted.
         to_fit = np.append(np.where(self._optimum, -1, self.profile), -1)
-        news = np.full(len(self.values), True)
+        news = np.full(len(self.values), True) if news is None else news
         while np.any(news):
             start = np.tile(np.flatnonzero(news), 2)
             point = start + np.repeat((-1, 1), len(start) // 2)
@@ -125,10 +125,26 @@ class Points:
         left = self.ends()[0, profile] + np.sum(below, axis=1) - 1
         new = self.values[left + 1] != values
         self._add(left[new], values[new])
+        self._deepen(np.flatnonzero(np.isin(self.values, values[new])))
         for _ in range(_MOST_ROUNDS):
             roots = np.sqrt(np.clip(self.increases, 0.0, HIGHEST))
             left = np.flatnonzero((np.abs(np.diff(roots)) > _STEP) & (np.diff(self.profile) == 0))
             self._add(left, 0.5 * (self.values[left] + self.values[left + 1]))
+
+    def _deepen(self, limits: IntArray) -> None:
+        """Fit limits above the threshold from the ends of all profiles, and so their neighbours.
+
+        The limit was found in a deeper basin than those of the points around it.
+        """
+        profile = self.profile[limits]
+        missed = self.increases[limits] > _CLEARLY * self.fits.threshold[profile]
+        limits, profile = limits[missed], profile[missed]
+        if not len(limits):
+            return
+        starts = self.extremes()[:, self.fits.trace[profile]]
+        increases, x = self.fits.from_each(profile, self.values[limits], starts, CLOSE)
+        self.increases[limits], self.x[limits] = np.min(increases, axis=0), x
+        self.from_neighbours(np.isin(np.arange(len(self.values)), limits))
 
     def _add(self, left: IntArray, values: Array) -> None:
         """Insert points after given ones, each with the lower of the fits from both neighbours."""
@@ -138,6 +154,7 @@ class Points:
         increases, x = self.fits.from_each(profile, values, self.x[np.stack((left, right))], CLOSE)
         self.profile = np.insert(self.profile, right, profile)
         self.values = np.insert(self.values, right, values)
+        self._optimum = np.insert(self._optimum, right, False)
         self.increases = np.insert(self.increases, right, np.min(increases, axis=0))
         self.x = np.insert(self.x, right, x, axis=0)
 

@@ -15,8 +15,12 @@ References
    least-squares residuals, Biometrika 56 (1969), 1-15.
 .. [3] R. D. Cook and S. Weisberg, Residuals and Influence in Regression, Chapman and Hall, 1982:
    section 2.2.2, the test for an outlier.
-.. [4] A. Sokal, Monte Carlo methods in statistical mechanics, in: Functional Integration,
-   Springer, 1997: the integrated autocorrelation time.
+.. [4] H. D. Patterson and R. Thompson, Recovery of inter-block information when block sizes are
+   unequal, Biometrika 58 (1971), 545-554.
+.. [5] F. E. Satterthwaite, An approximate distribution of estimates of variance components,
+   Biometrics Bulletin 2 (1946), 110-114.
+.. [6] H. Akaike, A new look at the statistical model identification, IEEE Transactions on Automatic
+   Control 19 (1974), 716-723.
 """
 
 import numpy as np
@@ -25,6 +29,10 @@ from biogrip.arrays import Array, BoolArray
 
 # Stretches over which residuals are averaged, and readings in the shortest.
 _STRETCHES, _SHORTEST = 20, 5
+# Sums of residuals that a misfit is estimated from; correlation lengths and shares of white noise
+# that are tried, and by how much they have to lower the deviance [6]_.
+_SUMS, _LENGTHS, _WHITE = 200, 10, (0.001, 0.03, 0.2, 0.6)
+_TWO_MORE = 4.0
 
 
 def correlated(residual: Array, basis: Array) -> tuple[float, float]:
@@ -151,18 +159,62 @@ def far_out(residual: Array, struck: BoolArray, directions: int) -> float:
     return min(chance, 1.0)
 
 
-def count_independent(residual: Array) -> float:
-    """Count the independent ones among residuals that are a misfit: n over their correlation time.
+def as_correlated(residual: Array, basis: Array) -> tuple[float, float]:
+    """Return how many independent residuals a misfit is worth, and the freedom of its variance.
 
-    The correlation time is the integrated one, 1 + 2 sum rho_k, in readings, up to the first
-    correlation rho_k that is not positive [4]_.
+    The misfit is taken for a random function of the reading's number, with a correlation that
+    falls exponentially or as a Gaussian, and white noise; size, correlation length and share of the
+    noise are those of highest restricted likelihood, which allows for what the fit absorbs [4]_. Of
+    many residuals sums over stretches are taken, since what is slow matters.
+
+    Parameters
+    ----------
+    residual : (n_samples,)
+        Residuals of a fit, over the noise's standard deviation where that is not the same.
+    basis : (n_directions, n_samples)
+        What the fit absorbs, orthonormal rows; none if that is not known.
+
+    Returns
+    -------
+    independent
+        The n residuals count as this many: n times their mean square over the variance of the
+        misfit in the direction, of those that the fit absorbs, in which it is largest.
+    freedom
+        Of the estimated variance: (tr V)^2 / tr V^2 for the covariance V of what is left [5]_.
     """
-    from scipy.fft import irfft, next_fast_len, rfft
-
     n = len(residual)
-    power = np.abs(rfft(residual, next_fast_len(2 * n))) ** 2
-    correlation = irfft(power)[:n]
-    correlation = correlation / correlation[0]
-    ends = np.flatnonzero(correlation <= 0)
-    until = ends[0] if len(ends) else n
-    return float(n / (1 + 2 * np.sum(correlation[1:until])))
+    sums = min(n, _SUMS)
+    starts = np.arange(sums) * n // sums
+    sizes = np.diff(np.append(starts, n))
+    rows = np.vstack((basis if len(basis) else np.full((1, n), n**-0.5), residual))
+    rows = np.add.reduceat(rows, starts, axis=-1) / np.sqrt(sizes)
+    left, taken = rows[-1], np.linalg.qr(rows[:-1].T)[0]
+    apart = np.abs(np.subtract.outer(np.arange(sums), np.arange(sums)))
+    found = np.eye(sums)
+    lowest, size = _restricted(found, left, taken)
+    lowest, found = lowest - _TWO_MORE, size * found
+    for length in np.geomspace(1, max(sums / 2, 2), _LENGTHS):
+        for kernel in (np.exp(-apart / length), np.exp(-0.5 * (apart / length) ** 2)):
+            for white in _WHITE:
+                covariance = (1 - white) * kernel + white * np.eye(sums)
+                deviance, size = _restricted(covariance, left, taken)
+                if deviance < lowest:
+                    lowest, found = deviance, size * covariance
+    largest = float(np.linalg.eigvalsh(taken.T @ found @ taken)[-1])
+    remaining = found - taken @ (taken.T @ found)
+    freedom = np.trace(remaining) ** 2 / np.sum(remaining * remaining.T)
+    return n * float(np.mean(residual**2)) / largest, float(freedom)
+
+
+def _restricted(covariance: Array, left: Array, taken: Array) -> tuple[float, float]:
+    """Return the restricted deviance of residuals, and the factor of their covariance."""
+    from scipy.linalg import solve_triangular
+
+    root = np.linalg.cholesky(covariance)
+    white = solve_triangular(root, np.column_stack((taken, left)), lower=True)
+    basis, triangle = np.linalg.qr(white[:, :-1])
+    rest = white[:, -1] - basis @ (basis.T @ white[:, -1])
+    free = len(left) - taken.shape[1]
+    size = float(rest @ rest) / free
+    determinants = np.log(np.diag(root)).sum() + np.log(np.abs(np.diag(triangle))).sum()
+    return free * np.log(size) + 2 * float(determinants), size

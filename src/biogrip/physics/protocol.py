@@ -292,6 +292,11 @@ def torque_at(history: TorqueHistory, time_s: ArrayLike, arm: str = "left") -> A
     return torque
 
 
+def is_held(history: TorqueHistory, time_s: ArrayLike) -> bool:
+    """Return True if the torque of either arm is the same at all of some times."""
+    return all(np.ptp(torque_at(history, time_s, arm)) == 0 for arm in ("left", "right"))
+
+
 def largest_load(phases: Iterable[Phase]) -> float:
     """Return the torque of either arm, or of what else they control, of the largest magnitude.
 

@@ -46,9 +46,9 @@ class Measurements:
     """Sentence on a rotation of a recording that is hardly plausible."""
     onset_s: float | None = None
     """Time of a recording's clock from which the sampling instants count, if it was given."""
-    at_steps: int = 0
-    """Number of readings of a recording that were left out, for they are at the instant of a step
-    of a load or a deformation."""
+    at_steps: tuple[float, ...] = ()
+    """Times by the recording's clock of readings that were left out, for they are at the very
+    instant of a step of what is controlled."""
     recognised: Recognised | None = None
     """What was recognised in the file of a recording."""
 

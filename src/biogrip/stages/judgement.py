@@ -63,11 +63,10 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
     (fit,) = fits_judged([case], [case_problem], [(recorded.time_s, trace)], TRACE)
     diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
     if case_problem.fit_start:
-        diagnosis = profile_over_onset(diagnosis, recorded.time_s)
+        diagnosis, _ = profile_over_onset(diagnosis, recorded.time_s)
     notes = notes_on_fit(fit)
     if case.may_start_late:
-        near = diagnosis.likelihood.best
-        notes += note_late_onset(case_problem, recorded.time_s, trace, near)
+        notes += note_late_onset(case_problem, recorded.time_s, trace, diagnosis)
     said = diagnosis_data(diagnosis, notes)
     _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": valley})
 

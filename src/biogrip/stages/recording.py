@@ -20,7 +20,7 @@ from biogrip.study.study import Case
 from biogrip.terminal import warn
 from biogrip.traces.any_sample import proportional_deviations
 from biogrip.traces.columns import Columns, place
-from biogrip.traces.onset import guess_onset
+from biogrip.traces.onset import estimate_onset
 from biogrip.traces.plausibility import check_recording
 from biogrip.traces.reader import Recognised, Recording, read_recording
 
@@ -66,12 +66,10 @@ def read_checked(
         )
     onset_s = columns.start_s
     if problem.fit_start:
-        onset_s = guess_onset(problem, trace.time_s, trace.rotation_rad)
+        onset_s = estimate_onset(problem, trace.time_s, trace.rotation_rad)
     if onset_s is not None:
         trace = without_padding(replace(trace, time_s=trace.time_s - onset_s))
-    at_steps = 0
-    if not problem.instrument.has_jaws:
-        trace, at_steps = without_steps(trace, problem.torque)
+    trace, at_steps = without_steps(trace, problem.torque, onset_s or 0.0)
     nuisance = problem.nuisance(trace.time_s)
     suspicion = check_recording(
         trace,
@@ -109,14 +107,16 @@ def read_checked(
     )
 
 
-def without_steps(trace: Recording, protocol: TorqueHistory) -> tuple[Recording, int]:
-    """Leave out readings at the very instant of a step, and count them.
+def without_steps(
+    trace: Recording, protocol: TorqueHistory, onset_s: float
+) -> tuple[Recording, tuple[float, ...]]:
+    """Leave out readings at the very instant of a step, and return their times by the file's clock.
 
-    Without inertia a sample jumps there, and nothing tells on which side a reading was taken.
+    Without inertia a sample may jump there, and nothing tells on which side a reading was taken.
     """
     steps = [start for start, order, _ in protocol.jumps if order == 0]
-    kept = ~np.isin(trace.time_s, steps)
-    return _part(trace, kept), int(np.count_nonzero(~kept))
+    at = np.isin(trace.time_s, steps)
+    return _part(trace, ~at), tuple((trace.time_s[at] + onset_s).tolist())
 
 
 def _part(trace: Recording, kept: BoolArray) -> Recording:
@@ -174,8 +174,9 @@ def notes_on_recording(trace: Measurements) -> list[str]:
     if form is not None and form.load:
         notes.append(f"The protocol is {form.load}.")
     if trace.at_steps:
+        times = ", ".join(f"{time_s:.6g} s" for time_s in trace.at_steps)
         notes.append(
-            f"Left out at the instant of a step: {counted(trace.at_steps, 'reading')}, of which "
-            "nothing tells on which side of it they were taken."
+            f"Left out at the instant of a step, of which nothing tells on which side of it they "
+            f"were taken: {counted(len(trace.at_steps), 'reading')}, at {times}."
         )
     return notes

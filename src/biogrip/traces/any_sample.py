@@ -18,8 +18,9 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lagged_torques
 from biogrip.physics.protocol import TorqueHistory
 
-# Retardation times a decade; shortest over the sampling interval, longest over the protocol.
-_A_DECADE, _SHORTEST, _LONGEST = 4, 0.01, 10.0
+# Retardation times a decade; shortest over the sampling interval, longest over the protocol, and
+# that of what does not relax.
+_A_DECADE, _SHORTEST, _LONGEST, _LASTING = 4, 0.01, 10.0, 1e6
 # The smooth rotation and the weights are found in turn.
 _ROUNDS = 4
 # Share of the readings whose scatter bounds the noise from below, and fewest of them.
@@ -96,7 +97,8 @@ def proportional_deviations(
         In rad.
     """
     shortest = _SHORTEST * float(np.diff(time_s).min()) / torque.end_s
-    lags = np.geomspace(shortest, _LONGEST, 2 + int(_A_DECADE * np.log10(_LONGEST / shortest)))
+    count = 2 + int(_A_DECADE * np.log10(_LONGEST / shortest))
+    lags = np.append(np.geomspace(shortest, _LONGEST, count), _LASTING)
     lagged = lagged_torques(torque, lags.tolist())(time_s)
     family = extreme_responses(lagged, gripper, len(lags))
     sizes = np.linalg.norm(family, axis=1)

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array, parts
+from biogrip.digits import plain
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
@@ -122,11 +123,11 @@ def check_recording(
         unit = f" {read.unit}".rstrip()
         given = ""
         if noise_rad is not None:
-            given = f" Given were {noise_rad:g}{unit} as noise; the peak is {largest:.3g}{unit}."
+            given = f" Given were {noise_rad:g}{unit} as noise; the peak is {plain(largest)}{unit}."
         raise BiogripError(
-            f"{where}: found no response to the {controlled}, but {trace.mean():.3g}{unit} "
-            f"throughout, give or take {trace.std():.2g}{unit}; allowed is a {read.name} from zero "
-            f"that follows the {controlled} and stands out of the noise.{given}"
+            f"{where}: found no response to the {controlled}, but {plain(trace.mean())}{unit} "
+            f"throughout, give or take {plain(trace.std(), 2)}{unit}; allowed is a {read.name} "
+            f"from zero that follows the {controlled} and stands out of the noise.{given}"
         )
     if _is_mirrored(functions, len(trace), gripper, noise_rad):
         sign = "one of the same sign"
