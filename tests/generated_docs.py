@@ -3,6 +3,7 @@
 import csv
 import importlib
 import re
+import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout, suppress
 from io import StringIO
@@ -17,9 +18,17 @@ import pandas as pd
 import biogrip.records
 from biogrip.cli import main
 from biogrip.digits import with_unit
-from biogrip.page.answers import compared_rows, say_what_traces_tell
+from biogrip.judging.verdicts import DETERMINED
+from biogrip.page.answers import (
+    compared_rows,
+    say_what_the_study_gives,
+    say_what_traces_tell,
+    say_which_method_finds_it,
+)
 from biogrip.records import identifications, traces
 from biogrip.records.rows import RowFile, read_table
+from biogrip.terminal import QUIET
+from tests.helpers.default import study_of
 from tests.helpers.key_reference import file_schema, reference
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.published_numbers import renewed_numbers
@@ -55,7 +64,8 @@ def config_keys() -> str:
 
 def paper_against_study() -> str:
     """The table "paper | this study", from the published error table."""
-    return _table(iter(compared_rows(read_table(PUBLISHED / "tables" / "errors.csv"), _verdicts())))
+    errors = read_table(PUBLISHED / "tables" / "errors.csv")
+    return _table(iter(compared_rows(errors, _verdicts(), _CASES)))
 
 
 def _verdicts() -> list[dict[str, str]]:
@@ -67,11 +77,21 @@ def _verdicts() -> list[dict[str, str]]:
 
 
 def answer() -> str:
-    """In how many of the paper's samples a trace determines which quantity."""
-    sentence = say_what_traces_tell(_verdicts())
-    sentence = sentence.replace("A trace", "A trace of the paper's experiment", 1)
-    told, _, where = sentence.partition(": ")
-    return f"**{told}**: {where}"
+    """What the study found, in sentences as on its page, and how far limits can be trusted."""
+    methods = read_table(PUBLISHED / "tables" / "methods.csv")
+    study = study_of()
+    own = study.shown_method.title, study.near_noise_tolerance
+    titles = {case.name: case.title for case in study.cases.values()}
+    counts = pd.read_csv(PUBLISHED / "coverage" / "tables" / "verdict_counts.csv")
+    whole = counts[(counts["verdict"] == DETERMINED) & (counts["reached"] == counts["seeds"])]
+    sentences = (
+        say_what_the_study_gives(methods, *own, titles, "Run again, the paper's"),
+        say_what_traces_tell(_verdicts()),
+        say_which_method_finds_it(methods, *own),
+        "Where every trace determines a quantity, its 95 % limits hold the truth in "
+        f"{_range(whole['true_percent'], '.3g')} % of {whole['seeds'].iloc[0]} traces.",
+    )
+    return "\n".join(f"- {sentence}" for sentence in sentences)
 
 
 def measured() -> str:
@@ -162,12 +182,24 @@ def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
     return f"{low}{unit}" if low == high else f"{low}–{high}{unit}"
 
 
-def identified_example() -> str:
-    """What `biogrip identify` prints of the quantities of the example."""
-    with TemporaryDirectory() as folder, redirect_stdout(StringIO()) as said:
-        main(["identify", str(EXAMPLE), "--output", f"{folder}/found.json"])
-    lines = [line for line in said.getvalue().splitlines() if line.startswith("  ")]
-    return "\n".join(f"  {line}" for line in lines)
+def printed_example(*options: str) -> str:
+    """What `biogrip identify` prints of the example, under options of the command."""
+    quiet = mock.patch.dict("os.environ", {QUIET: "1"})
+    with TemporaryDirectory() as folder, redirect_stdout(StringIO()) as said, quiet:
+        main(["identify", str(EXAMPLE), "--output", f"{folder}/found.json", *options])
+    lines = said.getvalue().replace(f"{ROOT}/", "").splitlines()[:-1]
+    return "\n".join(textwrap.indent(textwrap.fill(line, 136), "    ") for line in lines)
+
+
+def identified_example(*options: str) -> str:
+    """What it prints of the quantities."""
+    lines = printed_example(*options).splitlines()
+    return "\n".join(line[2:] for line in lines if line.startswith("      "))
+
+
+def shorter_arms() -> str:
+    """What it prints with arms that are shorter by a fifth."""
+    return identified_example("--set", "gripper.arm_length_m=1.2e-3")
 
 
 def command_help() -> str:
@@ -253,7 +285,7 @@ def _table(rows: Iterator[dict[str, str]]) -> str:
 PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "config" / "README.md": {"keys": config_keys},
     ROOT / "README.md": {"answer": answer, "example": identified_example},
-    ROOT / "docs" / "tutorial.md": {"example": identified_example},
+    ROOT / "docs" / "tutorial.md": {"printed": printed_example, "shorter": shorter_arms},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
     ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "rules": rules},
     ROOT / "docs" / "identifiability.md": {"methods": methods_compared},

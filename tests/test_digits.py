@@ -2,7 +2,7 @@
 
 import pytest
 
-from biogrip.digits import plain, rounded, with_limits
+from biogrip.digits import legible, plain, rounded, with_limits
 
 
 @pytest.mark.parametrize(
@@ -42,3 +42,16 @@ def test_numbers_are_as_fine_as_the_width_of_their_limits(
 def test_decimals_are_plain_where_a_person_reads_them() -> None:
     numbers = [1500.4, 123456, 2.5e6, 1.04e-4, 1.04e-5, -1500, 0]
     assert " ".join(map(plain, numbers)) == "1500 123000 2.5e+06 0.000104 1.04e-05 -1500 0"
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("1.20e-05 N s/m", "1.20·10⁻⁵~N~s/m"),
+        ("-2.9e+02 % of 3.36e+03", "−290~% of 3360"),
+        ("-1.1e+07 (-0.87 %)", "−1.1·10⁷ (−0.87~%)"),
+        ("k (N s/m), 5-95 of c-2 in section 4", "k (N~s/m), 5-95 of c-2 in section 4"),
+    ],
+)
+def test_powers_minus_signs_and_units_are_as_in_print(text: str, found: str) -> None:
+    assert legible(text).replace("\xa0", "~") == found

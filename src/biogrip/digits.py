@@ -1,6 +1,7 @@
 """Formatting and rounding of numbers, with units."""
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -113,3 +114,21 @@ def counted(count: object, noun: str) -> str:
 def with_unit(name: str, unit: str) -> str:
     """Return a name followed by its unit, if it has one: ``k (N/m)``, ``alpha``."""
     return f"{name} ({unit})" if unit else name
+
+
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_POWER = re.compile(r"(\d[\d.]*)e([+-]\d+)\b")
+_MINUS = re.compile(r"(?<![\w.⁻-])-(?=\d)")
+_BEFORE_UNIT = re.compile(
+    r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=%|[kmµn]?(?:N|m|s|rad|Pa|Hz|V)\b)|(?<=N|a) (?=[sm]\b)"
+)
+
+
+def legible(text: str) -> str:
+    """Return text for print: 1.1e-05 as 1.1·10⁻⁵, 3.4e+03 as 3400, units on their numbers' line."""
+
+    def power(found: re.Match[str]) -> str:
+        number, tens = plain(float(found[0]), 4), f"{int(found[2])}".translate(SUPERSCRIPTS)
+        return f"{found[1]}·10{tens}" if "e" in number else number
+
+    return _BEFORE_UNIT.sub("\u00a0", _MINUS.sub("−", _POWER.sub(power, text)))

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from biogrip.digits import legible
 from biogrip.figures.results import Fit
 from biogrip.fit.methods import METHODS
 from biogrip.page.answers import (
-    compare_with_paper,
+    say_what_the_study_gives,
     say_what_traces_tell,
     say_which_method_finds_it,
 )
@@ -39,16 +40,18 @@ def opened(browser: Any, report: Path) -> Opened:
 def explored(browser: Any, report: Path, **context: Any) -> Opened:
     """The page when its explorer is there."""
     found = Opened(browser, report, **context)
-    found.page.wait_for_selector("#explorer .main-svg")
+    found.page.wait_for_selector("#explorer .main-svg", state="attached")
     return found
 
 
 def test_the_page_needs_nothing_else(opened: Opened, report: Path) -> None:
     assert report.stat().st_size < MOST_BYTES
     assert opened.asked == []
-    missing = "[...document.images].filter(i => !(i.loading === 'lazy' && !i.complete))"
-    assert opened.page.evaluate(f"{missing}.filter(i => !i.naturalWidth).length") == 0
-    assert opened.page.evaluate("document.images.length") > 10
+    said = "['width', 'height'].map(name => +i.getAttribute(name))"
+    of_image = f"[[i.naturalWidth, i.naturalHeight], {said}]"
+    sizes = opened.page.evaluate(f"[...document.images].map(i => {of_image})")
+    assert len(sizes) > 10
+    assert all(natural == told and min(told) > 0 for natural, told in sizes)
     assert opened.problems == []
 
 
@@ -89,13 +92,54 @@ def test_the_page_is_legible_and_no_column_of_the_first_table_is_clipped(
 
 def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path) -> None:
     tables = report.parent / "tables"
-    errors, compared = (read_table(tables / f"{name}.csv") for name in ("errors", "methods"))
+    compared = read_table(tables / "methods.csv")
     verdicts = [row for file in tables.glob("verdicts_*.csv") for row in read_table(file)]
-    assert opened.page.locator("h1 + .answers p").all_inner_texts() == [
-        compare_with_paper(errors, verdicts, {}),
+    titles, who = {"liquid_drop_2": "Liquid drop, case 2"}, "Run again, the paper's"
+    page, own = opened.page, ("genetic algorithm", 0.02)
+    assert page.locator("h1 + .split .answers p:not(.soft)").all_text_contents() == [
+        legible(say_what_the_study_gives(compared, *own, titles, who)),
         say_what_traces_tell(sorted(verdicts, key=lambda row: row["case"])),
-        say_which_method_finds_it(compared, "genetic algorithm"),
+        legible(say_which_method_finds_it(compared, *own)),
     ]
+    # Then the picture's quantities, and figures of the paper, before all that is folded.
+    shown = page.locator("figure:visible").evaluate_all("all => all.map(f => f.id)")
+    assert shown == ["figure-answer", "figure-fit_liquid_drop_2"]
+
+
+def test_menu_links_land_where_they_say(browser: Any, report: Path) -> None:
+    """On the first click, and in what was folded."""
+    opened = explored(browser, report)
+    for link in opened.page.locator("nav a").all():
+        link.click()
+        target = opened.page.locator(str(link.get_attribute("href")))
+        opened.page.wait_for_function("document.readyState === 'complete'")
+        assert target.is_visible()
+        box = target.bounding_box()
+        assert box
+        assert 0 <= box["y"] < 720
+    opened.context.close()
+
+
+def test_print_shows_what_screens_fold(browser: Any, report: Path) -> None:
+    opened = explored(browser, report)
+    hidden = """[...document.querySelectorAll('details:not(.explorer) > :not(summary)')]
+        .filter(e => !e.checkVisibility() || !e.getBoundingClientRect().height).length"""
+    assert opened.page.evaluate(hidden) > 20
+    opened.page.emulate_media(media="print")
+    assert opened.page.evaluate(hidden) == 0
+    opened.context.close()
+
+
+def test_tables_have_titles_powers_and_right_aligned_numbers(opened: Opened) -> None:
+    cells = opened.page.locator("#table-errors td, #table-gripper td")
+    texts = cells.all_text_contents()
+    assert "Liquid drop, case 2" in texts
+    assert not [text for text in texts if re.search(r"liquid_drop|\de[+-]\d", text)]
+    powers = cells.filter(has_text="·10⁻")
+    assert powers.count() > 0
+    aligned = powers.evaluate_all("all => all.map(e => getComputedStyle(e).textAlign)")
+    assert set(aligned) == {"right"}
+    assert opened.page.locator("caption").count() == 1
 
 
 def test_full_tables_are_folded_and_can_be_downloaded(opened: Opened, report: Path) -> None:
@@ -124,24 +168,6 @@ def test_anybody_can_use_the_page(
     opened.context.close()
 
 
-def test_four_figures_are_shown_and_the_others_open_by_sample(opened: Opened) -> None:
-    page = opened.page
-    assert page.locator("figure").count() == 4
-    first = page.locator("details.sample").first
-    first.locator("> summary").press("Enter")
-    thumbnail = first.locator(".thumbnail").first
-    widths = [thumbnail.bounding_box()]
-    thumbnail.locator("> summary").press("Enter")
-    widths.append(thumbnail.bounding_box())
-    small, large = (box["width"] for box in widths if box)
-    assert large > 2 * small
-    # Alt texts are sentences, not names of files.
-    texts = page.locator("main img").evaluate_all("all => all.map(i => i.alt)")
-    assert min(len(text.split()) for text in texts) > 4
-    for summary in (thumbnail, first):
-        summary.locator("> summary").press("Enter")
-
-
 DRAWN = """document.getElementById('explorer')._fullData.filter(line => line.visible === true)
     .map(line => ({name: line.name, y: Array.from(line.y)}))"""
 
@@ -155,6 +181,7 @@ def test_the_explorer_shows_the_judged_trace_and_its_fits(
 ) -> None:
     """Of the case that is chosen, as SVG, which needs no graphics processor."""
     page, results = opened.page, tiny / "results"
+    page.locator("details.explorer").evaluate("e => { e.open = true; }")
     page.locator("#explorer .updatemenu-header").click()
     page.locator("#explorer .updatemenu-dropdown-button", has_text=title).click()
     label = f"closing rotation ({prefix}rad)"
@@ -181,8 +208,10 @@ def test_a_table_is_of_the_case_that_its_name_ends_with() -> None:
     captions = {("tables", known): known for known in ("errors", "contact_loss", "contact")}
     for name, whose in (("errors", "cell"), ("errors", "soft_cell"), ("contact_loss", "")):
         file = Path(f"results/tables/{name}{'_' * bool(whose)}{whose}.csv")
-        entry = entry_of(file, ["cell", "soft_cell", "loss"], captions)
+        titles = {"cell": "A cell", "soft_cell": "A soft cell", "loss": "A loss"}
+        entry = entry_of(file, titles, captions)
         assert (entry.name, entry.whose, entry.caption) == (name, whose, name)
+        assert entry.title == name.capitalize().replace("_", " ") + (whose and f": {titles[whose]}")
 
 
 def test_a_title_cannot_end_the_script() -> None:

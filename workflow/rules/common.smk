@@ -90,6 +90,7 @@ def names(cases):
 SIMULATED = [*STUDY.simulated, *STUDY.points]
 CALIBRATED = [n for n in [*STUDY.cases, *STUDY.points] if STUDY.case(n).is_calibrated]
 SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
+ANSWERED = [name for name in STUDY.gripped if STUDY.case(name).has_valley][-1:]
 COUNTED = [name for name in STUDY.covered if STUDY.case(name).verdicts_every == 1]
 calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 
@@ -107,6 +108,7 @@ OTHER_TABLES += ["claims"] if STUDY.published else []
 OTHER_TABLES += ["interpretations", "interpretations_jointly"] * bool(STUDY.config.interpretations)
 FIGURES = ["comb", "linkage", "torque"] if STUDY.has_gripper else []
 FIGURES += ["linearisation"] if STUDY.gripped else []
+FIGURES += ["answer"] if ANSWERED else []
 FIGURES += ["moduli", "overview"] if STUDY.simulated else []
 
 

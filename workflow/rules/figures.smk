@@ -64,6 +64,7 @@ rule figures:
         measurements=files("results/measurements/{case}/{batch}.parquet", STUDY.simulated[:1]),
         calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
         differences="results/linearisation.csv" if STUDY.gripped else [],
+        answered=[*files("results/identifiability/{case}.json", ANSWERED), *first_traces(ANSWERED)],
     output:
         [file for name in FIGURES for file in figure(name)],
     log:

@@ -6,6 +6,7 @@ from biogrip.figures import gripper as actuator
 from biogrip.figures import gripper as linkage
 from biogrip.figures import mechanics as linearisation
 from biogrip.figures import moduli, overview
+from biogrip.figures.answer import draw_answer
 from biogrip.figures.overview import shown_cases
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
@@ -15,11 +16,18 @@ with logged(snakemake):
     given = {name: paths(files) for name, files in snakemake.input.items()}
     gripped, shown = study.of(study.gripped), study.of(shown_cases(study))
     first = next(iter(shown.cases), None)
+    answered = given["answered"][0].stem if given["answered"] else None
 
     def of(name):
         return [file for file in given[name] if file.stem in shown.cases]
 
+    def calibrated_of(case):
+        return [file for file in given["calibrated"] if file.stem == case]
+
     drawings = {
+        "answer": lambda: draw_answer(
+            study.cases[answered], *given["answered"], calibrated_of(answered)
+        ),
         "comb": lambda: actuator.draw_comb(study),
         "torque": lambda: actuator.draw_torque(study),
         "linkage": lambda: linkage.draw_linkage(gripped),
@@ -30,7 +38,7 @@ with logged(snakemake):
             of("identifications"),
             of("expected"),
             given["measurements"],
-            [file for file in given["calibrated"] if file.stem == first],
+            calibrated_of(first),
         ),
     }
     for file in map(Path, snakemake.output):

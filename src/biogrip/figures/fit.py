@@ -1,5 +1,6 @@
 """Figures 9, 11 and 12: target, noisy trace, its typical or best fit, and the residuals."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -42,13 +43,20 @@ def draw_judged_fit(
     case: Case, verdicts: Path, measurements: Path, calibrated: list[Path]
 ) -> Figure:
     """Draw the judged trace of a case and its best fit."""
-    problem = case.problem.calibrated(calibrated)
-    found = {item["quantity"]: item["value"] for item in read_verdicts(verdicts)["quantities"]}
-    values = {name: found[name] for name in problem.searched.names}
-    recorded = read_measurements(measurements, [TRACE])
-    fit = fit_of(problem, {**problem.fixed, **values}, recorded, TRACE)
+    fit = judged_fit(case, read_verdicts(verdicts), measurements, calibrated)
     trace = "recorded trace" if case.recorded else f"seed {TRACE}"
     return draw_fit(fit, f"best fit ({trace})", case.title, case.published.axis_rad)
+
+
+def judged_fit(
+    case: Case, verdicts: Mapping[str, Any], measurements: Path, calibrated: list[Path]
+) -> Fit:
+    """Return the judged trace of a case and its best fit."""
+    problem = case.problem.calibrated(calibrated)
+    found = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
+    values = {name: found[name] for name in problem.searched.names}
+    recorded = read_measurements(measurements, [TRACE])
+    return fit_of(problem, {**problem.fixed, **values}, recorded, TRACE)
 
 
 def draw_traces(axes: Axes, fit: Fit, label: str) -> tuple[float, str]:

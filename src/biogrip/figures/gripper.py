@@ -352,7 +352,7 @@ def _networks(axes: Axes) -> None:
         (1.6, ("kc", "k_p", "c_p"), "(2) generalized Maxwell-Wiechert"),
     ):
         heights = [top - 0.75 * i for i in range(len(rows))]
-        axes.annotate(title, (2.5, top + 0.5), ha="center", fontsize=7)
+        axes.annotate(title, (2.5, top + 0.7), ha="center", fontsize=7)
         for x, name, offset in ((0.2, "B", -0.18), (4.8, "C", 0.18)):
             _line(axes, (x, heights[0]), (x, heights[-1]), BLACK, 1)
             middle = 0.5 * (heights[0] + heights[-1])
@@ -365,7 +365,7 @@ def _networks(axes: Axes) -> None:
                 _spring(axes, 0.2, 4.8, y, "$k_p$")
             else:
                 _damper(axes, 0.2, 4.8, y, "$c_p$")
-    axes.set(xlim=(-0.2, 5.2), ylim=(-0.5, 5.2))
+    axes.set(xlim=(-0.2, 5.2), ylim=(-0.5, 5.5))
 
 
 def _spring(axes: Axes, x0: float, x1: float, y: float, label: str, size: float = 1.0) -> None:
@@ -386,4 +386,4 @@ def _damper(axes: Axes, x0: float, x1: float, y: float, label: str, size: float 
     cup = [y + height, y + height, y - height, y - height]
     axes.plot([left, right, right, left], cup, color=SKY, linewidth=1)
     _line(axes, (right, y), (x1, y), SKY, 1)
-    axes.annotate(label, (middle, y + 0.18 * size), ha="center", va="bottom", fontsize=7)
+    axes.annotate(label, (middle, y + 0.22 * size), ha="center", va="bottom", fontsize=7)

@@ -59,31 +59,36 @@ def draw_profiles_of(
         if item["quantity"] in foreseen:
             curve = _curve(foreseen[item["quantity"]]["profile"])
             axes.plot(*curve, color=GREY, label="expected without noise")
-        axes.plot(*_curve(item["profile"]), color=FITTED, label="this trace")
+        draw_profile(axes, item)
         for increase, style, label in (
             (found["threshold"], "--", f"{100 * found['confidence']:g} %"),
             (found["certainty"], ":", f"{100 * CERTAIN:g} %, to close a side"),
         ):
             axes.axhline(increase, color=TARGET, linestyle=style, linewidth=0.7, label=label)
-        _limits(axes, item)
         truth = target_of(item["quantity"], truth_of or {})
         if truth is not None:
             axes.axvline(truth, color=TARGET, linewidth=0.7, label="truth")
-        low, high = profile_limits(item)
-        if is_wide(low, high):
-            axes.set_xscale("log")
-            axes.set_xticks(*decade_ticks(low, high))
-            axes.minorticks_off()
-        else:
-            axes.xaxis.set_major_locator(MaxNLocator(2, steps=[1, 2, 5, 10]))
-        axes.set(xlim=(low, high), ylim=(0, HIGHEST_INCREASE))
-        axes.set_xlabel(with_unit(item["symbol"], item["unit"]))
         panel(axes, ascii_letters[index], item["verdict"], 40)
     grid[0].set_ylabel("rise of χ²")
     handles, labels = grid[0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside lower right", ncols=5)
     drawn.suptitle(title, x=0.01, ha="left", fontsize=8)
     return drawn
+
+
+def draw_profile(axes: Axes, item: Mapping[str, Any]) -> None:
+    """Draw the profile of a quantity's verdict, with its limits."""
+    axes.plot(*_curve(item["profile"]), color=FITTED, label="this trace")
+    _limits(axes, item)
+    low, high = profile_limits(item)
+    if is_wide(low, high):
+        axes.set_xscale("log")
+        axes.set_xticks(*decade_ticks(low, high))
+        axes.minorticks_off()
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(2, steps=[1, 2, 5, 10]))
+    axes.set(xlim=(low, high), ylim=(0, HIGHEST_INCREASE))
+    axes.set_xlabel(with_unit(item["symbol"], item["unit"]))
 
 
 def _curve(profile: dict[str, Any]) -> tuple[Array, Array]:
@@ -98,7 +103,7 @@ def _curve(profile: dict[str, Any]) -> tuple[Array, Array]:
     return np.exp(dense), PchipInterpolator(np.log(values), roots)(dense) ** 2
 
 
-def _limits(axes: Axes, item: dict[str, Any]) -> None:
+def _limits(axes: Axes, item: Mapping[str, Any]) -> None:
     low, high = item["low"], item["high"]
     values = item["profile"]["values"]
     if low is not None or high is not None:

@@ -100,7 +100,7 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
         values, style = (grid.columns, grid.index, shares), {"cmap": "cividis_r"}
         mesh = axes.pcolormesh(*values, norm=LogNorm(1e-5, 30), shading="nearest", **style)
         if np.nanmax(shares) > LIMIT_PERCENT:
-            lines = axes.contour(*values, [LIMIT_PERCENT], colors="black", linewidths=1.2)
+            lines = axes.contour(*values, [LIMIT_PERCENT], colors="white", linewidths=1.2)
             axes.clabel(lines, fmt=f"{LIMIT_PERCENT:g} %%", fontsize=7)
         axes.set_yscale("log")
         ticks = [0.3, 1, 3, 10, 30]

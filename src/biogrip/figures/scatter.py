@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
 
 from biogrip.arrays import Array
 from biogrip.figures.results import SHOWN_SEEDS, seeds_in_words
@@ -30,10 +30,9 @@ from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.records.traces import read_target
 from biogrip.study.study import Case
 
-# Bound of a logarithm above which an axis shows decades instead of percent.
-_LOOSE = 0.25
-_WIDTHS = 8.0
-_DECADES = 1e4
+# Bounds on both sides of 1 that an axis shows, more where quartiles are further off; where that
+# leaves no room above zero, it shows decades.
+_WIDTHS, _LOOSE, _MOST_DECADES = 8.0, 0.95, 4
 # Points at the edge would make the layout leave them room.
 _DOTS: dict[str, Any] = {
     "linestyle": "", "marker": "o", "markersize": 2, "markeredgewidth": 0, "alpha": 0.55,
@@ -80,30 +79,33 @@ def _quantity(
     axes: Axes, case: Case, methods: "pd.Series[str]", ratios: Array, limit: float
 ) -> None:
     """Draw one column of points per method, with points beyond the axis at its edge."""
-    loose = limit > _LOOSE
-    top = _DECADES if loose else 1 + _WIDTHS * limit
-    bottom = 1 / _DECADES if loose else 1 - _WIDTHS * limit
     names = list(methods.unique())
-    for place, name in enumerate(names):
-        mine = ratios[(methods == name).to_numpy()]
+    of_methods = [ratios[(methods == name).to_numpy()] for name in names]
+    quartiles = np.percentile(of_methods, [25, 50, 75], axis=1).T
+    reach = max(_WIDTHS * limit, 1.1 * float(np.max(np.abs(quartiles - 1))))
+    loose = reach > _LOOSE
+    ends = np.log10(np.maximum(quartiles, 10.0**-_MOST_DECADES))
+    decades = float(np.clip(np.ceil(np.max(np.abs(ends))), 1, _MOST_DECADES))
+    bottom, top = (10**-decades, 10**decades) if loose else (1 - reach, 1 + reach)
+    for place, (name, mine) in enumerate(zip(names, of_methods, strict=True)):
         shown = mine[:SHOWN_SEEDS]
         # A fixed sideways scatter keeps points apart.
         x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
         style = _DOTS | {"color": line_of(case.study.identifiers[name])["color"]}
         points, ends = np.column_stack([x, shown]), ((-np.inf, bottom), (np.inf, top))
         points_within(axes, points, *ends, style, edge_size=3)
-        low, middle, high = np.clip(np.percentile(mine, [25, 50, 75]), bottom, top)
+        low, middle, high = np.clip(quartiles[place], bottom, top)
         axes.plot([place, place], [low, high], color=TARGET, linewidth=1.0)
         axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
     if np.isfinite(limit):
-        reach = NormalDist().inv_cdf((1 + case.confidence) / 2) * limit
+        half = NormalDist().inv_cdf((1 + case.confidence) / 2) * limit
         # Of the logarithm, straight where the axis is.
-        low, high = (np.exp(-reach), np.exp(reach)) if loose else (1 - reach, 1 + reach)
+        low, high = (np.exp(-half), np.exp(half)) if loose else (1 - half, 1 + half)
         axes.axhspan(low, high, color=SHADE, zorder=0, linewidth=0)
     axes.axhline(1, color=TARGET, linewidth=0.6)
     if loose:
         axes.set_yscale("log")
-        axes.set_yticks([1e-4, 1e-2, 1, 1e2, 1e4])
+        axes.yaxis.set_major_locator(LogLocator(numticks=5))
         axes.minorticks_off()
     else:
         axes.yaxis.set_major_locator(MaxNLocator(5))

@@ -7,7 +7,7 @@ a tenth of a figure's time.
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation
 
 from biogrip.arrays import Array
+from biogrip.digits import SUPERSCRIPTS
 from biogrip.figures.results import Fit, scale_of
 from biogrip.files import atomic_write
 from biogrip.fit.methods import Method
@@ -163,7 +164,6 @@ def lay_out(drawn: Figure, dots_per_inch: float) -> None:
     drawn.set_layout_engine(None)
 
 
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _POWER = re.compile(r"\^\{(.*?)\}")
 
 
@@ -172,7 +172,7 @@ class _Plain(LogFormatterSciNotation):
 
     def __call__(self, x: float, pos: Any = None) -> str:
         text: str = super().__call__(x, pos)
-        plain = _POWER.sub(lambda power: power[1].translate(_SUPERSCRIPTS), text)
+        plain = _POWER.sub(lambda power: power[1].translate(SUPERSCRIPTS), text)
         return re.sub(r"\$\\mathdefault\{(.*)\}\$", r"\1", plain).replace(r"\times", "×")
 
 
@@ -183,7 +183,7 @@ def decade_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
     if len(decades) >= 2:
         step = -(-(len(decades) - 1) // 2)
         chosen = decades[::step]
-        return [10.0**d for d in chosen], [f"10{str(d).translate(_SUPERSCRIPTS)}" for d in chosen]
+        return [10.0**d for d in chosen], [f"10{str(d).translate(SUPERSCRIPTS)}" for d in chosen]
     steps = [m * 10.0**d for d in range(first - 1, last + 2) for m in (1, 2, 5)]
     found = [value for value in steps if low <= value <= high]
     # Labels of these values are wide, so keep two.
@@ -215,7 +215,7 @@ def scale_of_fit(fit: Fit) -> tuple[float, str]:
     return scale_of(fit.fitted_rad, fit.read.unit) if plain else (1.0, fit.read.unit)
 
 
-def profile_limits(item: dict[str, Any]) -> tuple[float, float]:
+def profile_limits(item: Mapping[str, Any]) -> tuple[float, float]:
     """Return limits of the x-axis: where the profile is inside the figure, plus a margin."""
     values, increases = (np.array(item["profile"][key]) for key in ("values", "increases"))
     inside = np.flatnonzero(increases < HIGHEST_INCREASE)

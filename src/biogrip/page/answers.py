@@ -4,63 +4,27 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 
-from biogrip.digits import with_unit
+from scipy.stats import binomtest
+
+from biogrip.digits import legible, plain, with_unit
+from biogrip.fit.methods import near_noise_words
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.tables.claim_rules import FEWEST_SEEDS, IN_PART, NOT, REPLICATED, by_value
 
 Row = Mapping[str, str]
 
-_MEANINGS = {
-    REPLICATED: "replicated (within the middle 90 % of our seeds, of which the typical one "
-    "is as close to the target as a trace allows)",
-    IN_PART: "replicated in part (within, but the typical one is further off, or there are "
-    "no such limits)",
-    NOT: "not replicated",
-}
 
-
-def compare_with_paper(
-    errors: Iterable[Row], verdicts: Iterable[Row], names: Mapping[str, str]
+def say_what_the_study_gives(
+    methods: Iterable[Row], shown: str, tolerance: float, titles: Mapping[str, str], who: str
 ) -> str:
-    """Say which values of the paper the study replicates, in part or not; "" if it has none.
+    """Say which share of each case's traces the study's own method fits; "" if none is simulated.
 
-    The rule is `by_value`; limits are those of a trace without noise, on both sides.
-
-    Parameters
-    ----------
-    errors, verdicts
-        Rows of the tables of errors and verdicts.
-    names
-        Names of the cases in the sentence.
+    Rows are those of the table of methods; `shown` is the title of that method, which `who` stands
+    before; the tolerance of the noise is a share.
     """
-    rows = [row for row in errors if row["paper_identified"]]
-    if not rows:
-        return ""
-    fewest = min(int(row["seeds"]) for row in rows)
-    if fewest < FEWEST_SEEDS:
-        return (
-            f"Which of the paper's values are replicated takes {FEWEST_SEEDS} seeds a case to "
-            f"say, and this study has {fewest}."
-        )
-    limits = {(row["case"], row["quantity"]): row for row in verdicts}
-    found: dict[str, dict[str, list[str]]] = {verdict: {} for verdict in _MEANINGS}
-    for row in rows:
-        low, typical, printed, high = (
-            float(row[f"{which}_identified"]) for which in ("p05", "typical", "paper", "p95")
-        )
-        expected = limits[row["case"], row["parameter"]]
-        ends = expected["expected_low"], expected["expected_high"]
-        close = all(ends) and float(ends[0]) <= typical <= float(ends[1])
-        of_case = found[by_value(low, printed, high, is_close=close)]
-        of_case.setdefault(names[row["case"]], []).append(row["parameter"])
-    parts = []
-    for verdict, members in found.items():
-        if members:
-            count = sum(map(len, members.values()))
-            whose = ", ".join(f"{_listed(own)} of {case}" for case, own in members.items())
-            verb = "is" if count == 1 else "are"
-            parts.append(f"{count} {verb} {_MEANINGS[verdict]}: {whose}")
-    return f"Of {len(rows)} values of the paper, sums included, {'; '.join(parts)}."
+    rows = [row for row in methods if row["method"] == shown and row["near_noise_share"]]
+    shares = [f"{share_of(row)} of “{titles[row['case']]}”" for row in rows]
+    to = f"fits traces to {near_noise_words(tolerance)}"
+    return f"{who} {shown} {to}: {_listed(shares)}." if shares else ""
 
 
 def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
@@ -70,77 +34,82 @@ def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
         decided[row["quantity"]].append(row["verdict"] == DETERMINED)
     always = [name for name, each in decided.items() if all(each)]
     never = [name for name, each in decided.items() if not any(each)]
-    some = [
-        f"{name} in {sum(each)} of {len(each)}"
-        for name, each in decided.items()
-        if any(each) and not all(each)
-    ]
-    parts = [f"always determines {_listed(always)}"] if always else []
-    if never:
-        parts.append(f"never {'' if always else 'determines '}{_listed(never)}")
+    some = {name: each for name, each in decided.items() if any(each) and not all(each)}
+    provided = ", provided that the branch relaxes within the experiment"
+    provided *= any(" + " in name for name in always)
+    parts = [f"always determines {_listed(always)}{provided}"] if always else []
+    parts += [f"never determines {_listed(never)}"] if never else []
     if some:
-        parts.append(f"{'the rest' if parts else 'determines each'} sometimes")
-    samples = f": {_listed(some)} samples" if some else ""
-    return f"A trace {_listed(parts)}{samples}." if parts else ""
+        counts = [f"{name} in {sum(each)}" for name, each in some.items()]
+        parts.append(f"determines {_listed(counts)} of {max(map(len, some.values()))} samples")
+    return f"A trace {'; it '.join(parts)}." if parts else ""
 
 
-def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
-    """Say how often the surest method finds the best fit, and how often the study's own does.
+def say_which_method_finds_it(methods: Iterable[Row], shown: str, tolerance: float) -> str:
+    """Say how often the surest method fits the noise, and what it takes beside the study's own.
 
-    Parameters
-    ----------
-    methods
-        Rows of the table of methods.
-    shown
-        Title of the study's own method.
+    Parameters are those of `say_what_the_study_gives`.
     """
-    shares: dict[str, list[float]] = defaultdict(list)
-    responses: dict[str, list[float]] = defaultdict(list)
+    found: dict[str, list[Row]] = defaultdict(list)
     for row in methods:
-        shares[row["method"]].append(100 * float(row["optimum_share"]))
-        responses[row["method"]].append(float(row["median_evaluations"]))
-    if not shares:
+        if row["near_noise_share"]:
+            found[row["method"]].append(row)
+    if not found:
         return ""
 
-    def success(name: str) -> str:
-        return (
-            f"of {_range(shares[name])} % of the traces, with {_range(responses[name])} simulated "
-            "responses in the median"
-        )
+    def worst(name: str) -> tuple[float, float]:
+        lowest = min(float(row["near_noise_share"]) for row in found[name])
+        return lowest, -max(float(row["median_evaluations"]) for row in found[name])
 
-    surest = max(shares, key=lambda name: (min(shares[name]), -max(responses[name])))
-    said = f"{surest[:1].upper()}{surest[1:]} finds the best fit {success(surest)}"
-    if shown in shares and shown != surest:
-        said += f"; the {shown} {success(shown)}"
+    surest = max(found, key=worst)
+    least, *more = sorted(found[surest], key=lambda row: float(row["near_noise_share"]))
+    at_least = "at least " * (more != [] and share_of(least) != share_of(more[-1]))
+    said = (
+        f"{surest[:1].upper()}{surest[1:]} fits {at_least}{share_of(least)} of the traces of "
+        f"{'each' if more else 'the'} sample to {near_noise_words(tolerance)}, with "
+        f"{_responses(found[surest])} simulated responses"
+    )
+    if shown in found and shown != surest:
+        said += f"; the {shown} takes {_responses(found[shown])}"
     return f"{said}."
 
 
-def compared_rows(errors: Iterable[Row], verdicts: Iterable[Row]) -> list[dict[str, str]]:
+def compared_rows(
+    errors: Iterable[Row], verdicts: Iterable[Row], titles: Mapping[str, str]
+) -> list[dict[str, str]]:
     """Return the paper's results beside the study's, without quantities that no trace determines.
 
-    Parameters
-    ----------
-    errors, verdicts
-        Rows of the tables of errors and verdicts.
+    Rows are those of the tables of errors and verdicts, titles those of the cases.
     """
     decided = {row["quantity"] for row in verdicts if row["verdict"] == DETERMINED}
     return [
         {
-            "case": row["case"].replace("_", " "),
-            "parameter": with_unit(row["parameter"], row["unit"]),
-            "target": _number(row["target"], 4),
-            "paper": _with_error(row, "paper", 4),
-            "this study: typical seed": _with_error(row, "typical", 3),
-            "5-95 % of seeds": " to ".join(
-                _number(row[key], 3) for key in ("p05_identified", "p95_identified")
+            "sample": titles[row["case"]],
+            "quantity": legible(with_unit(row["parameter"], row["unit"])),
+            "target": _number(row["target"]),
+            "paper": _with_error(row["paper_identified"], row["paper_error_percent"]),
+            "this study: median": _with_error(row["median_identified"], _error(row)),
+            "5–95 % of seeds": " to ".join(
+                _number(row[key]) for key in ("p05_identified", "p95_identified")
             ),
-            "seeds near the noise": f"{100 * float(row['near_noise_share']):.0f} %"
-            if row["near_noise_share"]
-            else "",
+            "near the noise": share_of(row) if row["near_noise_share"] else "",
         }
         for row in errors
         if row["parameter"] in decided
     ]
+
+
+def share_of(row: Row) -> str:
+    """Return a row's share of seeds near the noise, with its 95 % interval (Clopper-Pearson)."""
+    share, seeds = float(row["near_noise_share"]), int(row["seeds"])
+    low, high = binomtest(round(share * seeds), seeds).proportion_ci(0.95, method="exact")
+    return legible(f"{100 * share:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)")
+
+
+def _responses(rows: Iterable[Row]) -> str:
+    values = [float(row["median_evaluations"]) for row in rows]
+    low, high = (f"{float(f'{end:.2g}'):,.0f}" for end in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -149,18 +118,17 @@ def _listed(names: Sequence[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def _range(values: Sequence[float]) -> str:
-    low, high = f"{min(values):.0f}", f"{max(values):.0f}"
-    return low if low == high else f"{low} to {high}"
+def _number(text: str) -> str:
+    return legible(plain(float(text), 4)) if text else ""
 
 
-def _number(text: str, digits: int) -> str:
-    return f"{float(text):.{digits}g}" if text else ""
+def _error(row: Row) -> str:
+    target, found = row["target"], row["median_identified"]
+    return str(100 * (1 - float(found) / float(target))) if target and float(target) else ""
 
 
-def _with_error(row: Row, whose: str, digits: int) -> str:
+def _with_error(value: str, error: str) -> str:
     """Return a value with its error in brackets, which the paper may give in words, as ">100"."""
-    value, error = row[f"{whose}_identified"], row[f"{whose}_error_percent"]
     with suppress(ValueError):
-        error = f"{float(f'{float(error):.2g}') + 0.0:g}"
-    return _number(value, digits) + (f" ({error} %)" if value and error else "")
+        error = plain(float(f"{float(error):.2g}") + 0.0)
+    return _number(value) + (legible(f" ({error} %)") if value and error else "")

@@ -1,11 +1,6 @@
-"""The pages of a study, each a self-contained HTML file.
-
-The report has the answers, tables, figures, verdicts and an explorer; a summary what one trace of a
-case tells.
-"""
+"""The pages of a study, self-contained HTML: the report, and what one trace of a case tells."""
 
 import base64
-import platform
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,13 +8,14 @@ from html import escape
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import jinja2
 import PIL.Image
 
+from biogrip.digits import legible
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
+from biogrip.fit.methods import near_noise_words
 from biogrip.page import answers
 from biogrip.page.explorer import explorer, fits_of
 from biogrip.records.identifications import read_verdicts
@@ -31,12 +27,10 @@ from biogrip.tables.cases import target_of
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
 _LIBRARIES = ("biogrip", "numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
-# Figures that are shown at once, on top and under their heading; the others are folded.
-_STORY = ("moduli",)
-_SHOWN = ("overview", "linkage", "torque")
-# Tables under the results, and under what is reconstructed; the others are under their heading.
-_FIRST = ("errors", "claims", "methods", "coverage", "models")
+# Tables under what is reconstructed; the others are under their heading.
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
+# The paper's figure of its first fit, between those of its convergence and of its evolution.
+_FIRST_FIT = 9
 
 _TEMPLATES = jinja2.Environment(
     loader=jinja2.FileSystemLoader(Path(__file__).parent),
@@ -45,6 +39,9 @@ _TEMPLATES = jinja2.Environment(
     lstrip_blocks=True,
     undefined=jinja2.StrictUndefined,
 )
+_TEMPLATES.filters["legible"] = legible
+_TEMPLATES.globals["style"] = Path(__file__).with_name("report.css").read_text(encoding="utf-8")
+_NUMBER = re.compile(r"(?:&[gl]t;|[≤≥−])*\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\u00a0%)?")
 
 
 @dataclass(frozen=True)
@@ -55,11 +52,13 @@ class Entry:
     """What it shows."""
     whose: str
     """Name of its case or sweep, if any."""
+    title: str
     caption: str
-    file: str
-    """Path among the results."""
+    file: Path
     content: str | None = None
     """Table element, or data URL of an image; None if there is no room for it."""
+    size: tuple[int, int] = (0, 0)
+    """Width and height of an image, px."""
     download: str = ""
     """Data URL of a table's CSV."""
 
@@ -88,48 +87,55 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
         (path.parent.name, path.stem): " ".join(path.read_text(encoding="utf-8").split())
         for path in files["captions"]
     }
-    owners = [*study.cases, *study.sweeps]
+    titles = {case.name: case.title for case in study.cases.values()}
+    owners = titles | {name: sweep.title or name for name, sweep in study.sweeps.items()}
     cases, methods = list(study.cases.values()), list(study.identifiers.values())
-    traces = []
-    of_cases = zip(cases, files["identifications"], files["measurements"], strict=True)
-    for case, found, measured in of_cases:
+    traces, of_cases = [], (cases, files["identifications"], files["measurements"])
+    for case, found, measured in zip(*of_cases, strict=True):
         calibrated = [path for path in files["calibrated"] if path.stem == case.name]
         traces.append((case.title, fits_of(case, methods, found, measured, calibrated)))
     errors, judged, compared = (
         [row for csv in files["downloads"] if csv.name.startswith(name) for row in read_table(csv)]
         for name in ("errors.csv", "verdicts_", "methods.csv")
     )
-    paper = {case.name: _in_paper(case) for case in cases}
     tables = []
     for path, csv in zip(files["tables"], files["downloads"], strict=True):
         entry, download = entry_of(path, owners, texts), _url("text/csv", csv.read_bytes())
-        tables.append(replace(entry, content=_table(path, entry.caption), download=download))
+        tables.append(replace(entry, content=_table(path, titles), download=download))
     figures = [
-        replace(entry_of(path, owners, texts), content=image)
-        for path, image in zip(files["figures"], _images(files["figures"]), strict=True)
+        replace(entry_of(path, owners, texts), content=image, size=size)
+        for path, (image, size) in zip(files["figures"], _images(files["figures"]), strict=True)
     ]
+    story = _as_in_paper(figures, [study.cases[name] for name in study.published])
+    hero = [replace(it, title="What a trace tells") for it in figures if it.name == "answer"]
+    placed = {entry.file for entry in hero + story}
+    folded: dict[str, list[Entry]] = {}
+    for entry in figures:
+        if entry.file not in placed:
+            folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
+    asked = compared, study.shown_method.title, study.near_noise_tolerance
+    who = "Run again, the paper's" if study.published else "The"
     write_text(
         page,
         _TEMPLATES.get_template("report.html.j2").render(
-            style=Path(__file__).with_name("report.css").read_text(encoding="utf-8"),
             explorer=explorer(traces),
             answers=[
-                answers.compare_with_paper(errors, judged, paper),
+                answers.say_what_the_study_gives(*asked, titles, who),
                 answers.say_what_traces_tell(judged),
-                answers.say_which_method_finds_it(compared, study.shown_method.title),
+                answers.say_which_method_finds_it(*asked),
             ],
-            compared=answers.compared_rows(errors, judged),
-            cases=[_card(case, path) for case, path in zip(cases, files["verdicts"], strict=True)],
-            story=_named(figures, _STORY),
-            figures=_named(figures, _SHOWN),
-            folded=_by_sample(figures, {case.name: case.title for case in cases}),
-            first_tables=_named(tables, _FIRST),
-            evidence_tables=_named(tables, _EVIDENCE),
-            other_tables=[it for it in tables if it.name not in _FIRST + _EVIDENCE],
+            compared=answers.compared_rows(errors, judged, titles),
+            near=near_noise_words(study.near_noise_tolerance),
+            cases=list(zip(cases, map(read_verdicts, files["verdicts"]), strict=True)),
+            target_of=target_of,
+            hero=hero,
+            story=story,
+            folded=folded,
+            evidence_tables=[it for it in tables if it.name in _EVIDENCE],
+            tables=[it for it in tables if it.name not in _EVIDENCE],
             config=config,
             grips=study.has_gripper,
-            versions={"Python": platform.python_version()}
-            | {name: version(name) for name in _LIBRARIES},
+            versions={name: version(name) for name in _LIBRARIES},
         ),
     )
 
@@ -143,32 +149,43 @@ def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -
         If an input cannot be read.
     """
     text = _TEMPLATES.get_template("summary.html.j2").render(
-        title=case.title,
-        model=case.sample.model.title,
+        case=case,
         trace=case.file or f"seed {TRACE} of the simulated traces",
         found=read_verdicts(verdicts),
-        unit=case.instrument.read.unit,
-        has_jaws=case.instrument.has_jaws,
         figures=[(path.stem, _url("image/png", path.read_bytes())) for path in figures],
     )
     write_text(page, text)
 
 
-def entry_of(file: Path, owners: Sequence[str], texts: Mapping[tuple[str, str], str]) -> Entry:
+def entry_of(file: Path, owners: Mapping[str, str], texts: Mapping[tuple[str, str], str]) -> Entry:
     """Return the entry of a file that is named after what it shows, and its case or sweep.
 
-    Captions are by the name of the file's folder and what it shows.
+    Owners are their titles; captions are by the file's folder and what it shows.
     """
     kind, stem = file.parent.name, file.stem
     # One name may end with another, and that of a figure with that of a case.
     ends = sorted((name for name in owners if stem.endswith(f"_{name}")), key=len)
     whose = "" if (kind, stem) in texts or not ends else ends[-1]
     name = stem.removesuffix(f"_{whose}")
-    return Entry(name, whose, texts[kind, name], str(file))
+    title = name.replace("_", " ").capitalize() + (f": {owners[whose]}" if whose else "")
+    return Entry(name, whose, title, legible(texts[kind, name]), file)
 
 
-def _images(paths: Sequence[Path]) -> Iterator[str | None]:
-    """Yield images of at most 256 colours, a third as large; None when there is no more room.
+def _as_in_paper(figures: Sequence[Entry], published: Sequence[Case]) -> list[Entry]:
+    """Return figures that the paper has, by their numbers there, no caption twice."""
+    numbers = {(case.name, "fit"): case.published.figure for case in published}
+    first = published[0].name if published else ""
+    if numbers.get((first, "fit")) == _FIRST_FIT:
+        numbers |= {(first, "convergence"): _FIRST_FIT - 1, (first, "evolution"): _FIRST_FIT + 1}
+    found = {numbers.get((it.whose, it.name)): it for it in figures}
+    return [
+        replace(it, title=f"Figure {n}. {it.title}", caption=it.caption * (it.whose == first))
+        for n, it in sorted((n, it) for n, it in found.items() if n is not None)
+    ]
+
+
+def _images(paths: Sequence[Path]) -> Iterator[tuple[str | None, tuple[int, int]]]:
+    """Yield images of at most 256 colours, None when there is no more room, and their sizes.
 
     Raises
     ------
@@ -186,7 +203,7 @@ def _images(paths: Sequence[Path]) -> Iterator[str | None]:
         few.save(packed, "png")
         url = _url("image/png", packed.getvalue())
         room -= len(url)
-        yield url if room >= 0 else None
+        yield url if room >= 0 else None, few.size
 
 
 def _url(kind: str, content: bytes) -> str:
@@ -194,39 +211,14 @@ def _url(kind: str, content: bytes) -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
-def _table(path: Path, caption: str) -> str:
-    """Return the table element of an HTML file written by `biogrip.tables.layout`."""
+def _table(path: Path, titles: Mapping[str, str]) -> str:
+    """Return the table of an HTML file written by `biogrip.tables.layout`, cases titled."""
+
+    def cell(match: re.Match[str]) -> str:
+        text = escape(titles[match[1]]) if match[1] in titles else legible(match[1])
+        return f"<td{' class=number' * bool(_NUMBER.fullmatch(text))}>{text}</td>"
+
     found = re.search(r"<table.*</table>", path.read_text(encoding="utf-8"), re.DOTALL)
     if found is None:
         raise BiogripError(f"{path}: holds no table.")
-    columns = found[0].replace("<th>", '<th scope="col">')
-    return re.sub("(<table[^>]*>)", rf"\1<caption>{escape(caption)}</caption>", columns)
-
-
-def _in_paper(case: Case) -> str:
-    """Return the paper's table of a case, or the title of a case that it does not have."""
-    number = case.truth.published.table
-    return case.title if number is None else f"Table {number}"
-
-
-def _card(case: Case, path: Path) -> dict[str, Any]:
-    """Return the verdicts on a case with the true values beside them."""
-    found = read_verdicts(path)
-    for item in found["quantities"]:
-        item["target"] = target_of(item["quantity"], case.parameters)
-    unit = case.instrument.read.unit
-    return found | {"title": case.title, "recorded": case.recorded, "unit": unit}
-
-
-def _named(entries: Sequence[Entry], names: Sequence[str]) -> list[Entry]:
-    return [entry for name in names for entry in entries if entry.name == name]
-
-
-def _by_sample(figures: Sequence[Entry], titles: Mapping[str, str]) -> dict[str, list[Entry]]:
-    """Return the figures that are not shown at once, by title of their sample."""
-    found: dict[str, list[Entry]] = {}
-    for entry in figures:
-        if entry.name not in _STORY + _SHOWN:
-            title = titles.get(entry.whose, entry.whose or "The study")
-            found.setdefault(title, []).append(entry)
-    return found
+    return re.sub("<td>(.*?)</td>", cell, found[0].replace("<th>", '<th scope="col">'))
