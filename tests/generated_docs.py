@@ -139,16 +139,17 @@ def errors_by_noise() -> str:
 
 
 def methods_compared() -> str:
-    """How often each method reaches the optimum, and with how many responses."""
+    """How often each method reaches what genes can encode, Δχ², and with how many responses."""
     table = pd.read_csv(PUBLISHED / "tables" / "methods.csv")
     return _table(
         {"method": method}
         | {
-            f"optimum, {_CASES[row['case']]}": f"{100 * row['optimum_share']:.0f} %"
+            _CASES[row["case"]]: f"{100 * row['reached_share']:.0f} % "
+            f"({100 * row['reached_low']:.0f}–{100 * row['reached_high']:.0f}), "
+            f"{row['median_rise']:.2g} (≥ {row['encodable_rise']:.2g})"
             for row in rows.to_dict("records")
         }
         | {
-            "near the noise": _range(100 * rows["near_noise_share"], ".0f", " %"),
             "median responses": _range(rows["median_evaluations"], ".0f"),
         }
         for method, rows in table.groupby("method", sort=False)
@@ -192,7 +193,9 @@ def file_columns() -> str:
     leading, trailing = identifications.LEADING, identifications.TRAILING
     files: dict[str, tuple[str, ...]] = {
         "results/targets/{case}.csv": traces.TARGET_COLUMNS,
-        "results/identifications/{case}.csv": (*leading, "parameters ...", *trailing),
+        "results/identifications/{case}.csv": (
+            *(*leading, "parameters ...", *trailing, identifications.ENCODABLE),
+        ),
     }
     files |= {kind.path: kind.columns for kind in _kinds()}
     for table in sorted(PUBLISHED.rglob("tables/*.csv")):

@@ -75,7 +75,7 @@ def test_what_traces_tell_is_what_the_verdicts_are(
 
 
 def method(name: str, share: str, responses: str) -> dict[str, str]:
-    return {"method": name, "optimum_share": share, "median_evaluations": responses}
+    return {"method": name, "reached_share": share, "median_evaluations": responses}
 
 
 def test_the_surest_method_is_named_before_the_study_s_own() -> None:
@@ -87,9 +87,9 @@ def test_the_surest_method_is_named_before_the_study_s_own() -> None:
         *(method(cheap, "1", "90.5"), method(cheap, "0.98", "800")),
     ]
     assert say_which_method_finds_it(rows, own) == (
-        "Cheap search finds the best fit of 98 to 100 % of the traces, with 90 to 800 simulated "
-        "responses in the median; the genetic algorithm of 0 to 68 % of the traces, with 15375 to "
-        "18250 simulated responses in the median."
+        "Cheap search reaches the best encodable fit in 98 to 100 % of the traces, with 90 to 800 "
+        "simulated responses in the median; the genetic algorithm in 0 to 68 % of the traces, with "
+        "15375 to 18250 simulated responses in the median."
     )
     assert say_which_method_finds_it([], own) == ""
 

@@ -89,18 +89,25 @@ def study(parameters: dict[str, float], samples: int) -> Any:
     return seen(cases=cases, identifiers=METHODS, optimum_tolerance=1.0, near_noise_tolerance=0.02)
 
 
-def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
+def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> None:
+    """1.03 has a chi-squared that is 61 above the optimum, and is all that the genes can hold."""
     rows = []
-    for seed, genetic, polished in ((0, 1.2, 1.0), (1, 1.0004, 1.0), (2, 1.05, 0.9)):
+    for seed, genetic, polished in ((0, 1.2, 1.0), (1, 1.0304, 1.0), (2, 1.0306, 0.9)):
         for method, misfit, n in (("genetic", genetic, 9), ("least_squares", polished, 10 + seed)):
             rows.append([method, seed, 8.0, 1.0, 3.0, 2.0, misfit, 1.02, n])
     path = identified(tmp_path / "drop.csv", rows)
+    pd.read_csv(path).assign(encodable_misfit=1.03).to_csv(path, index=False)
     parameters = {"k": 10.0, "k_p": 1.0, "c": 4.0, "c_p": 1.0}
     first, second = methods(study(parameters, 1000), [path]).rows
-    # 1000 (1.0004^2 - 1) = 0.80: at the optimum; the others are far above.
-    assert (first["seeds"], first["optimum_share"]) == (3, pytest.approx(1 / 3))
-    assert second["optimum_share"] == 1.0
-    assert first["near_noise_share"] == pytest.approx(1 / 3)
+    # 1000 ((1.0304 / 1.03)^2 - 1) = 0.78, the only one of at most 1; 1.0306 has 1.17.
+    assert (first["seeds"], first["reached_share"]) == (3, pytest.approx(1 / 3))
+    assert second["reached_share"] == 1.0
+    assert first["encodable_rise"] == second["encodable_rise"] == pytest.approx(60.9)
+    # By Wilson's formula, (p + z^2/2n +- z sqrt(p (1 - p)/n + z^2/4n^2)) / (1 + z^2/n).
+    z2 = 1.959964**2
+    middle, half = 1 / 3 + z2 / 6, np.sqrt(z2) * np.sqrt(2 / 27 + z2 / 36)
+    ends = np.array([middle - half, middle + half]) / (1 + z2 / 3)
+    np.testing.assert_allclose([first["reached_low"], first["reached_high"]], ends, rtol=1e-6)
     assert second["median_evaluations"] == 11
     assert first["error_percent k"] == pytest.approx(20.0)
     assert first["error_percent c + c_p"] == pytest.approx(0.0)
@@ -108,6 +115,7 @@ def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
 
 def test_the_lowest_known_may_be_the_truth(tmp_path: Path) -> None:
     path = identified(tmp_path / "d.csv", [["genetic", 0, 8.0, 1.0, 3.0, 2.0, 1.1, 1.0, 100]])
+    pd.read_csv(path).assign(encodable_misfit=1.1).to_csv(path, index=False)
     (made,) = methods(study(TRUE, 100), [path]).rows
     assert made["median_rise"] == pytest.approx(100 * (1.1**2 - 1))
 

@@ -21,8 +21,15 @@ from biogrip.figures.style import (
     figure,
     line_of,
 )
-from biogrip.fit.methods import chi_square_increase, near_noise, near_noise_words, typical
-from biogrip.records.identifications import read_identifications
+from biogrip.fit.methods import (
+    chi_square_increase,
+    near_noise,
+    near_noise_words,
+    reached_encodable,
+    share_with_limits,
+    typical,
+)
+from biogrip.records.identifications import ENCODABLE, read_identifications
 from biogrip.study.study import Case
 
 _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
@@ -149,10 +156,13 @@ def _beside(ratio: float) -> str:
 
 
 def draw_waterfall(case: Case, identifications: Path) -> Figure:
-    """Draw the sorted increases of chi-squared over the lowest known, for every method."""
+    """Draw the sorted increases of chi-squared over the lowest known, for every method.
+
+    And those of the best points that genes can encode, which methods without digits may undercut.
+    """
     found = read_identifications(identifications)
     increase = np.maximum(chi_square_increase(found, case.samples), _LOWEST)
-    tolerance = case.study.optimum_tolerance
+    reached = reached_encodable(found, case.samples, case.study.optimum_tolerance)
     drawn = figure(COLUMN_IN, 3.15)
     axes = drawn.subplots()
     methods = found["method"].unique()
@@ -160,17 +170,19 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
     # Where curves coincide each is seen beside the thinner ones on top of it.
     for name, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
         method = case.study.identifiers[name]
-        mine = np.sort(increase[found["method"] == name])
-        share = 100 * np.mean(mine <= tolerance)
+        runs = found["method"] == name
+        mine = np.sort(increase[runs])
+        share, low, high = (100 * each for each in share_with_limits(reached[runs]))
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
-        label = f"{method.title}: {share:.0f} %"
+        label = f"{method.title}: {share:.0f} % ({low:.0f}–{high:.0f})"
         curves += axes.plot(place, mine, label=label, linewidth=width, **line_of(method))
     near = case.samples * ((1 + case.study.near_noise_tolerance) ** 2 - 1)
     # Limits are named in the legend, since a curve may cover any place along them.
     words = near_noise_words(case.study.near_noise_tolerance)
     line: dict[str, Any] = {"color": TARGET, "linewidth": 0.8}
+    least = np.sort(chi_square_increase(found, case.samples, ENCODABLE)[runs])
     limits = [
-        axes.axhline(tolerance, linestyle="--", label="global optimum", **line),
+        *axes.plot(place, least, linestyle="--", label="best encodable point", **line),
         axes.axhline(near, linestyle=":", label=words, **line),
     ]
     axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * max(near, float(increase.max()))))
@@ -178,7 +190,7 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
     axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
     axes.minorticks_off()
     axes.set(xlim=(0, 100), xlabel="seeds, sorted (%)", ylabel="Δχ² over the lowest known")
-    axes.set_title(f"{case.title}: share at the global optimum")
+    axes.set_title(f"{case.title}: share that reached the best encodable point")
     # Each legend column ends with a limit; a third column would be too wide.
     half = -(-len(curves) // 2)
     handles = [*curves[:half], limits[0], *curves[half:], limits[1]]

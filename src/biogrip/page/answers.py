@@ -85,7 +85,7 @@ def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
 
 
 def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
-    """Say how often the surest method finds the best fit, and how often the study's own does.
+    """Say how often the surest method, and the study's own, reach the best encodable point.
 
     Parameters
     ----------
@@ -97,19 +97,19 @@ def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
     shares: dict[str, list[float]] = defaultdict(list)
     responses: dict[str, list[float]] = defaultdict(list)
     for row in methods:
-        shares[row["method"]].append(100 * float(row["optimum_share"]))
+        shares[row["method"]].append(100 * float(row["reached_share"]))
         responses[row["method"]].append(float(row["median_evaluations"]))
     if not shares:
         return ""
 
     def success(name: str) -> str:
         return (
-            f"of {_range(shares[name])} % of the traces, with {_range(responses[name])} simulated "
+            f"in {_range(shares[name])} % of the traces, with {_range(responses[name])} simulated "
             "responses in the median"
         )
 
     surest = max(shares, key=lambda name: (min(shares[name]), -max(responses[name])))
-    said = f"{surest[:1].upper()}{surest[1:]} finds the best fit {success(surest)}"
+    said = f"{surest[:1].upper()}{surest[1:]} reaches the best encodable fit {success(surest)}"
     if shown in shares and shown != surest:
         said += f"; the {shown} {success(shown)}"
     return f"{said}."
