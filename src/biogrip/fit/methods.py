@@ -133,16 +133,22 @@ def best_fit(
     return found
 
 
-def typical(found: pd.DataFrame) -> pd.Series:
-    """Return the identification with the median ratio of misfit to noise in its trace.
+ALL = "all"
+"""Name of the basin of all runs."""
+_FEWEST = 0.1
+"""Least share of runs that makes a basin."""
 
-    The lowest misfit of all would be that of the quietest trace. If the noise is unknown
-    or absent, the identification of median misfit is returned. Of an even number, it is
-    the better of the two in the middle.
+
+def basins(found: pd.DataFrame, tolerance: float) -> dict[str, pd.DataFrame]:
+    """Divide the runs of a method on a case into those that end `near_noise` and those above it.
+
+    These are two basins, by their names, if a tenth of the runs or more end in each. Else there is
+    one, `ALL`, as where the noise is unknown.
     """
-    noise = found["noise_rms"].where(found["noise_rms"] > 0).fillna(1.0)
-    ranked = (found["misfit"] / noise).sort_values(kind="stable").index
-    return found.loc[ranked[(len(ranked) - 1) // 2]]
+    near = near_noise(found, tolerance)
+    if not _FEWEST <= near.mean() <= 1 - _FEWEST:
+        return {ALL: found}
+    return {"near the noise": found[near], "above the noise": found[~near]}
 
 
 def chi_square_increase(found: pd.DataFrame, samples: int, of: str = "misfit") -> Array:
@@ -171,9 +177,8 @@ def reached_encodable(found: pd.DataFrame, samples: int, tolerance: float) -> Bo
     return reached
 
 
-def share_with_limits(reached: BoolArray) -> tuple[float, float, float]:
-    """Return the share of runs that reached something, and its 95 % interval by Wilson."""
-    count, runs = int(reached.sum()), len(reached)
+def share_with_limits(count: int, runs: int) -> tuple[float, float, float]:
+    """Return the share of runs that do something, and its 95 % interval by Wilson."""
     low, high = binomtest(count, runs).proportion_ci(0.95, method="wilson")
     return count / runs, float(low), float(high)
 

@@ -5,16 +5,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 
 from biogrip.digits import with_unit
+from biogrip.fit.methods import ALL, share_with_limits
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.tables.claim_rules import FEWEST_SEEDS, IN_PART, NOT, REPLICATED, by_value
 
 Row = Mapping[str, str]
 
 _MEANINGS = {
-    REPLICATED: "replicated (within the middle 90 % of our seeds, of which the typical one "
-    "is as close to the target as a trace allows)",
-    IN_PART: "replicated in part (within, but the typical one is further off, or there are "
-    "no such limits)",
+    REPLICATED: "replicated (within the middle 90 % of our seeds, whose median is as close "
+    "to the target as a trace allows)",
+    IN_PART: "replicated in part (within, but the median is further off, or there are no such "
+    "limits)",
     NOT: "not replicated",
 }
 
@@ -33,7 +34,7 @@ def compare_with_paper(
     names
         Names of the cases in the sentence.
     """
-    rows = [row for row in errors if row["paper_identified"]]
+    rows = [row for row in errors if row["paper_identified"] and row["basin"] == ALL]
     if not rows:
         return ""
     fewest = min(int(row["seeds"]) for row in rows)
@@ -45,12 +46,12 @@ def compare_with_paper(
     limits = {(row["case"], row["quantity"]): row for row in verdicts}
     found: dict[str, dict[str, list[str]]] = {verdict: {} for verdict in _MEANINGS}
     for row in rows:
-        low, typical, printed, high = (
-            float(row[f"{which}_identified"]) for which in ("p05", "typical", "paper", "p95")
+        low, median, printed, high = (
+            float(row[f"{which}_identified"]) for which in ("p05", "median", "paper", "p95")
         )
         expected = limits[row["case"], row["parameter"]]
         ends = expected["expected_low"], expected["expected_high"]
-        close = all(ends) and float(ends[0]) <= typical <= float(ends[1])
+        close = all(ends) and float(ends[0]) <= median <= float(ends[1])
         of_case = found[by_value(low, printed, high, is_close=close)]
         of_case.setdefault(names[row["case"]], []).append(row["parameter"])
     parts = []
@@ -116,7 +117,9 @@ def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
 
 
 def compared_rows(errors: Iterable[Row], verdicts: Iterable[Row]) -> list[dict[str, str]]:
-    """Return the paper's results beside the study's, without quantities that no trace determines.
+    """Return the paper's results beside the study's, by basin where there are two.
+
+    Quantities that no trace determines are left out.
 
     Parameters
     ----------
@@ -124,23 +127,30 @@ def compared_rows(errors: Iterable[Row], verdicts: Iterable[Row]) -> list[dict[s
         Rows of the tables of errors and verdicts.
     """
     decided = {row["quantity"] for row in verdicts if row["verdict"] == DETERMINED}
+    rows = list(errors)
+    split = {row["case"] for row in rows if row["basin"] != ALL}
+    seeds = {row["case"]: int(row["seeds"]) for row in rows if row["basin"] == ALL}
     return [
         {
             "case": row["case"].replace("_", " "),
             "parameter": with_unit(row["parameter"], row["unit"]),
             "target": _number(row["target"], 4),
             "paper": _with_error(row, "paper", 4),
-            "this study: typical seed": _with_error(row, "typical", 3),
-            "5-95 % of seeds": " to ".join(
-                _number(row[key], 3) for key in ("p05_identified", "p95_identified")
+            "runs": _share(row, seeds[row["case"]]),
+            "this study: median": _with_error(row, "median", 3),
+            "quartiles": " to ".join(
+                _number(row[key], 3) for key in ("p25_identified", "p75_identified")
             ),
-            "seeds near the noise": f"{100 * float(row['near_noise_share']):.0f} %"
-            if row["near_noise_share"]
-            else "",
         }
-        for row in errors
-        if row["parameter"] in decided
+        for row in rows
+        if row["parameter"] in decided and (row["basin"] == ALL) != (row["case"] in split)
     ]
+
+
+def _share(row: Row, runs: int) -> str:
+    """Return the share of runs in a basin, with its 95 % interval."""
+    share, low, high = (100 * each for each in share_with_limits(int(row["seeds"]), runs))
+    return ALL if row["basin"] == ALL else f"{share:.0f} % ({low:.0f}–{high:.0f}) {row['basin']}"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -35,7 +35,7 @@ def methods(study: Study, identifications: list[Path]) -> Table:
         found["least"] = chi_square_increase(found, case.samples, ENCODABLE)
         found["reached"] = reached_encodable(found, case.samples, study.optimum_tolerance)
         for method, mine in found.groupby("method", sort=False):
-            share, low, high = share_with_limits(mine["reached"].to_numpy(bool))
+            share, low, high = share_with_limits(int(mine["reached"].sum()), len(mine))
             row: Row = {
                 "case": name,
                 "method": study.identifiers[method].title,
