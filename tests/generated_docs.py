@@ -80,14 +80,14 @@ def answer() -> str:
     """What the study found, in sentences as on its page, and how far limits can be trusted."""
     methods = read_table(PUBLISHED / "tables" / "methods.csv")
     study = study_of()
-    own = study.shown_method.title, study.near_noise_tolerance
+    own = study.shown_method.title
     titles = {case.name: case.title for case in study.cases.values()}
     counts = pd.read_csv(PUBLISHED / "coverage" / "tables" / "verdict_counts.csv")
     whole = counts[(counts["verdict"] == DETERMINED) & (counts["reached"] == counts["seeds"])]
     sentences = (
-        say_what_the_study_gives(methods, *own, titles, "Run again, the paper's"),
+        say_what_the_study_gives(methods, own, titles, "Run again, the paper's"),
         say_what_traces_tell(_verdicts()),
-        say_which_method_finds_it(methods, *own),
+        say_which_method_finds_it(methods, own),
         "Where every trace determines a quantity, its 95 % limits hold the truth in "
         f"{_range(whole['true_percent'], '.3g')} % of {whole['seeds'].iloc[0]} traces.",
     )
@@ -159,16 +159,17 @@ def errors_by_noise() -> str:
 
 
 def methods_compared() -> str:
-    """How often each method reaches the optimum, and with how many responses."""
+    """How often each method reaches what genes can encode, Δχ², and with how many responses."""
     table = pd.read_csv(PUBLISHED / "tables" / "methods.csv")
     return _table(
         {"method": method}
         | {
-            f"optimum, {_CASES[row['case']]}": f"{100 * row['optimum_share']:.0f} %"
+            _CASES[row["case"]]: f"{100 * row['reached_share']:.0f} % "
+            f"({100 * row['reached_low']:.0f}–{100 * row['reached_high']:.0f}), "
+            f"{row['median_rise']:.2g} (≥ {row['encodable_rise']:.2g})"
             for row in rows.to_dict("records")
         }
         | {
-            "near the noise": _range(100 * rows["near_noise_share"], ".0f", " %"),
             "median responses": _range(rows["median_evaluations"], ".0f"),
         }
         for method, rows in table.groupby("method", sort=False)
@@ -224,7 +225,9 @@ def file_columns() -> str:
     leading, trailing = identifications.LEADING, identifications.TRAILING
     files: dict[str, tuple[str, ...]] = {
         "results/targets/{case}.csv": traces.TARGET_COLUMNS,
-        "results/identifications/{case}.csv": (*leading, "parameters ...", *trailing),
+        "results/identifications/{case}.csv": (
+            *(*leading, "parameters ...", *trailing, identifications.ENCODABLE),
+        ),
     }
     files |= {kind.path: kind.columns for kind in _kinds()}
     for table in sorted(PUBLISHED.rglob("tables/*.csv")):

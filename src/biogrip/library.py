@@ -161,7 +161,7 @@ def plot(
     times, read = as_column(time_s, "time_s"), as_column(readings, "readings")
     fit = fit_of(experiment, values, Measurements(times, None, {0: read}), 0)
     with styled():
-        return draw_fit(fit, "best fit", "")
+        return draw_fit({"best fit": fit}, "")
 
 
 __all__ = [

@@ -13,11 +13,11 @@ from matplotlib.patches import Rectangle
 
 from biogrip.arrays import Array
 from biogrip.figures.course import draw_convergence
-from biogrip.figures.fit import draw_fit, draw_typical_fit
+from biogrip.figures.fit import draw_fit, draw_fits
 from biogrip.figures.mechanics import draw_force
 from biogrip.figures.results import SHOWN_SEEDS, Fit, read_history
 from biogrip.figures.scatter import draw_scatter
-from biogrip.figures.style import ALL_SEEDS, FITTED, styled
+from biogrip.figures.style import ALL_SEEDS, RUNS, styled
 from biogrip.fit.methods import METHODS
 from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS
@@ -43,12 +43,12 @@ def response(values: list[float]) -> Array:
 
 @pytest.fixture
 def identifications(tmp_path: Path) -> Path:
-    """Of seed 1 the excess over the noise is the middle one, of seed 2 the misfit is lowest."""
+    """Of the seeds 1 and 2 near the noise, and 0 above it."""
     rows = [
         [CASE, "genetic", seed, k, *TRUTH[1:], misfit, noise, 7, 100, "stalled"]
         for seed, k, misfit, noise in (
             (0, 9.0, 1.3e-4, 1e-4),
-            (1, 0.7, 6e-5, 5e-5),
+            (1, 0.7, 5.05e-5, 5e-5),
             (2, 1e-6, 3e-5, 3e-5),
         )
     ]
@@ -73,11 +73,15 @@ def curve(found: Any, label: str) -> Array:
     return np.asarray(line.get_ydata(), dtype=float)
 
 
-def test_the_typical_run_is_drawn(identifications: Path, measurements: Path) -> None:
+def test_the_first_run_of_each_basin_is_drawn(identifications: Path, measurements: Path) -> None:
     with styled():
-        drawn = draw_typical_fit(STUDY.cases[CASE], identifications, [measurements], [])
-    expected = 1e3 * response([0.7, *TRUTH[1:]])
-    np.testing.assert_allclose(curve(drawn, "typical fit (seed 1"), expected, rtol=1e-9)
+        drawn = draw_fits(STUDY.cases[CASE], identifications, [measurements], [])
+    for label, k in (("seed 1, near the noise", 0.7), ("seed 0, above the noise", 9.0)):
+        expected = 1e3 * response([k, *TRUTH[1:]])
+        np.testing.assert_allclose(curve(drawn, label), expected, rtol=1e-9)
+    # Of the second the target's residual.
+    left = np.asarray(drawn.axes[1].lines[2].get_ydata(), dtype=float)
+    np.testing.assert_allclose(left, 1e3 * (response(TRUTH) - response([9.0, *TRUTH[1:]])))
     # The paper's axis is on it, and all that was measured.
     low, high = drawn.axes[0].get_ylim()
     assert low <= -0.6
@@ -98,7 +102,7 @@ def test_axes_suit_the_sampling_and_residuals_are_in_the_unit_that_was_minimised
     modulus = 100 / (1 + time_s)
     sds = None if sd is None else np.full(len(time_s), sd)
     fit = Fit(time_s, None, 1.01 * modulus, modulus, sds, MODULUS)
-    traces, residuals = draw_fit(fit, "fit", "").axes
+    traces, residuals = draw_fit({"fit": fit}, "").axes
     assert (traces.get_xscale(), traces.get_yscale()) == (scale, scale)
     assert traces.get_ylabel() == "modulus (Pa)"
     assert (residuals.get_yscale(), residuals.get_ylabel()) == ("linear", residual)
@@ -118,24 +122,22 @@ def test_histories_of_the_seeds_that_are_drawn_are_read(tmp_path: Path) -> None:
         for table in tables:
             for start in range(0, 12, 4):
                 writer.write_table(table.slice(start, 4))
-    found = read_history(path, "least_squares", SHOWN_SEEDS + 1, ["k"])
+    found = read_history(path, "least_squares", [SHOWN_SEEDS + 1], ["k"])
     kept = [("method", "==", "least_squares"), ("seed", "!=", SHOWN_SEEDS)]
     names = ["seed", "generation", "k"]
     pd.testing.assert_frame_equal(found, pd.read_parquet(path, columns=names, filters=kept))
 
 
 @pytest.mark.parametrize(
-    ("seeds", "shown", "others", "label"),
-    [(50, 7, 49, "all 50 seeds"), (1500, 1400, 100, "first 100 of 1500 seeds")],
+    ("seeds", "above", "others", "label"),
+    [(50, 7, 48, "all 50 seeds"), (1500, 1000, 99, "first 100 of 1500 seeds")],
 )
 def test_no_more_seeds_are_drawn_than_can_be_seen(
-    tmp_path: Path, seeds: int, shown: int, others: int, label: str
+    tmp_path: Path, seeds: int, above: int, others: int, label: str
 ) -> None:
-    """And the shown one, whose misfit is the middle one, wherever it is."""
+    """And the first above the noise, wherever it is."""
     numbers = np.arange(seeds)
-    lower = np.flatnonzero(numbers != shown)[: (seeds - 1) // 2]
-    misfit = np.where(np.isin(numbers, lower), 1.0, 1.5)
-    misfit[shown] = 1.2
+    misfit = np.where(numbers < above, 1.0, 1.5)
     found = pd.DataFrame({"seed": numbers, "misfit": misfit, "noise_rms": 1.0})
     found = found.assign(case=1, generations=1, evaluations=1, stop_reason=1, method="genetic")
     found.to_csv(tmp_path / "found.csv", index=False)
@@ -146,7 +148,7 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     case = seen(title="A cell", mutation_start=20, study=study)
     (axes,) = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.parquet").axes
     colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]
-    assert (colors.count(ALL_SEEDS), colors.count(FITTED)) == (others, 1)
+    assert [colors.count(each) for each in (ALL_SEEDS, *RUNS)] == [others, 1, 1]
     legend = axes.get_legend()
     assert legend
     assert legend.get_texts()[0].get_text() == label

@@ -10,11 +10,12 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.fit import multi_start
 from biogrip.fit.methods import (
+    ALL,
     METHODS,
+    basins,
     identifier,
     near_noise,
     near_noise_words,
-    typical,
 )
 from biogrip.fit.multi_start import refine_optima
 from biogrip.physics.noise import rms
@@ -146,22 +147,15 @@ def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:
     return runs.astype({"noise_rms": float})
 
 
-@pytest.mark.parametrize(
-    ("misfit", "noise", "seed"),
-    [
-        # Misfit over noise: 1.29, 1.01, 1.10, 1.19, 1.01.
-        ([0.90, 1.05, 1.10, 1.20, 1.01], [0.70, 1.04, 1.00, 1.01, 1.00], 2),
-        ([0.90, 1.05, 1.10, 1.20], [0.70, 1.04, 1.00, 1.01], 2),
-        ([0.90], [0.70], 0),
-        # Of unknown noise, or none.
-        ([3.0, 1.0, 2.0], [None] * 3, 2),
-        ([3.0, 1.0, 2.0], [0.0] * 3, 2),
-    ],
-)
-def test_the_typical_run_is_that_of_median_excess_and_not_of_the_quietest_trace(
-    misfit: list[float], noise: list[float | None], seed: int
-) -> None:
-    assert typical(found(misfit, noise))["seed"] == seed
+def test_two_basins_have_a_tenth_of_the_runs_each() -> None:
+    """And none is told where the noise is unknown, or absent."""
+    one = basins(found([1.05, 1.01, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), 0.02)
+    assert {name: len(runs) for name, runs in one.items()} == {ALL: 20}
+    two = basins(found([1.05, 1.06, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), 0.02)
+    assert two["above the noise"]["seed"].tolist() == [0, 1]
+    assert two["near the noise"]["seed"].tolist() == list(range(2, 20))
+    for noise in (None, 0.0):
+        assert list(basins(found([3.0, 1.0], [noise, noise]), 0.02)) == [ALL]
 
 
 def test_near_the_noise_is_a_share_of_it() -> None:

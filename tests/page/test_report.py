@@ -95,11 +95,11 @@ def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path
     compared = read_table(tables / "methods.csv")
     verdicts = [row for file in tables.glob("verdicts_*.csv") for row in read_table(file)]
     titles, who = {"liquid_drop_2": "Liquid drop, case 2"}, "Run again, the paper's"
-    page, own = opened.page, ("genetic algorithm", 0.02)
+    page, own = opened.page, "genetic algorithm"
     assert page.locator("h1 + .split .answers p:not(.soft)").all_text_contents() == [
-        legible(say_what_the_study_gives(compared, *own, titles, who)),
+        legible(say_what_the_study_gives(compared, own, titles, who)),
         say_what_traces_tell(sorted(verdicts, key=lambda row: row["case"])),
-        legible(say_which_method_finds_it(compared, *own)),
+        legible(say_which_method_finds_it(compared, own)),
     ]
     # Then the picture's quantities, and figures of the paper, before all that is folded.
     shown = page.locator("figure:visible").evaluate_all("all => all.map(f => f.id)")

@@ -64,7 +64,7 @@ def test_a_recorded_trace_has_verdicts_and_no_errors(tiny: Path) -> None:
     results = tiny / "results"
     errors = pd.read_csv(results / "tables" / "errors_mine.csv")
     assert errors["parameter"].tolist() == QUANTITIES
-    assert errors[["target", "typical_error_percent"]].isna().all(axis=None)
+    assert errors[["target", "median_error_percent"]].isna().all(axis=None)
     identified = pd.read_csv(results / "identifications" / "mine.csv")
     assert identified["noise_rms"].isna().all()
     verdicts = pd.read_csv(results / "tables" / "verdicts_mine.csv").set_index("quantity")

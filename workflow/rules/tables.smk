@@ -5,6 +5,8 @@ rule case_tables:
     input:
         batches=of_case("results/identifications/{case}/{method}/{batch}.csv"),
         histories=of_case("results/histories/{case}/{method}/{batch}.parquet"),
+        measurements=of_case("results/measurements/{case}/{batch}.parquet", STUDY.simulated),
+        calibrated=calibration_of,
         verdicts="results/identifiability/{case}.json",
         expected=of_case("results/identifiability/expected/{case}.json", STUDY.simulated),
     output:

@@ -17,7 +17,7 @@ with logged(snakemake):
         "convergence": lambda: course.draw_convergence(case, found, history),
         "evolution": lambda: course.draw_evolution(case, found, history),
         "waterfall": lambda: course.draw_waterfall(case, found),
-        "fit": lambda: fit.draw_typical_fit(case, found, measured, calibrated),
+        "fit": lambda: fit.draw_fits(case, found, measured, calibrated),
         "judged_fit": lambda: fit.draw_judged_fit(case, verdicts, measured[0], calibrated),
         "profiles": lambda: likelihood.draw_profiles(case, verdicts, expected),
         "valley": lambda: likelihood.draw_valley(case, verdicts, found),

@@ -23,7 +23,7 @@ def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list
     _device(device)
     panel(device, "1", "two arms squeeze")
     fit = judged_fit(case, found, measurements, calibrated)
-    factor, unit = draw_traces(trace, fit, "fit")
+    factor, unit = draw_traces(trace, {"fit": fit})
     trace.set_ylim(top=1.45 * factor * fit.measured_rad.max())
     trace.set(xlabel="time (s)", ylabel=with_unit("rotation", unit))
     handles, _ = trace.get_legend_handles_labels()

@@ -1,5 +1,6 @@
 """The course of the methods: Figures 8 and 10 over generations, and where all runs end."""
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,19 +11,25 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from biogrip.digits import with_unit
-from biogrip.figures.results import read_history, seeds_in_words, typical_in_words
+from biogrip.figures.results import first_of_basins, read_history, seeds_in_words
 from biogrip.figures.style import (
     ALL_SEEDS,
     COLUMN_IN,
-    FITTED,
     PAGE_IN,
     PAPER,
+    RUNS,
     TARGET,
     figure,
     line_of,
 )
-from biogrip.fit.methods import chi_square_increase, near_noise, near_noise_words, typical
-from biogrip.records.identifications import read_identifications
+from biogrip.fit.methods import (
+    chi_square_increase,
+    near_noise,
+    near_noise_words,
+    reached_encodable,
+    share_with_limits,
+)
+from biogrip.records.identifications import ENCODABLE, read_identifications
 from biogrip.study.study import Case
 
 _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
@@ -30,34 +37,36 @@ _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 _LOWEST = 1e-3
 
 
-def _line_of_seed(*, typical: bool, alpha: float) -> dict[str, Any]:
-    if typical:
-        return {"color": FITTED, "linewidth": 1.5, "zorder": 3}
+def _line_of_seed(seed: object, shown: Sequence[int], alpha: float) -> dict[str, Any]:
+    if seed in shown:
+        return {"color": RUNS[shown.index(seed)], "linewidth": 1.5, "zorder": 3}
     return {"color": ALL_SEEDS, "linewidth": 0.4, "alpha": alpha}
 
 
-def _name_seeds(axes: Axes, found: pd.DataFrame) -> None:
+def _name_seeds(axes: Axes, seeds: int, first: Iterable[str]) -> None:
     """Add to the legend what the lines of seeds are."""
-    if len(found) > 1:
-        axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=seeds_in_words(len(found)))
-    axes.plot([], [], color=FITTED, label=typical_in_words(found))
+    if seeds > 1:
+        axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=seeds_in_words(seeds))
+    for words, color in zip(first, RUNS, strict=False):
+        axes.plot([], [], color=color, label=words)
 
 
 def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figure:
-    """Draw each seed's excess of the misfit over its noise, highlighting the typical seed."""
+    """Draw each seed's excess of the misfit over its noise, highlighting a run of each basin."""
     method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
     found = read_identifications(identifications, method.name)
     noise = found.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else pd.Series(found["misfit"].min(), index=noise.index)
-    shown = int(typical(found)["seed"])
+    first = first_of_basins(found, tolerance)
+    shown = [int(run["seed"]) for run in first.values()]
     history = read_history(histories, method.name, shown)
     drawn = figure(COLUMN_IN, 2.5)
     axes = drawn.subplots()
     for seed, rows in history.groupby("seed"):
         excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
-        axes.plot(rows["generation"], excess, **_line_of_seed(typical=seed == shown, alpha=0.7))
-    _name_seeds(axes, found)
+        axes.plot(rows["generation"], excess, **_line_of_seed(seed, shown, 0.7))
+    _name_seeds(axes, len(found), first)
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
     last = int(history["generation"].max())
@@ -96,10 +105,11 @@ def _mark_mutation(axes: Axes, start: int, last: int) -> None:
 
 
 def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure:
-    """Draw every parameter over generations for all seeds, highlighting the typical seed."""
+    """Draw every parameter over generations for all seeds, highlighting a run of each basin."""
     truth, method = case.truth, case.study.shown_method
     found = read_identifications(identifications, method.name)
-    shown = int(typical(found)["seed"])
+    first = first_of_basins(found, case.study.near_noise_tolerance)
+    shown = [int(run["seed"]) for run in first.values()]
     parameters, identified = truth.model.parameters, truth.published.identified
     columns = [parameter.column for parameter in parameters]
     history = read_history(histories, method.name, shown, columns)
@@ -107,13 +117,13 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
     grid = drawn.subplots(2, -(-len(parameters) // 2), sharex=True).ravel()
     for axes, parameter in zip(grid, parameters, strict=False):
         for seed, rows in history.groupby("seed"):
-            style = _line_of_seed(typical=seed == shown, alpha=0.6)
+            style = _line_of_seed(seed, shown, 0.6)
             axes.step(rows["generation"], rows[parameter.column], where="post", **style)
         target = truth.parameters.get(parameter.name, 0)
         if target > 0:
             axes.axhline(target, color=TARGET, linestyle="--")
-            last = history.loc[history["seed"] == shown, parameter.column].iloc[-1]
-            axes.set_title(f"seed {shown} ends {_beside(last / target)}", loc="right", fontsize=7)
+            ends = (_beside(float(run[parameter.column]) / target) for run in first.values())
+            axes.set_title(f"ends {', '.join(ends)}", loc="right", fontsize=7)
         if parameter.name in identified:
             axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
         if np.any(history[parameter.column] > 0):
@@ -127,7 +137,7 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
         lowest = below if below.axison else axes
         lowest.set_xlabel(method.step)
         lowest.tick_params(labelbottom=True)
-    _name_seeds(grid[0], found)
+    _name_seeds(grid[0], len(found), first)
     if truth.parameters:
         grid[0].plot([], [], color=TARGET, linestyle="--", label="target")
     if identified:
@@ -149,10 +159,13 @@ def _beside(ratio: float) -> str:
 
 
 def draw_waterfall(case: Case, identifications: Path) -> Figure:
-    """Draw the sorted increases of chi-squared over the lowest known, for every method."""
+    """Draw the sorted increases of chi-squared over the lowest known, for every method.
+
+    And those of the best points that genes can encode, which methods without digits may undercut.
+    """
     found = read_identifications(identifications)
     increase = np.maximum(chi_square_increase(found, case.samples), _LOWEST)
-    tolerance = case.study.optimum_tolerance
+    reached = reached_encodable(found, case.samples, case.study.optimum_tolerance)
     drawn = figure(COLUMN_IN, 3.15)
     axes = drawn.subplots()
     methods = found["method"].unique()
@@ -160,17 +173,20 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
     # Where curves coincide each is seen beside the thinner ones on top of it.
     for name, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
         method = case.study.identifiers[name]
-        mine = np.sort(increase[found["method"] == name])
-        share = 100 * np.mean(mine <= tolerance)
+        runs = found["method"] == name
+        mine = np.sort(increase[runs])
+        limits = share_with_limits(int(reached[runs].sum()), len(mine))
+        share, low, high = (100 * each for each in limits)
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
-        label = f"{method.title}: {share:.0f} %"
+        label = f"{method.title}: {share:.0f} % ({low:.0f}–{high:.0f})"
         curves += axes.plot(place, mine, label=label, linewidth=width, **line_of(method))
     near = case.samples * ((1 + case.study.near_noise_tolerance) ** 2 - 1)
     # Limits are named in the legend, since a curve may cover any place along them.
     words = near_noise_words(case.study.near_noise_tolerance)
     line: dict[str, Any] = {"color": TARGET, "linewidth": 0.8}
-    limits = [
-        axes.axhline(tolerance, linestyle="--", label="global optimum", **line),
+    least = np.sort(chi_square_increase(found, case.samples, ENCODABLE)[runs])
+    lines = [
+        *axes.plot(place, least, linestyle="--", label="best encodable point", **line),
         axes.axhline(near, linestyle=":", label=words, **line),
     ]
     axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * max(near, float(increase.max()))))
@@ -178,9 +194,9 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
     axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
     axes.minorticks_off()
     axes.set(xlim=(0, 100), xlabel="seeds, sorted (%)", ylabel="Δχ² over the lowest known")
-    axes.set_title(f"{case.title}: share at the global optimum")
+    axes.set_title(f"{case.title}: share that reached the best encodable point")
     # Each legend column ends with a limit; a third column would be too wide.
     half = -(-len(curves) // 2)
-    handles = [*curves[:half], limits[0], *curves[half:], limits[1]]
+    handles = [*curves[:half], lines[0], *curves[half:], lines[1]]
     drawn.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.0)
     return drawn

@@ -1,4 +1,4 @@
-"""Figures 9, 11 and 12: target, noisy trace, its typical or best fit, and the residuals."""
+"""Figures 9, 11 and 12: target, noisy trace, fits, and the residuals."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,11 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.digits import with_unit
-from biogrip.figures.results import Fit, fit_of, typical_fit
+from biogrip.figures.results import Fit, fit_of, fits_of_basins
 from biogrip.figures.style import (
     COLUMN_IN,
     FITTED,
     MEASURED,
+    RUNS,
     TARGET,
     figure,
     is_over_decades,
@@ -27,16 +28,13 @@ from biogrip.study.study import Case
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
 
 
-def draw_typical_fit(
+def draw_fits(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> Figure:
-    """Draw the fit of a case's typical seed."""
-    problem, method = case.problem.calibrated(calibrated), case.study.shown_method
-    fit = typical_fit(problem, method.name, identifications, measurements)
-    ended = f"{method.step} {fit.generations}"
-    recorded = fit.target_rad is None
-    label = f"fit ({ended})" if recorded else f"typical fit (seed {fit.seed}, {ended})"
-    return draw_fit(fit, label, case.title, case.published.axis_rad)
+    """Draw the fit of the first run in each basin, beside the trace of the first of these."""
+    problem = case.problem.calibrated(calibrated)
+    fits = fits_of_basins(case, problem, identifications, measurements)
+    return draw_fit(fits, case.title, case.published.axis_rad)
 
 
 def draw_judged_fit(
@@ -45,7 +43,7 @@ def draw_judged_fit(
     """Draw the judged trace of a case and its best fit."""
     fit = judged_fit(case, read_verdicts(verdicts), measurements, calibrated)
     trace = "recorded trace" if case.recorded else f"seed {TRACE}"
-    return draw_fit(fit, f"best fit ({trace})", case.title, case.published.axis_rad)
+    return draw_fit({f"best fit ({trace})": fit}, case.title, case.published.axis_rad)
 
 
 def judged_fit(
@@ -59,24 +57,33 @@ def judged_fit(
     return fit_of(problem, {**problem.fixed, **values}, recorded, TRACE)
 
 
-def draw_traces(axes: Axes, fit: Fit, label: str) -> tuple[float, str]:
-    """Draw a trace, its target and its fit over time; return factor and unit of the readings."""
+def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:
+    """Draw the first trace, its target and all fits; return factor and unit of the readings.
+
+    Fits are given by their labels. Their traces have the same target.
+    """
+    fit = next(iter(fits.values()))
     factor, unit = scale_of_fit(fit)
     axes.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **_READINGS)
     kind = "recorded trace" if fit.target_rad is None else "noisy measurement"
     axes.plot([], [], ".", color=MEASURED, markersize=4, label=kind)
     if fit.target_rad is not None:
         axes.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
-    axes.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
+    for (label, each), color in zip(fits.items(), RUNS, strict=False):
+        axes.plot(each.time_s, factor * each.fitted_rad, "--", color=color, label=label)
     axes.set_ylabel(with_unit(fit.read.title, unit))
     return factor, unit
 
 
-def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
-    """Draw a trace, its fit and the residuals, on an axis that includes the paper's limits."""
+def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
+    """Draw a trace, fits and the residuals, on an axis that includes the paper's limits.
+
+    See `draw_traces`. The second fit is to another trace: of it the target's residual is drawn.
+    """
+    fit, *others = fits.values()
     drawn = figure(COLUMN_IN, 3.6)
     traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
-    factor, unit = draw_traces(traces, fit, label)
+    factor, unit = draw_traces(traces, fits)
     low, high = (end([*axis_rad, end(fit.measured_rad)]) for end in (np.min, np.max))
     margin = 0.02 * (high - low)
     traces.set_ylim(factor * (low - margin), factor * (high + margin))
@@ -87,6 +94,9 @@ def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ())
     residuals.plot(fit.time_s, residual, color=MEASURED, **_READINGS)
     if fit.target_rad is not None:
         residuals.plot(fit.time_s, factor * (fit.target_rad - fit.fitted_rad), color=TARGET)
+    for other, color in zip(others, RUNS[1:], strict=False):
+        left = factor * (np.asarray(other.target_rad) - other.fitted_rad)
+        residuals.plot(other.time_s, left, color=color)
     residuals.axhline(0, color=FITTED, linestyle="--", linewidth=0.8)
     bound = 1.15 * float(np.max(np.abs(residual)))
     residuals.set_ylim(-bound, bound)

@@ -1,5 +1,6 @@
-"""Overview of a study: one fit, and the scatter of all identifications about the truth."""
+"""Overview of a study: a fit of each basin, and all identifications about the truth."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,10 @@ from biogrip.arrays import Array
 from biogrip.figures.fit import draw_traces
 from biogrip.figures.results import (
     SHOWN_SEEDS,
-    TypicalFit,
+    Fit,
     first_seeds,
+    fits_of_basins,
     seeds_in_words,
-    typical_fit,
 )
 from biogrip.figures.style import (
     ALL_SEEDS,
@@ -53,13 +54,13 @@ def draw_overview(
     measurements: list[Path],
     calibrated: list[Path],
 ) -> Figure:
-    """Draw the first case's typical fit, and identified over target values of a few cases."""
+    """Draw a fit of each basin of the first case, and identified over target values of some."""
     cases = list(study.cases.values())
     drawn = figure(PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
     problem = cases[0].problem.calibrated(calibrated)
-    fit = typical_fit(problem, study.shown, identifications[0], measurements)
-    _fit(axes[0], cases[0].truth, fit)
+    fits = fits_of_basins(cases[0], problem, identifications[0], measurements)
+    _fits(axes[0], cases[0].truth, fits)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
         found = read_identifications(path, study.shown)
@@ -83,9 +84,10 @@ def draw_overview(
     return drawn
 
 
-def _fit(axes: Axes, case: Truth, fit: TypicalFit) -> None:
-    factor, _ = draw_traces(axes, fit, f"typical fit (seed {fit.seed})")
-    axes.set_ylim(top=1.55 * factor * fit.measured_rad.max())
+def _fits(axes: Axes, case: Truth, fits: Mapping[str, Fit]) -> None:
+    factor, _ = draw_traces(axes, fits)
+    fit = next(iter(fits.values()))
+    axes.set_ylim(top=1.65 * factor * fit.measured_rad.max())
     axes.set(xlim=(fit.time_s[0], fit.time_s[-1]), xlabel="time (s)")
     axes.legend(loc="upper right")
     panel(axes, "a", case.title)

@@ -1,4 +1,4 @@
-"""Inputs of result figures: a case's typical seed, its trace and its fit."""
+"""Inputs of result figures: one run of each basin, its trace and its fit."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,13 +10,14 @@ import pandas as pd
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.methods import typical
+from biogrip.fit.methods import ALL, basins
 from biogrip.physics.instruments import ROTATION, Quantity
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.physics.whitening import within
 from biogrip.records.identifications import read_histories, read_identifications
 from biogrip.records.traces import Measurements, read_measurements
 from biogrip.stages.job import seeds_of
+from biogrip.study.study import Case
 
 SHOWN_SEEDS = 100
 """Most seeds drawn individually; figures show the first ones."""
@@ -40,26 +41,33 @@ class Fit:
     """What is read."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class TypicalFit(Fit):
-    """The identification of the typical seed, see `typical`."""
+def first_of_basins(found: pd.DataFrame, tolerance: float) -> dict[str, pd.Series]:
+    """Return the first run of each of the `basins`, by what it is called in a legend."""
+    first = {name: runs.iloc[0] for name, runs in basins(found, tolerance).items()}
+    if len(found) == 1:
+        return {"the only trace": first[ALL]}
+    return {
+        f"seed {int(run['seed'])}" + f", {name}" * (name != ALL): run for name, run in first.items()
+    }
 
-    seed: int
-    generations: int
-    """Number of generations that it took."""
 
+def fits_of_basins(
+    case: Case, problem: CaseProblem, identifications: Path, measurements: list[Path]
+) -> dict[str, Fit]:
+    """Return the fit of the first run of each basin to its trace, by label, from files of a case.
 
-def typical_fit(
-    problem: CaseProblem, method: str, identifications: Path, measurements: list[Path]
-) -> TypicalFit:
-    """Return the trace of the typical seed and its fit, from files of a case."""
-    found = read_identifications(identifications, method)
-    shown = typical(found)
-    seed = int(shown["seed"])
-    values = {p.name: float(shown[p.column]) for p in problem.model.parameters}
-    recorded = read_measurements(_holding(seed, measurements), [seed])
-    fit = fit_of(problem, values, recorded, seed)
-    return TypicalFit(**vars(fit), seed=seed, generations=int(shown["generations"]))
+    `problem` is that of the case with its calibration.
+    """
+    method = case.study.shown_method
+    found = read_identifications(identifications, method.name)
+    fits = {}
+    for words, run in first_of_basins(found, case.study.near_noise_tolerance).items():
+        seed, ended = int(run["seed"]), f"{method.step} {int(run['generations'])}"
+        values = {p.name: float(run[p.column]) for p in problem.model.parameters}
+        recorded = read_measurements(_holding(seed, measurements), [seed])
+        label = f"fit ({ended})" if len(found) == 1 else f"fit ({words}, {ended})"
+        fits[label] = fit_of(problem, values, recorded, seed)
+    return fits
 
 
 def fit_of(
@@ -89,16 +97,12 @@ def seeds_in_words(count: int) -> str:
     return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
 
 
-def typical_in_words(found: pd.DataFrame) -> str:
-    """Return the label of the typical seed."""
-    return f"seed {int(typical(found)['seed'])}, typical" if len(found) > 1 else "the only trace"
-
-
 def read_history(
-    path: Path, method: str, shown: int, values: Sequence[str] = ("best_misfit",)
+    path: Path, method: str, shown: Sequence[int], values: Sequence[str] = ("best_misfit",)
 ) -> pd.DataFrame:
-    """Read one method's histories of the seeds drawn individually and of the one shown, Parquet."""
-    return read_histories(path, method, values, lambda seed: (seed < SHOWN_SEEDS) | (seed == shown))
+    """Read one method's histories of the seeds drawn individually and of those shown, Parquet."""
+    chosen = {*range(SHOWN_SEEDS), *shown}
+    return read_histories(path, method, values, lambda seed: seed.isin(chosen))
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:

@@ -34,6 +34,8 @@ SHADE = "#DCE6EE"
 
 # Colours have the same meaning in all figures.
 TARGET, MEASURED, FITTED, PAPER, ALL_SEEDS = BLACK, SKY, ORANGE, GREEN, GREY
+# Of the first run in each basin.
+RUNS = (FITTED, BLUE)
 
 COLORS = {
     "grey": GREY,

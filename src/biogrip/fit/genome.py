@@ -62,6 +62,16 @@ class GeneRange(Block):
         """Largest value that can be encoded (Table 4)."""
         return _value(self.most)
 
+    @property
+    def values(self) -> Array:
+        """All values that can be encoded, ascending, each the nearest double."""
+        mantissas = np.zeros(1)
+        for least, most in zip(self.least[1:], self.most[1:], strict=True):
+            mantissas = (10 * mantissas[:, None] + np.arange(least, most + 1)).ravel()
+        powers = np.arange(self.exponent[0], self.exponent[1] + 1) - self.digits + _LARGEST_POWER
+        values: Array = mantissas * _TIMES[powers, None] / _OVER[powers, None]
+        return values.ravel()
+
 
 @dataclass(frozen=True)
 class SearchRange(Block):
@@ -186,15 +196,8 @@ def make_genome(model: SampleModel, ranges: Mapping[str, GeneRange]) -> Genome:
 
 def nearest_encodable(value: float, genes: GeneRange) -> float:
     """Return the number closest to a positive value that the genes can encode."""
-    mantissas = np.zeros(1)
-    for least, most in zip(genes.least[1:], genes.most[1:], strict=True):
-        mantissas = (10 * mantissas[:, None] + np.arange(least, most + 1)).ravel()
-    found = []
-    for exponent in range(genes.exponent[0], genes.exponent[1] + 1):
-        scaled = value / 10.0 ** (exponent - genes.digits)
-        nearest = mantissas[np.argmin(np.abs(mantissas - scaled))]
-        found.append(float(f"{nearest:.0f}e{exponent - genes.digits}"))
-    return min(found, key=lambda candidate: abs(candidate - value))
+    values = genes.values
+    return float(values[np.argmin(np.abs(values - value))])
 
 
 def _value(genes: tuple[int, ...]) -> float:

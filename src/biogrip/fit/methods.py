@@ -13,9 +13,9 @@ from importlib import import_module
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from scipy.stats import binomtest
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, BoolArray
 from biogrip.fit.problem import Identification, Problem, Progress
 
 
@@ -133,33 +133,57 @@ def best_fit(
     return found
 
 
-def typical(found: pd.DataFrame) -> pd.Series:
-    """Return the identification with the median ratio of misfit to noise in its trace.
+ALL = "all"
+"""Name of the basin of all runs."""
+_FEWEST = 0.1
+"""Least share of runs that makes a basin."""
 
-    The lowest misfit of all would be that of the quietest trace. If the noise is unknown
-    or absent, the identification of median misfit is returned. Of an even number, it is
-    the better of the two in the middle.
+
+def basins(found: pd.DataFrame, tolerance: float) -> dict[str, pd.DataFrame]:
+    """Divide the runs of a method on a case into those that end `near_noise` and those above it.
+
+    These are two basins, by their names, if a tenth of the runs or more end in each. Else there is
+    one, `ALL`, as where the noise is unknown.
     """
-    noise = found["noise_rms"].where(found["noise_rms"] > 0).fillna(1.0)
-    ranked = (found["misfit"] / noise).sort_values(kind="stable").index
-    return found.loc[ranked[(len(ranked) - 1) // 2]]
+    near = near_noise(found, tolerance)
+    if not _FEWEST <= near.mean() <= 1 - _FEWEST:
+        return {ALL: found}
+    return {"near the noise": found[near], "above the noise": found[~near]}
 
 
-def chi_square_increase(found: pd.DataFrame, samples: int) -> Array:
+def chi_square_increase(found: pd.DataFrame, samples: int, of: str = "misfit") -> Array:
     """Return the increase of each identification's chi^2 over the lowest of its trace, (n,).
 
-    Identifications of one case by all methods are given, and the number of readings in a trace.
-    The lowest is that of any method, or that of the true parameters where these are
-    known; the best fit of a few parameters lies below the latter.
+    Identifications of one case by all methods are given, and the number of readings in a trace;
+    and the column of the misfits whose increase is returned. The lowest is that of any method, or
+    that of the true parameters where these are known; the best fit of a few parameters lies below
+    the latter.
     """
     misfit = found["misfit"]
     lowest = misfit.groupby(found["seed"]).transform("min")
     lowest = np.fmin(lowest, found["noise_rms"].where(found["noise_rms"] > 0))
-    increase: Array = samples * ((misfit / lowest) ** 2 - 1).to_numpy(float)
+    increase: Array = samples * ((found[of] / lowest) ** 2 - 1).to_numpy(float)
     return increase
 
 
-def near_noise(found: pd.DataFrame, tolerance: float) -> NDArray[np.bool_]:
+def reached_encodable(found: pd.DataFrame, samples: int, tolerance: float) -> BoolArray:
+    """Return True for each run that reached the best point that genes can encode, (n,).
+
+    Its chi^2, of so many readings, is at most `tolerance` above that of this point. So every method
+    can reach it, in digits or not.
+    """
+    misfit, encodable = (found[name].to_numpy(float) for name in ("misfit", "encodable_misfit"))
+    reached: BoolArray = samples * (misfit**2 - encodable**2) <= tolerance * encodable**2
+    return reached
+
+
+def share_with_limits(count: int, runs: int) -> tuple[float, float, float]:
+    """Return the share of runs that do something, and its 95 % interval by Wilson."""
+    low, high = binomtest(count, runs).proportion_ci(0.95, method="wilson")
+    return count / runs, float(low), float(high)
+
+
+def near_noise(found: pd.DataFrame, tolerance: float) -> BoolArray:
     """Return True for each seed whose misfit is at most a share above the RMS noise, (n_seeds,).
 
     Such a fit looks right in a plot. With thousands of readings it need not be an optimum:
@@ -167,7 +191,7 @@ def near_noise(found: pd.DataFrame, tolerance: float) -> NDArray[np.bool_]:
     `chi_square_increase`.
     """
     misfit, noise = (found[name].to_numpy(float) for name in ("misfit", "noise_rms"))
-    reached: NDArray[np.bool_] = misfit <= (1 + tolerance) * noise
+    reached: BoolArray = misfit <= (1 + tolerance) * noise
     return reached
 
 

@@ -56,7 +56,7 @@ def draw_best(identified: Identified) -> Figure:
     if not spread:
         fit = replace(fit, time_s=fit.time_s + start_s)
     with styled():
-        drawn = draw_fit(fit, "best fit", "")
+        drawn = draw_fit({"best fit": fit}, "")
         if spread and start_s:
             drawn.axes[-1].set_xlabel(f"time since {start_s:.6g} s of the clock (s)")
     return drawn

@@ -4,27 +4,26 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 
-from scipy.stats import binomtest
-
 from biogrip.digits import legible, plain, with_unit
-from biogrip.fit.methods import near_noise_words
+from biogrip.fit.methods import ALL, share_with_limits
 from biogrip.judging.verdicts import DETERMINED
 
 Row = Mapping[str, str]
 
+_BEST = "the least misfit that its digits can encode"
+
 
 def say_what_the_study_gives(
-    methods: Iterable[Row], shown: str, tolerance: float, titles: Mapping[str, str], who: str
+    methods: Iterable[Row], shown: str, titles: Mapping[str, str], who: str
 ) -> str:
-    """Say which share of each case's traces the study's own method fits; "" if none is simulated.
+    """Say in which share of each case's traces the study's own method finds what it can encode.
 
     Rows are those of the table of methods; `shown` is the title of that method, which `who` stands
-    before; the tolerance of the noise is a share.
+    before. It is "" if no case is simulated.
     """
-    rows = [row for row in methods if row["method"] == shown and row["near_noise_share"]]
-    shares = [f"{share_of(row)} of “{titles[row['case']]}”" for row in rows]
-    to = f"fits traces to {near_noise_words(tolerance)}"
-    return f"{who} {shown} {to}: {_listed(shares)}." if shares else ""
+    rows = [row for row in methods if row["method"] == shown]
+    shares = [f"in {share_of(row)} of the runs on “{titles[row['case']]}”" for row in rows]
+    return f"{who} {shown} reaches {_BEST} {_listed(shares)}." if shares else ""
 
 
 def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
@@ -45,28 +44,27 @@ def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
     return f"A trace {'; it '.join(parts)}." if parts else ""
 
 
-def say_which_method_finds_it(methods: Iterable[Row], shown: str, tolerance: float) -> str:
-    """Say how often the surest method fits the noise, and what it takes beside the study's own.
+def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
+    """Say how often the surest method reaches that, and what it takes beside the study's own.
 
     Parameters are those of `say_what_the_study_gives`.
     """
     found: dict[str, list[Row]] = defaultdict(list)
     for row in methods:
-        if row["near_noise_share"]:
-            found[row["method"]].append(row)
+        found[row["method"]].append(row)
     if not found:
         return ""
 
     def worst(name: str) -> tuple[float, float]:
-        lowest = min(float(row["near_noise_share"]) for row in found[name])
+        lowest = min(float(row["reached_share"]) for row in found[name])
         return lowest, -max(float(row["median_evaluations"]) for row in found[name])
 
     surest = max(found, key=worst)
-    least, *more = sorted(found[surest], key=lambda row: float(row["near_noise_share"]))
+    least, *more = sorted(found[surest], key=lambda row: float(row["reached_share"]))
     at_least = "at least " * (more != [] and share_of(least) != share_of(more[-1]))
     said = (
-        f"{surest[:1].upper()}{surest[1:]} fits {at_least}{share_of(least)} of the traces of "
-        f"{'each' if more else 'the'} sample to {near_noise_words(tolerance)}, with "
+        f"{surest[:1].upper()}{surest[1:]} reaches it, or less misfit, in {at_least}"
+        f"{share_of(least)} of the runs on {'each' if more else 'the'} sample, with "
         f"{_responses(found[surest])} simulated responses"
     )
     if shown in found and shown != surest:
@@ -77,32 +75,45 @@ def say_which_method_finds_it(methods: Iterable[Row], shown: str, tolerance: flo
 def compared_rows(
     errors: Iterable[Row], verdicts: Iterable[Row], titles: Mapping[str, str]
 ) -> list[dict[str, str]]:
-    """Return the paper's results beside the study's, without quantities that no trace determines.
+    """Return the paper's results beside the study's, by basin where there are two.
 
-    Rows are those of the tables of errors and verdicts, titles those of the cases.
+    Quantities that no trace determines are left out. Rows are those of the tables of errors and
+    verdicts, titles those of the cases.
     """
     decided = {row["quantity"] for row in verdicts if row["verdict"] == DETERMINED}
+    rows = list(errors)
+    split = {row["case"] for row in rows if row["basin"] != ALL}
+    seeds = {row["case"]: int(row["seeds"]) for row in rows if row["basin"] == ALL}
     return [
         {
             "sample": titles[row["case"]],
             "quantity": legible(with_unit(row["parameter"], row["unit"])),
             "target": _number(row["target"]),
             "paper": _with_error(row["paper_identified"], row["paper_error_percent"]),
+            "runs": _runs(row, seeds[row["case"]]),
             "this study: median": _with_error(row["median_identified"], _error(row)),
-            "5–95 % of seeds": " to ".join(
-                _number(row[key]) for key in ("p05_identified", "p95_identified")
+            "quartiles": " to ".join(
+                _number(row[key]) for key in ("p25_identified", "p75_identified")
             ),
-            "near the noise": share_of(row) if row["near_noise_share"] else "",
         }
-        for row in errors
-        if row["parameter"] in decided
+        for row in rows
+        if row["parameter"] in decided and (row["basin"] == ALL) != (row["case"] in split)
     ]
 
 
+def _runs(row: Row, runs: int) -> str:
+    """Return the share of runs in a basin, with its 95 % interval."""
+    if row["basin"] == ALL:
+        return ALL
+    return f"{_percent(*share_with_limits(int(row['seeds']), runs))} {row['basin']}"
+
+
 def share_of(row: Row) -> str:
-    """Return a row's share of seeds near the noise, with its 95 % interval (Clopper-Pearson)."""
-    share, seeds = float(row["near_noise_share"]), int(row["seeds"])
-    low, high = binomtest(round(share * seeds), seeds).proportion_ci(0.95, method="exact")
+    """Return a row's share of runs that reach the best encodable point, with its interval."""
+    return _percent(*(float(row[f"reached_{key}"]) for key in ("share", "low", "high")))
+
+
+def _percent(share: float, low: float, high: float) -> str:
     return legible(f"{100 * share:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)")
 
 

@@ -15,7 +15,6 @@ import PIL.Image
 from biogrip.digits import legible
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
-from biogrip.fit.methods import near_noise_words
 from biogrip.page import answers
 from biogrip.page.explorer import explorer, fits_of
 from biogrip.records.identifications import read_verdicts
@@ -113,7 +112,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
     for entry in figures:
         if entry.file not in placed:
             folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
-    asked = compared, study.shown_method.title, study.near_noise_tolerance
+    asked = compared, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
     write_text(
         page,
@@ -125,7 +124,6 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
                 answers.say_which_method_finds_it(*asked),
             ],
             compared=answers.compared_rows(errors, judged, titles),
-            near=near_noise_words(study.near_noise_tolerance),
             cases=list(zip(cases, map(read_verdicts, files["verdicts"]), strict=True)),
             target_of=target_of,
             hero=hero,

@@ -46,6 +46,9 @@ _DIGITS = 8
 
 LEADING = ("case", "method", "seed")
 TRAILING = ("misfit", "noise_rms", "generations", "evaluations", "stop_reason")
+ENCODABLE = "encodable_misfit"
+"""Last column of the identifications of a case: lowest misfit in rad that genes can encode of the
+trace, see `lowest_encodable`; empty if it was recorded."""
 
 TIMINGS = RowFile(
     "processor times",

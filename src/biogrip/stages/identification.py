@@ -1,7 +1,8 @@
 """Identification of the sample in every noisy trace, by a method or with every sample model.
 
 A job has a batch of the seeds of a case. `identify` writes what a method finds in each trace, with
-the history of its search; `join` puts the batches of a case together, a row per method and seed.
+the history of its search; `join` puts the batches of a case together, a row per method and seed,
+and `add_encodable` adds what the genes could have held of each trace.
 `fit` writes the misfits of all sample models, for model selection. Traces are fitted in groups,
 which are small enough for little memory; results do not depend on the grouping.
 """
@@ -11,14 +12,17 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from biogrip.arrays import parts
 from biogrip.errors import BiogripError
+from biogrip.fit.encodable import lowest_encodable
 from biogrip.fit.methods import identifier
 from biogrip.fit.nested_fits import fit_models
 from biogrip.physics.noise import rms, stream
 from biogrip.records.identifications import (
+    ENCODABLE,
     MODEL_FITS,
     Record,
     columns,
@@ -101,6 +105,35 @@ def join(
     write_rows(parameters, header, rows)
     histories = pd.concat([read_parquet(batch) for batch in history_batches])
     write_parquet(history, histories[histories["seed"] < case.seeds])
+
+
+def add_encodable(
+    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
+) -> None:
+    """Add the lowest encodable misfit of each trace to all identifications of a case.
+
+    It is looked for around the end of every run, since these surround the continuous optimum.
+    """
+    header, *rows = read_rows(identifications, columns(case.sample.model))
+    problem = case.problem.to_identify().calibrated(calibrated)
+    parameters = problem.searched.parameters
+    ranges = [problem.ranges[p.range_name] for p in parameters]
+    places = [header.index(p.column) for p in parameters]
+    lowest: dict[int, str] = {}
+    for file in measurements:
+        recorded = read_measurements(file)
+        weighted = problem.weighted(recorded.sd_rad)
+        condensed = weighted.condensed(recorded.time_s)
+        for seeds in groups([seed for seed in recorded.rotation_rad if seed < case.seeds]):
+            traces = [recorded.rotation_rad[seed] for seed in seeds]
+            posed = weighted.of_each(recorded.time_s, traces, condensed=condensed)
+            found = [(seeds.index(int(row[2])), row) for row in rows if int(row[2]) in seeds]
+            starts = np.array([[float(row[place]) for place in places] for _, row in found])
+            which = np.array([trace for trace, _ in found])
+            misfits = lowest_encodable([one.misfit for one in posed], ranges, starts, which)
+            lowest |= dict(zip(seeds, (f"{misfit:.6e}" for misfit in misfits), strict=True))
+    added = [[*row, lowest.get(int(row[2]), "")] for row in rows]
+    write_rows(identifications, (*header, ENCODABLE), added)
 
 
 def fit(

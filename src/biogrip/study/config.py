@@ -50,8 +50,8 @@ class Evaluation(Block):
     """Criteria by which identifications count as successful."""
 
     optimum_tolerance: Annotated[float, Field(gt=0, le=100)]
-    """A seed reaches the global optimum if its χ² exceeds the lowest known of its trace by at most
-    this. A change of one parameter by its standard deviation raises χ² by one."""
+    """A run reaches the best encodable point of its trace if its χ² exceeds that of the point by at
+    most this. A change of one parameter by its standard deviation raises χ² by one."""
     near_noise_tolerance: Annotated[float, Field(ge=0, le=1)]
     """A seed counts as near the noise if its misfit exceeds the RMS of the noise in its trace by at
     most this share. With thousands of samples that is a large increase of χ², so the fit need not

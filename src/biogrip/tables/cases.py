@@ -11,7 +11,7 @@ from scipy.stats import binomtest
 
 from biogrip.arrays import Array
 from biogrip.digits import counted
-from biogrip.fit.methods import near_noise, near_noise_words, typical
+from biogrip.fit.methods import ALL, basins, near_noise, near_noise_words, share_with_limits
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, NOT_DETERMINED, WIDE
 from biogrip.physics.models import Truth
@@ -28,61 +28,59 @@ _COLUMNS = (
     Column("target", "Target", 4),
     Column("paper_identified", "Paper", 4),
     Column("paper_error_percent", "Paper error %", 2),
-    Column("typical_seed", "Typical seed"),
-    Column("typical_identified", "Typical", 3),
-    Column("typical_error_percent", "Typical error %", 2),
-    Column("median_identified", "Median", 3),
-    Column("p05_identified", "5 %", 3),
-    Column("p95_identified", "95 %", 3),
-    Column("median_absolute_error_percent", "Median abs. error %", 2),
+    Column("basin", "Runs that end"),
     Column("seeds", "Seeds"),
+    Column("p05_identified", "5 %", 3),
+    Column("p25_identified", "25 %", 3),
+    Column("median_identified", "Median", 3),
+    Column("p75_identified", "75 %", 3),
+    Column("p95_identified", "95 %", 3),
+    Column("median_error_percent", "Error of the median %", 2),
+    Column("median_absolute_error_percent", "Median abs. error %", 2),
 )
-_TYPICAL = (
-    "Typical is the seed of median excess of the misfit over the noise in its trace; the lowest "
-    "misfit would be that of the quietest trace. Error = (target - identified) / target."
+_BASINS = (
+    "Runs that end near the noise of their trace and runs that end above it have rows of their own "
+    "if a tenth or more end in each. Error = (target - identified) / target."
 )
+_PERCENTILES = {"p05": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95}
 
 
 def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:
     share = f"Share {near_noise_words(near_noise_tolerance)}"
-    return (*_COLUMNS, Column("near_noise_share", share, 2))
+    ends = (Column(f"near_noise_{end}", f"95 % {end}", 2) for end in ("from", "to"))
+    return (*_COLUMNS, Column("near_noise_share", share, 2), *ends)
 
 
 def errors_of_case(case: Case, identifications: Path) -> Table:
     """Compare target and identified values of one case, given its identifications, CSV."""
     truth, tolerance = case.truth, case.study.near_noise_tolerance
     found = read_identifications(identifications, case.study.shown)
-    shown = found.index.get_loc(typical(found).name)
-    known = found["noise_rms"].notna().all()
-    of_case = {
-        "case": case.name,
-        "typical_seed": found["seed"].iloc[shown],
-        "seeds": len(found),
-        "near_noise_share": np.mean(near_noise(found, tolerance)) if known else None,
-    }
+    of_case: Row = {"case": case.name}
+    if found["noise_rms"].notna().all():
+        near = share_with_limits(int(near_noise(found, tolerance).sum()), len(found))
+        of_case |= zip((f"near_noise_{end}" for end in ("share", "from", "to")), near, strict=True)
     rows = []
-    for quantity in truth.model.quantities:
-        names = [parameter.name for parameter in quantity]
-        target = truth.target(quantity)
-        values = found[[parameter.column for parameter in quantity]].sum(axis=1).to_numpy(float)
-        error = error_percent(target, values)
-        low, median, high = np.percentile(values, [5, 50, 95])
-        of_quantity = {
-            "parameter": " + ".join(names),
-            "unit": quantity[0].unit,
-            "target": target,
-            "typical_identified": values[shown],
-            "typical_error_percent": error[shown],
-            "median_identified": median,
-            "p05_identified": low,
-            "p95_identified": high,
-            "median_absolute_error_percent": np.median(np.abs(error)),
-        }
-        rows.append(of_case | of_quantity | _of_paper(truth, names, target))
+    for basin, runs in ({ALL: found} | basins(found, tolerance)).items():
+        for quantity in truth.model.quantities:
+            names = [parameter.name for parameter in quantity]
+            target = truth.target(quantity)
+            values = runs[[parameter.column for parameter in quantity]].sum(axis=1).to_numpy(float)
+            of_quantity = {
+                "parameter": " + ".join(names),
+                "unit": quantity[0].unit,
+                "target": target,
+                "basin": basin,
+                "seeds": len(runs),
+                "median_error_percent": error_percent(target, np.median(values, keepdims=True))[0],
+                "median_absolute_error_percent": np.median(np.abs(error_percent(target, values))),
+            }
+            for name, percent in _PERCENTILES.items():
+                of_quantity[f"{name}_identified"] = np.percentile(values, percent)
+            rows.append(of_case | of_quantity | _of_paper(truth, names, target))
     number = f"Table {truth.published.table}. " if truth.published.table is not None else ""
     caption = (
         f"{number}{truth.title}: target and identified parameters over "
-        f"{counted(len(found), 'seed')}. {_TYPICAL}"
+        f"{counted(len(found), 'seed')}. {_BASINS}"
         if truth.parameters
         else f"{truth.title}: parameters identified in the recorded trace."
     )
@@ -117,11 +115,11 @@ def errors(study: Study, tables: list[Path]) -> Table:
         for path in tables
         for row in read_rows(path, names)[1:]
     ]
-    return Table(f"Identification errors of all cases. {_TYPICAL}", columns, rows)
+    return Table(f"Identification errors of all cases. {_BASINS}", columns, rows)
 
 
 def _cell(name: str, text: str) -> str | float:
-    if name in ("typical_seed", "seeds"):
+    if name == "seeds":
         return int(text)
     try:
         return float(text)

@@ -35,7 +35,7 @@ RULES = (
     f"{100 * FEW:g} % not. A printed number that the paper rounds is replicated if it is within "
     f"{100 * CLOSE:g} % of ours; one of a single run if it is within the middle half of the seeds, "
     "in part if within the middle 90 %. An identified value is replicated if it is within the "
-    "middle 90 % of the seeds and the typical seed is as close to the target as the limits of a "
+    "middle 90 % of the seeds and their median is as close to the target as the limits of a "
     "trace without noise, in part if it is only within. The order of magnitude is half a decade "
     "on both sides. What is said of several samples, parameters or numbers is judged one by one: "
     "in part if they differ, or if it holds once a misprint is put right. It cannot be told if "
@@ -101,7 +101,7 @@ def by_range(printed: float, of_seeds: "pd.Series[float] | pd.Series[int]") -> s
 
 
 def by_value(low: float, printed: float, high: float, *, is_close: bool) -> str:
-    """Judge an identified value by the middle 90 % of the seeds, and the typical seed."""
+    """Judge an identified value by the middle 90 % of the seeds, and their median."""
     if not low <= printed <= high:
         return NOT
     return REPLICATED if is_close else IN_PART

@@ -94,7 +94,7 @@ def judge_capability(results: Results) -> Judged:
     found = points.groupby(["case", "quantity"], sort=False)["bound_percent"]
     ratio = (found.max() / found.min()).groupby("case", sort=False).max()
     methods = results.table("methods").groupby("method", sort=False)
-    by_method = methods["optimum_share"].agg(["min", "max"])
+    by_method = methods["reached_share"].agg(["min", "max"])
     shares = "; ".join(
         f"{name} {_percents(row['min'], row['max'])}" for name, row in by_method.iterrows()
     )
@@ -103,7 +103,7 @@ def judge_capability(results: Results) -> Judged:
         altogether([*(REPLICATED if r > _FELT else NOT for r in ratio), *([REPLICATED] * decides)]),
         "From half to twice the stiffness and from 1 to 2 mm, the least errors that noise allows "
         f"change by factors of {ratio.min():.2g} to {ratio.max():.2g} (sweep robustness_gripper). "
-        f"Traces whose best fit is found: {shares}.",
+        f"Runs that reach the best point that the genes can encode: {shares}.",
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array
+from biogrip.fit.methods import ALL
 from biogrip.tables.claim_rules import (
     IN_PART,
     NOT,
@@ -44,14 +45,15 @@ def judge_values(results: Results, number: int) -> Judged:
     """Judge the identified values of a table."""
     runs = results.runs_of(number)
     errors = results.table("errors")
-    errors = errors[errors["case"] == runs.case].set_index("parameter")
+    of_all = (errors["case"] == runs.case) & (errors["basin"] == ALL)
+    errors = errors[of_all].set_index("parameter")
     limits = results.table(f"verdicts_{runs.case}").set_index("quantity")
     said, verdicts = [], []
     for name, printed in runs.truth.published.identified.items():
         row, expected = errors.loc[name], limits.loc[name]
         low, high = float(row["p05_identified"]), float(row["p95_identified"])
         ends = float(expected["expected_low"]), float(expected["expected_high"])
-        is_close = bool(ends[0] <= float(row["typical_identified"]) <= ends[1])
+        is_close = bool(ends[0] <= float(row["median_identified"]) <= ends[1])
         verdicts.append(by_value(low, printed, high, is_close=is_close))
         said.append(f"{name} = {printed:g} {verdicts[-1]} ({plain(low)} to {plain(high)})")
     return Judged(altogether(verdicts), f"With the middle 90 % of the seeds: {'; '.join(said)}.")

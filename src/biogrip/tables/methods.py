@@ -1,14 +1,13 @@
 """The identification methods on the same traces, the models that fit them, and processor time."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from biogrip.fit.methods import chi_square_increase, near_noise, near_noise_words
+from biogrip.fit.methods import chi_square_increase, reached_encodable, share_with_limits
 from biogrip.fit.nested_fits import aic_and_bic
-from biogrip.records.identifications import MODEL_FITS, TIMINGS, read_identifications
+from biogrip.records.identifications import ENCODABLE, MODEL_FITS, TIMINGS, read_identifications
 from biogrip.study.study import Study
 from biogrip.tables.cases import error_percent
 from biogrip.tables.layout import Column, Row, Table
@@ -17,9 +16,11 @@ _METHOD_COLUMNS = (
     Column("case", "Case"),
     Column("method", "Method"),
     Column("seeds", "Seeds"),
-    Column("optimum_share", "Share at global optimum", 3),
-    Column("near_noise_share", "Share {near_noise}", 2),
+    Column("reached_share", "Share that reached the best encodable point", 2),
+    Column("reached_low", "95 % from", 2),
+    Column("reached_high", "95 % to", 2),
     Column("median_rise", "Median Δχ²", 2),
+    Column("encodable_rise", "Median Δχ² of that point", 2),
     Column("median_evaluations", "Median responses", 3),
 )
 
@@ -31,14 +32,19 @@ def methods(study: Study, identifications: list[Path]) -> Table:
     for (name, case), path in zip(study.cases.items(), identifications, strict=True):
         found = read_identifications(path)
         found["increase"] = chi_square_increase(found, case.samples)
+        found["least"] = chi_square_increase(found, case.samples, ENCODABLE)
+        found["reached"] = reached_encodable(found, case.samples, study.optimum_tolerance)
         for method, mine in found.groupby("method", sort=False):
+            share, low, high = share_with_limits(int(mine["reached"].sum()), len(mine))
             row: Row = {
                 "case": name,
                 "method": study.identifiers[method].title,
                 "seeds": len(mine),
-                "optimum_share": np.mean(mine["increase"] <= study.optimum_tolerance),
-                "near_noise_share": np.mean(near_noise(mine, study.near_noise_tolerance)),
+                "reached_share": share,
+                "reached_low": low,
+                "reached_high": high,
                 "median_rise": np.median(mine["increase"]),
+                "encodable_rise": np.median(mine["least"]),
                 "median_evaluations": float(mine["evaluations"].median()),
             }
             for quantity in case.truth.model.quantities:
@@ -48,18 +54,15 @@ def methods(study: Study, identifications: list[Path]) -> Table:
                 row[f"error_percent {label}"] = np.median(error)
                 labels[f"error_percent {label}"] = f"Error {label} %"
             rows.append(row)
-    words = near_noise_words(study.near_noise_tolerance)
-    columns = (
-        *(replace(c, heading=c.heading.format(near_noise=words)) for c in _METHOD_COLUMNS),
-        *(Column(name, heading, 2) for name, heading in labels.items()),
-    )
+    errors = (Column(name, heading, 2) for name, heading in labels.items())
     caption = (
-        "Methods on the same traces. At the global optimum: chi-squared at most "
-        f"{study.optimum_tolerance:g} above the lowest that any method, or the truth, has on "
-        f"that trace. A misfit {words} in the trace may be far above that in chi-squared. Errors "
-        "are medians of the absolute error."
+        "Methods on the same traces. Reached: chi-squared at most "
+        f"{study.optimum_tolerance:g} above that of the best point that the genes can encode of "
+        "the trace (95 % interval by Wilson); methods without digits may lie below. Δχ² is above "
+        "the lowest that any method, or the truth, has on the trace; no point with the genes' "
+        "digits has less than the best encodable one. Errors are medians of the absolute error."
     )
-    return Table(caption, columns, rows)
+    return Table(caption, (*_METHOD_COLUMNS, *errors), rows)
 
 
 _MODEL_COLUMNS = (
