@@ -14,8 +14,8 @@ rule judged_cells:
     resources:
         runtime=240,
     params:
-        software=SOFTWARE,
-        traces=50,
+        **settings_of(),
+        traces=20,
     message:
         "Judging traces of {wildcards.instrument} with {wildcards.readings} readings"
     script:
@@ -31,7 +31,7 @@ rule levels:
     log:
         "results/logs/levels.log",
     params:
-        software=SOFTWARE,
+        **settings_of(),
     message:
         "Counting verdicts"
     script:

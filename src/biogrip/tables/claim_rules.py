@@ -12,13 +12,15 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 
-from biogrip.arrays import Array
+from biogrip.arrays import BoolArray
+from biogrip.fit.methods import share_with_limits
 from biogrip.physics.models import Truth
 from biogrip.records.identifications import read_histories, read_identifications
 from biogrip.records.rows import read_frame
 from biogrip.study.study import Study
 
 REPLICATED, IN_PART, NOT = "replicated", "in part", "not"
+OUTSIDE = "outside the printed encoding"
 UNDECIDED = "cannot be told"
 
 MOST, FEW = 0.9, 0.1
@@ -27,20 +29,21 @@ CLOSE = 0.05
 """Relative difference up to which a number that the paper rounds agrees."""
 FEWEST_SEEDS = 20
 """Seeds that shares and ranges take: with fewer, none is outside of the middle 90 %."""
+NEAR = 0.1
+"""Relative difference up to which a run's identified value counts as the paper's."""
 HALF_A_DECADE = 0.5
 """Largest difference of common logarithms within an order of magnitude."""
 
 RULES = (
     f"Of shares of seeds or of compared settings, {100 * MOST:g} % and more are replicated, up to "
-    f"{100 * FEW:g} % not. A printed number that the paper rounds is replicated if it is within "
-    f"{100 * CLOSE:g} % of ours; one of a single run if it is within the middle half of the seeds, "
-    "in part if within the middle 90 %. An identified value is replicated if it is within the "
-    "middle 90 % of the seeds and their median is as close to the target as the limits of a "
-    "trace without noise, in part if it is only within. The order of magnitude is half a decade "
-    "on both sides. What is said of several samples, parameters or numbers is judged one by one: "
-    "in part if they differ, or if it holds once a misprint is put right. It cannot be told if "
-    "nothing here or in the paper can contradict it, or if the study lacks what it takes, as "
-    f"{FEWEST_SEEDS} seeds."
+    f"{100 * FEW:g} % not; 95 % limits of shares of seeds are in brackets. A printed number that "
+    f"the paper rounds is replicated if it is within {100 * CLOSE:g} % of ours. An identified "
+    f"value is judged by the share of the seeds within {100 * NEAR:g} % of it; if no gene that the "
+    f"paper prints encodes a value so close, no run can reach it: {OUTSIDE}. The order of "
+    "magnitude is half a decade on both sides. What is said of several samples, parameters or "
+    "numbers is judged one by one: in part if they differ, or if it holds once a misprint is put "
+    "right. It cannot be told if nothing here or in the paper can contradict it, if what it says "
+    f"was used to choose a setting, or if the study lacks what it takes, as {FEWEST_SEEDS} seeds."
 )
 """The rules in words."""
 
@@ -92,19 +95,12 @@ def by_number(printed: float, found: float) -> str:
     return REPLICATED if abs(found / printed - 1) <= CLOSE else NOT
 
 
-def by_range(printed: float, of_seeds: "pd.Series[float] | pd.Series[int]") -> str:
-    """Judge the number of a single run by those of all seeds."""
-    low, first, third, high = np.percentile(of_seeds.to_numpy(float), [5, 25, 75, 95])
-    if first <= printed <= third:
-        return REPLICATED
-    return IN_PART if low <= printed <= high else NOT
+def by_value(distance: float, share: float) -> str:
+    """Judge an identified value by the share of the seeds near it.
 
-
-def by_value(low: float, printed: float, high: float, *, is_close: bool) -> str:
-    """Judge an identified value by the middle 90 % of the seeds, and their median."""
-    if not low <= printed <= high:
-        return NOT
-    return REPLICATED if is_close else IN_PART
+    The relative distance of the nearest value that the encoding has tells whether any can be.
+    """
+    return OUTSIDE if abs(distance) > NEAR else by_share(share)
 
 
 def altogether(verdicts: Iterable[str]) -> str:
@@ -123,10 +119,17 @@ def percent(share: float) -> str:
     return f"{100 * share:.0f} %"
 
 
-def share_within_a_decade(values: "pd.Series[float]", target: float) -> float:
-    """Return the share of values of the same order of magnitude as the target."""
-    apart: Array = np.abs(np.log10(values.to_numpy(float) / target))
-    return float(np.mean(apart <= HALF_A_DECADE))
+def of_seeds(those: "pd.Series[bool] | BoolArray") -> str:
+    """Return a share of seeds, (n_seeds,), in words, with its 95 % limits."""
+    share, low, high = share_with_limits(int(np.sum(those)), len(those))
+    return f"{percent(share)} ({100 * low:.0f} to {100 * high:.0f})"
+
+
+def within_a_decade(values: "pd.Series[float]", target: float) -> BoolArray:
+    """Return whether values are of the same order of magnitude as the target, (n_seeds,)."""
+    apart = np.abs(np.log10(values.to_numpy(float) / target))
+    near: BoolArray = apart <= HALF_A_DECADE
+    return near
 
 
 class LackingError(Exception):
