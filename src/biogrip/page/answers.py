@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 
 from biogrip.digits import with_unit
-from biogrip.fit.methods import ALL, share_with_limits
+from biogrip.fit.methods import ALL, share_in_words
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.tables.claim_rules import FEWEST_SEEDS, IN_PART, NOT, REPLICATED, by_value
 
@@ -136,7 +136,9 @@ def compared_rows(errors: Iterable[Row], verdicts: Iterable[Row]) -> list[dict[s
             "parameter": with_unit(row["parameter"], row["unit"]),
             "target": _number(row["target"], 4),
             "paper": _with_error(row, "paper", 4),
-            "runs": _share(row, seeds[row["case"]]),
+            "runs": ALL
+            if row["basin"] == ALL
+            else f"{share_in_words(int(row['seeds']), seeds[row['case']])} {row['basin']}",
             "this study: median": _with_error(row, "median", 3),
             "quartiles": " to ".join(
                 _number(row[key], 3) for key in ("p25_identified", "p75_identified")
@@ -145,12 +147,6 @@ def compared_rows(errors: Iterable[Row], verdicts: Iterable[Row]) -> list[dict[s
         for row in rows
         if row["parameter"] in decided and (row["basin"] == ALL) != (row["case"] in split)
     ]
-
-
-def _share(row: Row, runs: int) -> str:
-    """Return the share of runs in a basin, with its 95 % interval."""
-    share, low, high = (100 * each for each in share_with_limits(int(row["seeds"]), runs))
-    return ALL if row["basin"] == ALL else f"{share:.0f} % ({low:.0f}–{high:.0f}) {row['basin']}"
 
 
 def _listed(names: Sequence[str]) -> str:
