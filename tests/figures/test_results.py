@@ -146,11 +146,10 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     pd.DataFrame(history).assign(method="genetic").to_parquet(tmp_path / "history.parquet")
     study = seen(shown_method=METHODS["genetic"], near_noise_tolerance=0.02)
     case = seen(title="A cell", mutation_start=20, study=study)
-    (axes,) = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.parquet").axes
+    drawn = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.parquet")
+    (axes,), (legend,) = drawn.axes, drawn.legends
     colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]
     assert [colors.count(each) for each in (ALL_SEEDS, *RUNS)] == [others, 1, 1]
-    legend = axes.get_legend()
-    assert legend
     assert legend.get_texts()[0].get_text() == label
 
 

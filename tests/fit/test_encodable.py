@@ -23,8 +23,9 @@ def test_no_encodable_point_is_lower_where_the_optimum_is_not_encodable() -> Non
         found: Array = np.log(1e5 / parameters).sum(axis=1)
         return found
 
-    start = (33.73, 0.2843)
     every = np.array(list(product(*(genes.values for genes in RANGES))))
-    found = lowest_encodable([valley, beyond], RANGES, np.array([start, start]), np.arange(2))
-    assert found.tolist() == [valley(every).min(), beyond(every).min()]
+    found = [
+        lowest_encodable(each, RANGES, np.array([[33.73, 0.2843]])) for each in (valley, beyond)
+    ]
+    assert found == [valley(every).min(), beyond(every).min()]
     assert found[0] > 1 + 1e-6

@@ -1,4 +1,4 @@
-"""All identifiers on the same problems, and which run is typical, which near the noise."""
+"""All identifiers on the same problems, and which runs end near the noise."""
 
 from dataclasses import replace
 from typing import Any

@@ -27,7 +27,7 @@ from biogrip.fit.methods import (
     near_noise,
     near_noise_words,
     reached_encodable,
-    share_with_limits,
+    share_in_words,
 )
 from biogrip.records.identifications import ENCODABLE, read_identifications
 from biogrip.study.study import Case
@@ -61,7 +61,7 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
     first = first_of_basins(found, tolerance)
     shown = [int(run["seed"]) for run in first.values()]
     history = read_history(histories, method.name, shown)
-    drawn = figure(COLUMN_IN, 2.5)
+    drawn = figure(COLUMN_IN, 2.9)
     axes = drawn.subplots()
     for seed, rows in history.groupby("seed"):
         excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
@@ -84,7 +84,7 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
         axes.axhline(near, color=TARGET, linestyle="-.", linewidth=0.8, label=words)
         reached = near_noise(found, tolerance).sum()
         axes.set_title(f"{case.title}: {reached} of {len(found)} {words}")
-    axes.legend(loc="upper right")
+    drawn.legend(loc="outside lower center", ncols=2)
     return drawn
 
 
@@ -122,8 +122,6 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
         target = truth.parameters.get(parameter.name, 0)
         if target > 0:
             axes.axhline(target, color=TARGET, linestyle="--")
-            ends = (_beside(float(run[parameter.column]) / target) for run in first.values())
-            axes.set_title(f"ends {', '.join(ends)}", loc="right", fontsize=7)
         if parameter.name in identified:
             axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
         if np.any(history[parameter.column] > 0):
@@ -148,55 +146,29 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
     return drawn
 
 
-def _beside(ratio: float) -> str:
-    """Return the distance to the target in words, as a few percent are invisible on the axis."""
-    if not 0.5 < ratio < 2:
-        return f"at {ratio:.2g} times the target"
-    percent = 100 * (ratio - 1)
-    if abs(percent) < 0.05:
-        return "at the target"
-    return f"{abs(percent):.2g} % {'above' if percent > 0 else 'below'} the target"
-
-
 def draw_waterfall(case: Case, identifications: Path) -> Figure:
-    """Draw the sorted increases of chi-squared over the lowest known, for every method.
-
-    And those of the best points that genes can encode, which methods without digits may undercut.
-    """
+    """Draw sorted increases of chi-squared, of every method's runs and of best encodable points."""
     found = read_identifications(identifications)
     increase = np.maximum(chi_square_increase(found, case.samples), _LOWEST)
     reached = reached_encodable(found, case.samples, case.study.optimum_tolerance)
-    drawn = figure(COLUMN_IN, 3.15)
+    drawn = figure(COLUMN_IN, 3.5)
     axes = drawn.subplots()
     methods = found["method"].unique()
-    curves = []
     # Where curves coincide each is seen beside the thinner ones on top of it.
     for name, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
         method = case.study.identifiers[name]
         runs = found["method"] == name
         mine = np.sort(increase[runs])
-        limits = share_with_limits(int(reached[runs].sum()), len(mine))
-        share, low, high = (100 * each for each in limits)
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
-        label = f"{method.title}: {share:.0f} % ({low:.0f}–{high:.0f})"
-        curves += axes.plot(place, mine, label=label, linewidth=width, **line_of(method))
-    near = case.samples * ((1 + case.study.near_noise_tolerance) ** 2 - 1)
-    # Limits are named in the legend, since a curve may cover any place along them.
-    words = near_noise_words(case.study.near_noise_tolerance)
-    line: dict[str, Any] = {"color": TARGET, "linewidth": 0.8}
-    least = np.sort(chi_square_increase(found, case.samples, ENCODABLE)[runs])
-    lines = [
-        *axes.plot(place, least, linestyle="--", label="best encodable point", **line),
-        axes.axhline(near, linestyle=":", label=words, **line),
-    ]
-    axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * max(near, float(increase.max()))))
+        label = f"{method.title}: {share_in_words(int(reached[runs].sum()), len(mine))}"
+        axes.plot(place, mine, label=label, linewidth=width, **line_of(method))
+    least = np.sort(chi_square_increase(found, case.samples, ENCODABLE)[runs]).clip(_LOWEST)
+    axes.plot(place, least, "--", color=TARGET, linewidth=0.8, label="best encodable point")
+    axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * float(increase.max())))
     ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]
     axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
     axes.minorticks_off()
     axes.set(xlim=(0, 100), xlabel="seeds, sorted (%)", ylabel="Δχ² over the lowest known")
-    axes.set_title(f"{case.title}: share that reached the best encodable point")
-    # Each legend column ends with a limit; a third column would be too wide.
-    half = -(-len(curves) // 2)
-    handles = [*curves[:half], lines[0], *curves[half:], lines[1]]
-    drawn.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.0)
+    axes.set_title(f"{case.title}: best encodable point reached")
+    drawn.legend(loc="outside lower left")
     return drawn

@@ -32,8 +32,7 @@ def draw_fits(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> Figure:
     """Draw the fit of the first run in each basin, beside the trace of the first of these."""
-    problem = case.problem.calibrated(calibrated)
-    fits = fits_of_basins(case, problem, identifications, measurements)
+    fits = fits_of_basins(case, identifications, measurements, calibrated)
     return draw_fit(fits, case.title, case.published.axis_rad)
 
 
@@ -58,10 +57,7 @@ def judged_fit(
 
 
 def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:
-    """Draw the first trace, its target and all fits; return factor and unit of the readings.
-
-    Fits are given by their labels. Their traces have the same target.
-    """
+    """Draw a trace, its target, its fit and others, by label; return factor and unit."""
     fit = next(iter(fits.values()))
     factor, unit = scale_of_fit(fit)
     axes.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **_READINGS)
@@ -76,9 +72,9 @@ def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:
 
 
 def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
-    """Draw a trace, fits and the residuals, on an axis that includes the paper's limits.
+    """Draw a trace, its fit and the residuals, on an axis that includes the paper's limits.
 
-    See `draw_traces`. The second fit is to another trace: of it the target's residual is drawn.
+    Of further fits, which are to other traces of the same target, the target's residuals are drawn.
     """
     fit, *others = fits.values()
     drawn = figure(COLUMN_IN, 3.6)

@@ -58,8 +58,7 @@ def draw_overview(
     cases = list(study.cases.values())
     drawn = figure(PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
-    problem = cases[0].problem.calibrated(calibrated)
-    fits = fits_of_basins(cases[0], problem, identifications[0], measurements)
+    fits = fits_of_basins(cases[0], identifications[0], measurements, calibrated)
     _fits(axes[0], cases[0].truth, fits)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):

@@ -43,30 +43,26 @@ class Fit:
 
 def first_of_basins(found: pd.DataFrame, tolerance: float) -> dict[str, pd.Series]:
     """Return the first run of each of the `basins`, by what it is called in a legend."""
-    first = {name: runs.iloc[0] for name, runs in basins(found, tolerance).items()}
     if len(found) == 1:
-        return {"the only trace": first[ALL]}
+        return {"the only trace": found.iloc[0]}
     return {
-        f"seed {int(run['seed'])}" + f", {name}" * (name != ALL): run for name, run in first.items()
+        f"seed {runs['seed'].iloc[0]}" + f", {name}" * (name != ALL): runs.iloc[0]
+        for name, runs in basins(found, tolerance).items()
     }
 
 
 def fits_of_basins(
-    case: Case, problem: CaseProblem, identifications: Path, measurements: list[Path]
+    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> dict[str, Fit]:
-    """Return the fit of the first run of each basin to its trace, by label, from files of a case.
-
-    `problem` is that of the case with its calibration.
-    """
-    method = case.study.shown_method
-    found = read_identifications(identifications, method.name)
+    """Return the fit of the first run of each basin, by label, from files of a case."""
+    problem = case.problem.calibrated(calibrated)
+    found = read_identifications(identifications, case.study.shown)
     fits = {}
     for words, run in first_of_basins(found, case.study.near_noise_tolerance).items():
-        seed, ended = int(run["seed"]), f"{method.step} {int(run['generations'])}"
+        seed = int(run["seed"])
         values = {p.name: float(run[p.column]) for p in problem.model.parameters}
         recorded = read_measurements(_holding(seed, measurements), [seed])
-        label = f"fit ({ended})" if len(found) == 1 else f"fit ({words}, {ended})"
-        fits[label] = fit_of(problem, values, recorded, seed)
+        fits[f"fit ({words})"] = fit_of(problem, values, recorded, seed)
     return fits
 
 

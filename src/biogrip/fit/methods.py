@@ -154,10 +154,9 @@ def basins(found: pd.DataFrame, tolerance: float) -> dict[str, pd.DataFrame]:
 def chi_square_increase(found: pd.DataFrame, samples: int, of: str = "misfit") -> Array:
     """Return the increase of each identification's chi^2 over the lowest of its trace, (n,).
 
-    Identifications of one case by all methods are given, and the number of readings in a trace;
-    and the column of the misfits whose increase is returned. The lowest is that of any method, or
-    that of the true parameters where these are known; the best fit of a few parameters lies below
-    the latter.
+    Identifications of one case by all methods are given, the number of readings in a trace, and the
+    column of misfits. The lowest is that of any method, or that of the true parameters where these
+    are known; the best fit of a few parameters lies below the latter.
     """
     misfit = found["misfit"]
     lowest = misfit.groupby(found["seed"]).transform("min")
@@ -167,10 +166,9 @@ def chi_square_increase(found: pd.DataFrame, samples: int, of: str = "misfit") -
 
 
 def reached_encodable(found: pd.DataFrame, samples: int, tolerance: float) -> BoolArray:
-    """Return True for each run that reached the best point that genes can encode, (n,).
+    """Return True for each run with chi^2 at most `tolerance` above the best encodable point, (n,).
 
-    Its chi^2, of so many readings, is at most `tolerance` above that of this point. So every method
-    can reach it, in digits or not.
+    Every method can reach this point or lie below it, with digits or without.
     """
     misfit, encodable = (found[name].to_numpy(float) for name in ("misfit", "encodable_misfit"))
     reached: BoolArray = samples * (misfit**2 - encodable**2) <= tolerance * encodable**2
@@ -181,6 +179,12 @@ def share_with_limits(count: int, runs: int) -> tuple[float, float, float]:
     """Return the share of runs that do something, and its 95 % interval by Wilson."""
     low, high = binomtest(count, runs).proportion_ci(0.95, method="wilson")
     return count / runs, float(low), float(high)
+
+
+def share_in_words(count: int, runs: int) -> str:
+    """Return a share of runs in percent with its 95 % interval: ``18 % (10–31)``."""
+    share, low, high = (100 * each for each in share_with_limits(count, runs))
+    return f"{share:.0f} % ({low:.0f}–{high:.0f})"
 
 
 def near_noise(found: pd.DataFrame, tolerance: float) -> BoolArray:

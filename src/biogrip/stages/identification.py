@@ -8,6 +8,7 @@ which are small enough for little memory; results do not depend on the grouping.
 """
 
 import time
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -116,23 +117,20 @@ def add_encodable(
     """
     header, *rows = read_rows(identifications, columns(case.sample.model))
     problem = case.problem.to_identify().calibrated(calibrated)
-    parameters = problem.searched.parameters
-    ranges = [problem.ranges[p.range_name] for p in parameters]
-    places = [header.index(p.column) for p in parameters]
+    searched = problem.searched.parameters
+    ranges = [problem.ranges[parameter.range_name] for parameter in searched]
+    ends = defaultdict(list)
+    for row in rows:
+        ends[int(row[2])].append([float(row[header.index(p.column)]) for p in searched])
     lowest: dict[int, str] = {}
     for file in measurements:
         recorded = read_measurements(file)
-        weighted = problem.weighted(recorded.sd_rad)
-        condensed = weighted.condensed(recorded.time_s)
-        for seeds in groups([seed for seed in recorded.rotation_rad if seed < case.seeds]):
-            traces = [recorded.rotation_rad[seed] for seed in seeds]
-            posed = weighted.of_each(recorded.time_s, traces, condensed=condensed)
-            found = [(seeds.index(int(row[2])), row) for row in rows if int(row[2]) in seeds]
-            starts = np.array([[float(row[place]) for place in places] for _, row in found])
-            which = np.array([trace for trace, _ in found])
-            misfits = lowest_encodable([one.misfit for one in posed], ranges, starts, which)
-            lowest |= dict(zip(seeds, (f"{misfit:.6e}" for misfit in misfits), strict=True))
-    added = [[*row, lowest.get(int(row[2]), "")] for row in rows]
+        traces = {seed: trace for seed, trace in recorded.rotation_rad.items() if seed in ends}
+        posed = problem.weighted(recorded.sd_rad).of_each(recorded.time_s, traces.values())
+        for seed, of_trace in zip(traces, posed, strict=True):
+            misfit = lowest_encodable(of_trace.misfit, ranges, np.array(ends[seed]))
+            lowest[seed] = f"{misfit:.6e}"
+    added = ([*row, lowest.get(int(row[2]), "")] for row in rows)
     write_rows(identifications, (*header, ENCODABLE), added)
 
 
