@@ -59,8 +59,8 @@ METHODS = [
 
 def test_the_study_s_own_method_is_measured_by_what_it_can_encode() -> None:
     assert say_what_the_study_gives(METHODS, OWN, TITLES, "The").replace("\xa0", " ") == (
-        "The genetic algorithm reaches the least misfit that its digits can encode in 18 % (10 to "
-        "100 %) of the runs on “A cell” and in 100 % (10 to 100 %) of the runs on “A drop”."
+        "The genetic algorithm reaches the least misfit that its digits can encode in these runs: "
+        "18 % (10 to 100 %) on “A cell” and 100 % (10 to 100 %) on “A drop”."
     )
     assert say_what_the_study_gives(METHODS, "other", TITLES, "The") == ""
 

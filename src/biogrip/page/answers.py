@@ -22,8 +22,8 @@ def say_what_the_study_gives(
     before. It is "" if no case is simulated.
     """
     rows = [row for row in methods if row["method"] == shown]
-    shares = [f"in {share_of(row)} of the runs on “{titles[row['case']]}”" for row in rows]
-    return f"{who} {shown} reaches {_BEST} {_listed(shares)}." if shares else ""
+    shares = [f"{share_of(row)} on “{titles[row['case']]}”" for row in rows]
+    return f"{who} {shown} reaches {_BEST} in these runs: {_listed(shares)}." if shares else ""
 
 
 def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
