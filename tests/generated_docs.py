@@ -16,7 +16,8 @@ import pandas as pd
 
 import biogrip.records
 from biogrip.cli import main
-from biogrip.digits import plain, with_unit
+from biogrip.digits import plain as in_digits
+from biogrip.digits import with_unit
 from biogrip.page.answers import compared_rows, say_what_traces_tell
 from biogrip.records import identifications, traces
 from biogrip.records.rows import RowFile, read_table
@@ -146,14 +147,14 @@ def methods_compared() -> str:
         | {
             f"{_CASES[row['case']]}: reached; Δχ²": f"{100 * row['reached_share']:.0f} % "
             f"({100 * row['reached_low']:.0f}–{100 * row['reached_high']:.0f}); "
-            f"{plain(row['median_rise'], 2)}"
+            f"{in_digits(row['median_rise'], 2)}"
             for row in rows.to_dict("records")
         }
         | {"median responses": _range(rows["median_evaluations"], ".0f")}
         for method, rows in table.groupby("method", sort=False)
     ]
     least = table.groupby("case", sort=False)["encodable_rise"].first()
-    shown = [plain(rise, 2) for rise in least]
+    shown = [in_digits(rise, 2) for rise in least]
     best = dict(zip(rows[0], ["*best encodable point*", *shown, ""], strict=True))
     return _table(iter([*rows, best]))
 
