@@ -17,6 +17,7 @@ import pandas as pd
 
 import biogrip.records
 from biogrip.cli import main
+from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.page.answers import (
@@ -159,21 +160,23 @@ def errors_by_noise() -> str:
 
 
 def methods_compared() -> str:
-    """How often each method reaches what genes can encode, Δχ², and with how many responses."""
+    """How often each method reaches what genes can encode, its rise, and the responses it takes."""
     table = pd.read_csv(PUBLISHED / "tables" / "methods.csv")
-    return _table(
+    rows = [
         {"method": method}
         | {
-            _CASES[row["case"]]: f"{100 * row['reached_share']:.0f} % "
-            f"({100 * row['reached_low']:.0f}–{100 * row['reached_high']:.0f}), "
-            f"{row['median_rise']:.2g} (≥ {row['encodable_rise']:.2g})"
+            f"{_CASES[row['case']]}: reached; Δχ²": f"{100 * row['reached_share']:.0f} % "
+            f"({100 * row['reached_low']:.0f}–{100 * row['reached_high']:.0f}); "
+            f"{in_digits(row['median_rise'], 2)}"
             for row in rows.to_dict("records")
         }
-        | {
-            "median responses": _range(rows["median_evaluations"], ".0f"),
-        }
+        | {"median responses": _range(rows["median_evaluations"], ".0f")}
         for method, rows in table.groupby("method", sort=False)
-    )
+    ]
+    least = table.groupby("case", sort=False)["encodable_rise"].first()
+    shown = [in_digits(rise, 2) for rise in least]
+    best = dict(zip(rows[0], ["*best encodable point*", *shown, ""], strict=True))
+    return _table(iter([*rows, best]))
 
 
 def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
