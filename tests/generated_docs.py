@@ -143,9 +143,9 @@ def choices() -> str:
     )
     grips = pd.read_csv(PUBLISHED / "robustness" / "tables" / "robustness_gripper.csv")
     damping = grips[grips["quantity"] == "c + c_p"]["error_genetic"]
-    view = "chosen with the paper's results in view"
+    view = "from its results"
     rows = [
-        ("section 4", "as below", _tried("as printed")),
+        ("section 4", "all as below", _tried("as printed")),
         ("“two significant digits”; Table 5 has more", "two, each from 1", _tried("from 0")),
         ("Table 3, not in our copy", "the ranges that give Table 4", _tried("decade")),
         ("“population … 500”", f"{of.population}", _tried("population")),
