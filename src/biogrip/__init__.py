@@ -7,7 +7,7 @@
     result = biogrip.identify_trace(time_s, strain, reads="strain", hold=1.3)
 """
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 
 _LIBRARY = frozenset(

@@ -284,7 +284,10 @@ def _data(
         "moduli": None if said["fit"] == REJECTED else _moduli(problem, recorded.time_s, best),
         "assumed": _assumed(case, list(models.answers or case.models)),
         "by_default": _by_default(trace.given) if instrument.has_jaws else [],
-        "versions": {name: version(name) for name in ("biogrip", "numpy", "scipy")},
+        "versions": {
+            "biogrip": __version__,
+            **{name: version(name) for name in ("numpy", "scipy")},
+        },
     }
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import jinja2
 import PIL.Image
 
+from biogrip import __version__
 from biogrip.digits import legible
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
@@ -25,7 +26,7 @@ from biogrip.tables.cases import target_of
 
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
-_LIBRARIES = ("biogrip", "numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
+_LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
 # Tables under what is reconstructed; the others are under their heading.
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 # The paper's figure of its first fit, between those of its convergence and of its evolution.
@@ -133,7 +134,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
             tables=[it for it in tables if it.name not in _EVIDENCE],
             config=config,
             grips=study.has_gripper,
-            versions={name: version(name) for name in _LIBRARIES},
+            versions={"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
         ),
     )
 
