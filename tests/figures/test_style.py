@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.lines import Line2D
@@ -13,6 +14,7 @@ from biogrip.figures.style import (
     decade_ticks,
     figure,
     line_of,
+    literal,
     points_within,
     save,
     styled,
@@ -27,6 +29,23 @@ def test_saved_figures_are_the_same_every_time(tmp_path: Path) -> None:
             save(draw_torque(STUDY), tmp_path / f"{name}.png")
     for suffix in (".png", ".pdf"):
         assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+def test_a_matplotlibrc_changes_no_figure(tmp_path: Path) -> None:
+    for name, theirs in (("a", {}), ("b", {"text.color": "red", "savefig.facecolor": "yellow"})):
+        with mpl.rc_context(theirs), styled():
+            save(draw_torque(STUDY), tmp_path / f"{name}.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize("title", [r"$\frac{$", "5$ a day, 10$ a week", r"a_b ^ \ % # & < {"])
+def test_a_title_sets_no_mathematics(tmp_path: Path, title: str) -> None:
+    with styled():
+        for name, text, parsed in (("a", literal(title), True), ("b", title, False)):
+            drawn = figure(3, 2)
+            drawn.suptitle(text, parse_math=parsed)
+            save(drawn, tmp_path / f"{name}.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,23 @@ def test_markup_in_a_cell_is_text_in_every_format(tmp_path: Path) -> None:
     assert r"50 \% \& 3\_4 \$x\$ \#1 \{y\}" in (tmp_path / "t.tex").read_text()
 
 
+@pytest.mark.parametrize(
+    ("given", "latex"),
+    [
+        (r"dose & \input{x} #2", r"dose \& \textbackslash{}input\{x\} \#2"),
+        ("5$ a day, 10$ a week\n\n50 %", r"5\$ a day, 10\$ a week 50 \%"),
+        ("<img onerror=x> a_b ~ ^", r"<img onerror=x> a\_b \textasciitilde{} \textasciicircum{}"),
+    ],
+)
+def test_markup_in_a_caption_is_text_in_every_format(
+    tmp_path: Path, given: str, latex: str
+) -> None:
+    write(Table(given, (Column("a", given),), [{"a": given}]), tmp_path / "t.csv")
+    assert rf"\caption{{{latex}}}" in (tmp_path / "t.tex").read_text()
+    assert "<img" not in (tmp_path / "t.md").read_text() + (tmp_path / "t.html").read_text()
+    assert read_rows(tmp_path / "t.csv", ["a"])[1:] == [[given]]
+
+
 def test_regenerated_tables_are_the_same_bytes_or_their_lines_are_shown(tmp_path: Path) -> None:
     published, made = tmp_path / "published", tmp_path / "made"
     for folder in (published, made):

@@ -18,6 +18,7 @@ from biogrip.figures.style import (
     TARGET,
     figure,
     is_over_decades,
+    literal,
     scale_of_fit,
 )
 from biogrip.records.identifications import read_verdicts
@@ -84,7 +85,7 @@ def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = 
     margin = 0.02 * (high - low)
     traces.set_ylim(factor * (low - margin), factor * (high + margin))
     drawn.legend(loc="outside upper left", ncols=2)
-    traces.set_title(title)
+    traces.set_title(literal(title))
     residual = fit.measured_rad - fit.fitted_rad
     residual = factor * residual if fit.sd_rad is None else residual / fit.sd_rad
     residuals.plot(fit.time_s, residual, color=MEASURED, **_READINGS)

@@ -28,6 +28,7 @@ from biogrip.figures.style import (
     decade_ticks,
     figure,
     is_wide,
+    literal,
     panel,
     points_within,
     profile_limits,
@@ -72,7 +73,7 @@ def draw_profiles_of(
     grid[0].set_ylabel("rise of χ²")
     handles, labels = grid[0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside lower right", ncols=5)
-    drawn.suptitle(title, x=0.01, ha="left", fontsize=8)
+    drawn.suptitle(literal(title), x=0.01, ha="left", fontsize=8)
     return drawn
 
 
@@ -172,7 +173,7 @@ def draw_valley(case: Case, measured: Path, identifications: Path) -> Figure:
     for points, style, name in marked:
         labels = (name, "beyond the axis")
         points_within(axes, points, (0, 0), high, style, edge_size=4.5, labels=labels)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=case.title)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=literal(case.title))
     axes.set_xlabel(with_unit(x["symbol"], x["unit"]))
     axes.set_ylabel(with_unit(y["symbol"], y["unit"]))
     axes.set_box_aspect(1)

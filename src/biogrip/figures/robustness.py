@@ -12,7 +12,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.figures.style import PAGE_IN, figure, panel
+from biogrip.figures.style import PAGE_IN, figure, literal, panel
 from biogrip.study.study import Study
 from biogrip.study.sweeps import SweepBlock
 from biogrip.tables.sweeps import axis_title, headlines_of, read_points, shown_values
@@ -42,7 +42,7 @@ def draw_robustness(study: Study, name: str, points: Path) -> Figure:
     grid = drawn.subplots(3, len(cases), squeeze=False, sharex=True, sharey=True)
     for index, case in enumerate(cases):
         found = read_points(points, name, case)
-        panel(grid[0, index], "abc"[index], study.cases[case].title, most_letters=24)
+        panel(grid[0, index], "abc"[index], literal(study.cases[case].title), most_letters=24)
         first, *others = (found[found["method"] == method] for method in list(methods)[:2])
         shares = [100 * _grid(sweep, each, "basin_share") for each in (first, *others)]
         _heat_map(grid[0, index], sweep, shares[0], _SHARE, "cividis")

@@ -81,8 +81,16 @@ def line_of(method: Method) -> dict[str, Any]:
 @contextmanager
 def styled() -> Iterator[None]:
     """Apply the study's Matplotlib style within a context."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context():
+        # Whatever a matplotlibrc of the user's says.
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
         yield
+
+
+def literal(text: str) -> str:
+    """Return text of the user's so that its dollar signs set no mathematics."""
+    return text.replace("$", r"\$")
 
 
 def figure(width_in: float, height_in: float) -> Figure:

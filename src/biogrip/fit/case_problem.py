@@ -95,6 +95,11 @@ class CaseProblem:
         return replace(self, sd_rad=sd_rad, noise_rad=float(np.sqrt(np.mean(sd_rad**2))))
 
     @property
+    def unknowns(self) -> int:
+        """Number of parameters that are fitted to a trace, those of the instrument included."""
+        return len(self.searched.names) + self.offset + self.drift + self.fit_start
+
+    @property
     def uncertain_keys(self) -> list[str]:
         """Parts and keys of the gripper whose uncertainty changes what a fit simulates."""
         return [

@@ -50,6 +50,7 @@ from biogrip.stages.judgement import fits_judged, notes_on_fit
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
 from biogrip.traces.onset import note_hidden_ramp, note_late_onset, note_tare
+from biogrip.traces.plausibility import note_saturated
 
 # Most traces of a batch, and most readings of traces that are fitted together.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
@@ -231,6 +232,8 @@ def identify_alike(
         # Beside another start, an offset and a drift mean nothing.
         opinions[index] *= not any(note.weight != HARMLESS for note in starts[index])
         notes = [*again[index][1], *starts[index], *opinions[index], *note_flow(own)]
+        started = own.recorded.time_s > 0
+        notes += note_saturated(own.readings[1][started], own.problem.instrument.read.unit)
         data = _data(own, fits[index], diagnoses[index], models[index], notes)
         if index in onsets_s:
             data["onset_limits_s"] = [data["onset_s"] + end_s for end_s in onsets_s[index]]

@@ -43,6 +43,8 @@ from biogrip.physics.whitening import drift_is_flow
 from biogrip.stages.judgement import fits_judged
 
 _MOST_SAMPLES = 50_000
+# Most terms of the instrument that are fitted along: an offset and a drift.
+_TERMS = 2
 # Each of the others would take half a second to five; they are tried where the config names them.
 _POWER_LAWS = ["fractional_kelvin_voigt", "fractional_maxwell"]
 
@@ -177,7 +179,15 @@ def _candidates(trace: TraceCase, fit: TraceFit) -> tuple[str, ...]:
     few = fit.problem.residuals.samples <= _MOST_SAMPLES
     valid = trace.problem.torque.end_s <= LONGEST_S
     others = _POWER_LAWS if few and valid and not trace.names_models else []
-    names = tuple(dict.fromkeys((*trace.case.models, *others)))
+    # A model with as many parameters as readings leaves nothing to tell noise by.
+    most, chosen = (
+        fit.problem.residuals.free - trace.problem.fit_start - 1,
+        trace.case.sample.candidate,
+    )
+    every = dict.fromkeys((*trace.case.models, *others))
+    names = tuple(
+        name for name in every if len(CANDIDATES[name].model.names) <= most or name == chosen
+    )
     return names if len(names) > 1 else ()
 
 
@@ -221,8 +231,12 @@ def second_opinions(
     Of a rejected fit it is not said either, if BIC prefers another model by more: by its `leads`.
     """
     notes: list[list[Note]] = [[] for _ in traces]
-    problems = enumerate(trace.problem for trace in traces)
-    which = [index for index, own in problems if not (own.coloured or (own.offset and own.drift))]
+    which = [
+        index
+        for index, trace in enumerate(traces)
+        if not (trace.problem.coloured or (trace.problem.offset and trace.problem.drift))
+        and len(trace.readings[0]) > trace.problem.unknowns + _TERMS
+    ]
     both = _better(traces, diagnoses, which, progress, drift=True)
     alone = [index for index in both if both[index].added > 1]
     offsets = _better(traces, diagnoses, alone, progress, drift=False)

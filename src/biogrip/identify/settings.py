@@ -26,6 +26,7 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.identify.outputs import COLUMNS
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import CANDIDATES
+from biogrip.study.experiment_blocks import LONGEST_S, SHORTEST_S
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.measurement_block import READINGS, MeasurementBlock
 from biogrip.study.messages import checked, schema_of
@@ -227,6 +228,11 @@ def _with_instrument(
     elif own is not None:
         lasts = float(own.time_s[-1]) - (start_s or min(float(own.time_s[0]), 0.0))
         phases[0]["duration_s"] = lasts if lasts > 0 else 1.0
+        if lasts > 0 and not SHORTEST_S <= lasts <= LONGEST_S:
+            raise BiogripError(
+                f"{place(trace)}: found {lasts:g} s from the first reading to the last; allowed "
+                f"are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit of time right?"
+            )
     return {**found, "protocol": {"phases": phases}}
 
 

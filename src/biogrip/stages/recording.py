@@ -73,6 +73,11 @@ def read_checked(
     # What a gripper reads does not jump: dampers hold its arms.
     if not problem.instrument.has_jaws:
         trace, at_steps = without_steps(trace, problem.torque, onset_s or 0.0)
+    if len(trace.time_s) <= problem.unknowns:
+        raise BiogripError(
+            f"{place(recorded)}: found {len(trace.time_s)} readings for {problem.unknowns} unknown "
+            "parameters; allowed are more readings than parameters, or a simpler model."
+        )
     nuisance = problem.nuisance(trace.time_s)
     suspicion = check_recording(
         trace,

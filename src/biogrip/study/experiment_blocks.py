@@ -24,7 +24,7 @@ from biogrip.physics.sample_model import MOST_BRANCHES, SampleModel
 
 LARGEST_PARAMETER = 1e12
 _LEAST_PARAMETER = 1e-18
-_LONGEST_S = 1e9
+SHORTEST_S, LONGEST_S = 1e-6, 1e9
 _VOLTAGE = "voltage_V"
 # Keys that say what is controlled; with the first two a comb drive pulls.
 _BASES = (CONTROLLED[0].column, _VOLTAGE, *(each.column for each in CONTROLLED[1:]))
@@ -129,7 +129,7 @@ def _too_uncertain(path: tuple[str, ...], uncertainty: float, owner: object) -> 
 class PhaseBlock(Block):
     """A phase of the protocol: a hold, a ramp or a sinusoid, of one quantity in all phases."""
 
-    duration_s: Annotated[float, Field(ge=1e-6, le=_LONGEST_S)]
+    duration_s: Annotated[float, Field(ge=SHORTEST_S, le=LONGEST_S)]
     """Duration of the phase; of all together at most 1e9 s."""
     torque_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
     """Closing torque of both arms, held or, with to_torque_Nm, at the start of a ramp."""
@@ -248,9 +248,9 @@ class ProtocolBlock(Block):
 
     def problems(self) -> Iterator[Problem]:
         """Refuse a protocol that is too long, or in which all torques are zero."""
-        if self.end_s > _LONGEST_S:
+        if self.end_s > LONGEST_S:
             text = f"found {self.end_s:g} s in all phases together"
-            yield ("phases",), f"{text}, allowed is at most {_LONGEST_S:g} s."
+            yield ("phases",), f"{text}, allowed is at most {LONGEST_S:g} s."
         if not any(phase.drives for phase in self.phases):
             name = self.phases[0].bases[0].partition("_")[0]
             text = f"no phase has a {name}, so nothing would move; allowed is at least one above 0."

@@ -3,6 +3,7 @@
 CSV has six significant digits, print as many as a column says, of the number in the CSV.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import unified_diff
@@ -28,6 +29,11 @@ _STYLE = (
     "th{border-bottom:2px solid #333}p{max-width:60em}"
 )
 _MOST_LINES = 40
+_TAG = re.compile("<(?=[A-Za-z/!?])")
+_LATEX = str.maketrans(
+    {mark: rf"\{mark}" for mark in "%_&#${}"}
+    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+)
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,7 @@ def write(table: Table, output: Path) -> None:
     latex = shown.to_latex(
         index=False,
         escape=True,
-        caption=table.caption.replace("%", r"\%").replace("_", r"\_"),
+        caption=" ".join(table.caption.split()).translate(_LATEX),
         label=f"tab:{output.stem}",
         column_format="l" * shown.shape[1],
     )
@@ -84,7 +90,7 @@ def write(table: Table, output: Path) -> None:
     )
     cells = ([_text(row.get(c.name), 6) for c in columns] for row in table.rows)
     write_rows(output, [c.name for c in columns], cells)
-    write_text(output.with_suffix(".md"), f"{table.caption}\n\n{markdown}\n")
+    write_text(output.with_suffix(".md"), f"{_TAG.sub('&lt;', table.caption)}\n\n{markdown}\n")
     write_text(output.with_suffix(".tex"), latex)
     write_text(output.with_suffix(".html"), html)
 
@@ -100,8 +106,8 @@ def _text(cell: Any, digits: int) -> str:
 
 
 def _without_bars(text: str) -> str:
-    """Escape bars and line ends, which would end a cell or row of a Markdown table."""
-    return text.replace("|", r"\|").replace("\n", " ")
+    """Escape bars, line ends and tags, which a Markdown table would not show as text."""
+    return _TAG.sub("&lt;", " ".join(text.splitlines())).replace("|", r"\|")
 
 
 def compare(published: Path, made: Sequence[Path]) -> str:

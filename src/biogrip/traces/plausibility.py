@@ -17,6 +17,7 @@ import numpy as np
 from biogrip.arrays import Array, parts
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
+from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.modes import lagged_torques
@@ -60,6 +61,9 @@ _ROUNDING = 1e-9
 _FAR_ABOVE = 10.0
 # Multiple of the free rotation beyond which its square could overflow.
 _ABSURD = 1e9
+# Share of readings at an end of their scale from which on they are saturated, how many times as
+# often as each of the next values, and fewest values.
+_SATURATED, _MORE_OFTEN, _FEWEST_VALUES = 0.05, 5, 5
 # Number of samples processed at once.
 _AT_ONCE = 65_536
 
@@ -118,8 +122,8 @@ def check_recording(
     weights = _response_weights(functions, len(trace), noise_rad, constant=instrument.deforms)
     where = f"{_extent(recording, path)}, column '{columns.reading}'"
     read, controlled = columns.quantity, instrument.controlled.name
-    # Only the force of a spring is constant, as long as its deformation is.
-    if weights is None or (np.ptp(trace) == 0 and not instrument.deforms):
+    # Without any scatter nothing tells noise from sample.
+    if weights is None or np.ptp(trace) == 0:
         unit = f" {read.unit}".rstrip()
         given = ""
         if noise_rad is not None:
@@ -143,6 +147,27 @@ def check_recording(
     turns = (weights @ lagged(recording.time_s[some]) for some in parts(len(trace), _AT_ONCE))
     turn = max(float(np.abs(part).max()) for part in turns)
     return _check_turn(recording, turn, free, path, columns, typical_rad)
+
+
+def note_saturated(trace: Array, unit: str) -> list[Note]:
+    """Return a doubt if many readings, (n_samples,), are exactly the largest, or the smallest.
+
+    Readings that are only rounded have neighbouring values nearly as often.
+    """
+    values, counts = np.unique(trace, return_counts=True)
+    unit = f" {unit}".rstrip()
+    if len(values) < _FEWEST_VALUES:
+        return []
+    ends = {"largest": counts, "smallest": counts[::-1]}
+    return [
+        Note(
+            DOUBT,
+            f"{own[-1]} of {len(trace)} readings are exactly the {end}, {plain(value)}{unit}: the "
+            "instrument looks saturated, and what it cut off is missing.",
+        )
+        for (end, own), value in zip(ends.items(), values[[-1, 0]], strict=True)
+        if own[-1] > max(_SATURATED * len(trace), _MORE_OFTEN * own[-_FEWEST_VALUES:-1].max())
+    ]
 
 
 def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:

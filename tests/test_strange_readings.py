@@ -1,0 +1,92 @@
+"""`biogrip identify` of few and strange readings: an answer or one message."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from tests.helpers.identified import FEW, identified, identify, write_trace
+
+SINCE = np.linspace(0.05, 20, 400)
+NOISY = 500 + 300 * np.exp(-SINCE / 2) + np.random.default_rng(1).normal(0, 5, len(SINCE))
+
+
+def trace(folder: Path, times: Array, values: Array) -> Path:
+    return write_trace(folder / "trace.csv", times, values, "time_s,modulus_Pa")
+
+
+@pytest.mark.parametrize(
+    ("times", "values", "model", "said"),
+    [
+        (SINCE[:10], NOISY[:10], "generalized_maxwell_5", "found 10 readings for 12 unknown"),
+        (SINCE[:3], NOISY[:3], "kelvin_voigt", "found 3 rows with a number"),
+        (SINCE, np.full(400, 1.0), "zener_maxwell", "but 1 Pa throughout"),
+        (SINCE, np.zeros(400), "zener_maxwell", "but 0 Pa throughout"),
+        (1e-12 * SINCE, NOISY, "zener_maxwell", "Is the unit of time right?"),
+        (1e12 * SINCE, NOISY, "zener_maxwell", "Is the unit of time right?"),
+    ],
+)
+def test_what_tells_nothing_is_refused_in_one_message(
+    tmp_path: Path, times: Array, values: Array, model: str, said: str
+) -> None:
+    file = trace(tmp_path, times, values)
+    status, _, text = identify(file, "--reading", "modulus=modulus_Pa", "--model", model)
+    assert status == 1
+    assert said in text
+    assert text.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("times", "values", "cut"),
+    [
+        (SINCE[::40], NOISY[::40], None),
+        (SINCE, NOISY.clip(max=600), "largest, 600 Pa"),
+        (SINCE, NOISY.clip(min=510), "smallest, 510 Pa"),
+        (SINCE, NOISY.round(-1), None),
+        (SINCE, 500 + 300 * np.exp(-SINCE / 2), None),
+        (SINCE, 1e-12 * NOISY, None),
+        (SINCE, 1e12 * NOISY, None),
+        pytest.param(
+            np.linspace(1e-4, 20, 200_000),
+            500 + np.random.default_rng(1).normal(0, 5, 200_000),
+            None,
+            marks=pytest.mark.nightly,
+        ),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_strange_readings_are_answered_and_saturated_ones_told(
+    tmp_path: Path, times: Array, values: Array, cut: str | None
+) -> None:
+    rich = FEW.replace("damper, maxwell", "zener_maxwell, generalized_maxwell_5")
+    file = trace(tmp_path, times, values)
+    given = ("--reading", "modulus=modulus_Pa", "--model", "zener_maxwell")
+    found = identified(tmp_path, file, *given, config=rich if len(times) == 10 else FEW)
+    told = [text for text in map(str, found["notes"]) if "saturated" in text]
+    assert len(told) == (cut is not None)
+    assert all(f"exactly the {cut}" in text for text in told)
+    assert "generalized_maxwell_5" not in str(found["models"])
+
+
+@pytest.mark.nightly
+def test_what_lies_in_the_folder_and_a_name_of_marks_change_no_result(tmp_path: Path) -> None:
+    told, named = [], "a$x$ \\frac{$ %#&<b>_\x1b[31m\n.csv"
+    for folder in (tmp_path / "empty", tmp_path / "theirs"):
+        folder.mkdir()
+        trace(folder, SINCE, NOISY).rename(folder / named)
+        (folder / "sheet.csv").write_text(f'file,dose <b> &\n"{named}",<b>$\\frac{{$\n')
+        if folder.name == "theirs":
+            (folder / "matplotlibrc").write_text("text.usetex: True\ntext.color: red\n")
+            for name in ("yaml", "numpy", "signal"):
+                (folder / f"{name}.py").write_text("raise SystemExit(1)\n")
+        command = [Path(sys.executable).with_name("biogrip"), "identify", "sheet.csv"]
+        given = ["--reading", "modulus=modulus_Pa", "--csv", "o.csv", "--report", "o.html"]
+        said = subprocess.run([*command, *given], cwd=folder, check=True, capture_output=True)
+        assert b"\x1b" not in said.stdout + said.stderr
+        told.append((said.stdout, *((folder / f"o.{end}").read_bytes() for end in ("csv", "html"))))
+    assert told[0] == told[1]
+    assert b"<b>" not in told[0][2]
+    assert b"\x1b" not in told[0][2]
