@@ -82,7 +82,7 @@ def test_what_lies_in_the_folder_and_a_name_of_marks_change_no_result(tmp_path: 
             (folder / "matplotlibrc").write_text("text.usetex: True\ntext.color: red\n")
             for name in ("yaml", "numpy", "signal"):
                 (folder / f"{name}.py").write_text("raise SystemExit(1)\n")
-        command = [Path(sys.executable).with_name("biogrip"), "identify", "sheet.csv"]
+        command = [str(Path(sys.executable).with_name("biogrip")), "identify", "sheet.csv"]
         given = ["--reading", "modulus=modulus_Pa", "--csv", "o.csv", "--report", "o.html"]
         said = subprocess.run([*command, *given], cwd=folder, check=True, capture_output=True)
         assert b"\x1b" not in said.stdout + said.stderr

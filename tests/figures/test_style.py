@@ -32,8 +32,10 @@ def test_saved_figures_are_the_same_every_time(tmp_path: Path) -> None:
 
 
 def test_a_matplotlibrc_changes_no_figure(tmp_path: Path) -> None:
-    for name, theirs in (("a", {}), ("b", {"text.color": "red", "savefig.facecolor": "yellow"})):
-        with mpl.rc_context(theirs), styled():
+    theirs = tmp_path / "matplotlibrc"
+    for name, content in (("a", ""), ("b", "text.color: red\nsavefig.facecolor: yellow\n")):
+        theirs.write_text(content)
+        with mpl.rc_context(fname=theirs), styled():
             save(draw_torque(STUDY), tmp_path / f"{name}.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
