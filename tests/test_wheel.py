@@ -90,7 +90,7 @@ def test_the_wheel_compares_groups_and_designs(commands: Path, tmp_path: Path) -
     shutil.copytree(ROOT / "data" / "dishes", tmp_path, dirs_exist_ok=True)
     called(biogrip, "identify", "cells.tsv", "--csv", "found.csv", folder=tmp_path)
     assert "treated" in called(biogrip, "groups", "found.csv", "--by", "treatment", folder=tmp_path)
-    (tmp_path / "my.yaml").write_text(CREEP)
+    (tmp_path / "my.yaml").write_text(CREEP.replace("HELD", "stress_Pa"))
     called(biogrip, "design", "my.yaml", folder=tmp_path)
     assert (tmp_path / "my_designed.yaml").is_file()
 
