@@ -55,3 +55,34 @@ def test_after_a_kill_the_same_command_ends_with_the_undisturbed_bytes(
     ours, theirs = results_of(tiny_copy), results_of(tiny)
     assert ours.keys() == theirs.keys()
     assert [name for name in ours if ours[name] != theirs[name]] == []
+
+
+def test_what_is_missing_or_locked_is_said_and_made_again(tiny: Path, tiny_copy: Path) -> None:
+    """Deleted tables and pages come back, without `.snakemake/`, too; a second run is refused."""
+    (tiny_copy / ERRORS).unlink()
+    lock = tiny_copy / ".snakemake" / "locks" / "0.output.lock"
+    lock.parent.mkdir(parents=True, exist_ok=True)
+    lock.write_text(f"{ERRORS}\n")
+    refused = snakemake(tiny_copy, "--", ERRORS, config=TINY)
+    assert refused.status == 1
+    assert "Directory cannot be locked" in refused.output
+    shutil.rmtree(tiny_copy / ".snakemake")
+    run = snakemake(tiny_copy, "--", ERRORS, config=TINY)
+    assert run.status == 0, run.output
+    assert (tiny_copy / ERRORS).read_bytes() == (tiny / ERRORS).read_bytes()
+
+
+def test_a_full_disk_leaves_no_part_of_a_file(tmp_path: Path) -> None:
+    """Of a process that may write a kilobyte a file: EFBIG, which is reported as ENOSPC is."""
+    code = (
+        "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1024, 1024));"
+        "from pathlib import Path; from biogrip.files import write_text;"
+        "write_text(Path('table.csv'), 'a' * 5000)"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 1
+    assert "table.csv: cannot be written: File too large." in run.stderr
+    assert list(tmp_path.iterdir()) == []
