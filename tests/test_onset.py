@@ -160,7 +160,7 @@ def test_a_late_protocol_determines_nothing(
 @pytest.mark.nightly
 def test_the_workflow_knows_a_late_protocol(tmp_path: Path, start: str) -> None:
     trace = write_trace(tmp_path / "trace.csv", *late(2, 0.87))
-    config, traces, verdicts = (tmp_path / name for name in ("c.yaml", "t.parquet", "v.json"))
+    config, traces, verdicts = (tmp_path / name for name in ("c.yaml", "t.npz", "v.json"))
     measurement = f"{{file: {trace}, time: time_s, rotation: rotation_rad{start}}}"
     own = f"{{sample: {{model: generalized_maxwell}}, measurement: {measurement}}}"
     config.write_text(f"{CONFIG}only: [mine]\ncases: {{mine: {own}}}\n")

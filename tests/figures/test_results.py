@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from matplotlib.patches import Rectangle
 
@@ -23,6 +21,7 @@ from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.records.identifications import columns
+from biogrip.records.rows import write_arrays
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.stages import targets
 from tests.helpers.default import STUDY, seen, study_of
@@ -64,8 +63,8 @@ def measurements(tmp_path: Path) -> Path:
     traces = {
         seed: target + 1e-4 / (1 + seed) * rng.standard_normal(len(TIME_S)) for seed in range(3)
     }
-    write_measurements(tmp_path / "seeds_0-2.parquet", Measurements(TIME_S, target, traces))
-    return tmp_path / "seeds_0-2.parquet"
+    write_measurements(tmp_path / "seeds_0-2.npz", Measurements(TIME_S, target, traces))
+    return tmp_path / "seeds_0-2.npz"
 
 
 def curve(found: Any, label: str) -> Array:
@@ -111,21 +110,14 @@ def test_axes_suit_the_sampling_and_residuals_are_in_the_unit_that_was_minimised
 
 
 def test_histories_of_the_seeds_that_are_drawn_are_read(tmp_path: Path) -> None:
-    """By one method, wherever in the file they are; Arrow's own filter is the independent one."""
-    path = tmp_path / "histories.parquet"
-    seeds = np.repeat([0, 1, SHOWN_SEEDS, SHOWN_SEEDS + 1], 3)
-    tables = [
-        pa.table({"method": [method] * 12, "seed": seeds, "generation": seeds, "k": seeds * 0.5})
-        for method in ("genetic", "least_squares")
-    ]
-    with pq.ParquetWriter(path, tables[0].schema) as writer:
-        for table in tables:
-            for start in range(0, 12, 4):
-                writer.write_table(table.slice(start, 4))
+    """By one method, wherever in the file they are."""
+    path = tmp_path / "histories.npz"
+    seeds = [0, 1, SHOWN_SEEDS, SHOWN_SEEDS + 1]
+    columns = {"method": ["genetic"] * 4 + ["least_squares"] * 4, "seed": [*seeds, *seeds]}
+    write_arrays(path, {**columns, "generation": [9] * 8, "k": np.arange(8.0)})
     found = read_history(path, "least_squares", [SHOWN_SEEDS + 1], ["k"])
-    kept = [("method", "==", "least_squares"), ("seed", "!=", SHOWN_SEEDS)]
-    names = ["seed", "generation", "k"]
-    pd.testing.assert_frame_equal(found, pd.read_parquet(path, columns=names, filters=kept))
+    expected = {"seed": [0, 1, SHOWN_SEEDS + 1], "generation": [9] * 3, "k": [4.0, 5.0, 7.0]}
+    pd.testing.assert_frame_equal(found, pd.DataFrame(expected))
 
 
 @pytest.mark.parametrize(
@@ -143,10 +135,10 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     found.to_csv(tmp_path / "found.csv", index=False)
     history = {"seed": np.repeat(numbers, 2), "generation": np.tile([0, 1], seeds)}
     history["best_misfit"] = np.repeat(misfit, 2)
-    pd.DataFrame(history).assign(method="genetic").to_parquet(tmp_path / "history.parquet")
+    write_arrays(tmp_path / "history.npz", {**history, "method": np.full(2 * seeds, "genetic")})
     study = seen(shown_method=METHODS["genetic"], near_noise_tolerance=0.02)
     case = seen(title="A cell", mutation_start=20, study=study)
-    drawn = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.parquet")
+    drawn = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.npz")
     (axes,), (legend,) = drawn.axes, drawn.legends
     colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]
     assert [colors.count(each) for each in (ALL_SEEDS, *RUNS)] == [others, 1, 1]

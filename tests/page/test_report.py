@@ -188,7 +188,7 @@ def test_the_explorer_shows_the_judged_trace_and_its_fits(
     page.locator("#explorer .ytitle", has_text=label).wait_for()
     scale = {"m": 1e3, "µ": 1e6}[prefix]
     drawn = {line["name"]: np.array(line["y"]) / scale for line in page.evaluate(DRAWN)}
-    (batch,) = (results / "measurements" / case).glob("seeds_0-*.parquet")
+    (batch,) = (results / "measurements" / case).glob("seeds_0-*.npz")
     measured = read_measurements(batch, [0])
     noisy = drawn.pop("noisy trace" if case != "mine" else "recorded trace")
     assert np.allclose(noisy, measured.rotation_rad[0], rtol=1e-5, atol=0)

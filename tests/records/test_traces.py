@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.records.rows import read_parquet
 from biogrip.records.traces import (
     Measurements,
     each_trace,
@@ -58,7 +57,7 @@ def test_a_damaged_target_is_explained(tmp_path: Path, line: int, text: str, mes
 @pytest.mark.parametrize("known", [{}, {"target_rad": TIMES - 1}, {"sd_rad": TIMES + 0.1}])
 def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> None:
     """All of them or some, with what is known, bit for bit."""
-    path = tmp_path / "seeds_3-7.parquet"
+    path = tmp_path / "seeds_3-7.npz"
     traces = {seed: np.random.default_rng(seed).random(5) for seed in (3, 4, 5, 6, 7)}
     given = replace(Measurements(TIMES, None, traces), **known)
     write_measurements(path, given)
@@ -74,13 +73,15 @@ def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> No
 
 
 def test_damaged_measurements_are_named(tmp_path: Path) -> None:
-    path = tmp_path / "m.parquet"
+    path = tmp_path / "m.npz"
     write_measurements(path, Measurements(TIMES, None, {0: TIMES}))
-    with pytest.raises(BiogripError, match=r"m.parquet: has no column seed_3"):
+    with pytest.raises(BiogripError, match=r"m.npz: has no trace of seed 3"):
         read_measurements(path, [0, 3])
-    with pytest.raises(BiogripError, match=r"m.parquet: cannot be read: No match .*y"):
-        read_parquet(path, ["y"])
-    path.write_bytes(path.read_bytes()[:-9])
-    for file in (path, tmp_path / "gone.parquet"):
+    cut, another, changed = (tmp_path / name for name in ("cut.npz", "csv.npz", "changed.npz"))
+    whole = path.read_bytes()
+    cut.write_bytes(whole[:-9])
+    another.write_text("time_s,target\n0,1\n")
+    changed.write_bytes(whole.replace(TIMES.tobytes(), (TIMES + 1).tobytes()))
+    for file in (cut, another, changed, tmp_path / "gone.npz"):
         with pytest.raises(BiogripError, match=f"{file.name}: cannot be read"):
             read_measurements(file)
