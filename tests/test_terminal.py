@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from biogrip import terminal
-from biogrip.cli import main
+from biogrip.cli import _parser, main
 from biogrip.terminal import visible, visible_lines
 from tests.helpers.identified import identify
 from tests.helpers.places import EXAMPLE
@@ -114,3 +115,18 @@ def test_a_command_may_have_nobody_to_talk_to(
     assert "Traceback" not in done.stdout + done.stderr
     for output in tmp_path.glob("*.json"):
         assert json.loads(output.read_text())["written_by_biogrip"]
+
+
+@pytest.mark.parametrize("command", ["identify", "groups", "design"])
+def test_examples_are_commands_that_can_be_typed(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    _, _, examples = capsys.readouterr().out.partition("\nexamples:\n")
+    lines = [line for line in examples.splitlines() if line.startswith("  ")]
+    assert len(lines) == 2
+    for line in lines:
+        program, *arguments = shlex.split(line)
+        assert (program, arguments[0]) == ("biogrip", command)
+        _parser().parse_args(arguments)

@@ -36,21 +36,6 @@ def drawn(folder: Path, **changes: Any) -> Any:
         return draw_profiles(case, folder / "v.json", []).axes[0]
 
 
-def test_a_profile_is_a_curve_and_crosses_its_threshold_at_its_limits(tmp_path: Path) -> None:
-    axes = drawn(tmp_path)
-    (curve,) = (line for line in axes.lines if line.get_label() == "this trace")
-    values, increases = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
-    assert len(values) > 40
-    # Its root is bent at the optimum only, where cubics round it off.
-    away = np.abs(np.log(values / BEST)) > 0.3
-    np.testing.assert_allclose(
-        increases[away], (4 * np.log(values[away] / BEST)) ** 2, rtol=0.05, atol=0.05
-    )
-    low, high = axes.get_xlim()
-    assert low < BEST * np.exp(-0.49)
-    assert high > BEST * np.exp(0.49)
-
-
 def test_a_set_in_two_parts_is_shaded_in_two_parts(tmp_path: Path) -> None:
     axes = drawn(tmp_path, excluded=[[1.9, 2.1]])
     spans = [patch for patch in axes.patches if isinstance(patch, Rectangle)]

@@ -14,7 +14,6 @@ from matplotlib.patches import Rectangle
 from biogrip.arrays import Array
 from biogrip.figures.course import draw_convergence
 from biogrip.figures.fit import draw_fit, draw_fits
-from biogrip.figures.mechanics import draw_force
 from biogrip.figures.results import SHOWN_SEEDS, Fit, read_history
 from biogrip.figures.scatter import draw_scatter
 from biogrip.figures.style import ALL_SEEDS, RUNS, styled
@@ -30,7 +29,6 @@ from tests.helpers.default import STUDY, seen, study_of
 CASE = "liquid_drop_2"
 TRUTH = [1.0, 1e-4, 10.0, 1e-3]
 TIME_S = np.arange(0.0, 400.5, 1.0)
-COLUMNS = ["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"]
 
 
 def response(values: list[float]) -> Array:
@@ -181,31 +179,3 @@ def test_a_band_of_the_study_s_confidence_is_drawn_of_what_is_determined_alone(
     narrow = scattered("identifiability: {confidence: 0.6827}", identifications)
     wide, small = (float(f.axes[4].patches[0].get_extents().height) for f in (drawn, narrow))
     assert wide / small == pytest.approx(1.96, rel=1e-3)
-
-
-PULLED = """
-measurement: {rate_Hz: 1.0}
-cases:
-  left: {contact: unilateral, sample: {model: kelvin_voigt, k_p: 0.05, c_p: 5.0}}
-  bent: {sample: {model: liquid_drop, k: 1.0, k_p: 1.0e-3, c: 10.0}, models: {target: nonlinear}}
-"""
-
-
-@pytest.mark.parametrize(
-    ("name", "pulls", "free"),
-    [
-        ("endothelial_cell", False, False),
-        ("liquid_drop_1", True, True),
-        ("left", True, True),
-        ("bent", True, False),
-    ],
-)
-def test_a_pull_is_marked(tmp_path: Path, name: str, pulls: bool, free: bool) -> None:
-    case = study_of(PULLED).cases[name]
-    targets.simulate(case, tmp_path / "target.csv")
-    with styled():
-        legends = [axes.get_legend() for axes in draw_force(case, tmp_path / "target.csv").axes]
-    forces, rotations = ([t.get_text() for t in each.get_texts()] for each in legends if each)
-    assert ("the jaws would have to pull" in forces) == pulls
-    assert ("jaws that let go" in forces) == free
-    assert ("jaws that let go" in rotations) == (free and name != "left")

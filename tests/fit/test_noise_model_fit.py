@@ -12,7 +12,7 @@ from biogrip.fit.noise_model_fit import (
 )
 from biogrip.physics.noise import AR1, Flicker, Noise, add_noise
 from biogrip.physics.whitening import NoiseModel, Whitening
-from tests.physics.test_whitening import correlation
+from tests.physics.test_noise import correlation
 
 TIMES = np.cumsum(np.random.default_rng(0).exponential(1.0, 200))
 DIRECTIONS = np.stack((np.ones(200), TIMES, np.exp(-TIMES / 40)))
@@ -82,19 +82,6 @@ def test_colours_are_found(noise: Noise, expected: tuple[float, float]) -> None:
         slow = noise_model.ar1 * np.exp(-1 / noise_model.time_s)
         found.append((slow, noise_model.flicker))
     np.testing.assert_allclose(np.median(found, axis=0), expected, atol=0.12)
-
-
-@pytest.mark.parametrize("share", [0.5, 0.999])
-@pytest.mark.nightly
-def test_the_share_that_grows_is_found(share: float) -> None:
-    """On the mean of twenty, each known to 0.1 where both count; the prior leaves some 1/f."""
-    growing, rng = np.geomspace(0.01, 1.0, 200), np.random.default_rng(6)
-    deviations = np.sqrt(1 - share + share * growing**2 / np.mean(growing**2))
-    found = [
-        NoiseModelLikelihood(TIMES, deviations * left, DIRECTIONS, growing).best().proportional
-        for left in rng.standard_normal((20, 200))
-    ]
-    assert np.mean(found) == pytest.approx(share, abs=0.08)
 
 
 def test_degrees_of_freedom_are_those_of_the_least_known_variance() -> None:

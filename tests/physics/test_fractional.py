@@ -10,7 +10,7 @@ from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import hold, torque_history
 from biogrip.physics.sample_model import Network, complex_modulus
 from biogrip.physics.simulation import simulated_rotation
-from tests.helpers.laplace import IMPEDANCES, drawn, inverted, mittag_leffler
+from tests.helpers.laplace import IMPEDANCES, drawn, inverted
 
 TIMES = np.geomspace(1e-3, 1e3, 13)
 # Sinusoids of periods up to the longest experiment, and steps at times between both ends.
@@ -50,17 +50,6 @@ def test_a_model_is_the_network_that_its_drawing_shows(model: str, seed: int) ->
     np.testing.assert_allclose(modulus(network), IMPEDANCES[model](1j * OMEGA, *sample), rtol=3e-7)
     assert np.all(network.k > 0)
     assert np.all(network.c > 0)
-
-
-@pytest.mark.parametrize("x", [0.01, 0.3, 2.0])
-@pytest.mark.parametrize(("a", "b"), [(0.3, 1.0), (0.5, 1.0), (0.8, 1.8), (0.9, 0.6)])
-def test_inversion_gives_mittag_leffler_functions(a: float, b: float, x: float) -> None:
-    """With b = 1 relaxation of a spring and a springpot in series, with b = 1 + a creep of both
-    in parallel: t^(b-1) E_(a,b)(-x t^a).
-    """
-    assert inverted(lambda s: s ** (a - b) / (s**a + x), 1.0) == pytest.approx(
-        mittag_leffler(a, b, x), rel=1e-13
-    )
 
 
 @pytest.mark.parametrize("deforms", [False, True], ids=["creep", "relaxation"])

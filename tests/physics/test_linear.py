@@ -1,12 +1,14 @@
 import math
 
 import numpy as np
+import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.protocol import TorqueHistory, hold, torque_history
+from biogrip.physics.roots import SMALLEST_GAP, separate
 from biogrip.physics.simulation import jaw_force
 from tests.helpers.responses import exact_50_digits, random_samples
 
@@ -65,3 +67,10 @@ def test_starts_at_rest_and_ends_at_the_springs(gripper: Gripper, steps: TorqueH
     # At infinity only the arm's spring and k_p carry the torque.
     expected = 1 / (gripper.left.stiffness_Nm_per_rad + 2 * gripper.lever_m**2 * samples[:, 1])
     np.testing.assert_allclose(response.static[:, 0, 0], expected, rtol=1e-14)
+
+
+def test_coinciding_roots_are_moved_apart_about_their_mean() -> None:
+    found = separate(np.array([[-3.0, -3.0, -1.0]]))[0]
+    assert abs(found[0] - found[1]) == pytest.approx(3 * SMALLEST_GAP, rel=1e-6)
+    assert found[:2].mean() == pytest.approx(-3.0, rel=1e-12)
+    assert found[2] == -1.0

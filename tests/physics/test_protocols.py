@@ -27,7 +27,7 @@ from biogrip.physics.protocol import (
 from biogrip.study.experiment_blocks import PhaseBlock, ProtocolBlock
 from tests.helpers.problems import problem_alone
 from tests.helpers.radau import equal_arms
-from tests.physics.test_actuator import TABLE_2
+from tests.physics.test_contact import TABLE_2
 
 PROTOCOL = ProtocolBlock(
     (
