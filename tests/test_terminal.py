@@ -4,8 +4,6 @@ import json
 import re
 import shlex
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -95,26 +93,6 @@ def test_progress_and_warnings_are_shown(
     for text in capsys.readouterr():
         assert visible(HOSTILE) in text or not text
         assert not OBEYED.search(text)
-
-
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
-@pytest.mark.parametrize(
-    ("arguments", "status"),
-    [("groups a.csv --by x", 1), ("identify a.csv --config few.yaml", 0), ("design", 2)],
-)
-@pytest.mark.nightly
-def test_a_command_may_have_nobody_to_talk_to(
-    tmp_path: Path, arguments: str, status: int, closed: str
-) -> None:
-    """And what it would have said is in no file."""
-    shutil.copy(EXAMPLE, tmp_path / "a.csv")
-    (tmp_path / "few.yaml").write_text(FEW)
-    command = ["sh", "-c", f'"$0" -m biogrip {arguments} {closed}', sys.executable]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == status
-    assert "Traceback" not in done.stdout + done.stderr
-    for output in tmp_path.glob("*.json"):
-        assert json.loads(output.read_text())["written_by_biogrip"]
 
 
 @pytest.mark.parametrize("command", ["identify", "groups", "design"])

@@ -84,24 +84,6 @@ def test_a_kept_file_is_read_or_refused_as_its_table_says(
         assert first_last_sum(found.sd_rad) == pytest.approx(kept["sd"], rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("file", "encoding", "time", "reading"),
-    [
-        ("anton_paar_intervals.utf16.csv", "utf-16", "Time", "Relaxation Modulus"),
-        ("trios.txt", "utf-8", "Step time", "Modulus"),
-    ],
-)
-def test_a_table_between_commas_is_that_between_tabs(
-    tmp_path: Path, file: str, encoding: str, time: str, reading: str
-) -> None:
-    columns = columns_of({"time": time, "reading": reading, "quantity": "modulus", "block": 3})
-    text = (FILES / file).read_bytes().decode(encoding)
-    (tmp_path / "t.csv").write_text(text.replace(",", ".").replace("\t", ","), "utf-8")
-    tabs, commas = (read_recording(path, columns) for path in (FILES / file, tmp_path / "t.csv"))
-    for name in ("time_s", "rotation_rad", "lines"):
-        np.testing.assert_array_equal(getattr(commas, name), getattr(tabs, name))
-
-
 GAPS = ("", "NaN", "NA", "N/A", "-", '""', '" nan "', "n/a", "#N/A", "#NV", " ", "nan, ")
 NO_NUMBERS = ("abc", "1_0", "1.2.3", "0x1", "--", "1 2", "inf", "-1e999", "\0", '"3,5"', "#BEZUG!")
 
