@@ -117,14 +117,6 @@ def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read() -> N
     assert library.plot(CREEP, SECONDS, FRAME["strain"], found).axes[0].get_ylabel() == "strain"
 
 
-def test_readings_over_decades_are_drawn_over_the_time_since_the_start() -> None:
-    times = np.geomspace(0.1, 60, 40)
-    strain = library.simulate(CREEP, TRUTH, times) + SCATTER[:40]
-    drawn = library.identify_trace(times + 85, strain, **HELD, **compared(), start=85).plot()
-    assert drawn.axes[1].get_xscale() == "log"
-    assert drawn.axes[1].get_xlabel() == "time since 85 s of the clock (s)"
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [

@@ -10,7 +10,7 @@ from biogrip.arrays import Array
 from biogrip.fit import least_squares
 from biogrip.fit.levenberg_marquardt import Normal, bounded_step
 from biogrip.fit.local_fits import PRIOR_WIDTH, ROUGH, LocalFits, alike
-from biogrip.fit.multi_start import best_of_starts, fit_from, screened
+from biogrip.fit.multi_start import best_of_starts, fit_from
 from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
@@ -18,8 +18,6 @@ from biogrip.physics.sample_model import SampleModel
 from tests.helpers.problems import (
     GRIPPER,
     MODEL,
-    SAMPLES,
-    SETTINGS,
     TORQUE,
     case_problem,
     clean,
@@ -30,27 +28,12 @@ from tests.helpers.problems import (
     run,
 )
 from tests.helpers.responses import LOG_RANGES, MODEL_PARAMETERS
-from tests.helpers.scipy_fits import scipy_fit
 
 
 def starts_of(problem: Problem, count: int) -> Array:
     rng = np.random.default_rng(11)
     found: Array = rng.uniform(problem.low, problem.high, (count, len(problem.low)))
     return found
-
-
-@pytest.mark.parametrize("case", SAMPLES)
-def test_the_best_of_the_study_s_starts_is_that_of_scipy(case: str) -> None:
-    """And not much fewer of them lead there; in 600 traces of each case none did in none."""
-    (problem,) = of_case(case, 1)
-    starts = screened(problem.misfit, starts_of(problem, SETTINGS.candidates))[0][: SETTINGS.starts]
-    trace = np.zeros(len(starts), dtype=np.int64)
-    many = LocalFits([problem]).fitted(starts, trace, ROUGH).misfit_rad
-    one = np.array([scipy_fit(problem, start, ROUGH, prior=True).misfit_rad for start in starts])
-    increases = problem.residuals.samples * ((np.stack((many, one)) / one.min()) ** 2 - 1)
-    assert increases[0].min() < 0.1
-    reached = np.sum(increases < 1, axis=1)
-    assert reached[0] >= 0.7 * reached[1]
 
 
 def test_a_history_is_of_the_fits_so_far() -> None:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from jsonschema import Draft202012Validator
 
 from biogrip.errors import BiogripError
@@ -268,18 +267,3 @@ def test_a_case_may_override_the_blocks_of_the_study_and_of_every_method() -> No
     methods = {block for method in METHODS.values() for block in method.blocks}
     assert methods < set(OVERRIDABLE)
     assert set(OVERRIDABLE) == set(STUDY.keys["cases"].values.keys) & set(STUDY.keys)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "seedz: 3",
-        "gripper: {left: {mass_kg: 1}}",
-        "measurement: {noise: {kind: pink}}",
-        "least_squares: {starts: many}",
-        "cases: {x: {sample: {model: jelly}}}",
-        "protocol: {phases: []}",
-    ],
-)
-def test_the_schema_marks_what_the_study_refuses(text: str) -> None:
-    assert list(Draft202012Validator(SCHEMA).iter_errors(yaml.safe_load(text)))

@@ -89,28 +89,12 @@ def test_a_column_of_the_load_is_the_protocol_of_all_rows(tmp_path: Path, start_
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
-        (
-            "load",
-            "Force",
-            "column 'Force': found no such column, allowed are Time_S, Fn in mN, Disp",
-        ),
-        (
-            "load",
-            "Segment",
-            "column 'Segment': found no unit, neither stated (by --set measurement.loa",
-        ),
+        ("load", "Force", "column 'Force': found no such column, allowed are Time_S, Fn in mN"),
+        ("load", "Segment", "column 'Segment': found no unit, neither stated (by --set measure"),
         ("load_unit", "V", "measurement.load_unit: found 'V', allowed are m, cm, mm, um, nm."),
-        (
-            "rows",
-            {"Segment": "dwel"},
-            "column 'Segment': found no row with 'dwel', allowed are approach",
-        ),
+        ("rows", {"Segment": "dwel"}, "found no row with 'dwel', allowed are approach"),
         ("rows", {"Part": 2}, "column 'Part': found no such column, allowed are Time_S"),
-        (
-            "fit_start",
-            True,
-            "measurement.fit_start: does not go with load; allowed is one of them.",
-        ),
+        ("fit_start", True, "measurement.fit_start: does not go with load; allowed is one of"),
     ],
 )
 def test_a_load_or_rows_that_are_not_there_are_explained(

@@ -119,7 +119,8 @@ def check_recording(
     # Lagged torques, nuisance functions, a constant of norm 1 and the trace as short vectors that
     # have the same inner products.
     constant = np.full(len(trace), len(trace) ** -0.5)
-    rows = np.linalg.qr(np.vstack((lagged, nuisance, constant, trace)).T, mode="r").T
+    every = np.vstack((lagged, nuisance, constant, trace))
+    rows = np.asarray(np.linalg.qr(every.T, mode="r")).T
     functions = rows[: len(lagged)], rows[len(lagged) : -2], rows[-2:-1], rows[-1]
     weights = _response_weights(functions, len(trace), noise_rad, constant=instrument.deforms)
     where = f"{_extent(recording, path)}, column '{columns.reading}'"
