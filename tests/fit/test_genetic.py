@@ -10,9 +10,8 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit import genetic, genetic_refined
-from biogrip.fit.encodable import lowest_encodable
 from biogrip.fit.genetic import GeneticSettings, evolve_many, select
-from biogrip.fit.genome import GeneRange, make_genome, nearest_encodable
+from biogrip.fit.genome import GeneRange, lowest_encodable, make_genome, nearest_encodable
 from biogrip.fit.problem import Identification, Problem
 from biogrip.physics.misfit import Misfit, combine_misfits
 from biogrip.physics.models import MODELS, Sample
