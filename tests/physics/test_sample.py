@@ -34,7 +34,7 @@ def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
 
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if not model.power_law])
 def test_storage_and_loss_modulus_are_those_of_the_drawing(name: str) -> None:
-    """Over ten decades; those with springpots are in test_fractional.py."""
+    """Over ten decades; those with springpots are in test_creep_and_relaxation.py."""
     rng, omega = np.random.default_rng(1), np.geomspace(1e-5, 1e5, 21)
     values = 10 ** rng.uniform(-3, 3, (50, len(MODELS[name].parameters)))
     storage, loss = complex_modulus(MODELS[name].network(values), omega)
