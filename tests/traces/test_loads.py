@@ -31,7 +31,7 @@ def test_a_load_is_few_ramps_within_its_noise(clock: str, noise: float, step: fl
     read = np.round(read / step) * step if step else read
     ends, off = ramps(time_s, 3e-9 * read)
     found = np.interp(time_s, *ends.T) / 3e-9
-    assert len(ends) <= (60 if noise else 201 if step else 12)
+    assert len(ends) <= (15 if noise else 201 if step else 12)
     assert ends[[0, -1], 0].tolist() == time_s[[0, -1]].tolist()
     assert ends[0, 1] == 0
     assert np.sqrt(np.mean((found - true) ** 2)) < max(noise, 0.5 * step, 2e-4)
