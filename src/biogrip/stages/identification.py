@@ -17,7 +17,7 @@ import numpy as np
 
 from biogrip.arrays import parts
 from biogrip.errors import BiogripError
-from biogrip.fit.encodable import lowest_encodable
+from biogrip.fit.genome import lowest_encodable
 from biogrip.fit.methods import identifier
 from biogrip.fit.nested_fits import fit_models
 from biogrip.physics.noise import rms, stream
