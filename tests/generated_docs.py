@@ -30,6 +30,7 @@ from biogrip.page.answers import (
 )
 from biogrip.records import identifications, traces
 from biogrip.records.rows import RowFile, read_table
+from biogrip.tables.claims import count_verdicts
 from biogrip.terminal import QUIET
 from tests.helpers.default import study_of
 from tests.helpers.key_reference import file_schema, reference
@@ -89,8 +90,9 @@ def answer() -> str:
     whole = counts[(counts["verdict"] == DETERMINED) & (counts["reached"] == counts["seeds"])]
     sentences = (
         say_what_the_study_gives(methods, own, titles, "Run again, the paper's"),
-        say_what_traces_tell(_verdicts()),
         say_which_method_finds_it(methods, own),
+        say_what_traces_tell(_verdicts()),
+        count_verdicts(row["verdict"] for row in read_table(PUBLISHED / "tables" / "claims.csv")),
         "Where every trace determines a quantity, its 95 % limits hold the truth in "
         f"{_range(whole['true_percent'], '.3g')} % of {whole['seeds'].iloc[0]} traces.",
     )
