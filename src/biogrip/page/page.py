@@ -99,9 +99,11 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
         [row for csv in files["downloads"] if csv.name.startswith(name) for row in read_table(csv)]
         for name in ("errors.csv", "verdicts_", "methods.csv", "claims.csv")
     )
-    tables = []
+    tables: list[Entry] = []
     for path, csv in zip(files["tables"], files["downloads"], strict=True):
         entry, download = entry_of(path, owners, texts), _url("text/csv", csv.read_bytes())
+        if entry.caption in (it.caption for it in tables):
+            entry = replace(entry, caption="")
         tables.append(replace(entry, content=_table(path, titles), download=download))
     figures = [
         replace(entry_of(path, owners, texts), content=image, size=size)
@@ -186,13 +188,7 @@ def _as_in_paper(figures: Sequence[Entry], published: Sequence[Case]) -> list[En
 
 
 def _images(paths: Sequence[Path]) -> Iterator[tuple[str | None, tuple[int, int]]]:
-    """Yield images of at most 256 colours, None when there is no more room, and their sizes.
-
-    Raises
-    ------
-    BiogripError
-        If one cannot be read.
-    """
+    """Yield images of at most 256 colours, None when there is no more room, and their sizes."""
     room = _MOST_PICTURE_LETTERS
     for path in paths:
         packed = BytesIO()
