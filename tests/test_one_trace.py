@@ -34,10 +34,10 @@ from biogrip.judging.verdicts import Finding
 from biogrip.physics.models import CANDIDATES, MODELS
 from biogrip.traces.onset import note_late_onset
 from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
-from tests.helpers.places import EXAMPLE, ROOT
+from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
 from tests.helpers.problems import clean
 
-TRUTH = yaml.safe_load((ROOT / "data" / "example_truth.yaml").read_text())["cases"]["example"]
+TRUTH = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]
 
 
 @pytest.fixture

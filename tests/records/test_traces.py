@@ -3,13 +3,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.records.traces import (
     Measurements,
     each_trace,
-    read_jaw_force,
     read_measurements,
     read_target,
     write_measurements,
@@ -31,7 +31,7 @@ def test_a_target_is_read_back_to_nine_digits(tmp_path: Path) -> None:
     np.testing.assert_array_equal(time_s, TIMES)
     np.testing.assert_array_equal(torque, 1e-9)
     np.testing.assert_allclose(rotation, 1e-5 * TIMES / 3, rtol=5e-9)
-    force = read_jaw_force(written(tmp_path))[2]
+    force = pd.read_csv(written(tmp_path))["jaw_force_N"].to_numpy()
     np.testing.assert_allclose(force, FORCE, rtol=0, atol=5e-16)
     assert force[1] == 0
     assert ",-0" not in written(tmp_path).read_text()

@@ -13,7 +13,7 @@ from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import Phase, Sampling, hold
 from biogrip.records.identifications import columns
 from biogrip.records.rows import read_arrays, write_arrays, write_rows
-from biogrip.records.traces import read_jaw_force, read_target
+from biogrip.records.traces import read_target
 from biogrip.stages import identification as identifications
 from biogrip.stages import judgement, recording
 from biogrip.stages import targets as target
@@ -56,13 +56,13 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     said = capsys.readouterr()
     assert "biogrip: warning: Drop: under this protocol the jaws would have to pull" in said.out
     assert "from 100 s on" in said.err
-    time_s, _, force = read_jaw_force(file)
+    time_s, _, bilateral = read_target(file)
+    force = pd.read_csv(file)["jaw_force_N"].to_numpy()
     assert np.all(force[time_s < 100] >= 0)
     assert force[time_s > 100].max() < 0
-    bilateral = read_target(file)[2]
     target.simulate(drop(1e-9, hold(100.0, 1e-10), unilateral=True), file)
     assert "contact is lost there, which its identification ignores" in capsys.readouterr().out
-    time_s, _, force = read_jaw_force(file)
+    force = pd.read_csv(file)["jaw_force_N"].to_numpy()
     assert np.all(force[time_s > 100] == 0)
     rotation = read_target(file)[2]
     # Left to their hinges, the arms open at once.

@@ -126,9 +126,16 @@ def test_distances_of_printed_values_are_shares_of_them() -> None:
 
 
 def test_the_voltage_of_the_full_stroke_turns_a_free_arm_by_it() -> None:
-    rows = {row["quantity"]: row for row in evidence(STUDY, [], [], []).rows}
+    rows = {row["quantity"]: row for row in evidence(STUDY.of([]), [], []).rows}
     volts = np.array(rows["voltage for the full stroke, no sample"]["this_study"])
     assert float(torque(STUDY.actuator, volts)) / 4.4e-7 == pytest.approx(4.5 * math.pi / 180)
+
+
+def test_forces_of_the_jaws_in_the_evidence_are_those_of_mechanics() -> None:
+    rows = evidence(CASES, [], []).rows
+    found = [row["this_study"] for row in rows if "jaw force" in str(row["quantity"])]
+    forces = {row["case"]: row["lowest_force_uN"] for row in mechanics(CASES).rows}
+    assert found == list(forces.values())
 
 
 def test_errors_are_held_against_bounds_of_what_the_traces_determine() -> None:

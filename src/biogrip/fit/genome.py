@@ -209,21 +209,23 @@ def _value(genes: tuple[int, ...]) -> float:
 
 # Least relative decrease of the misfit that counts, so that all processors take the same steps.
 _LEAST = 1e-7
-# Steps of the last of two digits and of the first, and parameters changed at once: with three a
-# search follows a valley.
-_STEPS, _AT_ONCE = (-10, -1, 0, 1, 10), 3
+# Parameters changed at once: with three a search follows a valley.
+_AT_ONCE = 3
 
 
 def lowest_encodable(misfit: Misfit, ranges: Sequence[GeneRange], starts: Array) -> float:
     """Return the lowest misfit in rad of all encodable points around some starts.
 
-    Around each start's nearest encodable point all neighbours are computed, one or ten numbers up
-    or down in up to three parameters, and then around the best of them, until none is better than
-    the point that they surround. Starts, (n, n_parameters), are the ends of runs, among which
-    should be the continuous optimum; of each parameter a gene range is given.
+    Around each start's nearest encodable point all neighbours are computed, the last digit or the
+    one before it up or down by one in up to three parameters, and then around the best of them,
+    until none is better than the point that they surround. A lower point elsewhere is not excluded.
+    Starts, (n, n_parameters), are the ends of runs, among which should be the continuous optimum;
+    of each parameter a gene range is given.
     """
     values = [genes.values for genes in ranges]
-    steps = np.array(sorted(product(_STEPS, repeat=len(values)), key=np.count_nonzero))
+    tens = [genes.most[-1] - genes.least[-1] + 1 for genes in ranges]
+    every = product(*((-ten, -1, 0, 1, ten) for ten in tens))
+    steps = np.array(sorted(every, key=np.count_nonzero))
     steps = steps[np.count_nonzero(steps, axis=1) <= _AT_ONCE]
     columns = zip(values, starts.T, strict=True)
     places = np.stack([abs(own - start[:, None]).argmin(axis=1) for own, start in columns], axis=1)

@@ -90,17 +90,6 @@ def as_written(rotation_rad: Array) -> Array:
 
 def read_target(path: Path) -> tuple[Array, Array, Array]:
     """Read time, what is controlled and what is read of a target, all of them finite."""
-    time_s, controlled, read, *_ = _target_columns(path)
-    return time_s, controlled, read
-
-
-def read_jaw_force(path: Path) -> tuple[Array, Array, Array]:
-    """Read time, torque and jaw force of a target."""
-    time_s, torque, _, force = _target_columns(path)
-    return time_s, torque, force
-
-
-def _target_columns(path: Path) -> Array:
     # Without pandas, which most jobs that read a target do not import.
     try:
         with path.open() as stream:
@@ -119,7 +108,8 @@ def _target_columns(path: Path) -> Array:
     for row, column in np.argwhere(~np.isfinite(values))[:1]:
         place = f"{path}, line {row + 2}, {header[column]}"
         raise BiogripError(f"{place}: found {values[row, column]}, allowed is a finite number.")
-    return values.T
+    time_s, controlled, read, *_ = values.T
+    return time_s, controlled, read
 
 
 def write_measurements(path: Path, measurements: Measurements) -> None:
