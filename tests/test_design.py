@@ -21,7 +21,6 @@ from biogrip.design import (
     search,
 )
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.multi_start import fit_from
 from biogrip.library import simulate
 from biogrip.physics.protocol import Sampling
 from biogrip.physics.simulation import compute_grip
@@ -115,21 +114,6 @@ def test_bounds_are_those_of_the_inverse_information(
     rows = np.array([(read(own) - read(-own)) / (2 * step) for own in shifts]) / sample.noise
     expected = np.sqrt(np.diagonal(np.linalg.inv(rows @ rows.T)))
     assert found.bounds[0] == pytest.approx(expected, rel=1e-4)
-
-
-def test_simulated_fits_scatter_as_the_bounds_say(
-    one: tuple[Plausible, CaseProblem, Experiment],
-) -> None:
-    """200 fits: a standard deviation is then known to 5 %, and four of these are allowed."""
-    sample, problem, found = one
-    true = dict(zip(problem.searched.names, sample.parameters[0], strict=True))
-    exact = simulate(problem, {**problem.fixed, **true}, found.times_s)
-    noise = sample.noise * np.random.default_rng(3).standard_normal((200, len(exact)))
-    start = np.log(sample.parameters[0])
-    fits = fit_from(problem.of_each(found.times_s, exact + noise), start)
-    assert np.std(fits.x, axis=0, ddof=1) == pytest.approx(found.bounds[0], rel=0.2)
-    bias = np.mean(fits.x, axis=0) - start
-    assert np.all(np.abs(bias) < 4 * found.bounds[0] / np.sqrt(200))
 
 
 @pytest.mark.parametrize("rate_Hz", [0.7, 10.0, 1000.0])

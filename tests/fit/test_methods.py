@@ -117,18 +117,6 @@ def test_what_is_sure_of_it_reaches_the_global_optimum(case: str) -> None:
         assert np.all(increases < 1)
 
 
-@pytest.mark.parametrize("method", EXACT)
-def test_a_trace_without_noise_gives_the_truth_back(method: str) -> None:
-    case_problem = problem("endothelial_cell", 0, level=0.0)
-    answer = run(method, case_problem)
-    k, k_p, c, _ = (SAMPLES["endothelial_cell"][name] for name in MODEL.names)
-    # Any c_p below some N s/m makes a mode that dies out within 0.1 s, before the second
-    # sample; the other parameters make up for it exactly, by up to 1 %.
-    np.testing.assert_allclose(answer.parameters[:3], [k, k_p, c], rtol=1e-2)
-    assert answer.parameters[1] == pytest.approx(k_p, rel=1e-5)
-    assert answer.misfit_rad < 1e-7 * np.abs(clean("endothelial_cell")[1]).max()
-
-
 def test_what_a_trace_says_nothing_of_ends_in_the_middle_of_its_range() -> None:
     """A liquid's damper dominates: the range of k_p that fits is flat, and the prior decides."""
     case_problem = problem("endothelial_cell", 2)

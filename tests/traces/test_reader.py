@@ -295,25 +295,6 @@ def test_readings_of_equal_times_are_averaged(tmp_path: Path, sd: dict[str, str]
         np.testing.assert_allclose(found.sd_rad, of_means, rtol=1e-13)
 
 
-def test_what_was_recognised_is_a_small_table_unless_it_is_usual() -> None:
-    path = FILES / "anton_paar_semicolons.cp1252.csv"
-    columns = columns_of(
-        {"time": "Time", "reading": "Relaxation Modulus", "quantity": "modulus", "block": 2}
-    )
-    form = read_recording(path, columns).recognised
-    assert form is not None
-    assert not form.is_usual(columns)
-    first, *lines = form.in_words(Path("t.tsv")).split("\n")
-    said = {line[2:15].strip(): line[15:] for line in lines}
-    assert first == "t.tsv is read as"
-    assert said.pop("time") == "Time, in s"
-    assert said.pop("modulus") == "Relaxation Modulus, in kPa"
-    assert said == {key: str(value) for key, value in form.data().items() if key != "columns"}
-    plain = read_recording(FILES / "plain.csv", PLAIN).recognised
-    assert plain is not None
-    assert plain.is_usual(PLAIN)
-
-
 @pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
 def test_a_byte_that_is_no_text_is_placed_however_late_it_is(tmp_path: Path, newline: str) -> None:
     """The byte 0x81 is no character of Windows-1252; UTF-16 has no half of a pair."""
