@@ -233,6 +233,7 @@ def test_a_unit_is_read_off_a_name_or_a_row_of_units_or_stated(written: str) -> 
     [
         ("x_s", None, "", "found no unit, neither stated (by HOW) nor"),
         ("phi_left", None, "", "found no unit"),
+        ("phi (mrad) left", None, "", "found no unit"),
         ("phi (rad/s)", None, "", "found the unit 'rad/s' at the end of the name; allowed"),
         ("phi / mm", None, "", "found the unit 'mm' at the end of the name; allowed are rad, mrad"),
         ("phi_Mrad", None, "", "found no unit"),
