@@ -124,11 +124,3 @@ def test_a_rejected_fit_says_only_why(tmp_path: Path, noise_model: str) -> None:
     assert ("noise that cannot be told" in said) == (noise_model == "coloured")
     for word in ("allow for", "richer", "suits the trace", "intervals", "Limits are"):
         assert word not in said
-
-
-def test_an_undeclared_offset_may_be_why(tmp_path: Path) -> None:
-    shifted = RIGHT - 0.4 * RIGHT.max()
-    _, data = identified(tmp_path, shifted)
-    assert data["fit"] == REJECTED
-    assert any("identify the trace with --offset." in reason for reason in data["reasons"])
-    assert identified(tmp_path, shifted, "--offset")[1]["fit"] == OK

@@ -91,15 +91,6 @@ def test_an_onset_is_estimated_within_a_reading(onset_s: float, flat: bool) -> N
     assert begins_constant(times - 5.0, values, found)
 
 
-def test_a_fitted_onset_has_the_lowest_misfit() -> None:
-    times, values = late(1)
-    fits = OnsetFits(EXPERIMENT, times, values)
-    best = fits.best(8.3)
-    assert best.onset_s == pytest.approx(ONSET_S, abs=0.1)
-    for onset_s in np.linspace(7.85, 8.35, 6):
-        assert fits.at(onset_s, best.log_parameters).misfit_rad >= best.misfit_rad
-
-
 # The protocol starts at 0 of clocks whose median interval tells nothing of the onset.
 CLOCKS = {
     "later than the step": np.arange(5, 301) / 5,

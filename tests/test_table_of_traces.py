@@ -193,14 +193,6 @@ def test_settings_that_cannot_be_used_are_said_at_once(here: Path) -> None:
     assert not list(here.glob("*.json"))
 
 
-def test_a_table_that_is_nowhere_is_looked_for_in_a_folder_that_is_named(here: Path) -> None:
-    with pytest.raises(BiogripError) as error:
-        read_table(Path("gone.tsv"))
-    assert str(error.value).startswith(
-        f"gone.tsv: found 'gone.tsv', allowed is a file that exists in the folder {here}."
-    )
-
-
 def test_traces_of_a_command_read_one_quantity(here: Path) -> None:
     protocol = {"phases": [{"duration_s": 400, "strain": 1}]}
     lab = FEW | {"instrument": "relaxation", "protocol": protocol}

@@ -117,18 +117,6 @@ def test_what_is_sure_of_it_reaches_the_global_optimum(case: str) -> None:
         assert np.all(increases < 1)
 
 
-@pytest.mark.parametrize("method", EXACT)
-def test_a_trace_without_noise_gives_the_truth_back(method: str) -> None:
-    case_problem = problem("endothelial_cell", 0, level=0.0)
-    answer = run(method, case_problem)
-    k, k_p, c, _ = (SAMPLES["endothelial_cell"][name] for name in MODEL.names)
-    # Any c_p below some N s/m makes a mode that dies out within 0.1 s, before the second
-    # sample; the other parameters make up for it exactly, by up to 1 %.
-    np.testing.assert_allclose(answer.parameters[:3], [k, k_p, c], rtol=1e-2)
-    assert answer.parameters[1] == pytest.approx(k_p, rel=1e-5)
-    assert answer.misfit_rad < 1e-7 * np.abs(clean("endothelial_cell")[1]).max()
-
-
 def test_what_a_trace_says_nothing_of_ends_in_the_middle_of_its_range() -> None:
     """A liquid's damper dominates: the range of k_p that fits is flat, and the prior decides."""
     case_problem = problem("endothelial_cell", 2)
@@ -195,19 +183,20 @@ def test_a_history_is_of_the_fits_so_far() -> None:
         assert history.evaluations[count] == 10 + fitted.evaluations[:count].sum()
 
 
-def test_steps_within_a_box_are_those_of_exhaustive_search() -> None:
-    """Of a convex quadratic, with at most one parameter that wants to leave."""
+def test_steps_within_a_box_are_the_lowest_points_of_a_quadratic() -> None:
+    """Of one parameter that has bounds, and ends there in some problems and not in others."""
     rng = np.random.default_rng(0)
     shapes = rng.normal(size=(50, 3, 5))
-    information = shapes @ shapes.swapaxes(1, 2)
-    gradient = rng.normal(size=(50, 3))
-    none = np.zeros(50)
-    below, above = np.full((50, 3), -np.inf), np.full((50, 3), np.inf)
-    below[:, 0] = above[:, 0] = 0.0
-    step = bounded_step(Normal(none, gradient, information, none), none, below, above)
-    assert np.all(step[:, 0] == 0)
-    rest = np.linalg.solve(information[:, 1:, 1:], -gradient[:, 1:, None])[:, :, 0]
-    np.testing.assert_allclose(step[:, 1:], rest, rtol=1e-9, atol=1e-12)
+    information, gradient = shapes @ shapes.swapaxes(1, 2), rng.normal(size=(50, 3))
+    none, above = np.zeros(50), np.full((50, 3), np.inf)
+    above[:, 0] = 0.1
+    step = bounded_step(Normal(none, gradient, information, none), none, -above, above)
+    free = np.linalg.solve(information, -gradient[:, :, None])[:, 0, 0]
+    first = np.clip(free, -0.1, 0.1)
+    assert 10 < np.sum(first == free) < 40
+    pull = gradient[:, 1:] + information[:, 1:, 0] * first[:, None]
+    rest = np.linalg.solve(information[:, 1:, 1:], -pull[:, :, None])[:, :, 0]
+    np.testing.assert_allclose(step, np.column_stack((first, rest)), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", [*MODEL_PARAMETERS, "four branches"])

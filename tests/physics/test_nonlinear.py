@@ -160,24 +160,6 @@ def test_ramps_and_sinusoids_against_radau() -> None:
     assert np.max(np.abs(ours - force)) < 1e-6 * np.abs(force).max()
 
 
-def test_the_correction_is_of_second_order(gripper: Gripper) -> None:
-    """Ten times the torque, a hundred times the correction."""
-    network = generalized_maxwell(random_samples(200, 8))
-    small, large = (
-        np.abs(
-            correction(
-                gripper,
-                network,
-                torque_history((hold(200.0, 1.6e-9 * times), hold(200.0, 0.32e-9 * times))),
-            ).at(TIMES)
-        ).max(axis=1)
-        for times in (0.1, 1.0)
-    )
-    # The third order is a thousandth of it at these rotations.
-    visible = small > 1e-15
-    np.testing.assert_allclose((large / small)[visible], 100, rtol=2e-2)
-
-
 def test_rotation_of_a_tip_against_50_digits(gripper: Gripper) -> None:
     with mp.workdps(50):
         hat = mp.radians(mpf(75))

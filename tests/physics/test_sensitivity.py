@@ -106,18 +106,6 @@ READ_S = np.arange(401.0)
 AT = np.log([2.0, 50.0])
 
 
-def test_residuals_do_not_see_what_the_instrument_added(
-    gripper: Gripper, steps: TorqueHistory
-) -> None:
-    basis = nuisance_basis(READ_S, offset=True, drift=True)
-    plain, shifted = (
-        posed(steps, gripper, READ_S, basis, added) for added in (0 * READ_S, 5e-3 + 1e-5 * READ_S)
-    )
-    np.testing.assert_allclose(plain(AT)[0], shifted(AT)[0], atol=1e-15)
-    assert np.all(np.abs(plain(AT)[1] @ basis.T) < 1e-12)
-    assert plain.free == len(READ_S) - 2
-
-
 def test_the_gradient_of_many_samples_is_summed_in_parts(
     gripper: Gripper, steps: TorqueHistory, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,6 +1,5 @@
 """Jaws that press but do not pull, against the equations integrated with events."""
 
-import math
 from itertools import pairwise
 
 import numpy as np
@@ -138,18 +137,6 @@ def test_against_lsoda_with_events(
     assert not np.all(ours.touching)
     assert np.all(ours.jaw_force_N >= 0)
     assert np.all(ours.jaw_force_N[~ours.touching] == 0)
-
-
-def test_a_sample_that_recovers_meets_the_jaws_by_itself(gripper: Gripper) -> None:
-    torque = torque_history((hold(200.0, 1.6e-9), hold(400.0, 0.32e-9)))
-    found = unilateral_response(gripper, kelvin_voigt([0.05, 5.0]), torque, np.array([600.0]))
-    (parted,), (met,) = found.parted_s, found.met_s
-    # It creeps back by e^(-k_p t/c_p) until it reaches the arms.
-    before = unilateral_response(gripper, kelvin_voigt([0.05, 5.0]), torque, np.array([parted]))
-    b = gripper.lever_m
-    shortening = before.shortening_m[0] * math.exp(-0.05 / 5.0 * (met - parted))
-    assert shortening == pytest.approx(2 * b * 0.32e-9 / 4.4e-7, rel=1e-9)
-    assert found.touching[0]
 
 
 def test_over_the_whole_search_range_the_jaws_never_pull(

@@ -48,8 +48,10 @@ LEFT = {
     "howto/noise_kind.md": ["results/tables/verdicts_laplace_drop.md"],
     "howto/figure.md": ["results/figures/heights.png"],
 }
+# The code of posterior.md runs in test_library.py, with a shorter chain.
 TAKES_LONG = {"howto/relaxation.md", "howto/creep.md", "design.md", "tutorial.md"}
-TAKES_LONG |= {f"howto/{name}.md" for name in ("case", "trace", "noise", "figure", "noise_kind")}
+LONG_HOWTOS = ("case", "trace", "noise", "figure", "noise_kind", "posterior")
+TAKES_LONG |= {f"howto/{name}.md" for name in LONG_HOWTOS}
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
     "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
