@@ -13,6 +13,13 @@ def test_generated_parts_are_up_to_date(document: Path) -> None:
     assert renewed(document) == document.read_text(encoding="utf-8")
 
 
+def test_promises_are_kept_by_tests_that_there_are() -> None:
+    promised = re.findall(r"`(test_\w+)`", (ROOT / "docs" / "reliability.md").read_text())
+    tests = "".join(file.read_text() for file in (ROOT / "tests").rglob("test_*.py"))
+    assert len(promised) > 5
+    assert [name for name in promised if f"def {name}(" not in tests] == []
+
+
 @pytest.mark.parametrize(
     "document",
     [

@@ -2,7 +2,10 @@
 
 from pathlib import Path
 
-from tests.helpers.runs import TINY, snakemake
+import yaml
+
+from tests.helpers.places import ROOT
+from tests.helpers.runs import TINY, called, snakemake
 
 CASES = {
     "crept": {
@@ -25,6 +28,18 @@ def test_every_kind_of_case_is_identified(tmp_path: Path) -> None:
     run = snakemake(tmp_path, "--", *files, config=CONFIG)
     assert run.status == 0, run.output
     assert (tmp_path / "results/calibrations/sized_in_volts.yaml").is_file()
+
+
+def test_a_study_writes_in_its_folder_alone(tmp_path: Path) -> None:
+    """Run from another folder, with a config that lies there."""
+    mine, here = tmp_path / "mine", tmp_path / "here"
+    here.mkdir()
+    (here / "my.yaml").write_text(yaml.safe_dump(CONFIG))
+    given = ("-s", ROOT / "Snakefile", "-j1", "--configfile", "my.yaml", "--directory", mine)
+    run = called(here, *given, "--", "results/targets/crept.csv")
+    assert run.status == 0, run.output
+    assert (mine / "results/targets/crept.csv").is_file()
+    assert [file.name for file in here.iterdir()] == ["my.yaml"]
 
 
 def test_a_wrong_config_stops_with_one_message(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """A run that is killed ends with the undisturbed bytes when it is run again."""
 
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -35,21 +36,23 @@ def started(folder: Path) -> "subprocess.Popen[bytes]":
     )
 
 
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_after_a_kill_the_same_command_ends_with_the_undisturbed_bytes(
-    tiny: Path, tiny_copy: Path
+    tiny: Path, tiny_copy: Path, how: signal.Signals
 ) -> None:
-    """Kill -9 of Snakemake when there is a result; it asks to be unlocked."""
+    """Of Snakemake when there is a result; after kill -9 it asks to be unlocked."""
     process, give_up = started(tiny_copy), time.monotonic() + 120
     while not [*tiny_copy.glob("results/identifications/liquid_drop_2/*/*.csv")]:
         assert time.monotonic() < give_up
         assert process.poll() is None
         time.sleep(0.02)
-    process.kill()
-    process.wait()
-    again = snakemake(tiny_copy, "--", ERRORS, config=TINY)
-    assert again.status == 1
-    assert "--unlock" in again.output
-    assert snakemake(tiny_copy, "--unlock", config=TINY).status == 0
+    process.send_signal(how)
+    assert process.wait() != 0
+    if how == signal.SIGKILL:
+        again = snakemake(tiny_copy, "--", ERRORS, config=TINY)
+        assert again.status == 1
+        assert "--unlock" in again.output
+        assert snakemake(tiny_copy, "--unlock", config=TINY).status == 0
     run = snakemake(tiny_copy, "--", *AGAIN, config=TINY)
     assert run.status == 0, run.output
     ours, theirs = results_of(tiny_copy), results_of(tiny)
