@@ -17,7 +17,7 @@ _QUANTITY_COLUMNS = (
 )
 # Key of the config, symbol, meaning and unit.
 _OF_ARM = (
-    ("inertia_kgm2", "I", "moment of inertia", "kg m2"),
+    ("inertia_kgm2", "I", "moment of inertia", "kg m²"),
     ("damping_Nms_per_rad", "c", "damping", "N m s/rad"),
     ("stiffness_Nm_per_rad", "k", "stiffness", "N m/rad"),
 )
