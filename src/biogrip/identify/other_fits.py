@@ -30,7 +30,7 @@ from biogrip.fit.nested_fits import (
 )
 from biogrip.fit.problem import Identification, Problem, Progress
 from biogrip.fit.trace_fit import TraceFit
-from biogrip.identify.trace_case import FLOWS, TraceCase
+from biogrip.identify.trace_case import TraceCase, flow_of
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import DOUBT, FALSE_ALARM, HARMLESS, REJECTED, REJECTION, Note, one_in
 from biogrip.judging.likelihood import MISSED, compute_fall
@@ -43,6 +43,8 @@ from biogrip.physics.whitening import drift_is_flow
 from biogrip.stages.judgement import fits_judged
 
 _MOST_SAMPLES = 50_000
+# Difference of BIC by which a model is far better than another (Kass and Raftery).
+_FAR_BETTER = 10.0
 # Most terms of the instrument that are fitted along: an offset and a drift.
 _TERMS = 2
 # Each of the others would take half a second to five; they are tried where the config names them.
@@ -228,7 +230,7 @@ def second_opinions(
     with a rejected fit, only if the other is not rejected. None are tried if both are declared
     already, or if the noise model is coloured, which fits both unless they are refused.
 
-    Of a rejected fit it is not said either, if BIC prefers another model by more: by its `leads`.
+    Nor is it said if BIC prefers another model by far more: by its `leads`.
     """
     notes: list[list[Note]] = [[] for _ in traces]
     which = [
@@ -252,8 +254,8 @@ def second_opinions(
             noise_rad=other.trace.problem.noise_rad,
         )
         terms = np.log(len(traces[index].readings[0])) * other.added
-        led = judged.status == REJECTED or leads[index] > other.fall - terms
-        if not (diagnoses[index].status == REJECTED and led):
+        led = leads[index] > other.fall - terms + _FAR_BETTER
+        if not (led or diagnoses[index].status == judged.status == REJECTED):
             notes[index].append(_note(traces[index], diagnoses[index], other, judged))
     return notes
 
@@ -345,7 +347,7 @@ def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnos
 
 def note_flow(trace: TraceCase) -> list[Note]:
     """Say beside a damper that lets the sample flow that a drift would look the same."""
-    problem, damper = trace.problem, FLOWS.get(trace.problem.model.name)
+    problem, damper = trace.problem, flow_of(trace.problem)
     if problem.drift or not damper or not drift_is_flow(problem.torque, trace.recorded.time_s):
         return []
     text = (
