@@ -169,7 +169,8 @@ def far_out(residual: Array, struck: BoolArray, basis: Array) -> float:
     inverse = np.linalg.inv(left)
     residual = without(basis, residual)
     apart = inverse @ residual[struck]
-    scale = np.sqrt(max(np.sum(residual**2) - residual[struck] @ apart, 0.0) / free)
+    others = float(np.sum(residual**2) - residual[struck] @ apart)
+    scale = np.sqrt(max(others, 0.0) / free)
     if not scale:
         return 1.0
     away = np.abs(apart) / np.sqrt(np.diag(inverse)) / scale
