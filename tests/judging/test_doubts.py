@@ -103,10 +103,11 @@ def test_noise_that_grows_over_decades_is_weighed_and_its_share_advised() -> Non
     """A Maxwell liquid, whose first readings hardly count without weights; then all holds."""
     times = np.geomspace(1e-4, 1e4, 90)
     noise = 1 + 0.01 * np.random.default_rng(1).standard_normal(90)
-    models: dict[str, Any] = {"model_selection": {"models": []}}
+    models: dict[str, Any] = {"model_selection": {"models": ["kelvin_voigt", "liquid_drop"]}}
     given: dict[str, Any] = {"reads": "compliance", "model": "maxwell"}
     found = identify_trace(times, (1 + times / 5) * noise, config=models, **given)
     assert found.status == DOUBTFUL
+    assert "none of the 3 models" in found.data["advice"]
     (share,) = re.findall(r"weighted by measurement.noise_share (\S+) in", str(found))
     assert float(share) == pytest.approx(0.01, rel=0.2)
     weights = models | {"measurement": {"noise_share": float(share)}}

@@ -96,8 +96,9 @@ _TOO_LITTLE = 0.5
 _MANY = 100_000
 # Smaller chances are not told apart.
 _NEVER = 1e-6
-# Growth of noise that is nearly in proportion to what is read.
-_CLEARLY = 3.0
+CLEARLY = 3.0
+"""Growth of noise from which on its share is known, and unweighted fits are not compared."""
+
 # Share of readings that repeat the one before where a sensor is read less often than it is logged.
 _REPEATED = 0.45
 # Most outliers that are named.
@@ -250,7 +251,7 @@ def _about_growth(
         "nor the intervals allow for that."
     )
     # Of noise that grows little the share is hardly known.
-    if not residuals.coloured and high > _CLEARLY * low:
+    if not residuals.coloured and high > CLEARLY * low:
         share = scale * growth / np.abs(residuals.rotation(log_parameters))
         text += f" Readings are weighted by --noise-share {plain(np.median(share), 2)}."
     yield text
