@@ -266,18 +266,6 @@ def test_what_is_no_table_of_results_is_refused(
     assert error.count("\n") == 1
 
 
-def test_nothing_of_others_is_replaced(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], said: Said, rows: list[dict[str, str]]
-) -> None:
-    found, mine = written(tmp_path, rows), tmp_path / "mine.csv"
-    mine.write_text("mine\n")
-    for table, words in ((mine, "biogrip did not write it"), (found, "is read; allowed is")):
-        assert main(["groups", str(found), "--by", "dish", "--csv", str(table)]) == 1
-        assert words in capsys.readouterr().err
-    mine.unlink()
-    said(rows, "--csv", str(mine))
-
-
 def test_identify_and_groups_say_the_same_of_a_cell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

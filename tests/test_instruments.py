@@ -9,7 +9,6 @@ import pytest
 import yaml
 
 from biogrip.arrays import Array
-from biogrip.errors import BiogripError
 from biogrip.library import Sample, identify_sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import Harmonic, Load, Phase, hold
@@ -108,29 +107,6 @@ def test_what_is_not_held_is_asked_for_and_kinds_do_not_mix(tmp_path: Path) -> N
         status, _, error = identify(trace, *options)
         assert status == 1
         assert message in error
-
-
-@pytest.mark.parametrize(
-    ("config", "message"),
-    [
-        ("instrument: creeep", r"found 'creeep'. Did you mean 'creep'\? Allowed: gripper, creep, "),
-        ("instrument: creep", r"torque_Nm: is not what creep holds; allowed is force_N or stress_"),
-        (
-            "instrument: relaxation\nprotocol: {phases: [{duration_s: 5, stress_Pa: 1}]}",
-            "stress_Pa: is not what relaxation holds; allowed is displacement_m or strain",
-        ),
-        (
-            "instrument: creep\n"
-            "protocol: {phases: [{duration_s: 5, stress_Pa: 1}, {duration_s: 5, force_N: 1}]}",
-            "force_N: does not go with stress_Pa in another phase",
-        ),
-    ],
-)
-def test_a_config_that_holds_what_its_instrument_cannot_is_explained(
-    config: str, message: str
-) -> None:
-    with pytest.raises(BiogripError, match=message):
-        study_of(config)
 
 
 def test_a_study_mixes_instruments() -> None:

@@ -13,8 +13,6 @@ from biogrip.judging.verdicts import DETERMINED
 from tests.helpers.default import STUDY
 from tests.helpers.identified import identified
 from tests.helpers.places import ROOT
-from tests.helpers.radau import equal_arms
-from tests.physics.test_nonlinear import ARM, TIMES
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "library.md"
 POSTERIOR = DOCUMENT.parent / "howto" / "posterior.md"
@@ -59,23 +57,6 @@ def test_a_sampled_posterior_agrees_with_the_profiles(monkeypatch: pytest.Monkey
         if name != "c_p":
             assert findings[name].verdict == DETERMINED
             assert findings[name].low < median < findings[name].high
-
-
-def test_what_is_simulated_by_the_nonlinear_model_is_not_what_the_linear_one_gives() -> None:
-    """Against Radau without inertia; at ten times the paper's torque a cell shows 3e-4 of it."""
-    gripper = library.Gripper(1.5e-3, 60.0, ARM, ARM)
-    protocol = (library.hold(200.0, 1.6e-8), library.hold(200.0, 3.2e-9))
-    sample = {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 1e-3}
-    experiment = library.set_up(gripper, protocol, library.Sample("generalized_maxwell"))
-    linear, nonlinear = (
-        library.simulate(experiment, sample, TIMES, nonlinear=nonlinear)
-        for nonlinear in (False, True)
-    )
-    ends = [(200.0, 1.6e-8), (400.0, 3.2e-9)]
-    peak = float(nonlinear.max())
-    expected = equal_arms(gripper, np.array(list(sample.values())), ends, TIMES, peak)[0]
-    np.testing.assert_allclose(nonlinear, expected, rtol=0, atol=1e-6 * peak)
-    assert np.max(np.abs(linear - expected)) > 1e-4 * peak
 
 
 # A strain of 5 Pa on a clock that starts at 85 s, with a tare.
@@ -134,14 +115,6 @@ def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read() -> N
     found = library.identify_sample(CREEP, SECONDS, FRAME["strain"])
     assert len(repr(found)) < 300
     assert library.plot(CREEP, SECONDS, FRAME["strain"], found).axes[0].get_ylabel() == "strain"
-
-
-def test_readings_over_decades_are_drawn_over_the_time_since_the_start() -> None:
-    times = np.geomspace(0.1, 60, 40)
-    strain = library.simulate(CREEP, TRUTH, times) + SCATTER[:40]
-    drawn = library.identify_trace(times + 85, strain, **HELD, **compared(), start=85).plot()
-    assert drawn.axes[1].get_xscale() == "log"
-    assert drawn.axes[1].get_xlabel() == "time since 85 s of the clock (s)"
 
 
 @pytest.mark.parametrize(

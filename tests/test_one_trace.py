@@ -34,10 +34,10 @@ from biogrip.judging.verdicts import Finding
 from biogrip.physics.models import CANDIDATES, MODELS
 from biogrip.traces.onset import note_late_onset
 from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
-from tests.helpers.places import EXAMPLE, ROOT
+from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
 from tests.helpers.problems import clean
 
-TRUTH = yaml.safe_load((ROOT / "data" / "example_truth.yaml").read_text())["cases"]["example"]
+TRUTH = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]
 
 
 @pytest.fixture
@@ -395,7 +395,7 @@ def test_a_rejected_fit_names_a_better_model_though_it_is_simpler(tmp_path: Path
     noise = 1e-4 * np.random.default_rng(1).standard_normal(len(times))
     trace = write_trace(tmp_path / "t.csv", times, 0.01 * times**0.3 + noise, "time_s,strain")
     models = "model_selection: {models: [springpot, maxwell]}"
-    options = ("--reading", "strain=strain", "--hold", "1")
+    options = ("--reading", "strain", "--hold", "1")
     found = identified(tmp_path, trace, *options, config=models)
     assert found["fit"] == "rejected"
     assert "(--model springpot) is preferred" in found["advice"]

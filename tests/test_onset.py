@@ -1,6 +1,5 @@
 """Traces that start before their torque: given onsets, fitted ones, and what is said without."""
 
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +15,6 @@ from biogrip.identify.notebook import identify_trace
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import Phase, hold, load
-from biogrip.stages import judgement, recording
-from biogrip.study.load import load_study, read_configs
-from biogrip.study.source import default_config
 from biogrip.traces.onset import begins_constant, estimate_onset, is_cut_off
 from tests.helpers import identified as command
 from tests.helpers.default import STUDY
@@ -154,22 +150,6 @@ def test_a_late_protocol_determines_nothing(
     (said,) = [text for text in found["reasons"] if "The trace is constant until" in text]
     assert "--start fit" in said
     assert {each["verdict"] for each in found["quantities"]} == {"fit rejected"}
-
-
-@pytest.mark.parametrize("start", ["", ", start_s: 0.87"])
-@pytest.mark.nightly
-def test_the_workflow_knows_a_late_protocol(tmp_path: Path, start: str) -> None:
-    trace = write_trace(tmp_path / "trace.csv", *late(2, 0.87))
-    config, traces, verdicts = (tmp_path / name for name in ("c.yaml", "t.parquet", "v.json"))
-    measurement = f"{{file: {trace}, time: time_s, rotation: rotation_rad{start}}}"
-    own = f"{{sample: {{model: generalized_maxwell}}, measurement: {measurement}}}"
-    config.write_text(f"{CONFIG}only: [mine]\ncases: {{mine: {own}}}\n")
-    study = load_study(read_configs([default_config(), config]), [config])
-    recording.record(study.cases["mine"], trace, traces)
-    judgement.judge(study.cases["mine"], traces, [], verdicts)
-    found = json.loads(verdicts.read_text())
-    assert found["fit"] == ("ok" if start else "rejected")
-    assert start or any("measurement.start_s" in reason for reason in found["reasons"])
 
 
 @pytest.mark.nightly

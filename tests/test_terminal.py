@@ -2,15 +2,14 @@
 
 import json
 import re
+import shlex
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from biogrip import terminal
-from biogrip.cli import main
+from biogrip.cli import _parser, main
 from biogrip.terminal import visible, visible_lines
 from tests.helpers.identified import identify
 from tests.helpers.places import EXAMPLE
@@ -96,21 +95,16 @@ def test_progress_and_warnings_are_shown(
         assert not OBEYED.search(text)
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
-@pytest.mark.parametrize(
-    ("arguments", "status"),
-    [("groups a.csv --by x", 1), ("identify a.csv --config few.yaml", 0), ("design", 2)],
-)
-@pytest.mark.nightly
-def test_a_command_may_have_nobody_to_talk_to(
-    tmp_path: Path, arguments: str, status: int, closed: str
+@pytest.mark.parametrize("command", ["identify", "groups", "design"])
+def test_examples_are_commands_that_can_be_typed(
+    command: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """And what it would have said is in no file."""
-    shutil.copy(EXAMPLE, tmp_path / "a.csv")
-    (tmp_path / "few.yaml").write_text(FEW)
-    command = ["sh", "-c", f'"$0" -m biogrip {arguments} {closed}', sys.executable]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == status
-    assert "Traceback" not in done.stdout + done.stderr
-    for output in tmp_path.glob("*.json"):
-        assert json.loads(output.read_text())["written_by_biogrip"]
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    _, _, examples = capsys.readouterr().out.partition("\nexamples:\n")
+    lines = [line for line in examples.splitlines() if line.startswith("  ")]
+    assert len(lines) == 2
+    for line in lines:
+        program, *arguments = shlex.split(line)
+        assert (program, arguments[0]) == ("biogrip", command)
+        _parser().parse_args(arguments)

@@ -90,8 +90,12 @@ def _examples(*commands: str, cost: str = "") -> str:
 
 
 def _reading(text: str) -> tuple[tuple[str, ...], Any]:
+    from biogrip.physics.instruments import INSTRUMENTS
+
     quantity, found, column = text.partition("=")
-    return ("measurement", quantity if found else "rotation"), column if found else text
+    if found:
+        return ("measurement", quantity), column
+    return ("measurement", text if text in INSTRUMENTS else "rotation"), text
 
 
 def _start(text: str) -> tuple[tuple[str, ...], Any]:

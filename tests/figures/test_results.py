@@ -1,4 +1,4 @@
-"""Which run a figure shows, and what is drawn of fits, bounds and forces; nothing misleading."""
+"""Which run a figure shows; what is drawn of fits, bounds, forces, profiles and valleys."""
 
 import json
 from pathlib import Path
@@ -6,15 +6,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from matplotlib.patches import Rectangle
 
 from biogrip.arrays import Array
 from biogrip.figures.course import draw_convergence
 from biogrip.figures.fit import draw_fit, draw_fits
-from biogrip.figures.mechanics import draw_force
+from biogrip.figures.likelihood import draw_profiles, draw_valley
 from biogrip.figures.results import SHOWN_SEEDS, Fit, read_history
 from biogrip.figures.scatter import draw_scatter
 from biogrip.figures.style import ALL_SEEDS, RUNS, styled
@@ -23,6 +21,7 @@ from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.records.identifications import columns
+from biogrip.records.rows import write_arrays
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.stages import targets
 from tests.helpers.default import STUDY, seen, study_of
@@ -30,7 +29,6 @@ from tests.helpers.default import STUDY, seen, study_of
 CASE = "liquid_drop_2"
 TRUTH = [1.0, 1e-4, 10.0, 1e-3]
 TIME_S = np.arange(0.0, 400.5, 1.0)
-COLUMNS = ["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"]
 
 
 def response(values: list[float]) -> Array:
@@ -64,8 +62,8 @@ def measurements(tmp_path: Path) -> Path:
     traces = {
         seed: target + 1e-4 / (1 + seed) * rng.standard_normal(len(TIME_S)) for seed in range(3)
     }
-    write_measurements(tmp_path / "seeds_0-2.parquet", Measurements(TIME_S, target, traces))
-    return tmp_path / "seeds_0-2.parquet"
+    write_measurements(tmp_path / "seeds_0-2.npz", Measurements(TIME_S, target, traces))
+    return tmp_path / "seeds_0-2.npz"
 
 
 def curve(found: Any, label: str) -> Array:
@@ -111,21 +109,14 @@ def test_axes_suit_the_sampling_and_residuals_are_in_the_unit_that_was_minimised
 
 
 def test_histories_of_the_seeds_that_are_drawn_are_read(tmp_path: Path) -> None:
-    """By one method, wherever in the file they are; Arrow's own filter is the independent one."""
-    path = tmp_path / "histories.parquet"
-    seeds = np.repeat([0, 1, SHOWN_SEEDS, SHOWN_SEEDS + 1], 3)
-    tables = [
-        pa.table({"method": [method] * 12, "seed": seeds, "generation": seeds, "k": seeds * 0.5})
-        for method in ("genetic", "least_squares")
-    ]
-    with pq.ParquetWriter(path, tables[0].schema) as writer:
-        for table in tables:
-            for start in range(0, 12, 4):
-                writer.write_table(table.slice(start, 4))
+    """By one method, wherever in the file they are."""
+    path = tmp_path / "histories.npz"
+    seeds = [0, 1, SHOWN_SEEDS, SHOWN_SEEDS + 1]
+    columns = {"method": ["genetic"] * 4 + ["least_squares"] * 4, "seed": [*seeds, *seeds]}
+    write_arrays(path, {**columns, "generation": [9] * 8, "k": np.arange(8.0)})
     found = read_history(path, "least_squares", [SHOWN_SEEDS + 1], ["k"])
-    kept = [("method", "==", "least_squares"), ("seed", "!=", SHOWN_SEEDS)]
-    names = ["seed", "generation", "k"]
-    pd.testing.assert_frame_equal(found, pd.read_parquet(path, columns=names, filters=kept))
+    expected = {"seed": [0, 1, SHOWN_SEEDS + 1], "generation": [9] * 3, "k": [4.0, 5.0, 7.0]}
+    pd.testing.assert_frame_equal(found, pd.DataFrame(expected))
 
 
 @pytest.mark.parametrize(
@@ -143,10 +134,10 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     found.to_csv(tmp_path / "found.csv", index=False)
     history = {"seed": np.repeat(numbers, 2), "generation": np.tile([0, 1], seeds)}
     history["best_misfit"] = np.repeat(misfit, 2)
-    pd.DataFrame(history).assign(method="genetic").to_parquet(tmp_path / "history.parquet")
+    write_arrays(tmp_path / "history.npz", {**history, "method": np.full(2 * seeds, "genetic")})
     study = seen(shown_method=METHODS["genetic"], near_noise_tolerance=0.02)
     case = seen(title="A cell", mutation_start=20, study=study)
-    drawn = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.parquet")
+    drawn = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.npz")
     (axes,), (legend,) = drawn.axes, drawn.legends
     colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]
     assert [colors.count(each) for each in (ALL_SEEDS, *RUNS)] == [others, 1, 1]
@@ -183,29 +174,95 @@ def test_a_band_of_the_study_s_confidence_is_drawn_of_what_is_determined_alone(
     assert wide / small == pytest.approx(1.96, rel=1e-3)
 
 
-PULLED = """
-measurement: {rate_Hz: 1.0}
-cases:
-  left: {contact: unilateral, sample: {model: kelvin_voigt, k_p: 0.05, c_p: 5.0}}
-  bent: {sample: {model: liquid_drop, k: 1.0, k_p: 1.0e-3, c: 10.0}, models: {target: nonlinear}}
-"""
+BEST = 2.0
+
+
+def item(**changes: Any) -> dict[str, Any]:
+    """A quantity whose profile is a parabola of its logarithm, with few points."""
+    values = BEST * np.exp(np.linspace(-1, 1, 9))
+    profile = {"values": list(values), "increases": list((4 * np.log(values / BEST)) ** 2)}
+    limits = {"low": BEST * np.exp(-0.49), "high": BEST * np.exp(0.49), "excluded": []}
+    words = {"quantity": "k", "symbol": "$k$", "unit": "N/m", "verdict": "determined"}
+    return {**words, **limits, "profile": profile, **changes}
+
+
+def drawn(folder: Path, **changes: Any) -> Any:
+    """Axes of a profile."""
+    content = {"quantities": [item(**changes)], "trades": [], "notes": []}
+    levels = {"confidence": 0.9, "threshold": 2.71, "certainty": 10.83}
+    (folder / "v.json").write_text(json.dumps({**content, **levels}))
+    with styled():
+        case = seen(title="A drop", parameters={"k": 2.2})
+        return draw_profiles(case, folder / "v.json", []).axes[0]
+
+
+def test_a_set_in_two_parts_is_shaded_in_two_parts(tmp_path: Path) -> None:
+    axes = drawn(tmp_path, excluded=[[1.9, 2.1]])
+    spans = [patch for patch in axes.patches if isinstance(patch, Rectangle)]
+    edges = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in spans]
+    assert [round(end, 3) for pair in edges for end in pair] == [1.225, 1.9, 2.1, 3.265]
+
+
+def drawn_valley(
+    folder: Path, increases: list[list[float]], fits: dict[str, list[float]], **known: Any
+) -> Any:
+    """Axes of a valley along the sum of 10, with sums of 9, 10 and 11."""
+    shares = np.linspace(0.1, 0.9, 5)
+    sums = 10 * np.array([[0.9], [1.0], [1.1]])
+    grid = {"x_values": sums * shares, "y_values": sums * (1 - shares), "increases": increases}
+    axis = {"name": "c", "symbol": "$c$", "unit": "N s/m"}
+    found = {
+        "x": axis,
+        "y": {**axis, "name": "c_p", "symbol": "$c_p$"},
+        "grids": [{key: np.asarray(each).tolist() for key, each in grid.items()}],
+        "best": [9.0, 1.0],
+    }
+    path = folder / "v.json"
+    path.write_text(json.dumps({"quantities": [], "trades": [], "notes": [], "valley": found}))
+    rows = {f"{name}_Ns_per_m": values for name, values in fits.items()}
+    frame = pd.DataFrame(rows).assign(case="x", method="least_squares", misfit=1, noise_rms=1)
+    frame = frame.assign(seed=range(len(frame)), generations=1, evaluations=1, stop_reason=1)
+    frame.to_csv(folder / "found.csv", index=False)
+    paper = seen(identified=known.get("paper", {}))
+    study = seen(fitting_method=METHODS["least_squares"])
+    case = seen(title="A drop", study=study, parameters=known.get("truth", {}), published=paper)
+    with styled():
+        return draw_valley(case, path, folder / "found.csv").axes[0]
+
+
+KNOWN = ("truth", "paper")
+DEEP = [[50.0] * 5, [0.0] * 5, [60.0] * 5]
+# Deep at its last point alone, where c is 9.
+CLOSED = [[900.0] * 5, [900.0, 900.0, 900.0, 900.0, 0.0], [900.0] * 5]
 
 
 @pytest.mark.parametrize(
-    ("name", "pulls", "free"),
-    [
-        ("endothelial_cell", False, False),
-        ("liquid_drop_1", True, True),
-        ("left", True, True),
-        ("bent", True, False),
-    ],
+    ("c", "paper"), [([3.0, 4e4, 5.0], {}), ([3.0, 5.0, 5.0], {"c": 1e5, "c_p": 10.0})]
 )
-def test_a_pull_is_marked(tmp_path: Path, name: str, pulls: bool, free: bool) -> None:
-    case = study_of(PULLED).cases[name]
-    targets.simulate(case, tmp_path / "target.csv")
-    with styled():
-        legends = [axes.get_legend() for axes in draw_force(case, tmp_path / "target.csv").axes]
-    forces, rotations = ([t.get_text() for t in each.get_texts()] for each in legends if each)
-    assert ("the jaws would have to pull" in forces) == pulls
-    assert ("jaws that let go" in forces) == free
-    assert ("jaws that let go" in rotations) == (free and name != "left")
+def test_fits_and_a_paper_beyond_a_valleys_axes_are_marked(
+    tmp_path: Path, c: list[float], paper: dict[str, float]
+) -> None:
+    axes = drawn_valley(tmp_path, DEEP, {"c": c, "c_p": [7.0, 10.0, 5.0]}, paper=paper)
+    (beyond,) = (line for line in axes.lines if line.get_label() == "beyond the axis")
+    np.testing.assert_allclose(np.asarray(beyond.get_xydata()), [[11.5, 10.0]])
+    assert beyond.get_marker() == ">"
+
+
+def test_a_valleys_axes_end_around_what_is_in_it(tmp_path: Path) -> None:
+    """Fits, truth, paper and where it is deep; each of them widens the axes, none is cut off."""
+    near = {"c": [8.9, 9.05], "c_p": [1.1, 0.95]}
+    narrow = drawn_valley(tmp_path, CLOSED, near)
+    # The root of the rise, 30 at the next point, (7, 3), is below that of 10.83 for 0.11 of the way
+    # there, which is as far as (8.78, 1.22); the fits end at (9.05, 0.95).
+    low, high = narrow.get_xlim()
+    assert 8.5 < low < 8.78 < 9.05 < high < 9.3
+    low, high = narrow.get_ylim()
+    assert 0.7 < low < 0.95 < 1.22 < high < 1.5
+    wide = drawn_valley(tmp_path, DEEP, near)
+    assert wide.get_xlim()[0] < 1
+    assert wide.get_xlim()[1] > 9
+    known = {"c": 6.0, "c_p": 4.0}
+    more = drawn_valley(tmp_path, CLOSED, {"c": [6.0, 9.05], "c_p": [4.0, 0.95]})
+    for axes in (more, *(drawn_valley(tmp_path, CLOSED, near, **{n: known}) for n in KNOWN)):
+        assert axes.get_xlim()[0] < 6 < 9.05 < axes.get_xlim()[1]
+        assert axes.get_ylim()[0] < 0.95 < 4 < axes.get_ylim()[1]

@@ -11,7 +11,6 @@ from biogrip.figures.gripper import draw_torque
 from biogrip.figures.results import scale_of
 from biogrip.figures.style import (
     COLORS,
-    decade_ticks,
     figure,
     line_of,
     literal,
@@ -21,14 +20,6 @@ from biogrip.figures.style import (
 )
 from biogrip.fit.methods import METHODS
 from tests.helpers.default import STUDY
-
-
-def test_saved_figures_are_the_same_every_time(tmp_path: Path) -> None:
-    for name in ("a", "b"):
-        with styled():
-            save(draw_torque(STUDY), tmp_path / f"{name}.png")
-    for suffix in (".png", ".pdf"):
-        assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
 
 
 def test_a_matplotlibrc_changes_no_figure(tmp_path: Path) -> None:
@@ -56,21 +47,6 @@ def test_a_title_sets_no_mathematics(tmp_path: Path, title: str) -> None:
 )
 def test_prefixes(value: float, expected: tuple[float, str]) -> None:
     assert scale_of(np.array([-value, 0.0]), "rad") == expected
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "labels"),
-    [
-        (1e-3, 1e7, ["10⁻³", "10²", "10⁷"]),
-        (0.5, 50, ["10⁰", "10¹"]),
-        (1.5e-4, 1.2e-3, ["0.0002", "0.001"]),
-        (2.1, 4.9, []),
-    ],
-)
-def test_ticks_do_not_collide(low: float, high: float, labels: list[str]) -> None:
-    ticks, found = decade_ticks(low, high)
-    assert found == labels
-    assert all(low <= tick <= high for tick in ticks)
 
 
 def test_every_method_is_drawn_as_no_other_and_in_colours_for_all_eyes() -> None:

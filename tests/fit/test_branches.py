@@ -11,7 +11,6 @@ from biogrip.fit.methods import METHODS, identifier
 from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.likelihood import Likelihood, make_likelihood
-from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import Sample
@@ -84,18 +83,6 @@ def test_another_name_of_the_optimum_is_none_of_its_neighbours() -> None:
     for which in (0, 1, 3, 4):
         increases, _ = fits.at(np.array([which]), swapped[:, which], swapped, FINE)
         assert np.all(increases > 10)
-
-
-@pytest.mark.nightly
-def test_intervals_are_those_of_one_branch() -> None:
-    quantities = parameters_and_sum(TWO)
-    (profiles,) = compute_profiles([likelihood()], quantities, smooth=False)
-    for quantity, found in zip(quantities, profiles, strict=True):
-        if quantity.label in ("k_1", "k_2", "c_1", "c_2"):
-            assert found.low is not None
-            assert found.high is not None
-            truth = SAMPLE[quantity.label]
-            assert truth / 2 < np.exp(found.low) < truth < np.exp(found.high) < 2 * truth
 
 
 def test_the_truth_is_counted_in_the_same_order() -> None:

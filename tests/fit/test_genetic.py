@@ -1,6 +1,8 @@
 """The genetic algorithm: what it does, and that populations side by side are as if alone."""
 
 from dataclasses import replace
+from decimal import Decimal
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.fit import genetic, genetic_refined
 from biogrip.fit.genetic import GeneticSettings, evolve_many, select
-from biogrip.fit.genome import GeneRange, make_genome
+from biogrip.fit.genome import GeneRange, lowest_encodable, make_genome, nearest_encodable
 from biogrip.fit.problem import Identification, Problem
 from biogrip.physics.misfit import Misfit, combine_misfits
 from biogrip.physics.models import MODELS, Sample
@@ -41,7 +43,8 @@ MODELS_SEARCHED = {
 }
 POPULATIONS = [*READINGS, *MODELS_SEARCHED]
 STIFFNESS, DAMPING = GeneRange((-3, 8), (1, 9)), GeneRange((-4, 5), (1, 9))
-GENOME = make_genome(MAXWELL, {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING})
+RANGES = {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING}
+GENOME = make_genome(MAXWELL, RANGES)
 BOWL = np.log10([35.0, 5.5, 290.0, 4.4e-3])
 
 
@@ -160,3 +163,81 @@ def test_polished_populations_are_as_if_alone() -> None:
     alone = [polished([p], settings, [rng_of(s)])[0] for s, p in enumerate(problems)]
     found = polished(problems, settings, [rng_of(0), rng_of(1)])
     assert [content(answer) for answer in found] == [content(answer) for answer in alone]
+
+
+def test_genes_are_drawn_uniformly_from_their_whole_range() -> None:
+    chromosomes = GENOME.draw(20_000, np.random.default_rng(1))
+    assert (GENOME.low[:3].tolist(), GENOME.high[:3].tolist()) == ([-3, 1, 1], [8, 9, 9])
+    for gene in range(GENOME.genes):
+        values, counts = np.unique(chromosomes[:, gene], return_counts=True)
+        assert values.tolist() == list(range(GENOME.low[gene], GENOME.high[gene] + 1))
+        expected = 20_000 / len(values)
+        assert np.abs(counts - expected).max() < 5 * np.sqrt(expected)
+
+
+@pytest.mark.parametrize("digits", range(1, 7))
+@pytest.mark.parametrize("digit", [(1, 9), (0, 9), (3, 5)])
+def test_any_number_of_digits_is_decoded_as_the_decimal_number_it_is(
+    digits: int, digit: tuple[int, int]
+) -> None:
+    ranges = {**RANGES, "k": GeneRange((-16, 16), digit, digits)}
+    genome = make_genome(MAXWELL, ranges)
+    assert genome.genes == 9 + 1 + digits
+    chromosomes = genome.draw(300, np.random.default_rng(digits))
+    # Lest numbers were encoded twice.
+    assert np.all(chromosomes[:, 1] > 0)
+    decoded = genome.decode(chromosomes)
+    for genes, value in zip(chromosomes[:, : 1 + digits].tolist(), decoded[:, 0], strict=True):
+        share = sum(Decimal(g) * Decimal(10) ** -place for place, g in enumerate(genes[1:], 1))
+        assert value == float(share * Decimal(10) ** genes[0])
+    assert genome.decode(np.stack((genome.low, genome.high)))[:, 0].tolist() == [
+        ranges["k"].low,
+        ranges["k"].high,
+    ]
+
+
+@pytest.mark.parametrize("value", [1e-9, 0.0999, 10.0, 12.34567, 302.5, 1.0e12])
+@pytest.mark.parametrize("digits", [1, 3, 4])
+def test_nearest_encodable_is_the_nearest_of_all(value: float, digits: int) -> None:
+    genes = GeneRange((-2, 4), (0, 9), digits)
+    every = [
+        float(f"{mantissa}e{exponent - digits}")
+        for mantissa in range(10 ** (digits - 1), 10**digits)
+        for exponent in range(-2, 5)
+    ]
+    nearest = min(abs(each - value) for each in every)
+    assert abs(nearest_encodable(value, genes) - value) == nearest
+
+
+@pytest.mark.parametrize("digit", [0, 1])
+def test_no_encodable_point_is_lower_where_the_optimum_is_not_encodable(digit: int) -> None:
+    """In a valley across both parameters, whose bottom no digits can hold; and at an end."""
+    ranges = [GeneRange((0, 2), (digit, 9), 2), GeneRange((-1, 1), (digit, 9), 2)]
+
+    def valley(parameters: Array) -> Array:
+        first, second = np.log(parameters / [33.73, 0.2843]).T
+        found: Array = np.sqrt(1 + 100 * (first + second) ** 2 + first**2)
+        return found
+
+    def beyond(parameters: Array) -> Array:
+        found: Array = np.log(1e5 / parameters).sum(axis=1)
+        return found
+
+    every = np.array(list(product(*(genes.values for genes in ranges))))
+    found = [
+        lowest_encodable(each, ranges, np.array([[33.73, 0.2843]])) for each in (valley, beyond)
+    ]
+    assert found == [valley(every).min(), beyond(every).min()]
+    assert found[0] > 1 + 1e-6
+
+
+@pytest.mark.parametrize("digit", [0, 1])
+def test_the_first_digit_is_searched_with_the_second_kept(digit: int) -> None:
+    """From 24 to 74, where every other second digit is worse."""
+
+    def rungs(parameters: Array) -> Array:
+        first, second = np.divmod(np.rint(parameters[:, 0]), 10)
+        found: Array = 1.0 + abs(first - 7) + 10 * (second != 4)
+        return found
+
+    assert lowest_encodable(rungs, [GeneRange((2, 2), (digit, 9), 2)], np.array([[24.0]])) == 1

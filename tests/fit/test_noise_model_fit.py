@@ -10,9 +10,9 @@ from biogrip.fit.noise_model_fit import (
     compute_growth,
     outliers_of,
 )
-from biogrip.physics.noise import AR1, Flicker, Noise, add_noise
+from biogrip.physics.noise import AR1, Noise, add_noise
 from biogrip.physics.whitening import NoiseModel, Whitening
-from tests.physics.test_whitening import correlation
+from tests.physics.test_noise import correlation
 
 TIMES = np.cumsum(np.random.default_rng(0).exponential(1.0, 200))
 DIRECTIONS = np.stack((np.ones(200), TIMES, np.exp(-TIMES / 40)))
@@ -57,44 +57,6 @@ def test_the_likelihood_is_that_of_dense_matrices(
         found.append(likelihood._deviance(x) + x[2])
         expected.append(restricted(TIMES, DIRECTIONS, left, noise_model, growing))
     np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("noise", "expected"),
-    [
-        (Noise("gaussian", 1.0, "peak"), (0.0, 0.0)),
-        (Noise("gaussian", 1.0, "peak", ar1=AR1(0.5, 10.0)), (0.45, 0.0)),
-        (Noise("gaussian", 1.0, "peak", flicker=Flicker(0.5)), (0.0, 0.5)),
-    ],
-)
-@pytest.mark.nightly
-def test_colours_are_found(noise: Noise, expected: tuple[float, float]) -> None:
-    """On the median of nine traces; the scatter of one is some 0.15.
-
-    What relaxes counts by what is left of it after a sample.
-    """
-    times = np.arange(1500.0)
-    found = []
-    for seed in range(9):
-        trace = add_noise(np.ones(1500), noise, np.random.default_rng([seed, 5]), times)
-        noise_model = NoiseModelLikelihood(times, trace, np.ones((1, 1500))).best()
-        # What is forgotten within a sample is white.
-        slow = noise_model.ar1 * np.exp(-1 / noise_model.time_s)
-        found.append((slow, noise_model.flicker))
-    np.testing.assert_allclose(np.median(found, axis=0), expected, atol=0.12)
-
-
-@pytest.mark.parametrize("share", [0.5, 0.999])
-@pytest.mark.nightly
-def test_the_share_that_grows_is_found(share: float) -> None:
-    """On the mean of twenty, each known to 0.1 where both count; the prior leaves some 1/f."""
-    growing, rng = np.geomspace(0.01, 1.0, 200), np.random.default_rng(6)
-    deviations = np.sqrt(1 - share + share * growing**2 / np.mean(growing**2))
-    found = [
-        NoiseModelLikelihood(TIMES, deviations * left, DIRECTIONS, growing).best().proportional
-        for left in rng.standard_normal((20, 200))
-    ]
-    assert np.mean(found) == pytest.approx(share, abs=0.08)
 
 
 def test_degrees_of_freedom_are_those_of_the_least_known_variance() -> None:

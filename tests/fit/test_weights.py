@@ -11,7 +11,7 @@ from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.problem import Identification, Problem
 from biogrip.fit.trace_fit import trace_fit
 from biogrip.judging.diagnosis import Diagnosis, diagnose
-from biogrip.library import set_up, simulate
+from biogrip.library import set_up
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import Sample
@@ -108,8 +108,3 @@ def test_a_plateau_is_no_noise() -> None:
         times, readings, relaxation.gripper, relaxation.torque, none, 0.01
     )
     assert found == pytest.approx(0.01 * smooth, rel=0.02)
-
-
-def test_the_model_is_that_of_the_closed_form() -> None:
-    ours = simulate(POLYSTYRENE, {"k_alpha": V, "alpha": BETA, "c": ETA}, TIMES)
-    np.testing.assert_allclose(ours, noisy(0.0), rtol=1e-7)

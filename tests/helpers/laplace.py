@@ -53,19 +53,6 @@ def drawn(model: str, sample: Any) -> Impedance:
     return lambda s: IMPEDANCES[model](s, *(arb(float(value)) for value in sample))
 
 
-def mittag_leffler(a: float, b: float, x: float) -> float:
-    """E_(a,b)(-x) by its series, sum (-x)^k / Gamma(a k + b); terms are as large as e^(x^(1/a))."""
-    with ctx.workdps(40 + int(0.9 * x ** (1 / a))):
-        a_, b_, x_ = arb(a), arb(b), arb(x)
-        total, k, power = arb(0), 0, arb(1)
-        while True:
-            term = power * (a_ * k + b_).rgamma()
-            total += term
-            if k > x ** (1 / a) / a and abs(term) < arb(10) ** -30 * abs(total):
-                return float(total.mid())
-            k, power = k + 1, -power * x_
-
-
 def inverted(transform: Impedance, t: float) -> float:
     """Inverse Laplace transform at a time, by Talbot's contour [1]; it has 0.6 digits a node."""
     with ctx.workdps(45):

@@ -99,7 +99,7 @@ def snakemake(folder: Path, *arguments: str | Path, config: dict[str, Any] | Non
 
 
 def dry_run(folder: Path, *arguments: str, config: dict[str, Any]) -> Run:
-    """Ask Snakemake what it would run, by its plain logger."""
+    """Ask Snakemake what it would run."""
     # Other workers ask in the same folder.
     with NamedTemporaryFile("w", suffix=".yaml") as overlay:
         yaml.safe_dump(config, overlay)

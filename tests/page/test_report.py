@@ -21,6 +21,7 @@ from biogrip.page.page import entry_of
 from biogrip.records.identifications import read_identifications
 from biogrip.records.rows import read_table
 from biogrip.records.traces import read_measurements
+from biogrip.tables.claims import count_verdicts
 from tests.helpers.browser import Opened
 
 MOST_BYTES = 8_000_000
@@ -98,9 +99,14 @@ def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path
     page, own = opened.page, "genetic algorithm"
     assert page.locator("h1 + .split .answers p:not(.soft)").all_text_contents() == [
         legible(say_what_the_study_gives(compared, own, titles, who)),
-        say_what_traces_tell(sorted(verdicts, key=lambda row: row["case"])),
         legible(say_which_method_finds_it(compared, own)),
+        say_what_traces_tell(sorted(verdicts, key=lambda row: row["case"])),
+        count_verdicts(row["verdict"] for row in read_table(tables / "claims.csv")),
     ]
+    # No caption of a table stands twice.
+    told = page.locator("#tables summary").all_text_contents()
+    captions = [text.split(". ", 1)[1] for text in map(str.strip, told) if ". " in text]
+    assert len(captions) == len(set(captions)) > 5
     # Then the picture's quantities, and figures of the paper, before all that is folded.
     shown = page.locator("figure:visible").evaluate_all("all => all.map(f => f.id)")
     assert shown == ["figure-answer", "figure-fit_liquid_drop_2"]
@@ -188,7 +194,7 @@ def test_the_explorer_shows_the_judged_trace_and_its_fits(
     page.locator("#explorer .ytitle", has_text=label).wait_for()
     scale = {"m": 1e3, "µ": 1e6}[prefix]
     drawn = {line["name"]: np.array(line["y"]) / scale for line in page.evaluate(DRAWN)}
-    (batch,) = (results / "measurements" / case).glob("seeds_0-*.parquet")
+    (batch,) = (results / "measurements" / case).glob("seeds_0-*.npz")
     measured = read_measurements(batch, [0])
     noisy = drawn.pop("noisy trace" if case != "mine" else "recorded trace")
     assert np.allclose(noisy, measured.rotation_rad[0], rtol=1e-5, atol=0)

@@ -96,16 +96,6 @@ def test_rows_do_not_depend_on_who_else_is_there(either_gripper: Gripper, name: 
         np.testing.assert_array_equal(residuals.condensed_responses(x[chosen]), together[chosen])
 
 
-def test_a_clean_trace_leaves_no_residual(gripper: Gripper) -> None:
-    torque, time_s = torque_history(PROTOCOLS["steps"]), TIMES["uniform"]
-    condensed = condensed_of(torque, time_s)
-    model, x = Sample("generalized_maxwell", 2).model, np.log([5.0, 0.2, 1.0, 9.0, 99.0, 0.5])
-    empty = posed(gripper, model, condensed, np.zeros(len(time_s)))
-    clean, _ = empty(x)
-    exact = posed(gripper, model, condensed, clean)
-    assert np.linalg.norm(condensed_rows(exact, x)[0]) < 1e-10 * np.linalg.norm(clean)
-
-
 @pytest.mark.parametrize("times", DENSE)
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_too_many_nodes_have_a_row_each(

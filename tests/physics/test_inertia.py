@@ -14,8 +14,7 @@ from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.protocol import hold, torque_history
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import VISIBLE, elapsed_s, find_ring, ring, ringing_s
-from tests.helpers.default import STUDY
-from tests.helpers.problems import GRIPPER, MODEL, SAMPLES, TORQUE
+from tests.helpers.problems import GRIPPER, MODEL, TORQUE
 
 # Dampers between the jaws end a ring before it is seen; a spring in front of them goes on.
 RINGING = {
@@ -90,15 +89,6 @@ def notes_of(model: str, time_s: Array, level: float, truth: dict[str, float]) -
     found = library.identify_sample(experiment, time_s, trace)
     notes = library.judge(experiment, time_s, trace, found).notes
     return [note for note in notes if note.text.startswith("The arms ring")]
-
-
-@pytest.mark.parametrize("case", SAMPLES)
-@pytest.mark.nightly
-def test_the_default_study_does_not_show_it(case: str) -> None:
-    """At 10 Hz, beside a tenth of noise, and beside a thousandth."""
-    time_s = STUDY.cases[case].sampling.over(400.0)[::5]
-    for level in (0.1, 1e-3):
-        assert notes_of("generalized_maxwell", time_s, level, SAMPLES[case]) == []
 
 
 @pytest.mark.parametrize("model", RINGING)

@@ -1,3 +1,5 @@
+"""The nonlinear response and the force of the jaws, against Radau and closed forms."""
+
 import math
 
 import numpy as np
@@ -9,12 +11,21 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, displacement_of_tip, rotation_of_tip
 from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.maxwell_models import generalized_maxwell
+from biogrip.physics.maxwell_models import damper, generalized_maxwell, kelvin_voigt, maxwell
 from biogrip.physics.nonlinear import correction, nonlinear_rotation
-from biogrip.physics.protocol import Harmonic, Load, Phase, hold, torque_history
-from biogrip.physics.simulation import jaw_force
+from biogrip.physics.protocol import (
+    Harmonic,
+    Load,
+    Phase,
+    TorqueHistory,
+    hold,
+    torque_at,
+    torque_history,
+)
+from biogrip.physics.simulation import compute_grip, jaw_force, jaw_force_response, linear_jaw_force
 from tests.helpers.radau import TOLERANCE, equal_arms, tip
 from tests.helpers.responses import random_samples
+from tests.physics.test_protocols import TORQUE
 
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)
 OTHER = Arm(1.3e-14, 2.5e-12, 5.5e-7)
@@ -181,3 +192,130 @@ def test_too_large_a_torque_is_refused(gripper: Gripper) -> None:
     network = generalized_maxwell(np.array([1e-3, 1e-4, 1e-3, 1e-3]))
     with pytest.raises(BiogripError, match="closes the arms so far"):
         nonlinear_rotation(gripper, network, torque_history((hold(100.0, 1e-5),)), TIMES[:10])
+
+
+DROPS = np.array([[9.5, 1e-4, 10.0, 1e-4], [1.0, 1e-4, 10.0, 1e-3]])
+CELL = np.array([[35.0, 12.3, 299.9, 1e-3]])
+
+
+@pytest.mark.parametrize("inertia", [False, True])
+def test_the_arms_equation_closes_under_ramps_and_sinusoids(
+    gripper: Gripper, inertia: bool
+) -> None:
+    """b F = tau - k phi - c phi' (- I phi'', which is nothing beside these a moment later)."""
+    network = generalized_maxwell(np.concatenate((DROPS, CELL, random_samples(20, 5))))
+    time_s, arm = np.linspace(0.3, TORQUE.end_s - 0.2, 301), gripper.left
+    response = step_response(gripper, network, inertia=False)
+    rest = torque_at(TORQUE, time_s) - arm.stiffness_Nm_per_rad * rotation(response, TORQUE, time_s)
+    rest -= arm.damping_Nms_per_rad * rotation(response, TORQUE, time_s, rate=True)
+    of_steps = jaw_force_response(gripper, network, inertia=inertia)
+    force = linear_jaw_force(of_steps, TORQUE, time_s)
+    largest = torque_at(TORQUE, time_s).max()
+    np.testing.assert_allclose(
+        gripper.lever_m * force, rest, rtol=0, atol=(3e-6 if inertia else 1e-12) * largest
+    )
+
+
+# Arms in air, and in a liquid where they lag by a tenth of a second and more.
+@pytest.mark.parametrize("damping", [3.3e-12, 1e-7])
+@pytest.mark.parametrize("case", range(4))
+def test_nonlinear_against_radau(case: int, damping: float) -> None:
+    rng = np.random.default_rng([52, case])
+    arm = Arm(1.0e-14, damping, 4.4e-7)
+    gripper = Gripper(1.5e-3, rng.uniform(40, 90), arm, arm)
+    # Of stiffer samples Radau's own force is a difference of nearly equal displacements.
+    sample, factor = 10 ** rng.uniform([-1, -3, 0, -3], [2, 1, 2, 1]), rng.uniform(1, 10)
+    taus = 1.6e-9 * factor, 0.32e-9 * factor
+    torque = torque_history(tuple(hold(200.0, tau) for tau in taus))
+    time_s = np.concatenate((np.geomspace(0.1, 200, 25), 200 + np.geomspace(0.1, 200, 25)))
+    time_s[24] = np.nextafter(200, 0)
+    network = generalized_maxwell(sample)
+    ours = jaw_force(gripper, network, torque, time_s, nonlinear=True, inertia=False)[0]
+    ends = [(200.0, taus[0]), (400.0, taus[1])]
+    _, expected = equal_arms(gripper, sample, ends, time_s, taus[0] / 4.4e-7)
+    assert np.max(np.abs(ours - expected)) < 1e-6 * np.abs(expected).max()
+    linear = jaw_force(gripper, network, torque, time_s, nonlinear=False, inertia=False)[0]
+    assert np.max(np.abs(ours - linear)) > 1e-5 * np.abs(expected).max()
+
+
+def test_nonlinear_force_follows_the_work_of_unequal_arms(unequal_gripper: Gripper) -> None:
+    """Of a bare damper the force's impulse is what it gave way times c_p."""
+    c_p = 20.0
+    torque = torque_history((hold(40.0, 3e-9, 2e-9),))
+    x, weights = np.polynomial.legendre.leggauss(40)
+    edges = np.concatenate(([0.0], np.geomspace(1e-6, 40.0, 40)))
+    half = 0.5 * np.diff(edges)
+    time_s = (edges[:-1, None] + half[:, None] * (1 + x)).ravel()
+    force = jaw_force(unequal_gripper, damper(c_p), torque, time_s, nonlinear=True, inertia=False)
+    impulse = np.sum(half[:, None] * weights * force.reshape(len(half), -1))
+    end, hat = np.array([40.0]), np.radians(unequal_gripper.reference_angle_deg)
+    shortening = 0.0
+    for arm in (0, 1):
+        phi = float(nonlinear_rotation(unequal_gripper, damper(c_p), torque, end, arm)[0, 0])
+        shortening += 2 * 1.5e-3 * np.sin(hat - phi / 2) * np.sin(phi / 2)
+    assert impulse == pytest.approx(c_p * shortening, rel=1e-8)
+
+
+def test_what_is_left_in_the_end(gripper: Gripper) -> None:
+    """The springs' share of a held torque; nothing for a liquid, without a digit lost."""
+    samples = random_samples(300, 12)
+    response = jaw_force_response(gripper, generalized_maxwell(samples))
+    b, k_p = gripper.lever_m, samples[:, 1]
+    expected = 2 * b * k_p / (gripper.left.stiffness_Nm_per_rad + 2 * b**2 * k_p)
+    np.testing.assert_allclose(response.static[:, 0, 0], expected, rtol=1e-14)
+    liquid = jaw_force_response(gripper, maxwell([[1.0, 10.0]]))
+    assert liquid.static[0, 0, 0] == 0
+    torque = torque_history((hold(5000.0, 1.6e-9),))
+    late = linear_jaw_force(liquid, torque, np.array([1000.0, 2000.0]))[0]
+    slow = liquid.rates.real.max()
+    assert late[1] / late[0] == pytest.approx(np.exp(1000 * slow), rel=1e-12)
+    assert 0 < late[1] < 1e-14
+
+
+def test_without_inertia_the_force_jumps(gripper: Gripper, steps: TorqueHistory) -> None:
+    """The damper takes nearly the whole torque at once: c_p u over c_g + c_p u."""
+    network, start = generalized_maxwell(CELL), np.zeros(1)
+    for nonlinear in (False, True):
+        force = jaw_force(gripper, network, steps, start, nonlinear=nonlinear)
+        assert abs(force[0, 0]) < 1e-20
+    jumping = jaw_force(gripper, network, steps, start, nonlinear=False, inertia=False)
+    share = 1e-3 * 2 * gripper.lever_m**2
+    expected = share / (share + 3.3e-12) * 1.6e-9 / gripper.lever_m
+    assert jumping[0, 0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_damper_is_pulled_from_the_drop_on(gripper: Gripper, steps: TorqueHistory) -> None:
+    """F = c_p delta': tau/b at first; after the drop (tau_2 - k phi)/b."""
+    grip = compute_grip(gripper, damper(10.0), steps, nonlinear=False)
+    b, k_g = gripper.lever_m, 4.4e-7
+    phi = 1.6e-9 / k_g * -math.expm1(-k_g * 200 / (2 * 10 * b * b))
+    assert grip.largest_N == pytest.approx(1.6e-9 / b, rel=1e-5)
+    assert grip.lowest_N == pytest.approx((0.32e-9 - k_g * phi) / b, rel=1e-5)
+    assert grip.pulls_from_s == pytest.approx(200, abs=1e-5)
+    assert grip.words() == (
+        "the jaws would have to pull the sample from 200 s on (with 0.75 µN at 200 s, where they "
+        "press with 1.1 µN at most)"
+    )
+
+
+def test_pressed_throughout(gripper: Gripper, steps: TorqueHistory) -> None:
+    for network in (generalized_maxwell([35.0, 12.3, 299.9, 1e-3]), kelvin_voigt([1.0, 0.0])):
+        grip = compute_grip(gripper, network, steps, nonlinear=False)
+        assert grip.pulls_from_s is None
+        assert grip.words() is None
+        # The start, when nothing presses yet, is not meant.
+        assert 0.1 * grip.largest_N < grip.lowest_N < grip.largest_N
+
+
+def test_a_pull_within_a_period_is_found(gripper: Gripper) -> None:
+    swing = Load(1e-9, 0.0, 0.0, (Harmonic(0.99e-9, 2 * np.pi * 0.5, 0.0),))
+    torque = torque_history((Phase(200.0, swing, swing), hold(10.0, 2e-9)))
+    grip = compute_grip(gripper, damper(5.0), torque, nonlinear=False)
+    assert grip.lowest_N < 0 < grip.largest_N
+    assert grip.pulls_from_s is not None
+    assert grip.pulls_from_s < 200
+
+
+def test_no_torque_no_force(gripper: Gripper) -> None:
+    grip = compute_grip(gripper, damper(5.0), torque_history((hold(10.0, 0.0),)), nonlinear=False)
+    assert (grip.largest_N, grip.lowest_N, grip.pulls_from_s) == (0, 0, None)

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
-from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.models import CANDIDATES, MODELS, Sample, as_richer, contained, different_in
+from biogrip.physics.protocol import TorqueHistory, hold, torque_history
 from biogrip.physics.sample_model import complex_modulus, with_fixed
 from tests.helpers.laplace import IMPEDANCES, series
 
@@ -33,7 +34,7 @@ def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
 
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if not model.power_law])
 def test_storage_and_loss_modulus_are_those_of_the_drawing(name: str) -> None:
-    """Over ten decades; those with springpots are in test_fractional.py."""
+    """Over ten decades; those with springpots are in test_creep_and_relaxation.py."""
     rng, omega = np.random.default_rng(1), np.geomspace(1e-5, 1e5, 21)
     values = 10 ** rng.uniform(-3, 3, (50, len(MODELS[name].parameters)))
     storage, loss = complex_modulus(MODELS[name].network(values), omega)
@@ -60,3 +61,42 @@ def test_fixing_a_parameter_leaves_the_others() -> None:
     for one, other in zip(vars(ours).values(), vars(theirs).values(), strict=True):
         np.testing.assert_array_equal(one, other)
     assert with_fixed(model, {}) is model
+
+
+TORQUE = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
+TIME_S = np.linspace(0.0, 400.0, 801)
+DECADES = {"stiffness": (0, 2), "damping": (0, 3), "springpot": (0, 2), "exponent": (-0.6, -0.2)}
+TRIED = [name for name in CANDIDATES if name[-1] not in "5678"]
+PAIRS = [(richer, simpler) for richer in TRIED for simpler in contained(richer)]
+
+
+def drawn(candidate: str, rng: np.random.Generator) -> Array:
+    kinds = [parameter.kind for parameter in CANDIDATES[candidate].model.parameters]
+    return np.array([10 ** rng.uniform(*DECADES[kind]) for kind in kinds])
+
+
+def response(gripper: Gripper, candidate: str, parameters: Array, inertia: bool) -> Array:
+    network = CANDIDATES[candidate].model.network(parameters)
+    found: Array = rotation(step_response(gripper, network, inertia=inertia), TORQUE, TIME_S)[0]
+    return found
+
+
+@pytest.mark.parametrize("inertia", [False, True], ids=["without inertia", "with inertia"])
+@pytest.mark.parametrize(("richer", "simpler"), PAIRS)
+def test_a_richer_model_becomes_the_simpler_one(
+    gripper: Gripper, richer: str, simpler: str, inertia: bool
+) -> None:
+    """To rounding: that of polynomials of degree nine, where there are eight branches."""
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        parameters = drawn(simpler, rng)
+        expected = response(gripper, simpler, parameters, inertia)
+        found = response(gripper, richer, as_richer(richer, simpler, parameters), inertia)
+        assert np.max(np.abs(found - expected)) < 2e-11 * np.abs(expected).max()
+
+
+def test_of_equal_models_one_leads_on() -> None:
+    others = ["liquid_drop", "damper", "kelvin_voigt", "maxwell", "zener_maxwell", "zener_kelvin"]
+    assert set(others) <= set(contained("burgers"))
+    found = different_in("burgers", others)
+    assert found == ["maxwell", "zener_kelvin", "damper", "kelvin_voigt"]

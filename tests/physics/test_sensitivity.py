@@ -1,4 +1,4 @@
-"""Exact derivatives, against differences of responses that are right to 1e-11 (test_linear.py)."""
+"""Exact derivatives, against differences of responses right to 1e-11 (test_protocols.py)."""
 
 import numpy as np
 import pytest

@@ -3,14 +3,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.records.rows import read_parquet
 from biogrip.records.traces import (
     Measurements,
     each_trace,
-    read_jaw_force,
     read_measurements,
     read_target,
     write_measurements,
@@ -32,7 +31,7 @@ def test_a_target_is_read_back_to_nine_digits(tmp_path: Path) -> None:
     np.testing.assert_array_equal(time_s, TIMES)
     np.testing.assert_array_equal(torque, 1e-9)
     np.testing.assert_allclose(rotation, 1e-5 * TIMES / 3, rtol=5e-9)
-    force = read_jaw_force(written(tmp_path))[2]
+    force = pd.read_csv(written(tmp_path))["jaw_force_N"].to_numpy()
     np.testing.assert_allclose(force, FORCE, rtol=0, atol=5e-16)
     assert force[1] == 0
     assert ",-0" not in written(tmp_path).read_text()
@@ -58,7 +57,7 @@ def test_a_damaged_target_is_explained(tmp_path: Path, line: int, text: str, mes
 @pytest.mark.parametrize("known", [{}, {"target_rad": TIMES - 1}, {"sd_rad": TIMES + 0.1}])
 def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> None:
     """All of them or some, with what is known, bit for bit."""
-    path = tmp_path / "seeds_3-7.parquet"
+    path = tmp_path / "seeds_3-7.npz"
     traces = {seed: np.random.default_rng(seed).random(5) for seed in (3, 4, 5, 6, 7)}
     given = replace(Measurements(TIMES, None, traces), **known)
     write_measurements(path, given)
@@ -74,13 +73,15 @@ def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> No
 
 
 def test_damaged_measurements_are_named(tmp_path: Path) -> None:
-    path = tmp_path / "m.parquet"
+    path = tmp_path / "m.npz"
     write_measurements(path, Measurements(TIMES, None, {0: TIMES}))
-    with pytest.raises(BiogripError, match=r"m.parquet: has no column seed_3"):
+    with pytest.raises(BiogripError, match=r"m.npz: has no trace of seed 3"):
         read_measurements(path, [0, 3])
-    with pytest.raises(BiogripError, match=r"m.parquet: cannot be read: No match .*y"):
-        read_parquet(path, ["y"])
-    path.write_bytes(path.read_bytes()[:-9])
-    for file in (path, tmp_path / "gone.parquet"):
+    cut, another, changed = (tmp_path / name for name in ("cut.npz", "csv.npz", "changed.npz"))
+    whole = path.read_bytes()
+    cut.write_bytes(whole[:-9])
+    another.write_text("time_s,target\n0,1\n")
+    changed.write_bytes(whole.replace(TIMES.tobytes(), (TIMES + 1).tobytes()))
+    for file in (cut, another, changed, tmp_path / "gone.npz"):
         with pytest.raises(BiogripError, match=f"{file.name}: cannot be read"):
             read_measurements(file)

@@ -37,11 +37,11 @@ def study() -> Study:
 
 
 def test_one_that_changes_nothing_finds_what_the_study_finds(study: Study, tmp_path: Path) -> None:
-    target, measured, ours_file = (tmp_path / name for name in ("t.csv", "m.parquet", "ours.csv"))
+    target, measured, ours_file = (tmp_path / name for name in ("t.csv", "m.npz", "ours.csv"))
     case = study.case(CASE)
     simulate(case, target)
     measure(case, range(3), target, measured)
-    others = tmp_path / "h.parquet", tmp_path / "times.csv"
+    others = tmp_path / "h.npz", tmp_path / "times.csv"
     identify(case, "genetic", range(3), measured, [], ours_file, *others)
     interpreted = tmp_path / f"{CASE}.csv"
     identify_interpreted(case, target, interpreted)

@@ -12,8 +12,8 @@ from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import Phase, Sampling, hold
 from biogrip.records.identifications import columns
-from biogrip.records.rows import write_rows
-from biogrip.records.traces import read_jaw_force, read_target
+from biogrip.records.rows import read_arrays, write_arrays, write_rows
+from biogrip.records.traces import read_target
 from biogrip.stages import identification as identifications
 from biogrip.stages import judgement, recording
 from biogrip.stages import targets as target
@@ -56,13 +56,13 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     said = capsys.readouterr()
     assert "biogrip: warning: Drop: under this protocol the jaws would have to pull" in said.out
     assert "from 100 s on" in said.err
-    time_s, _, force = read_jaw_force(file)
+    time_s, _, bilateral = read_target(file)
+    force = pd.read_csv(file)["jaw_force_N"].to_numpy()
     assert np.all(force[time_s < 100] >= 0)
     assert force[time_s > 100].max() < 0
-    bilateral = read_target(file)[2]
     target.simulate(drop(1e-9, hold(100.0, 1e-10), unilateral=True), file)
     assert "contact is lost there, which its identification ignores" in capsys.readouterr().out
-    time_s, _, force = read_jaw_force(file)
+    force = pd.read_csv(file)["jaw_force_N"].to_numpy()
     assert np.all(force[time_s > 100] == 0)
     rotation = read_target(file)[2]
     # Left to their hinges, the arms open at once.
@@ -85,13 +85,13 @@ def test_what_is_left_from_a_larger_study_is_not_joined(tmp_path: Path) -> None:
             rows = [("drop", method, seed, *range(len(columns(model)) - 3)) for seed in some]
             write_rows(batch.with_suffix(".csv"), columns(model), rows)
             values = {"method": [method] * len(some), "seed": list(some)}
-            pd.DataFrame(values).to_parquet(batch.with_suffix(".parquet"))
+            write_arrays(batch.with_suffix(".npz"), values)
 
     def joined() -> tuple[pd.DataFrame, pd.DataFrame]:
-        files, histories = ([b.with_suffix(s) for b in batches] for s in (".csv", ".parquet"))
-        made, history = tmp_path / "all.csv", tmp_path / "all.parquet"
+        files, histories = ([b.with_suffix(s) for b in batches] for s in (".csv", ".npz"))
+        made, history = tmp_path / "all.csv", tmp_path / "all.npz"
         identifications.join(case, files, histories, made, history)
-        return pd.read_csv(made), pd.read_parquet(history)
+        return pd.read_csv(made), pd.DataFrame(read_arrays(history))
 
     written(((0, 1), (2, 3), (0, 1, 2)))
     for found in joined():
@@ -109,12 +109,12 @@ def test_all_stages_weight_the_readings(tmp_path: Path) -> None:
     case = study_of(
         f"cases: {{mine: {{sample: {{model: liquid_drop}}, measurement: {file}}}}}"
     ).cases["mine"]
-    traces, verdicts = tmp_path / "t.parquet", tmp_path / "v.json"
+    traces, verdicts = tmp_path / "t.npz", tmp_path / "v.json"
     recording.record(case, EXAMPLE, traces)
     judgement.judge(case, traces, [], verdicts)
     judged = json.loads(verdicts.read_text())
     assert judged["threshold"] == pytest.approx(3.8415, abs=1e-4)
-    outputs = [tmp_path / name for name in ("p.csv", "h.parquet", "t.csv")]
+    outputs = [tmp_path / name for name in ("p.csv", "h.npz", "t.csv")]
     identifications.identify(case, "least_squares", range(1), traces, [], *outputs)
     (found,) = pd.read_csv(outputs[0]).itertuples()
     assert found.misfit == pytest.approx(judged["misfit"], rel=1e-4)

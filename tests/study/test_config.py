@@ -1,17 +1,25 @@
+"""Configs: what they mean, what is refused with its line, and the schema that follows."""
+
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from biogrip.errors import BiogripError
+from biogrip.fit.methods import METHODS
 from biogrip.physics.gripper import torque
+from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.load import load_study
-from biogrip.study.source import overlaid, read_config
+from biogrip.study.source import LARGEST_BYTES, overlaid, read_config, read_source
 from biogrip.study.study import Study
-from tests.helpers.places import CONFIG
+from tests.helpers.key_reference import STUDY, file_schema, leaves
+from tests.helpers.places import CONFIG, ROOT
 
+SCHEMA: dict[str, Any] = json.loads(file_schema())
 DROP = "sample: {model: liquid_drop, k: 1.0, k_p: 1.0, c: 1.0}"
 
 
@@ -168,3 +176,94 @@ def test_numbers_of_the_command_line_are_numbers() -> None:
     assert (case.sampling.rate_Hz, case.block.measurement.drift) == (10.0, False)
     assert [phase.duration_s for phase in case.phases] == [200.0]
     assert (case.title, case.parameters["k"]) == ("5", 9.0)
+
+
+BOMB = "\n".join(f"a{i}: &a{i} [{f'*a{i - 1}, ' * 10 if i else 'x'}]" for i in range(30))
+
+UNREADABLE: dict[str, tuple[str | bytes, str]] = {
+    "latin 1": (b"seeds: 1\n# \xe9\n", r"line 2: found the byte 0xe9, allowed is text in UTF-8"),
+    "a program": (b"\x7fELF\x02\x01\x01" + bytes(99), r"not valid YAML: .*not allowed"),
+    "aliases of aliases": (BOMB, r"line \d+: found more than 50 levels or 100000 values, those of"),
+    "large": ("# " + "x" * LARGEST_BYTES, r"my.yaml: found more than 1000000 bytes; allowed are"),
+    "tag": ("a: !!python/object/apply:os.system [x]", r"line 1: not valid YAML: could not"),
+    "sexagesimal": (
+        "study_seed: 2\nseeds: 1:30",
+        r"line 2: seeds: found 1:30, which YAML reads in base 60; allowed is a number without col",
+    ),
+    "octal": ("seeds: 010", r"line 1: seeds: found 010, which YAML reads in base 8; allowed is a"),
+    "date": ("cases: {x: {title: 2020-01-01}}", r"cases.x.title: found 2020-01-01, which YAML re"),
+    "number as a key": ("cases: {1: {}}", r"line 1: cases.1: is no text: YAML reads on, off, yes"),
+    "list as a key": ("? [a, b]\n: c", r"line 1: .* is no text"),
+    "two documents": ("seeds: 1\n---\nseeds: 2", r"line 2: not valid YAML: but found another docu"),
+    "list of all": ("[1, 2]", r"line 1: found no keys, allowed is a config"),
+    "given twice": ("seeds: 1\nseeds: 2", r"line 2: seeds: is given twice, first in line 1"),
+    "code": ("__use_yte__: true\nseeds: ?1+1", r"line 1: __use_yte__ makes Snakemake run code"),
+    "open": ("seeds: [1\n", r"line 2: not valid YAML"),
+}
+
+
+@pytest.mark.parametrize("name", UNREADABLE)
+def test_what_cannot_be_read_is_refused_with_its_line(tmp_path: Path, name: str) -> None:
+    content, message = UNREADABLE[name]
+    file = tmp_path / "my.yaml"
+    file.write_bytes(content if isinstance(content, bytes) else content.encode())
+    for read in (read_config, read_source):
+        with pytest.raises(BiogripError, match=r"my\.yaml") as caught:
+            read(file)
+        assert re.search(message, str(caught.value)), caught.value
+
+
+def test_a_config_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BiogripError, match=r"nowhere.yaml: cannot be read: No such file"):
+        load_study({}, [tmp_path / "nowhere.yaml"])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("\ufeffseeds: 90", "seeds: 0x5a", "seeds: 9_0", "seeds: '9e1'", "seeds: 9e1"),
+        *("seeds: '90'", "seeds: &a 90\nbatch_size: *a", '{"seeds": 90}', "---\nseeds: 90\n...\n"),
+        "seeds: 90\ngripper: {<<: {arm_length_m: 1e-3}, jaw_gap_m: 1e-4}",
+        "seeds: 90\nmeasurement: {offset: null}",
+    ],
+)
+def test_what_is_unusual_but_clear_works(tmp_path: Path, text: str) -> None:
+    assert {case.seeds for case in load(tmp_path, text).cases.values()} == {90}
+
+
+@pytest.mark.parametrize("file", sorted(CONFIG.parent.glob("*.yaml")), ids=lambda it: it.stem)
+def test_the_shipped_studies_load_and_the_schema_knows_them(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)
+    Draft202012Validator.check_schema(SCHEMA)
+    assert [e.message for e in Draft202012Validator(SCHEMA).iter_errors(read_config(file))] == []
+    assert load_study(overlaid(read_config(CONFIG), read_config(file)), [CONFIG, file]).cases
+
+
+def test_every_key_says_what_it_means() -> None:
+    known = leaves(STUDY)
+    assert len(known) > 80
+    assert [path for path, shape in known.items() if not shape.get("description")] == []
+
+
+def test_every_number_has_bounds() -> None:
+    kinds = ("integer", "number")
+    numbers = {path: key.node for path, key in leaves(STUDY).items() if key.get("type") in kinds}
+    assert len(numbers) > 40
+    assert [path for path, node in numbers.items() if "maximum" not in node] == []
+    assert [p for p, node in numbers.items() if not {*node} & {"minimum", "exclusiveMinimum"}] == []
+
+
+def test_every_block_refuses_unknown_keys() -> None:
+    """All but those that take names of the user's or of a model's."""
+    blocks = {"": SCHEMA, **SCHEMA["$defs"]}
+    with_keys = {name: block for name, block in blocks.items() if "properties" in block}
+    open_ = [n for n, b in with_keys.items() if b.get("additionalProperties") is not False]
+    assert sorted(open_) == ["SampleBlock", "ValueBlock"]
+
+
+def test_a_case_may_override_the_blocks_of_the_study_and_of_every_method() -> None:
+    methods = {block for method in METHODS.values() for block in method.blocks}
+    assert methods < set(OVERRIDABLE)
+    assert set(OVERRIDABLE) == set(STUDY.keys["cases"].values.keys) & set(STUDY.keys)

@@ -24,10 +24,11 @@ from biogrip.physics.protocol import (
     torque_history,
 )
 from biogrip.physics.whitening import nuisance_basis
+from biogrip.traces.any_sample import proportional_deviations
 from biogrip.traces.columns import Columns
 from biogrip.traces.plausibility import check_recording, free_rotation
 from biogrip.traces.reader import Recording
-from tests.helpers.problems import GRIPPER, TORQUE
+from tests.helpers.problems import GRIPPER, TORQUE, clean
 
 UNEQUAL = Gripper(1.5e-3, 75.0, Arm(1.0e-14, 3.3e-12, 4.4e-7), Arm(1.3e-14, 2.5e-12, 5.5e-7))
 SI = Columns("time_s", "rotation_rad")
@@ -159,16 +160,6 @@ def test_a_noise_in_another_unit_is_named_beside_the_readings() -> None:
     assert re.search(r"Given were 0.045 rad as noise; the peak is \S+ rad\.", text)
 
 
-@pytest.mark.nightly
-def test_noise_is_taken_for_a_response_as_rarely_as_said() -> None:
-    times, rng = sample_times(400.0, 0.1), np.random.default_rng(6)
-    taken = 0
-    for _ in range(5000):
-        found = said(times, 1e-3 * rng.standard_normal(len(times)))
-        taken += NO_RESPONSE not in found
-    assert taken <= 12
-
-
 @pytest.mark.parametrize("value", [0.0, 1e-3, -1e-3, 5.0])
 @pytest.mark.parametrize("sigma", [0.0, 0.03])
 def test_a_constant_is_no_response(value: float, sigma: float) -> None:
@@ -222,16 +213,6 @@ def test_the_free_rotation_is_that_of_the_left_arm() -> None:
     ):
         found = free_rotation(UNEQUAL, torque_history(phases))
         assert found == pytest.approx(largest_rad, rel=2e-3)
-
-
-def test_no_sample_lets_the_arm_turn_further_than_the_free_rotation() -> None:
-    rng, late = np.random.default_rng(9), np.array([1e4])
-    for left, right in ((1e-9, 2e-9), (2e-9, -1e-9), (0.0, 1e-9)):
-        torque = torque_history((hold(1e4, left, right),))
-        samples = [tuple(10 ** rng.uniform(-4, 4, 4)) for _ in range(60)]
-        turned = [abs(trace(each, late, UNEQUAL, torque)[0]) for each in samples]
-        largest = free_rotation(UNEQUAL, torque)
-        assert 0.9 * largest < max(turned) <= largest * (1 + 1e-9)
 
 
 @pytest.mark.parametrize(
@@ -365,3 +346,45 @@ def test_a_mirrored_trace_is_refused_with_its_place_and_a_hint() -> None:
     )
     noise = 0.1 * values.max() * np.random.default_rng(0).standard_normal(len(TIMES))
     assert MIRRORED in said(TIMES, noise - values, noise_rad=0.1 * values.max())
+
+
+CLEAN_S, CLEAN = clean("endothelial_cell", 2.0)
+NONE = nuisance_basis(CLEAN_S, offset=False, drift=False)
+
+
+def test_deviations_follow_the_rotation_without_its_noise() -> None:
+    """Each reading has noise of 5 %; the smooth rotation is known far better."""
+    rng = np.random.default_rng(0)
+    trace = CLEAN * (1 + 0.05 * rng.standard_normal(len(CLEAN_S)))
+    found = proportional_deviations(CLEAN_S, trace, GRIPPER, TORQUE, NONE, 0.05)
+    large = np.quantile(CLEAN, 0.1) < CLEAN
+    errors = np.abs(found[large] / (0.05 * CLEAN[large]) - 1)
+    assert np.median(errors) < 0.05 / 3
+    assert np.quantile(errors, 0.99) < 0.05
+
+
+def test_no_reading_is_certain() -> None:
+    """Of a trace without noise: the first rotation is zero, and counts as one of the smallest."""
+    assert CLEAN[0] == 0
+    found = proportional_deviations(CLEAN_S, CLEAN, GRIPPER, TORQUE, NONE, 0.05)
+    smallest = np.sort(CLEAN)[: len(CLEAN) // 10]
+    assert found.min() == pytest.approx(0.05 * np.median(smallest), rel=0.01)
+
+
+def test_other_noise_shows_where_the_rotation_is_small() -> None:
+    rng = np.random.default_rng(1)
+    floor = 0.3 * float(CLEAN.max())
+    trace = CLEAN + floor * rng.standard_normal(len(CLEAN_S))
+    found = proportional_deviations(CLEAN_S, trace, GRIPPER, TORQUE, NONE, 1e-3)
+    # Some eighty readings tell the scatter.
+    assert found.min() == pytest.approx(floor, rel=0.3)
+    given = proportional_deviations(CLEAN_S, CLEAN, GRIPPER, TORQUE, NONE, 0.05, floor)
+    np.testing.assert_allclose(given, np.hypot(0.05 * CLEAN, floor), rtol=1e-3)
+
+
+def test_an_offset_is_not_rotation() -> None:
+    offset = nuisance_basis(CLEAN_S, offset=True, drift=False)
+    trace = CLEAN + 3 * CLEAN.max()
+    found = proportional_deviations(CLEAN_S, trace, GRIPPER, TORQUE, offset, 0.05)
+    large = np.quantile(CLEAN, 0.2) < CLEAN
+    np.testing.assert_allclose(found[large], 0.05 * CLEAN[large], rtol=0.1)

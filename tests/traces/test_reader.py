@@ -84,24 +84,6 @@ def test_a_kept_file_is_read_or_refused_as_its_table_says(
         assert first_last_sum(found.sd_rad) == pytest.approx(kept["sd"], rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("file", "encoding", "time", "reading"),
-    [
-        ("anton_paar_intervals.utf16.csv", "utf-16", "Time", "Relaxation Modulus"),
-        ("trios.txt", "utf-8", "Step time", "Modulus"),
-    ],
-)
-def test_a_table_between_commas_is_that_between_tabs(
-    tmp_path: Path, file: str, encoding: str, time: str, reading: str
-) -> None:
-    columns = columns_of({"time": time, "reading": reading, "quantity": "modulus", "block": 3})
-    text = (FILES / file).read_bytes().decode(encoding)
-    (tmp_path / "t.csv").write_text(text.replace(",", ".").replace("\t", ","), "utf-8")
-    tabs, commas = (read_recording(path, columns) for path in (FILES / file, tmp_path / "t.csv"))
-    for name in ("time_s", "rotation_rad", "lines"):
-        np.testing.assert_array_equal(getattr(commas, name), getattr(tabs, name))
-
-
 GAPS = ("", "NaN", "NA", "N/A", "-", '""', '" nan "', "n/a", "#N/A", "#NV", " ", "nan, ")
 NO_NUMBERS = ("abc", "1_0", "1.2.3", "0x1", "--", "1 2", "inf", "-1e999", "\0", '"3,5"', "#BEZUG!")
 
@@ -251,12 +233,7 @@ def test_a_unit_is_read_off_a_name_or_a_row_of_units_or_stated(written: str) -> 
     [
         ("x_s", None, "", "found no unit, neither stated (by HOW) nor"),
         ("phi_left", None, "", "found no unit"),
-        (
-            "phi (rad/s)",
-            None,
-            "",
-            "found the unit 'rad/s' at the end of the name; allowed are rad,",
-        ),
+        ("phi (rad/s)", None, "", "found the unit 'rad/s' at the end of the name; allowed"),
         ("phi / mm", None, "", "found the unit 'mm' at the end of the name; allowed are rad, mrad"),
         ("phi_Mrad", None, "", "found no unit"),
         ("phi", None, "[V]", "found no unit (but '[V]' below it)"),
@@ -280,15 +257,7 @@ def test_a_strain_without_a_unit_is_a_pure_number(name: str) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "Strain (a.u.)",
-        "Strain [10^-6]",
-        "strain_foo",
-        "1000*strain",
-        "Strain x1000",
-        "Strain/V",
-        "2",
-    ],
+    ["Strain (a.u.)", "Strain [10^-6]", "1000*strain", "Strain x1000", "Strain/V", "2"],
 )
 def test_a_strain_that_may_have_an_unknown_unit_is_refused(name: str) -> None:
     with pytest.raises(BiogripError, match=r"allowed are 1, %, ‰, ppm"):
@@ -408,10 +377,3 @@ def test_a_damaged_file_is_refused_or_leaves_a_trace(kept: dict[str, Any], tmp_p
             assert np.all(np.isfinite(found.rotation_rad))
             read += 1
     assert 0 < read < 60
-
-
-def test_random_bytes_are_refused(tmp_path: Path) -> None:
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        (tmp_path / "t.csv").write_bytes(rng.bytes(int(rng.integers(1, 5000))))
-        refusal(tmp_path / "t.csv")

@@ -54,7 +54,7 @@ use rule * from biogrip as biogrip_*
 use rule measurement from biogrip as biogrip_measurement with:
     resources: mem_mb=4321
     message: "Measuring with {{resources.mem_mb}} MB"
-    output: measurements="elsewhere/{{case}}/{{batch}}.parquet"
+    output: measurements="elsewhere/{{case}}/{{batch}}.npz"
 
 assert config == BEFORE
 
@@ -62,7 +62,7 @@ rule mine:
     output: "mine.txt"
     shell: "command -v python > {{output}}"
 """
-    run = host(tmp_path, text, "--", "elsewhere/liquid_drop_2/seeds_0-0.parquet", "mine.txt")
+    run = host(tmp_path, text, "--", "elsewhere/liquid_drop_2/seeds_0-0.npz", "mine.txt")
     assert run.status == 0, run.output
     assert "Measuring with 4321 MB" in run.output
     assert sorted(path.name for path in tmp_path.iterdir()) == [

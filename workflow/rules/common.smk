@@ -78,7 +78,7 @@ def of_case(pattern, cases=STUDY.cases):
 
 def first_traces(cases):
     """The files of measurements with the traces that are judged."""
-    return [files("results/measurements/{case}/{batch}.parquet", [case])[0] for case in cases]
+    return [files("results/measurements/{case}/{batch}.npz", [case])[0] for case in cases]
 
 
 def names(cases):

@@ -12,8 +12,8 @@ def case_figures(simulated, valley):
 rule case_figures:
     input:
         identifications="results/identifications/{case}.csv",
-        history="results/histories/{case}.parquet",
-        measurements=of_case("results/measurements/{case}/{batch}.parquet"),
+        history="results/histories/{case}.npz",
+        measurements=of_case("results/measurements/{case}/{batch}.npz"),
         verdicts="results/identifiability/{case}.json",
         expected=of_case("results/identifiability/expected/{case}.json", STUDY.simulated),
         target=of_case("results/targets/{case}.csv", STUDY.simulated),
@@ -61,7 +61,7 @@ rule figures:
         identifications=files("results/identifications/{case}.csv", STUDY.simulated),
         targets=files("results/targets/{case}.csv", STUDY.simulated),
         expected=files("results/identifiability/expected/{case}.json", STUDY.simulated),
-        measurements=files("results/measurements/{case}/{batch}.parquet", STUDY.simulated[:1]),
+        measurements=files("results/measurements/{case}/{batch}.npz", STUDY.simulated[:1]),
         calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
         differences="results/linearisation.csv" if STUDY.gripped else [],
         answered=[*files("results/identifiability/{case}.json", ANSWERED), *first_traces(ANSWERED)],

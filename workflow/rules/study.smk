@@ -24,7 +24,7 @@ rule measurement:
     input:
         target="results/targets/{case}.csv",
     output:
-        measurements="results/measurements/{case}/{batch}.parquet",
+        measurements="results/measurements/{case}/{batch}.npz",
     log:
         "results/logs/measurement/{case}/{batch}.log",
     wildcard_constraints:
@@ -41,7 +41,7 @@ rule recording:
     input:
         recorded=lambda wildcards: STUDY.case(wildcards.case).file,
     output:
-        measurements="results/measurements/{case}/seeds_0-0.parquet",
+        measurements="results/measurements/{case}/seeds_0-0.npz",
     log:
         "results/logs/recording/{case}.log",
     wildcard_constraints:
@@ -57,7 +57,7 @@ rule recording:
 rule calibration:
     output:
         gripper="results/calibrations/{case}.yaml",
-        records="results/calibrations/{case}.parquet",
+        records="results/calibrations/{case}.npz",
     log:
         "results/logs/calibration/{case}.log",
     wildcard_constraints:
@@ -75,11 +75,11 @@ rule calibration:
 
 rule identification:
     input:
-        measurements="results/measurements/{case}/{batch}.parquet",
+        measurements="results/measurements/{case}/{batch}.npz",
         calibrated=calibration_of,
     output:
         parameters="results/identifications/{case}/{method}/{batch}.csv",
-        history="results/histories/{case}/{method}/{batch}.parquet",
+        history="results/histories/{case}/{method}/{batch}.npz",
         timing="results/timings/{case}/{method}/{batch}.csv",
     log:
         "results/logs/identification/{case}/{method}/{batch}.log",
@@ -147,7 +147,7 @@ rule intervals:
 
 rule model_fits:
     input:
-        measurements="results/measurements/{case}/{batch}.parquet",
+        measurements="results/measurements/{case}/{batch}.npz",
         calibrated=calibration_of,
     output:
         fits="results/selection/{case}/{batch}.csv",

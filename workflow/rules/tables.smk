@@ -4,14 +4,14 @@
 rule case_tables:
     input:
         batches=of_case("results/identifications/{case}/{method}/{batch}.csv"),
-        histories=of_case("results/histories/{case}/{method}/{batch}.parquet"),
-        measurements=of_case("results/measurements/{case}/{batch}.parquet", STUDY.simulated),
+        histories=of_case("results/histories/{case}/{method}/{batch}.npz"),
+        measurements=of_case("results/measurements/{case}/{batch}.npz", STUDY.simulated),
         calibrated=calibration_of,
         verdicts="results/identifiability/{case}.json",
         expected=of_case("results/identifiability/expected/{case}.json", STUDY.simulated),
     output:
         identifications="results/identifications/{case}.csv",
-        history="results/histories/{case}.parquet",
+        history="results/histories/{case}.npz",
         errors=table("errors", "{case}"),
         verdicts=table("verdicts", "{case}"),
     log:
@@ -51,7 +51,7 @@ rule tables:
         identifications=files("results/identifications/{case}.csv", STUDY.cases),
         targets=files("results/targets/{case}.csv", STUDY.simulated),
         intervals=files("results/coverage/{case}/{batch}.csv", STUDY.covered),
-        measurements=files("results/measurements/{case}/{batch}.parquet", STUDY.cases),
+        measurements=files("results/measurements/{case}/{batch}.npz", STUDY.cases),
         calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
         differences="results/linearisation.csv" if STUDY.gripped else [],
     output:
@@ -72,7 +72,7 @@ rule tables:
 rule claims:
     input:
         identifications=files("results/identifications/{case}.csv", STUDY.published),
-        histories=files("results/histories/{case}.parquet", STUDY.published),
+        histories=files("results/histories/{case}.npz", STUDY.published),
         tables=[f"results/tables/{name}.csv" for name in TABLES]
         + files("results/tables/verdicts_{case}.csv", STUDY.cases),
         # As published, since these sweeps take longer than the study.

@@ -6,8 +6,7 @@ from biogrip.figures import gripper as actuator
 from biogrip.figures import gripper as linkage
 from biogrip.figures import mechanics as linearisation
 from biogrip.figures import moduli, overview
-from biogrip.figures.answer import draw_answer
-from biogrip.figures.overview import shown_cases
+from biogrip.figures.overview import draw_answer, shown_cases
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
 

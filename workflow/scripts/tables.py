@@ -42,7 +42,6 @@ with logged(snakemake):
             published,
             of(published, "identifications"),
             [file for file in given["measurements"] if file.parent.name in axes],
-            of(published, "targets"),
         ),
         "printed_values": lambda: evidence.printed_values(published),
         "sampling_evidence": lambda: evidence.sampling_evidence(published),

@@ -96,7 +96,7 @@ def seeds_in_words(count: int) -> str:
 def read_history(
     path: Path, method: str, shown: Sequence[int], values: Sequence[str] = ("best_misfit",)
 ) -> pd.DataFrame:
-    """Read one method's histories of the seeds drawn individually and of those shown, Parquet."""
+    """Read one method's histories of the seeds drawn individually and of those shown."""
     chosen = {*range(SHOWN_SEEDS), *shown}
     return read_histories(path, method, values, lambda seed: seed.isin(chosen))
 

@@ -16,6 +16,9 @@ from biogrip.physics.sample_model import SampleModel
 # a hundredth above that of the next branch by 1.
 _WITHIN, _IN_ORDER = 10.0, 100.0
 
+PROVIDED = "provided that the branch, k and c in series, relaxes within the experiment"
+"""Condition of a sum of dampers, in the sentences of tables and pages."""
+
 
 @dataclass(frozen=True)
 class BranchPenalty:

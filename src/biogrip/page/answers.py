@@ -6,24 +6,26 @@ from contextlib import suppress
 
 from biogrip.digits import legible, plain, with_unit
 from biogrip.fit.methods import ALL, share_with_limits
+from biogrip.judging.quantities import PROVIDED
 from biogrip.judging.verdicts import DETERMINED
 
 Row = Mapping[str, str]
-
-_BEST = "the least misfit that its digits can encode"
 
 
 def say_what_the_study_gives(
     methods: Iterable[Row], shown: str, titles: Mapping[str, str], who: str
 ) -> str:
-    """Say in which share of each case's traces the study's own method finds what it can encode.
+    """Say in which share of each case's traces the study's own method finds what genes can encode.
 
     Rows are those of the table of methods; `shown` is the title of that method, which `who` stands
     before. It is "" if no case is simulated.
     """
     rows = [row for row in methods if row["method"] == shown]
     shares = [f"{share_of(row)} on “{titles[row['case']]}”" for row in rows]
-    return f"{who} {shown} reaches {_BEST} in these runs: {_listed(shares)}." if shares else ""
+    if not rows:
+        return ""
+    shares[0] = shares[0].replace("(", f"of {rows[0]['seeds']} runs (95 %: ", 1)
+    return f"{who} {shown} finds the best fit it can represent in {_listed(shares)}."
 
 
 def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
@@ -34,8 +36,7 @@ def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
     always = [name for name, each in decided.items() if all(each)]
     never = [name for name, each in decided.items() if not any(each)]
     some = {name: each for name, each in decided.items() if any(each) and not all(each)}
-    provided = ", provided that the branch relaxes within the experiment"
-    provided *= any(" + " in name for name in always)
+    provided = f", {PROVIDED}" * any(" + " in name for name in always)
     parts = [f"always determines {_listed(always)}{provided}"] if always else []
     parts += [f"never determines {_listed(never)}"] if never else []
     if some:
@@ -63,7 +64,7 @@ def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
     least, *more = sorted(found[surest], key=lambda row: float(row["reached_share"]))
     at_least = "at least " * (more != [] and share_of(least) != share_of(more[-1]))
     said = (
-        f"{surest[:1].upper()}{surest[1:]} reaches it, or less misfit, in {at_least}"
+        f"{surest[:1].upper()}{surest[1:]} finds a fit at least as good in {at_least}"
         f"{share_of(least)} of the runs on {'each' if more else 'the'} sample, with "
         f"{_responses(found[surest])} simulated responses"
     )
@@ -75,9 +76,9 @@ def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
 def compared_rows(
     errors: Iterable[Row], verdicts: Iterable[Row], titles: Mapping[str, str]
 ) -> list[dict[str, str]]:
-    """Return the paper's results beside the study's, by basin where there are two.
+    """Return the paper's results beside the study's, of `basins` where there are two.
 
-    Quantities that no trace determines are left out. Rows are those of the tables of errors and
+    Quantities that no case determines are left out. Rows are those of the tables of errors and
     verdicts, titles those of the cases.
     """
     decided = {row["quantity"] for row in verdicts if row["verdict"] == DETERMINED}
@@ -102,7 +103,6 @@ def compared_rows(
 
 
 def _runs(row: Row, runs: int) -> str:
-    """Return the share of runs in a basin, with its 95 % interval."""
     if row["basin"] == ALL:
         return ALL
     return f"{_percent(*share_with_limits(int(row['seeds']), runs))} {row['basin']}"
@@ -124,7 +124,6 @@ def _responses(rows: Iterable[Row]) -> str:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Return names with commas, and an "and" before the last."""
     *others, last = names
     return f"{', '.join(others)} and {last}" if others else last
 

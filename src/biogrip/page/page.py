@@ -23,6 +23,7 @@ from biogrip.records.rows import read_table
 from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import target_of
+from biogrip.tables.claims import count_verdicts
 
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
@@ -94,13 +95,15 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
     for case, found, measured in zip(*of_cases, strict=True):
         calibrated = [path for path in files["calibrated"] if path.stem == case.name]
         traces.append((case.title, fits_of(case, methods, found, measured, calibrated)))
-    errors, judged, compared = (
+    errors, judged, compared, claimed = (
         [row for csv in files["downloads"] if csv.name.startswith(name) for row in read_table(csv)]
-        for name in ("errors.csv", "verdicts_", "methods.csv")
+        for name in ("errors.csv", "verdicts_", "methods.csv", "claims.csv")
     )
-    tables = []
+    tables: list[Entry] = []
     for path, csv in zip(files["tables"], files["downloads"], strict=True):
         entry, download = entry_of(path, owners, texts), _url("text/csv", csv.read_bytes())
+        if entry.caption in (it.caption for it in tables):
+            entry = replace(entry, caption="")
         tables.append(replace(entry, content=_table(path, titles), download=download))
     figures = [
         replace(entry_of(path, owners, texts), content=image, size=size)
@@ -121,8 +124,9 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
             explorer=explorer(traces),
             answers=[
                 answers.say_what_the_study_gives(*asked, titles, who),
-                answers.say_what_traces_tell(judged),
                 answers.say_which_method_finds_it(*asked),
+                answers.say_what_traces_tell(judged),
+                count_verdicts(row["verdict"] for row in claimed),
             ],
             compared=answers.compared_rows(errors, judged, titles),
             cases=list(zip(cases, map(read_verdicts, files["verdicts"]), strict=True)),
@@ -184,13 +188,7 @@ def _as_in_paper(figures: Sequence[Entry], published: Sequence[Case]) -> list[En
 
 
 def _images(paths: Sequence[Path]) -> Iterator[tuple[str | None, tuple[int, int]]]:
-    """Yield images of at most 256 colours, None when there is no more room, and their sizes.
-
-    Raises
-    ------
-    BiogripError
-        If one cannot be read.
-    """
+    """Yield images of at most 256 colours, None when there is no more room, and their sizes."""
     room = _MOST_PICTURE_LETTERS
     for path in paths:
         packed = BytesIO()

@@ -28,10 +28,11 @@ from biogrip.judging.doubts import (
 from biogrip.physics.sample_model import SINGLE_BRANCH, Parameter, SampleModel
 from biogrip.records.rows import (
     RowFile,
+    join_arrays,
+    read_arrays,
     read_frame,
     read_object,
-    read_parquet,
-    write_parquet,
+    write_arrays,
     write_rows,
 )
 
@@ -156,15 +157,11 @@ def write_identifications(path: Path, records: list[Record]) -> None:
 
 
 def write_histories(path: Path, records: list[Record]) -> None:
-    """Write one row per seed and generation as Parquet, with eight significant digits."""
-    import pandas as pd
-
-    write_parquet(path, pd.concat(map(_history, records)))
+    """Write columns of a row per seed and generation as npz, with eight significant digits."""
+    write_arrays(path, join_arrays([_history(record) for record in records]))
 
 
-def _history(record: Record) -> "pd.DataFrame":
-    import pandas as pd
-
+def _history(record: Record) -> dict[str, Array]:
     history = record.answer.history
     generations = len(history.best_misfit)
     found = {
@@ -172,19 +169,16 @@ def _history(record: Record) -> "pd.DataFrame":
         "median_misfit": history.median_misfit,
         **record.by_column(history.best_parameters.T),
     }
-    return pd.DataFrame(
-        {
-            "case": record.case,
-            "method": record.method,
-            "seed": record.seed,
-            "generation": np.arange(generations),
-            "evaluations": history.evaluations,
-            **{
-                name: significant(np.broadcast_to(values, generations), _DIGITS)
-                for name, values in found.items()
-            },
-        }
-    )
+    return {
+        "method": np.full(generations, record.method),
+        "seed": np.full(generations, record.seed),
+        "generation": np.arange(generations),
+        "evaluations": np.asarray(history.evaluations),
+        **{
+            name: significant(np.broadcast_to(values, generations), _DIGITS)
+            for name, values in found.items()
+        },
+    }
 
 
 def write_timings(path: Path, records: list[Record]) -> None:
@@ -210,9 +204,11 @@ def read_histories(
     chosen: "Callable[[pd.Series[int]], pd.Series[bool]]" = lambda seed: seed >= 0,
 ) -> "pd.DataFrame":
     """Read columns of one method's histories of the chosen seeds."""
-    names = ["seed", "generation", *values]
-    frame = read_parquet(path, names, [("method", "==", method)])
-    return frame[chosen(frame["seed"])].reset_index(drop=True)
+    import pandas as pd
+
+    frame = pd.DataFrame(read_arrays(path))
+    kept = (frame["method"] == method) & chosen(frame["seed"])
+    return frame.loc[kept, ["seed", "generation", *values]].reset_index(drop=True)
 
 
 def diagnosis_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[str, Any]:

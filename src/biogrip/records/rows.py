@@ -1,4 +1,4 @@
-"""How files between rules are written and read: CSV with a header, Parquet, JSON.
+"""How files between rules are written and read: CSV with a header, arrays of NumPy, JSON.
 
 They are written atomically. Text that a spreadsheet would take for a formula is written to CSV with
 an apostrophe before it, and read without. A reader raises a `BiogripError` that names a file which
@@ -14,7 +14,11 @@ from itertools import chain
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
+import numpy as np
+
+from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.files import atomic_write
 
@@ -120,26 +124,24 @@ def read_table(path: Path) -> list[dict[str, str]]:
     return [dict(zip(header, row, strict=True)) for row in rows]
 
 
-def write_parquet(path: Path, columns: "Mapping[str, Any] | pd.DataFrame") -> None:
-    """Write columns, (n_rows,) each or the same in every row, as Parquet."""
-    import pandas as pd
-
-    with atomic_write(path) as scratch:
-        pd.DataFrame(columns).to_parquet(scratch, index=False)
+def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
+    """Write arrays of numbers or text as NumPy's npz, whose bytes they alone determine."""
+    with atomic_write(path) as scratch, scratch.open("wb") as stream:
+        np.savez(stream, **arrays)
 
 
-def read_parquet(
-    path: Path,
-    columns: Sequence[str] | None = None,
-    filters: Sequence[tuple[str, str, Any]] | None = None,
-) -> "pd.DataFrame":
-    """Read all or some columns of a Parquet file, of all rows or those of pandas' filters."""
-    import pandas as pd
-
+def read_arrays(path: Path) -> dict[str, Array]:
+    """Read all arrays of an npz."""
     try:
-        return pd.read_parquet(path, columns=columns, filters=filters)
-    except (OSError, TypeError, ValueError) as error:
+        with np.load(path) as arrays:
+            return dict(arrays)
+    except (OSError, ValueError, EOFError, BadZipFile) as error:
         raise BiogripError(f"{path}: cannot be read: {error}.") from error
+
+
+def join_arrays(several: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    """Join arrays of the same names end to end."""
+    return {name: np.concatenate([each[name] for each in several]) for name in several[0]}
 
 
 def read_object(path: Path, kind: str, keys: Set[str], lacking: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Files of targets, CSV, and of measurements, Parquet: traces without and with noise."""
+"""Files of targets, CSV, and of measurements, npz: traces without and with noise."""
 
 import math
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from biogrip.arrays import Array
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import INSTRUMENTS, Instrument
-from biogrip.records.rows import read_parquet, write_parquet, write_rows
+from biogrip.records.rows import read_arrays, write_arrays, write_rows
 from biogrip.traces.reader import Recognised
 
 TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
@@ -21,8 +21,6 @@ _WITHOUT_JAWS = {
     for each in INSTRUMENTS.values()
     if not each.has_jaws
 }
-# Prefix of a seed's column.
-_SEED = "seed_"
 # More than any instrument gives, and few enough that results on different processors agree.
 _DIGITS = 9
 _WRITTEN = f"{{:.{_DIGITS - 1}e}}"
@@ -92,17 +90,6 @@ def as_written(rotation_rad: Array) -> Array:
 
 def read_target(path: Path) -> tuple[Array, Array, Array]:
     """Read time, what is controlled and what is read of a target, all of them finite."""
-    time_s, controlled, read, *_ = _target_columns(path)
-    return time_s, controlled, read
-
-
-def read_jaw_force(path: Path) -> tuple[Array, Array, Array]:
-    """Read time, torque and jaw force of a target."""
-    time_s, torque, _, force = _target_columns(path)
-    return time_s, torque, force
-
-
-def _target_columns(path: Path) -> Array:
     # Without pandas, which most jobs that read a target do not import.
     try:
         with path.open() as stream:
@@ -121,34 +108,30 @@ def _target_columns(path: Path) -> Array:
     for row, column in np.argwhere(~np.isfinite(values))[:1]:
         place = f"{path}, line {row + 2}, {header[column]}"
         raise BiogripError(f"{place}: found {values[row, column]}, allowed is a finite number.")
-    return values.T
+    time_s, controlled, read, *_ = values.T
+    return time_s, controlled, read
 
 
 def write_measurements(path: Path, measurements: Measurements) -> None:
-    """Write noisy traces as Parquet: time_s, target and sd if known, then seed_0, ..."""
-    known = {
+    """Write noisy traces as npz: time_s, target and sd if known, seeds, traces in their order."""
+    arrays = {
         "time_s": measurements.time_s,
         "target": measurements.target_rad,
         "sd": measurements.sd_rad,
+        "seeds": list(measurements.rotation_rad),
+        "traces": list(measurements.rotation_rad.values()),
     }
-    columns = {name: values for name, values in known.items() if values is not None}
-    columns |= {f"{_SEED}{seed}": trace for seed, trace in measurements.rotation_rad.items()}
-    write_parquet(path, columns)
+    write_arrays(path, {name: values for name, values in arrays.items() if values is not None})
 
 
 def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurements:
     """Read noisy traces of all or of given seeds, which it must have."""
-    frame = read_parquet(path)
-    traces = {
-        int(name.removeprefix(_SEED)): frame[name].to_numpy(float)
-        for name in frame
-        if name.startswith(_SEED)
-    }
+    found = read_arrays(path)
+    traces = dict(zip(found["seeds"].tolist(), found["traces"], strict=True))
     if missing := set(seeds or ()) - set(traces):
-        raise BiogripError(f"{path}: has no column {_SEED}{min(missing)}.")
-    target, sd = (frame[name].to_numpy() if name in frame else None for name in ("target", "sd"))
+        raise BiogripError(f"{path}: has no trace of seed {min(missing)}.")
     chosen = traces if seeds is None else {seed: traces[seed] for seed in seeds}
-    return Measurements(frame["time_s"].to_numpy(), target, chosen, sd_rad=sd)
+    return Measurements(found["time_s"], found.get("target"), chosen, sd_rad=found.get("sd"))
 
 
 def each_trace(path: Path) -> Iterator[Array]:

@@ -14,11 +14,10 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from biogrip.arrays import parts
 from biogrip.errors import BiogripError
-from biogrip.fit.encodable import lowest_encodable
+from biogrip.fit.genome import lowest_encodable
 from biogrip.fit.methods import identifier
 from biogrip.fit.nested_fits import fit_models
 from biogrip.physics.noise import rms, stream
@@ -31,7 +30,7 @@ from biogrip.records.identifications import (
     write_identifications,
     write_timings,
 )
-from biogrip.records.rows import read_parquet, read_rows, write_parquet, write_rows
+from biogrip.records.rows import join_arrays, read_arrays, read_rows, write_arrays, write_rows
 from biogrip.records.traces import read_measurements
 from biogrip.study.study import Case
 from biogrip.terminal import Progress
@@ -104,8 +103,9 @@ def join(
             f"{methods}. Delete them and run again."
         )
     write_rows(parameters, header, rows)
-    histories = pd.concat([read_parquet(batch) for batch in history_batches])
-    write_parquet(history, histories[histories["seed"] < case.seeds])
+    histories = join_arrays([read_arrays(batch) for batch in history_batches])
+    kept = histories["seed"] < case.seeds
+    write_arrays(history, {name: values[kept] for name, values in histories.items()})
 
 
 def add_encodable(

@@ -26,7 +26,7 @@ from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import compute_grip, jaw_force, simulated_rotation
 from biogrip.physics.unilateral import unilateral_response
 from biogrip.records.identifications import DIFFERENCES
-from biogrip.records.rows import write_parquet
+from biogrip.records.rows import write_arrays
 from biogrip.records.traces import (
     Measurements,
     read_target,
@@ -100,7 +100,7 @@ def _warn_if_contact_is_lost(case: Case, network: Network, torque: TorqueHistory
 
 
 def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) -> None:
-    """Add noise of each seed in a batch to a target, CSV, and write the traces, Parquet."""
+    """Add noise of each seed in a batch to a target, CSV, and write the traces, npz."""
     time_s, _, rotation = read_target(target)
     rngs = {seed: stream(case.study.study_seed, case.name, seed, "noise") for seed in seeds}
     traces = {seed: add_noise(rotation, case.noise, rng, time_s) for seed, rng in rngs.items()}
@@ -124,7 +124,7 @@ def run(case: Case, gripper: Path, records: Path) -> None:
         )
         columns |= {f"{name}_step_rad": record.step_rad, f"{name}_impulse_rad": record.impulse_rad}
         found[name] = calibrate(record, *causes)
-    write_parquet(records, columns)
+    write_arrays(records, columns)
     write_text(gripper, calibration_yaml(found["left"], found["right"]))
 
 

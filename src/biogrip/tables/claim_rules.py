@@ -6,6 +6,7 @@ share, and the results that they are given.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -38,12 +39,14 @@ RULES = (
     f"Of shares of seeds or of compared settings, {100 * MOST:g} % and more are replicated, up to "
     f"{100 * FEW:g} % not; 95 % limits of shares of seeds are in brackets. A printed number that "
     f"the paper rounds is replicated if it is within {100 * CLOSE:g} % of ours. An identified "
-    f"value is judged by the share of the seeds within {100 * NEAR:g} % of it; if no gene that the "
-    f"paper prints encodes a value so close, no run can reach it: {OUTSIDE}. The order of "
-    "magnitude is half a decade on both sides. What is said of several samples, parameters or "
-    "numbers is judged one by one: in part if they differ, or if it holds once a misprint is put "
-    "right. It cannot be told if nothing here or in the paper can contradict it, if what it says "
-    f"was used to choose a setting, or if the study lacks what it takes, as {FEWEST_SEEDS} seeds."
+    f"value is judged by the share of the seeds within {100 * NEAR:g} % of it. It is {OUTSIDE} if "
+    "the nearest value of the genes, rounded to its digits, is another: no run can reach it; so is "
+    "an error below that of the value nearest to the target. The order of magnitude is half a "
+    "decade on both sides. What is said of several samples, parameters or numbers is judged one by "
+    "one: in part if some is replicated and some is not, or if it holds once a misprint is put "
+    "right. It cannot be told if nothing here or in the paper can contradict it, as a value that "
+    "no trace determines, if what it says was used to choose a setting, or if the study lacks what "
+    f"it takes, as {FEWEST_SEEDS} seeds."
 )
 """The rules in words."""
 
@@ -95,18 +98,28 @@ def by_number(printed: float, found: float) -> str:
     return REPLICATED if abs(found / printed - 1) <= CLOSE else NOT
 
 
-def by_value(distance: float, share: float) -> str:
-    """Judge an identified value by the share of the seeds near it.
+def by_value(share: float, *, encodable: bool, determined: bool) -> str:
+    """Judge an identified value by the share of the seeds near it, if a run can come near.
 
-    The relative distance of the nearest value that the encoding has tells whether any can be.
+    A value that the encoding has may still be one that no trace determines.
     """
-    return OUTSIDE if abs(distance) > NEAR else by_share(share)
+    if not encodable:
+        return OUTSIDE
+    return by_share(share) if determined else UNDECIDED
+
+
+def is_encodable(printed: float, nearest: float) -> bool:
+    """Return whether the nearest value of the genes is the printed one, rounded to its digits."""
+    exponent = int(Decimal(f"{printed:.15g}").as_tuple().exponent)
+    return abs(nearest - printed) <= (0.5 + 1e-9) * 10.0**exponent
 
 
 def altogether(verdicts: Iterable[str]) -> str:
     """Return the verdict on something that is said of several things."""
     found = set(verdicts)
-    return found.pop() if len(found) == 1 else IN_PART
+    if found & {REPLICATED, IN_PART}:
+        return found.pop() if len(found) == 1 else IN_PART
+    return next((each for each in (NOT, OUTSIDE) if each in found), UNDECIDED)
 
 
 def plain(value: float, digits: int = 3) -> str:

@@ -19,6 +19,7 @@ from biogrip.tables.claim_rules import (
     by_number,
     by_share,
     claim,
+    is_encodable,
     percent,
     plain,
 )
@@ -206,9 +207,10 @@ def judge_digits(results: Results) -> Judged:
     """Judge whether the printed results can be encoded."""
     table = results.table("printed_values")
     found = table[table["quantity"] == "identified"]
-    fits = (found["distance_percent"].abs() < 1e-9) & (found["within_range"] == "yes")
+    pairs = zip(found["printed"], found["nearest_encodable"], strict=True)
+    fits = np.array([is_encodable(*pair) for pair in pairs]) & (found["within_range"] == "yes")
     return Judged(
         by_share(float(fits.mean())),
-        f"{fits.sum()} of the {len(fits)} values that Tables 5 to 7 call identified have two "
-        "digits within the ranges of Table 4.",
+        f"{fits.sum()} of the {len(fits)} values that Tables 5 to 7 call identified are two-digit "
+        "numbers within the ranges of Table 4, rounded as printed.",
     )

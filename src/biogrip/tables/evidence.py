@@ -17,10 +17,11 @@ from biogrip.judging.likelihood import DETERMINED_PERCENT, bounds_percent
 from biogrip.judging.quantities import Quantity
 from biogrip.physics import gripper as actuator
 from biogrip.physics.models import Truth
-from biogrip.physics.protocol import sample_times
+from biogrip.physics.protocol import sample_times, torque_history
 from biogrip.physics.sample_model import SINGLE_BRANCH
+from biogrip.physics.simulation import compute_grip
 from biogrip.records.identifications import read_identifications
-from biogrip.records.traces import each_trace, read_jaw_force
+from biogrip.records.traces import each_trace
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import error_percent
 from biogrip.tables.layout import Column, Row, Table
@@ -41,14 +42,12 @@ _PRINTED_VOLTAGES = (
 _PRINTED_GENE_VALUES = "9 or 12"
 
 
-def evidence(
-    study: Study, identifications: list[Path], measurements: list[Path], targets: list[Path]
-) -> Table:
+def evidence(study: Study, identifications: list[Path], measurements: list[Path]) -> Table:
     """Compare statements of the paper with results of the study."""
     rows = _device_rows(study)
     for name, case in study.cases.items():
         truth = case.truth
-        rows += [row for path in targets if path.stem == name for row in _grip_rows(truth, path)]
+        rows += [_grip_row(case)] if name in study.gripped else []
         rows += _axis_rows(truth, [path for path in measurements if path.parent.name == name])
         if study.shown == "genetic":
             identified = [path for path in identifications if path.stem == name]
@@ -90,19 +89,14 @@ def _volts(study: Study, torque_Nm: float) -> float:
     return float(actuator.voltage(study.actuator, torque_Nm))
 
 
-def _grip_rows(case: Truth, target: Path) -> list[Row]:
-    """Return the jaw force at the lower torque, which the paper says maintains the grip."""
-    time_s, torque, force = read_jaw_force(target)
-    # The first such sample may coincide with the step, so skip it.
-    reduced = np.flatnonzero(torque < torque.max())[1:]
-    if not len(reduced):
-        return []
-    lowest = reduced[np.argmin(force[reduced])]
-    remark = (
-        f"lowest of the samples, at {time_s[lowest]:.4g} s; negative: the jaws would have to pull"
-    )
-    quantity = f"{case.title}: jaw force at the lower torque"
-    return [_row(quantity, "uN", "maintains the grip", 1e6 * float(force[lowest]), remark)]
+def _grip_row(case: Case) -> Row:
+    """Return the lowest jaw force; the paper says that the lower torque maintains the grip."""
+    network = case.sample.model.sample(case.parameters)
+    torque = torque_history(case.phases)
+    grip = compute_grip(case.gripper, network, torque, nonlinear=case.nonlinear_target)
+    remark = f"at {grip.lowest_at_s:.4g} s, as in mechanics; negative: the jaws would have to pull"
+    quantity = f"{case.title}: lowest jaw force"
+    return _row(quantity, "uN", "maintains the grip", 1e6 * grip.lowest_N, remark)
 
 
 def _axis_rows(case: Truth, traces: list[Path]) -> list[Row]:

@@ -56,11 +56,12 @@ def methods(study: Study, identifications: list[Path]) -> Table:
             rows.append(row)
     errors = (Column(name, heading, 2) for name, heading in labels.items())
     caption = (
-        "Methods on the same traces. Reached: chi-squared at most "
+        "Methods on the same traces. Reached: chi-squared, in mean squares of that point, at most "
         f"{study.optimum_tolerance:g} above that of the best point that the genes can encode of "
-        "the trace (95 % interval by Wilson); methods without digits may lie below. Δχ² is above "
-        "the lowest that any method, or the truth, has on the trace; no point with the genes' "
-        "digits has less than the best encodable one. Errors are medians of the absolute error."
+        "the trace (95 % interval by Wilson); methods without digits may lie below. That point is "
+        "the lowest around the ends of all methods' runs: were there a lower one, a run that is "
+        "just within the bound would not count. Δχ² is above the lowest that any method, or the "
+        "truth, has on the trace. Errors are medians of the absolute error."
     )
     return Table(caption, (*_METHOD_COLUMNS, *errors), rows)
 

@@ -34,16 +34,13 @@ _SPELLED_OUT = {
     "ppm": ("ustrain", "microstrain", "uε", "um/m"),
 }
 _IN_BRACKETS = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\}|<([^<>]*)>")
-# Where a unit ends a name; the first few are nothing else. After a digit, / makes a reciprocal.
-_UNIT_AT_END = [
-    re.compile(f"(?:{_IN_BRACKETS.pattern})$"),
-    re.compile(r"(?<![\d\s])\s*/\s*([^\W\d]+|%)$"),
-    re.compile(r"(?:\sin|,)\s+(\S+)$"),
-    re.compile(r"_per_([^\W_]+)$"),
-    re.compile(r"[_\s]([^\s_]+)$"),
-    re.compile(r"(%|‰|percent|pct|(?:micro|milli|[um])strain)$", re.I),
-]
-_SURELY = 3
+# What ends a name and is only a unit, and what may be one. After a digit, / is a reciprocal's.
+_SURELY = (
+    rf"(?:{_IN_BRACKETS.pattern})$",
+    r"(?<![\d\s])\s*/\s*([^\W\d]+|%)$",
+    r"(?:\sin|,)\s+(\S+)$",
+)
+_PERHAPS = (r"[_\s]([^\s_]+)$", r"(?i)(%|‰|percent|pct|(?:micro|milli|[um])strain)$")
 # Pa^-1, Pa**-1, Pa-1, and with digits above the line, which `plain_name` brings down.
 _RECIPROCAL = re.compile(r"([A-Za-z]+)(?:\^|\*\*)?\(?[-\u2212]1\)?")
 # Names of pure numbers that have no unit: a word, or more that end with one for a strain.
@@ -212,22 +209,22 @@ def known_unit(written: str, allowed: Collection[str]) -> str | None:
     return next((unit for unit in allowed if plain.lower() in _SPELLED_OUT.get(unit, ())), None)
 
 
-def _endings(column: str) -> list[str]:
-    """Return what may be a unit at the end of a name, empty where there is no such ending."""
-    name = plain_name(column)
-    found = [pattern.search(name) for pattern in _UNIT_AT_END]
-    ends = ["".join(filter(None, match.groups())).strip() if match else "" for match in found]
-    return [f"1/{end}" if end and at == _SURELY else end for at, end in enumerate(ends)]
+def _endings(column: str, *patterns: str) -> list[str]:
+    """Return what patterns find at the end of a name."""
+    name = re.sub(r"_per_([^\W_]+)$", r" 1/\1", plain_name(column))
+    found = filter(None, (re.search(pattern, name) for pattern in patterns))
+    return ["".join(filter(None, match.groups())).strip() for match in found]
 
 
 def _unit_at_end(column: str, allowed: Collection[str]) -> str | None:
     # A name may end with something other than a unit, as in rotation_left or phi (2).
-    return next(filter(None, (known_unit(end, allowed) for end in _endings(column) if end)), None)
+    ends = _endings(column, *_SURELY, *_PERHAPS)
+    return next(filter(None, (known_unit(end, allowed) for end in ends)), None)
 
 
 def _said_at_end(column: str) -> str | None:
     """Return what can be nothing but a unit at the end of a name, or None."""
-    return next((end for end in _endings(column)[:_SURELY] if end and not end.isdigit()), None)
+    return next((end for end in _endings(column, *_SURELY) if end and not end.isdigit()), None)
 
 
 def _is_pure(column: str) -> bool:

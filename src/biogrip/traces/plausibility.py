@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from biogrip.arrays import Array, parts
+from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
 from biogrip.judging.doubts import DOUBT, Note
@@ -64,8 +64,6 @@ _ABSURD = 1e9
 # Share of readings at an end of their scale from which on they are saturated, how many times as
 # often as each of the next values, and fewest values.
 _SATURATED, _MORE_OFTEN, _FEWEST_VALUES = 0.05, 5, 5
-# Number of samples processed at once.
-_AT_ONCE = 65_536
 
 
 def check_recording(
@@ -117,8 +115,13 @@ def check_recording(
     largest = float(np.abs(trace).max())
     if largest > _ABSURD * free:
         _check_turn(recording, largest, free, path, columns, None)
-    lagged = lagged_torques(torque, _LAG_SHARES)
-    functions = _reduced(recording, lagged, nuisance)
+    lagged = lagged_torques(torque, _LAG_SHARES)(recording.time_s)
+    # Lagged torques, nuisance functions, a constant of norm 1 and the trace as short vectors that
+    # have the same inner products.
+    constant = np.full(len(trace), len(trace) ** -0.5)
+    every = np.vstack((lagged, nuisance, constant, trace))
+    rows = np.asarray(np.linalg.qr(every.T, mode="r")).T
+    functions = rows[: len(lagged)], rows[len(lagged) : -2], rows[-2:-1], rows[-1]
     weights = _response_weights(functions, len(trace), noise_rad, constant=instrument.deforms)
     where = f"{_extent(recording, path)}, column '{columns.reading}'"
     read, controlled = columns.quantity, instrument.controlled.name
@@ -144,8 +147,7 @@ def check_recording(
         )
     if not instrument.has_jaws:
         return None
-    turns = (weights @ lagged(recording.time_s[some]) for some in parts(len(trace), _AT_ONCE))
-    turn = max(float(np.abs(part).max()) for part in turns)
+    turn = float(np.abs(weights @ lagged).max())
     return _check_turn(recording, turn, free, path, columns, typical_rad)
 
 
@@ -155,19 +157,17 @@ def note_saturated(trace: Array, unit: str) -> list[Note]:
     Readings that are only rounded have neighbouring values nearly as often.
     """
     values, counts = np.unique(trace, return_counts=True)
-    unit = f" {unit}".rstrip()
-    if len(values) < _FEWEST_VALUES:
-        return []
-    ends = {"largest": counts, "smallest": counts[::-1]}
-    return [
-        Note(
-            DOUBT,
-            f"{own[-1]} of {len(trace)} readings are exactly the {end}, {plain(value)}{unit}: the "
-            "instrument looks saturated, and what it cut off is missing.",
-        )
-        for (end, own), value in zip(ends.items(), values[[-1, 0]], strict=True)
-        if own[-1] > max(_SATURATED * len(trace), _MORE_OFTEN * own[-_FEWEST_VALUES:-1].max())
-    ]
+    unit, notes = f" {unit}".rstrip(), []
+    for end, value, own in (("largest", values[-1], counts[::-1]), ("smallest", values[0], counts)):
+        others = own[1:_FEWEST_VALUES]
+        often = len(own) >= _FEWEST_VALUES and own[0] > _MORE_OFTEN * others.max()
+        if often and own[0] > _SATURATED * len(trace):
+            text = (
+                f"{own[0]} of {len(trace)} readings are exactly the {end}, {plain(value)}{unit}: "
+                "the instrument looks saturated, and what it cut off is missing."
+            )
+            notes.append(Note(DOUBT, text))
+    return notes
 
 
 def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
@@ -219,27 +219,6 @@ def _check_times(
     )
 
 
-def _reduced(
-    recording: Recording, lagged: Callable[[Array], Array], nuisance: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Return lagged torques, nuisance functions, a constant of norm 1, and the trace.
-
-    They are projected to short vectors, (..., n_rows), that have the same inner products: a million
-    samples would take too much memory.
-    """
-    samples = len(recording.time_s)
-    constant = np.full(samples, samples**-0.5)
-    rows: Array | None = None
-    for some in parts(samples, _AT_ONCE):
-        own = lagged(recording.time_s[some])
-        both = np.vstack((own, nuisance[:, some], constant[some], recording.rotation_rad[some]))
-        below = both.T if rows is None else np.vstack((rows, both.T))
-        rows = np.asarray(np.linalg.qr(below, mode="r"))
-    assert rows is not None
-    lags, others = np.split(rows.T, [len(own)])
-    return lags, others[:-2], others[-2:-1], others[-1]
-
-
 def _response_weights(
     functions: tuple[Array, Array, Array, Array],
     samples: int,
@@ -247,15 +226,12 @@ def _response_weights(
     *,
     constant: bool,
 ) -> Array | None:
-    """Return the weights of the lagged torques in the trace, or None if it does not follow them.
-
-    It does not if a constant describes it better, or if white noise about zero would have as
-    large a fit by an F test (chi-squared test with known noise).
-    """
+    """Return the weights of the lagged torques in the trace, or None if it does not follow them."""
     from scipy.special import chdtri, fdtri
 
     lagged, nuisance, one, readings = functions
     basis, trace = _cleared(nuisance, lagged), without(nuisance, readings)
+    # By an F test against white noise about zero, or a chi-squared test if the noise is known.
     weights, _, unknowns, _ = np.linalg.lstsq(basis.T, trace, _ROUNDING)
     response = weights @ basis
     explained, rest = np.sum(response**2), np.sum((trace - response) ** 2)
@@ -270,11 +246,7 @@ def _response_weights(
 
 
 def _cleared(basis: Array, functions: Array) -> Array:
-    """Project functions out of a basis, setting those to zero that lie in its span.
-
-    Otherwise the rounding error of a fully relaxed lag, which an offset spans, would count as
-    an independent function.
-    """
+    """Project functions out of a basis; of those in its span only rounding errors would be left."""
     rest = without(basis, functions)
     left, whole = np.linalg.norm(rest, axis=1), np.linalg.norm(functions, axis=1)
     return np.where(left[:, None] > _ROUNDING * whole[:, None], rest, 0.0)
@@ -286,11 +258,7 @@ def _is_mirrored(
     gripper: Gripper,
     noise_rad: float | None,
 ) -> bool:
-    """Return True if the mirrored trace is far more likely to be a response.
-
-    It must be so also with a constant fitted along: an undeclared offset is not a wrong
-    sign.
-    """
+    """Return True if the mirrored trace is far likelier, also beside an undeclared offset."""
     lagged, nuisance, constant, trace = functions
     rest = without(nuisance, constant)
     norm = np.linalg.norm(rest)

@@ -34,39 +34,30 @@ class Recognised:
     """What was recognised in a file, for people to check before they believe a fit."""
 
     encoding: str
-    """Name of the encoding."""
     separator: str
     """``commas``, ``semicolons``, ``tabs`` or ``blanks``."""
     decimal: str
     """``point`` or ``comma``."""
     header_line: int | None
-    """Line of the names, if there is one."""
     units_line: int | None
-    """Line of the row of units, if there is one."""
     block: int | None
-    """Number of the table, from 1; None if the file has only one."""
+    """Number of the table, from 1, and of all tables; None if the file has only one."""
     blocks: int | None
-    """Number of tables, likewise."""
     preamble: str | None
-    """Some words of the table's preamble."""
+    """Some words above the table."""
     columns: dict[str, dict[str, str]]
     """Name, as `column`, and `unit` of each column by its quantity."""
     rows: int
-    """Number of rows."""
     gaps: int
-    """Number of rows that were left out as gaps."""
+    """Rows left out as gaps, then readings averaged, outside of the times to use, and left out by
+    `rows`, None for none."""
     averaged: int | None
-    """Number of readings that were averaged, for they have equal times, if any."""
     outside: int | None
-    """Number of readings that were left out, for they are not among the times to use, if any."""
     others: int | None
-    """Number of rows that were left out, for `rows` says so, if any."""
     load: str | None
     """How the column of what was controlled is followed, if it is read."""
     first_s: float
-    """First time."""
     last_s: float
-    """Last time."""
 
     def is_usual(self, columns: Columns) -> bool:
         """Return True if the file is a table as biogrip itself would write it."""
@@ -320,19 +311,15 @@ def _load(
 
 
 def _averaged(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:
-    """Average successive rows of equal times, as a rounded clock writes them.
+    """Average rows of equal times; return the means, their first lines, and how many rows it were.
 
-    A third column, (n_rows,), has standard deviations; that of a mean is the root of their sum of
-    squares over their number. Returns the means, the lines of the first rows, and the number of
-    rows that are averaged with others.
+    The standard deviation of a mean is the root of the sum of squares over the number.
     """
     starts = np.flatnonzero(np.append(True, np.diff(values[:, 0]) != 0))
     counts = np.diff(np.append(starts, len(values)))
-    shares = values / np.repeat(counts, counts)[:, None]
-    means = np.add.reduceat(shares, starts, axis=0)
+    means = np.add.reduceat(values, starts) / counts[:, None]
     means[:, 0] = values[starts, 0]
-    if values.shape[1] > 2:
-        means[:, 2] = np.hypot.reduceat(shares[:, 2], starts)
+    means[:, 2:] = np.hypot.reduceat(values[:, 2:], starts) / counts[:, None]
     return means, lines[starts], int(np.sum(counts[counts > 1]))
 
 

@@ -73,7 +73,6 @@ class Sheet:
     """Cells of a text file, without empty lines and comments."""
 
     encoding: str
-    """Name of the encoding."""
     separator: str
     """What parts cells, `BLANKS` for any number of blanks."""
     cells: NDArray[Any]
@@ -93,15 +92,13 @@ class Table:
     at: int
     """Place of the names."""
     names: list[str]
-    """Names of the columns."""
     units: list[str] | None
     """Cells of the row of units, if there is one."""
     first: int
-    """Place of the first row."""
+    """Place of the first row; `end` is that after the last."""
     is_step: bool = False
     """True if ``[step]`` and a name are right above the names."""
     end: int = 0
-    """Place after the last row."""
     title: str = ""
     """Some words of the preamble."""
 
