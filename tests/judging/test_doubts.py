@@ -1,14 +1,17 @@
 """Tests of residuals: how often they are wrong, what they see, and what is misfit."""
 
+import re
 from typing import Any
 
 import numpy as np
 import pytest
 
+from biogrip.identify.notebook import identify_trace
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
+    OK,
     REJECTED,
     REJECTION,
     examine_residuals,
@@ -94,3 +97,52 @@ def test_slow_misfit_rejects_if_it_is_more_than_two_per_cent_of_the_peak(
     assert diagnosis.status == status
     said = " ".join(note.text for note in diagnosis.notes)
     assert ("independent ones" in said) == (status == DOUBTFUL)
+
+
+def test_noise_that_grows_over_decades_is_weighed_and_its_share_advised() -> None:
+    """A Maxwell liquid, whose first readings hardly count without weights; then all holds."""
+    times = np.geomspace(1e-4, 1e4, 90)
+    noise = 1 + 0.01 * np.random.default_rng(1).standard_normal(90)
+    models: dict[str, Any] = {"model_selection": {"models": ["kelvin_voigt", "liquid_drop"]}}
+    given: dict[str, Any] = {"reads": "compliance", "model": "maxwell"}
+    found = identify_trace(times, (1 + times / 5) * noise, config=models, **given)
+    assert found.status == DOUBTFUL
+    assert "none of the 3 models" in found.data["advice"]
+    (share,) = re.findall(r"weighted by measurement.noise_share (\S+) in", str(found))
+    assert float(share) == pytest.approx(0.01, rel=0.2)
+    weights = models | {"measurement": {"noise_share": float(share)}}
+    again = identify_trace(times, (1 + times / 5) * noise, config=weights, **given)
+    assert again.status == OK
+    limits = again.to_frame().loc[["k", "c"]]
+    assert np.all((limits["low"] < [1.0, 5.0]) & (limits["high"] > [1.0, 5.0]))
+
+
+@pytest.mark.parametrize(("lacking", "of_peak"), [(0.012, 0.1), (0.06, 0.4)])
+def test_a_quiet_trace_has_limits_that_allow_for_a_slightly_wrong_model(
+    lacking: float, of_peak: float
+) -> None:
+    """A second branch of a share of the first, six times as slow; noise of 0.05 % of the peak."""
+    times = np.linspace(0.1, 60, 600)
+    values = 1500 + 3000 * (np.exp(-times / 2) + lacking * np.exp(-times / 12))
+    values += 2.2 * np.random.default_rng(0).standard_normal(600)
+    config: dict[str, Any] = {"model_selection": {"models": ["springpot"]}}
+    found = identify_trace(times, values, reads="modulus", model="zener_maxwell", config=config)
+    assert found.status == DOUBTFUL
+    (good,) = re.findall("good to (.+) % of the peak", str(found))
+    assert float(good) == pytest.approx(of_peak, rel=0.2)
+    limits, truth = found.to_frame().loc[["k", "k_p", "c"]], [3000, 1500, 6000]
+    assert np.all((limits["low"] < truth) & (limits["high"] > truth))
+    assert np.all(limits["high"] < 2 * limits["low"])
+
+
+@pytest.mark.parametrize("times", [2, 5])
+def test_a_sensor_that_is_logged_more_often_than_read_is_named(times: int) -> None:
+    time_s = np.arange(1, 601) / 10
+    values = 1500 + 3000 * np.exp(-time_s / 2) + 20 * np.random.default_rng(0).standard_normal(600)
+    config: dict[str, Any] = {"model_selection": {"models": []}}
+    held = np.repeat(values[::times], times)
+    found = identify_trace(time_s, held, reads="modulus", model="zener_maxwell", config=config)
+    assert found.status == DOUBTFUL
+    assert "repeat the one before" in found.data["reasons"][0]
+    (count,) = re.findall(r"as (\d+) independent ones", str(found))
+    assert float(count) == pytest.approx(600 / times, rel=0.3)

@@ -9,7 +9,14 @@ from scipy.stats import t as student
 
 from biogrip.arrays import Array
 from biogrip.fit.noise_model_fit import absorbed, outliers_of
-from biogrip.judging.whiteness import as_correlated, correlated, far_out, uneven, wandering
+from biogrip.judging.whiteness import (
+    as_correlated,
+    by_leverage,
+    correlated,
+    far_out,
+    uneven,
+    wandering,
+)
 
 LEVEL = 0.01
 TRACES = 4000
@@ -38,7 +45,7 @@ def test_of_white_noise_each_test_fails_as_many_as_its_level_says(
                 correlated(residual, basis)[1],
                 wandering(residual, basis),
                 uneven(residual, basis),
-                far_out(residual, outliers_of(residual), len(basis)),
+                far_out(residual, outliers_of(by_leverage(residual, basis)), basis),
             )
             for residual in left
         ]
@@ -84,19 +91,38 @@ def test_the_cumulative_periodogram_is_kolmogorovs() -> None:
     assert uneven(np.ones(3), NOTHING[:, :3]) == 1.0
 
 
-@pytest.mark.parametrize(("away", "doubted"), [(3.5, False), (5.0, True), (50.0, True)])
-@pytest.mark.parametrize("readings", [100, 600])
-def test_one_outlier_is_told_by_how_far_it_is(readings: int, away: float, doubted: bool) -> None:
-    """Twice the chance of Student's t in as many readings."""
-    residual = np.random.default_rng(1).standard_normal(readings)
-    residual = np.clip(residual, -3, 3)
-    residual[readings // 3] = away * np.std(np.delete(residual, readings // 3))
-    struck = np.arange(readings) == readings // 3
-    chance = far_out(residual, struck, 3)
-    scale = np.sqrt(np.sum(residual[~struck] ** 2) / (readings - 4))
-    expected = 2 * -np.expm1(-2 * readings * student.sf(residual[struck][0] / scale, readings - 4))
-    assert chance == pytest.approx(min(expected, 1.0), rel=1e-6)
+@pytest.mark.parametrize(("away", "doubted"), [(3.5, False), (8.0, True), (50.0, True)])
+@pytest.mark.parametrize(("readings", "place"), [(12, 11), (20, 0), (100, 0), (600, 200)])
+def test_one_outlier_is_told_by_how_far_it_is_from_the_fit_to_the_others(
+    readings: int, place: int, away: float, doubted: bool
+) -> None:
+    """Twice the chance of Student's t in as many readings; the fit is repeated without it."""
+    slopes = directions(np.arange(1, readings + 1) / readings)
+    others = np.arange(readings) != place
+    trace = np.random.default_rng(1).standard_normal(readings)
+    fitted, square_sum = np.linalg.lstsq(slopes[:, others].T, trace[others], rcond=None)[:2]
+    scale = np.sqrt(square_sum[0] / (readings - 4))
+    inverse = np.linalg.inv(slopes[:, others] @ slopes[:, others].T)
+    error = scale * np.sqrt(1 + slopes[:, place] @ inverse @ slopes[:, place])
+    trace[place] = slopes[:, place] @ fitted + away * error
+    basis = absorbed(slopes)
+    residual = trace - trace @ basis.T @ basis
+    chance = far_out(residual, ~others, basis)
+    expected = 2 * -np.expm1(-2 * readings * student.sf(away, readings - 4))
+    assert chance == pytest.approx(min(expected, 1.0), rel=1e-6, abs=1e-15)
     assert (chance < 0.003) == doubted
+    if doubted:
+        assert outliers_of(by_leverage(residual, basis))[place]
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_reading_that_the_fit_follows_is_no_outlier(place: int) -> None:
+    """Two directions take the first two readings; nothing tells of their noise."""
+    basis = np.eye(2, 20)
+    residual = np.random.default_rng(2).standard_normal(20)
+    residual[:2] = 0.0, 1e-9
+    assert not outliers_of(by_leverage(residual, basis))[place]
+    assert far_out(residual, np.arange(20) == place, basis) == 1.0
 
 
 def test_independent_residuals_are_counted() -> None:

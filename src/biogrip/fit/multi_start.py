@@ -34,6 +34,8 @@ _STILL = 1e-9
 _FAR, _SPACING = 1e-5, 2.0**-24
 # A step with a smaller predicted decrease of chi^2 changes no digit that is written.
 _NOTHING = 1e-8
+# One that ends with less has converged as far as data can tell: limits are at about 4.
+_UNTOLD = 1e-3
 # E-folds; a converged fit is nearer to its optimum.
 _LONGEST_STEP = 1.0
 # Least curvature of a direction, relative to single parameters; and of a single parameter.
@@ -78,7 +80,7 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     rounding = _rounding(fits, here.misfit_rad, trace)
     state = _State(fits, trace, rounding, found.x.copy(), here)
     state.move(moving, closer.x)
-    converged, damping = np.zeros(len(moving), dtype=bool), np.zeros(len(moving))
+    left, damping = np.full(len(moving), np.inf), np.zeros(len(moving))
     for _ in range(_MOST_STEPS):
         if not len(moving):
             break
@@ -87,8 +89,8 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
         normal.gradient = state.here.gradient[moving]
         bounds = low[moving], high[moving]
         plain = _newton_step(*bounds, normal, x, np.zeros(len(x)))
-        gain = -np.sum(plain * normal.gradient, axis=1)
-        converged[moving] = gain <= np.maximum(_NOTHING, rounding[moving])
+        left[moving] = -np.sum(plain * normal.gradient, axis=1)
+        converged = left <= np.maximum(_NOTHING, rounding)
         step = _newton_step(*bounds, normal, x, damping[moving])
         step = np.where(damping[moving, None] > 0, np.log1p(np.maximum(step, -0.9)), step)
         on = np.max(np.abs(plain), axis=1) >= _STILL
@@ -105,7 +107,7 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
         moving = moving[kept | ~converged[moving]]
     order = fits.problems[0].residuals.model.in_order(np.exp(state.x))
     x = np.take_along_axis(state.x, order, axis=1)
-    return Minima(x, state.here.misfit_rad, evaluations, converged)
+    return Minima(x, state.here.misfit_rad, evaluations, left <= np.maximum(_UNTOLD, rounding))
 
 
 def _on_grid(x: Array, step: Array) -> Array:

@@ -252,8 +252,6 @@ class FittedModel:
 
     candidate: str
     """Name of the model in `CANDIDATES`."""
-    misfit_rad: float
-    """RMS misfit of its best fit."""
     delta_aic: float
     """AIC minus the lowest of the models tried."""
     delta_bic: float
@@ -286,8 +284,8 @@ def ranked(
     criteria = aic_and_bic(misfits_rad, samples, counts)
     aic, bic = (values - values.min() for values in criteria)
     return [
-        FittedModel(name, misfit, float(a), float(b))
-        for name, misfit, a, b in zip(candidates, misfits_rad, aic, bic, strict=True)
+        FittedModel(name, float(a), float(b))
+        for name, a, b in zip(candidates, aic, bic, strict=True)
     ]
 
 

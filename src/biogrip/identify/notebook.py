@@ -29,6 +29,7 @@ _ARGUMENTS = (
     ("--(offset|drift)", r"\1=True"),
     (r"--model (\w+)", r'model="\1"'),
     (r"--noise-model (\w+)", r'noise_model="\1"'),
+    (r"--noise-share (\S+)\.", r"measurement.noise_share \1 in config."),
     ("--(from|until)", r"measurement.\1_s in config"),
     ("--load", "measurement.load of the command"),
     ("--(?=[a-z])", ""),

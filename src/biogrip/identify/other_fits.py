@@ -9,7 +9,7 @@ ratio: if neither is in the trace, the decrease of chi^2 follows a chi-squared d
 many degrees of freedom as terms are added (Wilks 1938).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -28,21 +28,33 @@ from biogrip.fit.nested_fits import (
     ranked,
     within_range,
 )
+from biogrip.fit.noise_model_fit import absorbed, compute_growth
 from biogrip.fit.problem import Identification, Problem, Progress
 from biogrip.fit.trace_fit import TraceFit
-from biogrip.identify.trace_case import FLOWS, TraceCase
+from biogrip.identify.trace_case import TraceCase, flow_of
 from biogrip.judging.diagnosis import Diagnosis, diagnose
-from biogrip.judging.doubts import DOUBT, FALSE_ALARM, HARMLESS, REJECTED, REJECTION, Note, one_in
+from biogrip.judging.doubts import (
+    CLEARLY,
+    DOUBT,
+    FALSE_ALARM,
+    HARMLESS,
+    REJECTED,
+    REJECTION,
+    Note,
+    one_in,
+)
 from biogrip.judging.likelihood import MISSED, compute_fall
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.fractional import LONGEST_S
 from biogrip.physics.models import CANDIDATES, as_richer, contained
 from biogrip.physics.noise import stream
 from biogrip.physics.protocol import is_held
-from biogrip.physics.whitening import drift_is_flow
+from biogrip.physics.whitening import drift_is_flow, without
 from biogrip.stages.judgement import fits_judged
 
 _MOST_SAMPLES = 50_000
+# Difference of BIC by which a model is far better than another (Kass and Raftery).
+_FAR_BETTER = 10.0
 # Most terms of the instrument that are fitted along: an offset and a drift.
 _TERMS = 2
 # Each of the others would take half a second to five; they are tried where the config names them.
@@ -80,7 +92,7 @@ class FittedModels:
                 "model": each.candidate,
                 "title": each.model.title,
                 "parameters": len(each.model.names),
-                "misfit_rad": each.misfit_rad,
+                "misfit_rad": self.answers[each.candidate].misfit_rad,
                 "vanished": _vanished(each.candidate, self.answers[each.candidate]),
                 "converged": self.answers[each.candidate].converged,
                 "delta_aic": each.delta_aic,
@@ -152,10 +164,33 @@ def models_tried(
                     name: _at_own_onset(traces[index], name, problems[name][place], answer)
                     for name, answer in answers.items()
                 }
-            misfits = [answer.misfit_rad for answer in answers.values()]
+            own = {name: problems[name][place] for name in names}
+            misfits = _misfits(diagnoses[index], own, answers)
             samples = fits[index].problem.residuals.samples
             every[index] = FittedModels(chosen, ranked(names, misfits, samples), answers)
     return every
+
+
+def _misfits(
+    diagnosis: Diagnosis, problems: Mapping[str, Problem], answers: Mapping[str, Identification]
+) -> list[float]:
+    """Return misfits of models; in noise that clearly grows those of weighted fits, to first order.
+
+    Noise that grows by a rejected fit is its misfit.
+    """
+    misfits = [answer.misfit_rad for answer in answers.values()]
+    residuals, best = diagnosis.likelihood.problem.residuals, diagnosis.likelihood.best
+    if diagnosis.status == REJECTED:
+        return misfits
+    growth = compute_growth(residuals.left(best), residuals.rotation(best), residuals.rounding_rad)
+    low, high = np.quantile(growth, (0.05, 0.95))
+    if high <= CLEARLY * low:
+        return misfits
+    for place, (name, problem) in enumerate(problems.items()):
+        left, slopes = problem.residuals(within_range(answers[name].parameters, problem))
+        weighted = without(absorbed(slopes / growth), left / growth)
+        misfits[place] = float(np.sqrt(np.mean(weighted**2)))
+    return misfits
 
 
 def _at_own_onset(
@@ -228,7 +263,7 @@ def second_opinions(
     with a rejected fit, only if the other is not rejected. None are tried if both are declared
     already, or if the noise model is coloured, which fits both unless they are refused.
 
-    Of a rejected fit it is not said either, if BIC prefers another model by more: by its `leads`.
+    Nor is it said if BIC prefers another model by far more: by its `leads`.
     """
     notes: list[list[Note]] = [[] for _ in traces]
     which = [
@@ -252,8 +287,8 @@ def second_opinions(
             noise_rad=other.trace.problem.noise_rad,
         )
         terms = np.log(len(traces[index].readings[0])) * other.added
-        led = judged.status == REJECTED or leads[index] > other.fall - terms
-        if not (diagnoses[index].status == REJECTED and led):
+        led = leads[index] > other.fall - terms + _FAR_BETTER
+        if not (led or diagnoses[index].status == judged.status == REJECTED):
             notes[index].append(_note(traces[index], diagnoses[index], other, judged))
     return notes
 
@@ -345,7 +380,7 @@ def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnos
 
 def note_flow(trace: TraceCase) -> list[Note]:
     """Say beside a damper that lets the sample flow that a drift would look the same."""
-    problem, damper = trace.problem, FLOWS.get(trace.problem.model.name)
+    problem, damper = trace.problem, flow_of(trace.problem)
     if problem.drift or not damper or not drift_is_flow(problem.torque, trace.recorded.time_s):
         return []
     text = (

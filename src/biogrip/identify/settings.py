@@ -226,12 +226,14 @@ def _with_instrument(
         measurement["start_s"] = float(start_s) or None
         phases = _phases(own.load, start_s, controlled.column) or phases
     elif own is not None:
-        lasts = float(own.time_s[-1]) - (start_s or min(float(own.time_s[0]), 0.0))
+        first = start_s or min(float(own.time_s[0]), 0.0)
+        lasts = float(own.time_s[-1]) - first
         phases[0]["duration_s"] = lasts if lasts > 0 else 1.0
         if lasts > 0 and not SHORTEST_S <= lasts <= LONGEST_S:
             raise BiogripError(
-                f"{place(trace)}: found {lasts:g} s from the first reading to the last; allowed "
-                f"are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit of time right?"
+                f"{place(trace)}: found {lasts:g} s from the protocol's start, at {first:g} s, to "
+                f"the last reading; allowed are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit of "
+                "time right? Or say when it started (--start)."
             )
     return {**found, "protocol": {"phases": phases}}
 

@@ -28,8 +28,17 @@ from biogrip.traces.reader import Recognised
 _CLEAREST, _MARGIN = 1e5, 10.0
 _LEAST, _MOST = -16, 18
 
-FLOWS = {"damper": "c_p", "maxwell": "c", "burgers": "c_s"}
-"""Dampers by which models flow under a constant load, on and on in a line."""
+_FLOWS = {"damper": "c_p", "maxwell": "c", "burgers": "c_s"}
+
+
+def flow_of(problem: CaseProblem) -> str:
+    """Name what a sample flows by under a constant load, on and on in a line; nothing if by none.
+
+    Without the spring beside the branches that is the sum of their dampers.
+    """
+    if problem.fixed.get("k_p") == 0:
+        return " + ".join(p.name for p in problem.searched.parameters if p.kind == "damping")
+    return _FLOWS.get(problem.model.name, "")
 
 
 @dataclass(frozen=True)
@@ -109,7 +118,7 @@ def _without_likenesses(case: Case, time_s: Array) -> Case:
     own = network.k_p[0] > 0 if problem.instrument.deforms else network.c_p[0] == 0
     if measured.offset is None and own and is_held(problem.torque, time_s):
         measured = replace(measured, offset=False)
-    flows = problem.model.name in FLOWS and drift_is_flow(problem.torque, time_s)
+    flows = bool(flow_of(problem)) and drift_is_flow(problem.torque, time_s)
     if measured.drift is None and flows:
         measured = replace(measured, drift=False)
     return replace(case, block=replace(case.block, measurement=measured))

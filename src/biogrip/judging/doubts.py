@@ -28,10 +28,17 @@ from biogrip.fit.noise_model_fit import (
     outliers_of,
 )
 from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.whiteness import as_correlated, correlated, far_out, uneven, wandering
+from biogrip.judging.whiteness import (
+    as_correlated,
+    by_leverage,
+    correlated,
+    far_out,
+    uneven,
+    wandering,
+)
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.residuals import Residuals
-from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, estimate_noise
+from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, estimate_noise, without
 
 HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 """Weights of a note, in ascending order."""
@@ -89,6 +96,11 @@ _TOO_LITTLE = 0.5
 _MANY = 100_000
 # Smaller chances are not told apart.
 _NEVER = 1e-6
+CLEARLY = 3.0
+"""Growth of noise from which on its share is known, and unweighted fits are not compared."""
+
+# Share of readings that repeat the one before where a sensor is read less often than it is logged.
+_REPEATED = 0.45
 # Most outliers that are named.
 _NAMED = 5
 
@@ -115,15 +127,19 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     growth = compute_growth(residual, residuals.rotation(likelihood.best), rounding_rad)
     directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
     basis = absorbed(directions / growth)
-    struck = outliers_of(residual / growth, rounding_rad)
-    if far_out(residual / growth, struck, len(basis)) >= FALSE_ALARM:
+    standard = residual / growth
+    if np.ptp(growth):
+        # What a fit with these weights would leave, to first order.
+        standard = without(basis, standard)
+    struck = outliers_of(by_leverage(standard, basis), rounding_rad)
+    if far_out(standard, struck, basis) >= FALSE_ALARM:
         struck[:] = False
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
-    bulk = (residual / growth)[~struck]
+    bulk = standard[~struck]
     basis = absorbed(basis[:, ~struck]) if struck.any() else basis
     scale = residuals.noise_scale_rad
     if np.ptp(growth):
-        scale = max(scale, estimate_noise(residual / growth, rounding_rad))
+        scale = max(scale, estimate_noise(standard, rounding_rad))
     times = float(np.sqrt(np.mean(bulk**2))) / scale
     correlation, chance = correlated(bulk, basis)
     notes: list[Note] = []
@@ -131,7 +147,12 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     if chance < CERTAIN_MISFIT and times > _TOO_MUCH:
         found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
         notes += found.notes
-    doubts = [*_about_growth(growth, residuals.instrument), *_about_outliers(residuals, struck)]
+        # What a misfit has in a row are no outliers.
+        struck &= ~(np.convolve(struck, (1, 0, 1), "same") > 0)
+    doubts = [
+        *_about_growth(growth, scale, residuals, likelihood.best),
+        *_about_outliers(residuals, struck),
+    ]
     # Outliers distort a fit, so that all that it leaves is correlated.
     if not (found or struck.any()):
         doubts += _about_colour(bulk, basis, correlation, chance, residuals.instrument)
@@ -182,10 +203,16 @@ def _misfit(
         )
         return Remainder([Note(DOUBT, text)])
     misfit = as_correlated(*bulk)
-    allowed = (
-        f"The limits count the {len(bulk[0])} residuals as {plain(misfit[0], 2)} independent ones."
-    )
+    count = f"{plain(misfit[0], 2)} independent ones" if misfit[0] > 1 else "less than one"
+    allowed = f"The limits count the {len(bulk[0])} residuals as {count}."
     more = plain(times, 2)
+    read = residuals.trace.rotation_rad
+    if not residuals.rounding_rad and np.mean(read[1:] == read[:-1]) > _REPEATED:
+        text = (
+            "Most readings repeat the one before, as of a sensor that is read less often than it "
+            f"is logged: keep one of each. {allowed}"
+        )
+        return Remainder([Note(DOUBT, text)], misfit)
     if has_fast_noise(residuals, *left):
         text = (
             f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
@@ -208,19 +235,26 @@ def _misfit(
     return Remainder([Note(REJECTION, text)])
 
 
-def _about_growth(growth: Array, instrument: Instrument) -> Iterator[str]:
-    """Yield a sentence on noise that grows with what is read, (n_samples,)."""
-    if np.ptp(growth):
-        read = instrument.read.name
-        many = f"{read}s" if instrument.has_jaws else "readings"
-        low, high = np.quantile(growth, (0.05, 0.95))
-        if high < _TOO_MUCH * low:
-            return
-        yield (
-            f"The noise grows with the {read}: it is {plain(high / low, 2)} times as large for the "
-            f"largest tenth of the {many} as for the smallest, and neither the weights of the "
-            "readings nor the intervals allow for that."
-        )
+def _about_growth(
+    growth: Array, scale: float, residuals: Residuals, log_parameters: Array
+) -> Iterator[str]:
+    """Yield a sentence on noise that grows with what is read, (n_samples,) in units of a scale."""
+    low, high = np.quantile(growth, (0.05, 0.95))
+    if not np.ptp(growth) or high < _TOO_MUCH * low:
+        return
+    instrument = residuals.instrument
+    read = instrument.read.name
+    many = f"{read}s" if instrument.has_jaws else "readings"
+    text = (
+        f"The noise grows with the {read}: it is {plain(high / low, 2)} times as large for the "
+        f"largest tenth of the {many} as for the smallest, and neither the weights of the readings "
+        "nor the intervals allow for that."
+    )
+    # Of noise that grows little the share is hardly known.
+    if not residuals.coloured and high > CLEARLY * low:
+        share = scale * growth / np.abs(residuals.rotation(log_parameters))
+        text += f" Readings are weighted by --noise-share {plain(np.median(share), 2)}."
+    yield text
 
 
 def _about_colour(

@@ -75,12 +75,14 @@ class Likelihood:
         `biogrip.judging.whiteness.as_correlated`.
         """
         noise_rad = self.misfit_rad * math.sqrt(self.problem.residuals.samples / independent)
-        threshold, certainty = _thresholds(self.confidence, freedom)
+        threshold, _ = _thresholds(self.confidence, freedom)
+        # What few degrees of freedom say of one misfit in a thousand is not known.
+        known, certain = _thresholds(self.confidence, inf)
         return replace(
             self,
             noise_rad=noise_rad,
             threshold=threshold,
-            certainty=certainty,
+            certainty=threshold * certain / known,
             freedom=freedom,
             independent=independent,
         )

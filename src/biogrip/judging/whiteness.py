@@ -26,6 +26,7 @@ References
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
+from biogrip.physics.whitening import without
 
 # Stretches over which residuals are averaged, and readings in the shortest.
 _STRETCHES, _SHORTEST = 20, 5
@@ -33,6 +34,11 @@ _STRETCHES, _SHORTEST = 20, 5
 # that are tried, and by how much they have to lower the deviance [6]_.
 _SUMS, _LENGTHS, _WHITE = 200, 10, (0.001, 0.03, 0.2, 0.6)
 _TWO_MORE = 4.0
+# A misfit that is smooth over half a trace would seem worth next to nothing: so few hardly lower
+# the share of limits that hold.
+_FEWEST, _LEAST_FREEDOM = 0.3, 3.0
+# Least share of its variance that a fit leaves of a reading whose noise can be told.
+_TOLD = 0.03
 
 
 def correlated(residual: Array, basis: Array) -> tuple[float, float]:
@@ -131,28 +137,43 @@ def uneven(residual: Array, basis: Array) -> float:
     return float(kolmogorov(np.sqrt(len(power)) * np.max(np.abs(reached - shares))))
 
 
-def far_out(residual: Array, struck: BoolArray, directions: int) -> float:
+def by_leverage(residual: Array, basis: Array) -> Array:
+    """Return residuals in their own standard deviations; those that a fit follows as they are."""
+    share = 1 - np.sum(basis**2, axis=0)
+    return np.where(share > _TOLD, residual / np.sqrt(np.maximum(share, _TOLD)), residual)
+
+
+def far_out(residual: Array, struck: BoolArray, basis: Array) -> float:
     """Return the chance that white noise has readings as far out as those that are struck.
 
-    Their distances are in standard deviations of the others, with Student's distribution [3]_;
-    that of the nearest of them, and their number, have Poisson's distribution, and so has that of
-    the farthest alone.
+    They are held against the fit to the others, to first order: their distances are in standard
+    deviations of these, with Student's distribution [3]_. That of the nearest of them, and their
+    number, have Poisson's distribution, and so has that of the farthest alone.
 
     Parameters
     ----------
     residual, struck : (n_samples,)
         Residuals of a fit, and True for outliers.
-    directions
-        Number of directions that the fit absorbs.
+    basis : (n_directions, n_samples)
+        What the fit absorbs, orthonormal rows.
     """
     from scipy.special import pdtrc, stdtr
 
     count = int(np.count_nonzero(struck))
-    free = len(residual) - count - directions
+    free = len(residual) - count - len(basis)
     if not count or free < 1:
         return 1.0
-    scale = np.sqrt(np.sum(residual[~struck] ** 2) / free)
-    away = np.abs(residual[struck]) / scale
+    left = np.eye(count) - basis[:, struck].T @ basis[:, struck]
+    if np.linalg.eigvalsh(left)[0] < _TOLD:
+        return 1.0
+    inverse = np.linalg.inv(left)
+    residual = without(basis, residual)
+    apart = inverse @ residual[struck]
+    others = float(np.sum(residual**2) - residual[struck] @ apart)
+    scale = np.sqrt(max(others, 0.0) / free)
+    if not scale:
+        return 1.0
+    away = np.abs(apart) / np.sqrt(np.diag(inverse)) / scale
     most, least = (2 * len(residual) * float(stdtr(free, -far)) for far in (away.max(), away.min()))
     # Two tests, so each at half the level.
     chance = 2 * min(float(pdtrc(0, most)), float(pdtrc(count - 1, least)))
@@ -202,8 +223,9 @@ def as_correlated(residual: Array, basis: Array) -> tuple[float, float]:
                     lowest, found = deviance, size * covariance
     largest = float(np.linalg.eigvalsh(taken.T @ found @ taken)[-1])
     remaining = found - taken @ (taken.T @ found)
-    freedom = np.trace(remaining) ** 2 / np.sum(remaining * remaining.T)
-    return n * float(np.mean(residual**2)) / largest, float(freedom)
+    freedom = float(np.trace(remaining) ** 2 / np.sum(remaining * remaining.T))
+    independent = n * float(np.mean(residual**2)) / largest
+    return max(independent, _FEWEST), max(freedom, _LEAST_FREEDOM)
 
 
 def _restricted(covariance: Array, left: Array, taken: Array) -> tuple[float, float]:

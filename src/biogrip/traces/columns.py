@@ -28,7 +28,7 @@ _SPELLED_OUT = {
     "mrad": ("milliradian", "milliradians"),
     "urad": ("microrad", "microradian", "microradians"),
     "deg": ("degree", "degrees"),
-    "1": ("-", "mm/mm", "m/m", "um/um", "nm/nm"),
+    "1": ("-", "\u2212", "\u2013", "in/in", "mm/mm", "m/m", "um/um", "nm/nm"),
     "%": ("percent", "pct"),
     "‰": ("permille", "mstrain", "millistrain", "mε"),
     "ppm": ("ustrain", "microstrain", "uε", "um/m"),
