@@ -31,7 +31,7 @@ from biogrip.physics.protocol import Phase, hold, load
 from biogrip.physics.simulation import simulated_rotation
 
 INSTRUMENTS_JUDGED = ("creep", "relaxation", "gripper")
-READINGS = (10, 20, 40, 80, 400)
+READINGS = (10, 20, 40, 80, 400, 4000)
 """Numbers of readings of a trace."""
 
 _SEED, _LASTS_S, _CONFIDENCE = 2019, 100.0, 0.95
