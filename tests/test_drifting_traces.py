@@ -181,3 +181,8 @@ def test_flow_under_a_constant_load_is_said_to_look_like_a_drift(
     flow = found.to_frame().loc[names]
     assert flow["value"] == pytest.approx(3e4, rel=0.1)
     assert flow["high"] < 2 * flow["low"]
+
+
+def test_of_a_drift_that_is_declared_and_flow_only_the_sum_is_determined() -> None:
+    found = told(1 / 1000 + CREEP / 3e4, model="maxwell", reads="strain", hold=1.0, drift=True)
+    assert "of c and the drift that is fitted along, only the sum is determined" in str(found)

@@ -304,6 +304,19 @@ def test_a_start_that_is_no_number_is_refused() -> None:
 HOLD = np.arange(0.4, 44, 0.4)
 
 
+def test_a_clock_may_count_seconds_since_1970() -> None:
+    """Within the 2e-7 s to which it is read; and without a start that is asked for."""
+    values = (1 - np.exp(-HOLD / 8)) / 100
+    values += 1e-4 * np.random.default_rng(3).standard_normal(len(HOLD))
+    given: dict[str, Any] = {"reads": "compliance", "model": "kelvin_voigt"}
+    given["config"] = {"model_selection": {"models": []}}
+    found = identify_trace(HOLD + 1.764e9, values, start=1.764e9, **given).to_frame()
+    expected = identify_trace(HOLD, values, **given).to_frame()
+    np.testing.assert_allclose(found["low"], expected["low"], rtol=1e-5)
+    with pytest.raises(BiogripError, match="Or say when it started"):
+        identify_trace(HOLD + 1.764e9, values, **given)
+
+
 @pytest.mark.parametrize(
     ("model", "reads", "clean", "said"),
     [

@@ -379,13 +379,16 @@ def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnos
 
 
 def note_flow(trace: TraceCase) -> list[Note]:
-    """Say beside a damper that lets the sample flow that a drift would look the same."""
+    """Say of a damper that lets the sample flow that a drift would look the same."""
     problem, damper = trace.problem, flow_of(trace.problem)
-    if problem.drift or not damper or not drift_is_flow(problem.torque, trace.recorded.time_s):
+    if not damper or not drift_is_flow(problem.torque, trace.recorded.time_s):
         return []
+    held = f"{damper} holds if the instrument does not drift"
+    if problem.drift:
+        held = f"of {damper} and the drift that is fitted along, only the sum is determined"
     text = (
         f"Under a constant {problem.instrument.controlled.name} a drift of the instrument and the "
-        f"flow of the sample are one line: {damper} holds if the instrument does not drift."
+        f"flow of the sample are one line: {held}."
     )
     return [Note(HARMLESS, text)]
 

@@ -98,15 +98,15 @@ class MeasurementBlock(Block):
     """Unit of that column, where its name does not end in it."""
     average_repeated: bool = False
     """If true, average the readings of equal times, as a rounded clock writes them."""
-    from_s: Annotated[float | None, Field(ge=-1e9, le=1e9)] = None
+    from_s: Annotated[float | None, Field(ge=-1e12, le=1e12)] = None
     """First time of the file's clock to use: readings before it are left out, as where a rheometer
     has not yet reached its strain. The protocol stays. By default all are used."""
-    until_s: Annotated[float | None, Field(ge=-1e9, le=1e9)] = None
+    until_s: Annotated[float | None, Field(ge=-1e12, le=1e12)] = None
     """Last time of the file's clock to use, as before a sample slips."""
     scale: Annotated[float | None, Field(ge=-1e30, le=1e30)] = None
     """Rotation, in its unit, over the number in the column: for a sensor's volts, or -1 for a
     rotation that is positive where the arm opens. By default 1."""
-    start_s: Annotated[float | None, Field(ge=-1e9, le=1e9)] = None
+    start_s: Annotated[float | None, Field(ge=-1e12, le=1e12)] = None
     """Time of the file's clock at which the protocol starts. Readings before it tell of the zero
     only. By default 0, before which there may be none."""
     fit_start: bool = False
