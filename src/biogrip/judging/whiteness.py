@@ -163,17 +163,18 @@ def far_out(residual: Array, struck: BoolArray, basis: Array) -> float:
     free = len(residual) - count - len(basis)
     if not count or free < 1:
         return 1.0
-    left = np.eye(count) - basis[:, struck].T @ basis[:, struck]
-    if np.linalg.eigvalsh(left)[0] < _TOLD:
+    own = basis[:, struck]
+    left = np.eye(len(basis)) - own @ own.T
+    if len(basis) and np.linalg.eigvalsh(left)[0] < _TOLD:
         return 1.0
-    inverse = np.linalg.inv(left)
+    through = np.linalg.solve(left, own)
     residual = without(basis, residual)
-    apart = inverse @ residual[struck]
+    apart = residual[struck] + own.T @ (through @ residual[struck])
     others = float(np.sum(residual**2) - residual[struck] @ apart)
     scale = np.sqrt(max(others, 0.0) / free)
     if not scale:
         return 1.0
-    away = np.abs(apart) / np.sqrt(np.diag(inverse)) / scale
+    away = np.abs(apart) / np.sqrt(1 + np.sum(own * through, axis=0)) / scale
     most, least = (2 * len(residual) * float(stdtr(free, -far)) for far in (away.max(), away.min()))
     # Two tests, so each at half the level.
     chance = 2 * min(float(pdtrc(0, most)), float(pdtrc(count - 1, least)))

@@ -82,7 +82,6 @@ class Recognised:
         found = self.data()
         columns = found.pop("columns")
         named = {key: f"{each['column']}, in {each['unit']}" for key, each in columns.items()}
-        found |= {key: f"{found[key]:.12g}" for key in ("first_s", "last_s")}
         rows = (f"\n  {key:<13}{visible(value)}" for key, value in (found | named).items())
         return f"{visible(path)} is read as{''.join(rows)}"
 
