@@ -30,7 +30,7 @@ VERDICTS = [
         (
             VERDICTS,
             "A trace always determines c and c + c_p, provided that the branch, k and c in series, "
-            "relaxes within the experiment; it never determines c_p; it determines k in 1 of 2 "
+            "relaxes within the experiment. It never determines c_p. It determines k in 1 of 2 "
             "samples.",
         ),
         ([VERDICTS[0], VERDICTS[4]], "A trace always determines k and c."),
@@ -60,8 +60,8 @@ METHODS = [
 
 def test_the_study_s_own_method_is_measured_by_what_it_can_encode() -> None:
     assert say_what_the_study_gives(METHODS, OWN, TITLES, "The").replace("\xa0", " ") == (
-        "The genetic algorithm finds the best fit it can represent in 18 % of 50 runs (95 %: 10 to "
-        "100 %) on “A cell” and 100 % (10 to 100 %) on “A drop”."
+        "The genetic algorithm finds the best fit that its digits can express in 18 % of 50 runs (95 % "
+        "interval: 10 to 100 %) on “A cell” and 100 % (10 to 100 %) on “A drop”."
     )
     assert say_what_the_study_gives(METHODS, "other", TITLES, "The") == ""
 
@@ -69,8 +69,8 @@ def test_the_study_s_own_method_is_measured_by_what_it_can_encode() -> None:
 def test_the_surest_method_is_named_before_the_study_s_own() -> None:
     """The cheaper of two that are as sure, by the sample of which it fits the fewest traces."""
     assert say_which_method_finds_it(METHODS, OWN).replace("\xa0", " ") == (
-        "Cheap search finds a fit at least as good in at least 98 % (10 to 100 %) of the runs on "
-        "each sample, with 90 to 800 simulated responses; the genetic algorithm takes 15,000 to "
+        "Cheap search finds that fit, or a better one, in at least 98 % (10 to 100 %) of the runs "
+        "on each sample, with 90 to 800 simulated responses; the genetic algorithm takes 15,000 to "
         "18,000."
     )
     assert say_which_method_finds_it([], OWN) == ""

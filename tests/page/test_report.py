@@ -100,7 +100,7 @@ def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path
     assert page.locator("h1 + .split .answers p:not(.soft)").all_text_contents() == [
         legible(say_what_the_study_gives(compared, own, titles, who)),
         legible(say_which_method_finds_it(compared, own)),
-        say_what_traces_tell(sorted(verdicts, key=lambda row: row["case"])),
+        say_what_traces_tell(sorted(verdicts, key=lambda row: row["case"])).replace("_", ""),
         count_verdicts(row["verdict"] for row in read_table(tables / "claims.csv")),
     ]
     # No caption of a table stands twice.

@@ -24,8 +24,8 @@ def say_what_the_study_gives(
     shares = [f"{share_of(row)} on “{titles[row['case']]}”" for row in rows]
     if not rows:
         return ""
-    shares[0] = shares[0].replace("(", f"of {rows[0]['seeds']} runs (95 %: ", 1)
-    return f"{who} {shown} finds the best fit it can represent in {_listed(shares)}."
+    shares[0] = shares[0].replace("(", f"of {rows[0]['seeds']} runs (95 % interval: ", 1)
+    return f"{who} {shown} finds the best fit that its digits can express in {_listed(shares)}."
 
 
 def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
@@ -37,12 +37,12 @@ def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
     never = [name for name, each in decided.items() if not any(each)]
     some = {name: each for name, each in decided.items() if any(each) and not all(each)}
     provided = f", {PROVIDED}" * any(" + " in name for name in always)
-    parts = [f"always determines {_listed(always)}{provided}"] if always else []
-    parts += [f"never determines {_listed(never)}"] if never else []
+    parts = [f"It always determines {_listed(always)}{provided}"] if always else []
+    parts += [f"It never determines {_listed(never)}"] if never else []
     if some:
         counts = [f"{name} in {sum(each)}" for name, each in some.items()]
-        parts.append(f"determines {_listed(counts)} of {max(map(len, some.values()))} samples")
-    return f"A trace {'; it '.join(parts)}." if parts else ""
+        parts.append(f"It determines {_listed(counts)} of {max(map(len, some.values()))} samples")
+    return "".join(f"{part}. " for part in parts).strip().replace("It", "A trace", 1)
 
 
 def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
@@ -64,7 +64,7 @@ def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
     least, *more = sorted(found[surest], key=lambda row: float(row["reached_share"]))
     at_least = "at least " * (more != [] and share_of(least) != share_of(more[-1]))
     said = (
-        f"{surest[:1].upper()}{surest[1:]} finds a fit at least as good in {at_least}"
+        f"{surest[:1].upper()}{surest[1:]} finds that fit, or a better one, in {at_least}"
         f"{share_of(least)} of the runs on {'each' if more else 'the'} sample, with "
         f"{_responses(found[surest])} simulated responses"
     )

@@ -32,6 +32,7 @@ _LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 # The paper's figure of its first fit, between those of its convergence and of its evolution.
 _FIRST_FIT = 9
+_SYMBOL = re.compile(r"\b([kc])_(\w)\b")
 
 _TEMPLATES = jinja2.Environment(
     loader=jinja2.FileSystemLoader(Path(__file__).parent),
@@ -41,6 +42,7 @@ _TEMPLATES = jinja2.Environment(
     undefined=jinja2.StrictUndefined,
 )
 _TEMPLATES.filters["legible"] = legible
+_TEMPLATES.filters["symbols"] = lambda text: _SYMBOL.sub(r"<i>\1</i><sub>\2</sub>", escape(text))
 _TEMPLATES.globals["style"] = Path(__file__).with_name("report.css").read_text(encoding="utf-8")
 _NUMBER = re.compile(r"(?:&[gl]t;|[≤≥−])*\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\u00a0%)?")
 
