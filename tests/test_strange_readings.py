@@ -1,5 +1,7 @@
 """`biogrip identify` of few and strange readings: an answer or one message."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -67,3 +69,24 @@ def test_strange_readings_are_answered_and_saturated_ones_told(
     assert len(told) == (cut is not None)
     assert all(f"exactly the {cut}" in text for text in told)
     assert "generalized_maxwell_5" not in str(found["models"])
+
+
+@pytest.mark.nightly
+def test_what_lies_in_the_folder_and_a_name_of_marks_change_no_result(tmp_path: Path) -> None:
+    told, named = [], "a$x$ \\frac{$ %#&<b>_\x1b[31m\n.csv"
+    for folder in (tmp_path / "empty", tmp_path / "theirs"):
+        folder.mkdir()
+        trace(folder, SINCE, NOISY).rename(folder / named)
+        (folder / "sheet.csv").write_text(f'file,dose <b> &\n"{named}",<b>$\\frac{{$\n')
+        if folder.name == "theirs":
+            (folder / "matplotlibrc").write_text("text.usetex: True\ntext.color: red\n")
+            for name in ("yaml", "numpy", "signal"):
+                (folder / f"{name}.py").write_text("raise SystemExit(1)\n")
+        command = [str(Path(sys.executable).with_name("biogrip")), "identify", "sheet.csv"]
+        given = ["--reading", "modulus=modulus_Pa", "--csv", "o.csv", "--report", "o.html"]
+        said = subprocess.run([*command, *given], cwd=folder, check=True, capture_output=True)
+        assert b"\x1b" not in said.stdout + said.stderr
+        told.append((said.stdout, *((folder / f"o.{end}").read_bytes() for end in ("csv", "html"))))
+    assert told[0] == told[1]
+    assert b"<b>" not in told[0][2]
+    assert b"\x1b" not in told[0][2]

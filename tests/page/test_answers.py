@@ -60,8 +60,8 @@ METHODS = [
 
 def test_the_study_s_own_method_is_measured_by_what_it_can_encode() -> None:
     assert say_what_the_study_gives(METHODS, OWN, TITLES, "The").replace("\xa0", " ") == (
-        "The genetic algorithm finds the best fit that its digits can express in 18 % of 50 runs (95 % "
-        "interval: 10 to 100 %) on “A cell” and 100 % (10 to 100 %) on “A drop”."
+        "The genetic algorithm finds the best fit that its digits can express in 18 % of 50 runs "
+        "(95 % interval: 10 to 100 %) on “A cell” and 100 % (10 to 100 %) on “A drop”."
     )
     assert say_what_the_study_gives(METHODS, "other", TITLES, "The") == ""
 
