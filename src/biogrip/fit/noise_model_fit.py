@@ -102,6 +102,12 @@ def compute_growth(residual: Array, rotation_rad: Array, rounding_rad: float = 0
     return _growth(float(found.x), size)
 
 
+def compare_extremes(growth: Array) -> float:
+    """Return how much larger noise is for the largest twentieth of readings than the smallest."""
+    low, high = np.quantile(growth, (0.05, 0.95))
+    return float(high / low)
+
+
 def _grows(apart: Array, size: Array) -> bool:
     from scipy.stats import spearmanr
 

@@ -28,7 +28,7 @@ from biogrip.fit.nested_fits import (
     ranked,
     within_range,
 )
-from biogrip.fit.noise_model_fit import absorbed, compute_growth
+from biogrip.fit.noise_model_fit import absorbed, compare_extremes, compute_growth
 from biogrip.fit.problem import Identification, Problem, Progress
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.identify.trace_case import TraceCase, flow_of
@@ -183,8 +183,7 @@ def _misfits(
     if diagnosis.status == REJECTED:
         return misfits
     growth = compute_growth(residuals.left(best), residuals.rotation(best), residuals.rounding_rad)
-    low, high = np.quantile(growth, (0.05, 0.95))
-    if high <= CLEARLY * low:
+    if compare_extremes(growth) <= CLEARLY:
         return misfits
     for place, (name, problem) in enumerate(problems.items()):
         left, slopes = problem.residuals(within_range(answers[name].parameters, problem))

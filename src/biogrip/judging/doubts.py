@@ -24,6 +24,7 @@ from biogrip.digits import counted, plain
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
     absorbed,
+    compare_extremes,
     compute_growth,
     outliers_of,
 )
@@ -239,19 +240,19 @@ def _about_growth(
     growth: Array, scale: float, residuals: Residuals, log_parameters: Array
 ) -> Iterator[str]:
     """Yield a sentence on noise that grows with what is read, (n_samples,) in units of a scale."""
-    low, high = np.quantile(growth, (0.05, 0.95))
-    if not np.ptp(growth) or high < _TOO_MUCH * low:
+    times = compare_extremes(growth)
+    if not np.ptp(growth) or times < _TOO_MUCH:
         return
     instrument = residuals.instrument
     read = instrument.read.name
     many = f"{read}s" if instrument.has_jaws else "readings"
     text = (
-        f"The noise grows with the {read}: it is {plain(high / low, 2)} times as large for the "
+        f"The noise grows with the {read}: it is {plain(times, 2)} times as large for the "
         f"largest tenth of the {many} as for the smallest, and neither the weights of the readings "
         "nor the intervals allow for that."
     )
     # Of noise that grows little the share is hardly known.
-    if not residuals.coloured and high > CLEARLY * low:
+    if not residuals.coloured and times > CLEARLY:
         share = scale * growth / np.abs(residuals.rotation(log_parameters))
         text += f" Readings are weighted by --noise-share {plain(np.median(share), 2)}."
     yield text
