@@ -50,8 +50,6 @@ _Root = TypeVar("_Root", np.float64, np.complex128)
 _SWEEPS, _MOST_SWEEPS = 80, 60
 # Share of a sum of poles below which it is zero, and of a distance below which a step is the last.
 _ROUNDING, _SHORT = 4e-16, 1e-9
-# Numbers in an array that fits into a processor's cache.
-_FITS = 70_000
 
 
 def real_quadratic_roots(coefficients: Array) -> Array:
@@ -260,35 +258,11 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
 
 
 def _sides(weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros) -> _Sides:
-    """Return the sums, each in the order of the poles, vectorised if that fits into the cache.
+    """Return the sums at points, in the order of the poles: no point depends on the others.
 
     Points are given by the index of the last pole below, `zero`, in ascending order, and by that of
     their function.
     """
-    few = len(poles) * len(zero) <= _FITS
-    return (_sides_at_once if few else _sides_in_turn)(weights, poles, zero, which, at)
-
-
-def _sides_at_once(
-    weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros
-) -> _Sides:
-    slope = at.pole - poles[:, which]
-    slope += at.beyond
-    term = weights[:, which] / slope
-    np.divide(term, slope, out=slope)
-    is_below = np.arange(len(poles))[:, None] <= zero
-    every = np.zeros((len(poles), 4, len(zero)))
-    for place, of in enumerate((term, slope)):
-        np.copyto(every[:, place], of, where=is_below)
-        np.copyto(every[:, 2 + place], of, where=~is_below)
-    # Reducing the first of several axes adds in sequence, so the result is reproducible.
-    below, below_slope, above, above_slope = np.add.reduce(every, axis=0)
-    return _Sides(below, -below_slope, above, -above_slope)
-
-
-def _sides_in_turn(
-    weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros
-) -> _Sides:
     below, below_slope, above, above_slope = np.zeros((4, len(zero)))
     term, slope = np.empty((2, len(zero)))
     firsts = np.searchsorted(zero, np.arange(len(poles))).tolist()
