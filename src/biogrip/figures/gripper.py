@@ -118,7 +118,7 @@ def draw_torque(study: Study) -> Figure:
     """Draw torque and voltage of both arms against time."""
     comb = study.actuator
     history = torque_history(study.phases)
-    # Include both sides of every jump, and enough points for ramps and sinusoids.
+    # Include both sides of every jump, and enough points for ramps.
     grid = np.linspace(0, history.end_s, 4001)
     time_s = np.sort(np.concatenate((grid, history.time_s, np.nextafter(history.time_s, -1))))
     arms = [np.maximum(torque_at(history, time_s, arm), 0) for arm in ("left", "right")]

@@ -27,7 +27,7 @@ from biogrip.physics.simulation import jaw_force
 from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
 from biogrip.records.identifications import DIFFERENCES
 from biogrip.records.traces import read_target
-from biogrip.stages.targets import network_of, scaled
+from biogrip.stages.targets import network_of
 from biogrip.study.study import Case, Study
 from biogrip.tables.mechanics import LIMIT_PERCENT
 
@@ -127,7 +127,7 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
 def _difference(axes: Axes, case: Case) -> None:
     """Draw the nonlinear minus the linear rotation, as the curves themselves look the same."""
     gripper, network = case.gripper, network_of(case)
-    torque = scaled(torque_history(case.phases), _SHOWN_FACTOR)
+    torque = torque_history(case.phases).times(_SHOWN_FACTOR)
     time_s = np.linspace(0, torque.end_s, 1001)
     response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
     linear = rotation(response, torque, time_s)[0]

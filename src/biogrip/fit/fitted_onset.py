@@ -146,7 +146,7 @@ class OnsetFits:
         begins some times as far before it.
         """
         torque = self._case_problem.torque
-        changes_s = np.unique([start for start, *_ in (*torque.jumps, *torque.swings)])
+        changes_s = torque.changes_s
         edges = np.unique(np.subtract.outer(self._time_s, changes_s))
         equal_s = _ROUNDING * max(np.abs(self._time_s).max(), np.abs(changes_s).max())
         edges = edges[np.diff(edges, prepend=-np.inf) > equal_s]

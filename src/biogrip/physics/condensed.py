@@ -4,10 +4,9 @@ First, nodes replace dense readings in sums of products of smooth functions (`De
 a change of torque, modes of all rates respond; later, only slow ones remain. On a piece of time
 twice as far from the last change at its end as at its start, a response is a polynomial of degree
 19 to 1e-15 of its peak, whatever the rate: with e^(-rho (3 + s)), |s| <= 1, Chebyshev coefficients
-fall like 5.8^-n [1]_. Earlier changes are further away, and a sinusoid of the torque is a
-polynomial as well on a piece of a period. So a piece with thousands of readings needs twenty nodes,
-and sums of products over its readings follow from one small matrix, which is summed up block by
-block. If readings are few, they are the nodes.
+fall like 5.8^-n [1]_. Earlier changes are further away. So a piece with thousands of readings needs
+twenty nodes, and sums of products over its readings follow from one small matrix, which is summed
+up block by block. If readings are few, they are the nodes.
 
 Second, a few times replace the nodes (`Condensed`). The linear rotation of any sample is a weighted
 sum of the responses of modes to the protocol, g(t; r). Over all rates r these nearly span a space
@@ -87,10 +86,8 @@ class DenseSamples:
     def __init__(self, torque: TorqueHistory, time_s: Array, *, dense: bool = True) -> None:
         self._all_s = time_s
         self._kept: dict[tuple[int, int], list[tuple[slice, Array]]] = {}
-        starts = [start for start, *_ in (*torque.jumps, *torque.swings)]
-        self._starts_s = np.unique([-np.inf, *starts])
-        omega = torque.omega_rad_per_s
-        self._longest_s = 2 * np.pi / omega.max() if len(omega) else np.inf
+        starts = torque.changes_s
+        self._starts_s = np.append(-np.inf, starts)
         bounds = np.unique(np.concatenate(([0], time_s.searchsorted(starts), [len(time_s)])))
         self._pieces = [_Piece(0, len(time_s), time_s)]
         if dense:
@@ -153,7 +150,7 @@ class DenseSamples:
             return
         start, end = self._all_s[first], self._all_s[stop - 1]
         elapsed = start - self._starts_s[self._starts_s.searchsorted(start, side="right") - 1]
-        if end - start <= min(elapsed, self._longest_s):
+        if end - start <= elapsed:
             gram = np.zeros((_NODES, _NODES))
             for _, series in self._blocks(first, stop):
                 gram += series.T @ series
@@ -258,8 +255,7 @@ class Condensed:
     @cached_property
     def of_modes(self) -> ModeRows:
         """Function from modes of many samples to rows of their responses."""
-        events_s = [start for start, *_ in (*self.torque.jumps, *self.torque.swings)]
-        elapsed = np.subtract.outer(self.time_s, events_s)
+        elapsed = np.subtract.outer(self.time_s, self.torque.changes_s)
         shortest_s = float(np.min(elapsed, where=elapsed > 0, initial=self.time_s[-1]))
         return ModeRows(self.torque, self.time_s, self.to_rows, shortest_s)
 

@@ -127,15 +127,6 @@ def rotation(
         growth = _growth(order - rate, rates, time_s[after] - start)
         amplitude = np.einsum("ndj,d->nj", weights, heights)
         phi[:, after] += np.einsum("nj,njt->nt", amplitude, growth).real
-    for start, omega, a in torque.swings:
-        after = time_s >= start
-        elapsed = time_s[after] - start
-        # int_0^t h'(t - s) e^(i omega s) ds with h' = sum_j w_j p_j e^(p_j t).
-        share = response.rates / (1j * omega - response.rates)
-        swing = (1j * omega) ** rate * np.exp(1j * omega * elapsed)
-        swing = swing - rates**rate * np.exp(rates * elapsed)
-        amplitude = np.einsum("ndj,d->nj", weights, a) * share
-        phi[:, after] += np.einsum("nj,njt->nt", amplitude, swing).real
     return phi
 
 

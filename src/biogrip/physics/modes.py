@@ -35,7 +35,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from biogrip.arrays import Array, ComplexArray, parts
+from biogrip.arrays import Array, parts
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import (
     LEFT,
@@ -255,7 +255,7 @@ def mode_responses(rates: Array, history: TorqueHistory, time_s: Array) -> tuple
         In units of what is controlled, for each of the `drives`, and those times s.
     """
     rate = rates[:, None, :, None]
-    powers, swings = history.within_phases
+    powers = history.within_phases
     shape = len(rates), powers.shape[1], rates.shape[1]
     responses, slopes = np.zeros((2, *shape, len(time_s)))
     reached, its_slope = np.zeros((2, *shape, 1))
@@ -264,34 +264,25 @@ def mode_responses(rates: Array, history: TorqueHistory, time_s: Array) -> tuple
     level = np.zeros(powers.shape[1])
     # The step of a deformation is the start of a phase.
     orders = (1, 2) if history.deforms else (0, 1, 2)
-    to_power, to_swing = (_stretched, _swayed) if history.deforms else (_turned, _swung)
+    respond = _stretched if history.deforms else _turned
     for k, start in enumerate(history.time_s):
         here = slice(firsts[k], firsts[k + 1])
         # The end of a phase is the initial state of the next.
         elapsed = np.append(time_s[here], ends[k]) - start
         if history.deforms:
-            reached = reached + (_course(powers[k], swings[k], 0.0) - level)[:, None, None]
-            level = _course(powers[k], swings[k], float(elapsed[-1]))
+            value, slope, curvature = powers[k].T
+            reached = reached + (value - level)[:, None, None]
+            level = value + slope * elapsed[-1] + curvature * elapsed[-1] ** 2 / 2
         remains = np.exp(rate * elapsed)
         response, slope = reached * remains, (its_slope + reached * elapsed) * remains
         for order in orders:
             height = powers[k, :, order, None, None]
             if height.any():
-                one, one_slope = to_power(order, rate, elapsed)
+                one, one_slope = respond(order, rate, elapsed)
                 response, slope = response + height * one, slope + height * one_slope
-        for omega, amplitudes in swings[k]:
-            one, one_slope = to_swing(omega, rate, elapsed, amplitudes[:, None, None])
-            response, slope = response + one, slope + one_slope
         responses[..., here], slopes[..., here] = response[..., :-1], slope[..., :-1]
         reached, its_slope = response[..., -1:], slope[..., -1:]
     return responses, slopes
-
-
-def _course(powers: Array, swings: list[tuple[float, ComplexArray]], elapsed: float) -> Array:
-    """Return what is controlled of each drive at one time within a phase, (n_drives,)."""
-    value, slope, curvature = powers.T
-    polynomial: Array = value + slope * elapsed + curvature * elapsed**2 / 2
-    return polynomial + sum((a * np.exp(1j * omega * elapsed)).real for omega, a in swings)
 
 
 def _turned(order: int, rate: Array, elapsed: Array) -> tuple[Array, Array]:
@@ -305,26 +296,8 @@ def _turned(order: int, rate: Array, elapsed: Array) -> tuple[Array, Array]:
     return rate * power * this, power * (before - order * this)
 
 
-def _swung(omega: float, rate: Array, elapsed: Array, phasor: ComplexArray) -> tuple[Array, Array]:
-    """Return the response to a torque Re(a e^(i omega t)), and its derivative."""
-    remains = np.exp(rate * elapsed)
-    difference = np.exp(1j * omega * elapsed) - remains
-    share = rate / (1j * omega - rate)
-    slope = 1j * omega / (1j * omega - rate) ** 2 * difference - share * elapsed * remains
-    return (phasor * share * difference).real, (phasor * slope).real
-
-
 def _stretched(order: int, rate: Array, elapsed: Array) -> tuple[Array, Array]:
     """Return the response to a deformation t^n/n!, n above 0, and its derivative."""
     z, power = rate * elapsed, elapsed**order
     this, after = phi_function(order, z), phi_function(order + 1, z)
     return power * this, power * elapsed * (this - order * after)
-
-
-def _swayed(omega: float, rate: Array, elapsed: Array, phasor: ComplexArray) -> tuple[Array, Array]:
-    """Return the response to the change of Re(a e^(i omega t)) since t = 0, and its derivative."""
-    remains = np.exp(rate * elapsed)
-    difference = np.exp(1j * omega * elapsed) - remains
-    share = 1j * omega / (1j * omega - rate)
-    slope = share / (1j * omega - rate) * difference - share * elapsed * remains
-    return (phasor * share * difference).real, (phasor * slope).real

@@ -47,8 +47,6 @@ _STAGES = 5
 # Length of the first element after a jump of the torque, in s, and the ratio of each element's
 # length to the one before: the error was below 1e-7 of the peak in all tests.
 _FIRST_S, _GROWTH = 1e-8, 1.3
-# Elements in a period of the fastest sinusoid.
-_PER_PERIOD = 8.0
 # Largest change in the last sweep, relative to the peak, and limit of sweeps.
 _TOLERANCE, _MOST_SWEEPS = 1e-13, 200
 
@@ -182,23 +180,19 @@ def _from_starts(force: Array, edges_s: Array, torque: TorqueHistory) -> Array:
     is short, and its polynomial is extrapolated to its start.
     """
     starts = np.concatenate((force[:, :1, 0], force[:, :-1, -1]), axis=1)
-    sets_in = np.isin(edges_s[:-1], np.concatenate((torque.time_s, torque.harmonic_time_s)))
+    sets_in = np.isin(edges_s[:-1], torque.time_s)
     starts[:, sets_in] = force[:, sets_in] @ _polynomials(_radau()[0], np.zeros(1))[:, 0]
     return np.concatenate((starts[..., None], force), axis=2)
 
 
 def _mesh(torque: TorqueHistory) -> Array:
     """Return element edges from 0 to the end, graded towards every change of torque."""
-    jumps = np.unique(np.concatenate((torque.time_s, torque.harmonic_time_s, [torque.end_s])))
-    longest = np.inf
-    if len(torque.omega_rad_per_s):
-        longest = 2 * np.pi / torque.omega_rad_per_s.max() / _PER_PERIOD
     edges = [0.0]
-    for start, end in pairwise(jumps[jumps <= torque.end_s]):
+    for start, end in pairwise([*torque.time_s.tolist(), torque.end_s]):
         length, here = _FIRST_S, start
         # The last element takes a short remainder along.
-        while here + 1.5 * min(length, longest) < end:
-            here += min(length, longest)
+        while here + 1.5 * length < end:
+            here += length
             edges.append(here)
             length *= _GROWTH
         edges.append(end)

@@ -87,14 +87,6 @@ def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Arra
         growth = elapsed**order * (phi_function(order, z) if order else np.exp(z))
         rest = constant[:, None] * elapsed**order / factorial(order)
         force[:, after] += rest + np.einsum("nj,njt->nt", amplitude, growth).real
-    for start, omega, a in torque.swings:
-        after = time_s >= start
-        elapsed = time_s[after] - start
-        amplitude = np.einsum("ndj,d->nj", weights, a)
-        steady = static @ a + np.sum(amplitude * 1j * omega / (1j * omega - response.rates), axis=1)
-        fading = amplitude * response.rates / (response.rates - 1j * omega)
-        swing = steady[:, None] * np.exp(1j * omega * elapsed)
-        force[:, after] += (swing + np.einsum("nj,njt->nt", fading, np.exp(rates * elapsed))).real
     return force
 
 
@@ -124,7 +116,7 @@ def jaw_force(
 
 # Forces below this share of the largest one are rounding errors.
 _NOTHING = 1e-9
-_A_PHASE, _A_PERIOD, _MOST = 200, 32, 200_000
+_A_PHASE = 200
 
 
 @dataclass(frozen=True)
@@ -174,16 +166,10 @@ def compute_grip(
 
 
 def _instants(torque: TorqueHistory) -> Array:
-    """Return times that are dense after every change of torque and within every period."""
-    starts = np.unique(np.concatenate((torque.time_s, torque.harmonic_time_s)))
-    starts = starts[starts < torque.end_s]
-    lengths = np.diff(np.append(starts, torque.end_s))
+    """Return times that are dense after every change of torque."""
+    lengths = np.diff(torque.time_s, append=torque.end_s)
     share = np.geomspace(1e-9, 1.0, _A_PHASE)[:-1]
-    pieces = [start + length * share for start, length in zip(starts, lengths, strict=True)]
-    if len(torque.omega_rad_per_s):
-        periods = torque.end_s * float(torque.omega_rad_per_s.max()) / (2 * np.pi)
-        count = int(min(_MOST, _A_PERIOD * np.ceil(periods)))
-        pieces.append(np.linspace(0, torque.end_s, count))
+    pieces = [start + length * share for start, length in zip(torque.time_s, lengths, strict=True)]
     return np.unique(np.append(np.concatenate(pieces), torque.end_s))
 
 
@@ -290,9 +276,8 @@ def ringing_s(gripper: Gripper) -> float:
 
 def elapsed_s(torque: TorqueHistory, time_s: Array) -> Array:
     """Return the times since the last change of the torque, (n_times,)."""
-    changes_s = np.unique([start for start, *_ in (*torque.jumps, *torque.swings)])
-    last = np.maximum(changes_s.searchsorted(time_s, side="right") - 1, 0)
-    return time_s - changes_s[last]
+    last = np.maximum(torque.changes_s.searchsorted(time_s, side="right") - 1, 0)
+    return time_s - torque.changes_s[last]
 
 
 def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array) -> Array:

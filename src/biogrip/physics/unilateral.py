@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biogrip.arrays import Array, BoolArray, ComplexArray
+from biogrip.arrays import Array, BoolArray
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import phi_function
@@ -33,8 +33,8 @@ from biogrip.physics.sample_model import Network
 _MOST_EVENTS = 100_000
 # Share of the largest force and closing below which a change of contact is rounding.
 _NOTHING = 1e-11
-# Grid on which the end of a stretch is bracketed: growth, points per period, points at once.
-_GROWTH, _PER_PERIOD, _AT_ONCE = 1.1, 48, 2048
+# Growth of the distances in the grid on which the end of a stretch is bracketed.
+_GROWTH = 1.1
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,7 @@ def unilateral_response(
     """
     system, pieces = _System(gripper, network), list(_pieces(torque))
     most_torque = max(
-        float(np.max(np.abs(loads.at(length * np.linspace(0, 1, 65)[:-1]))))
-        for _, length, loads in pieces
+        float(np.max(np.abs(loads.at(np.array([0.0, length]))))) for _, length, loads in pieces
     )
     softest = min(arm.stiffness_Nm_per_rad for arm in (gripper.left, gripper.right))
     least = {
@@ -90,7 +89,7 @@ def unilateral_response(
         while True:
             go_on = system.in_contact if touching else system.apart
             stretch = go_on(state, loads.later(done))
-            grid = _grid(stretch.fastest_per_s, loads.omega_rad_per_s, length - done)
+            grid = _grid(stretch.fastest_per_s, length - done)
             lasts = _first_below(stretch.margin, grid, least[touching])
             begin, end = start + done, start + (length if lasts is None else done + lasts)
             final = lasts is None and start + length >= torque.end_s
@@ -111,7 +110,7 @@ def unilateral_response(
             if len(parted) > _MOST_EVENTS:
                 raise BiogripError(
                     f"the jaws leave the sample more than {_MOST_EVENTS} times; allowed are "
-                    "protocols with fewer periods."
+                    "protocols with fewer phases."
                 )
     return UnilateralResponse(
         states[:2], force, touches, states[2], states[3:], tuple(parted), tuple(met)
@@ -124,33 +123,24 @@ class _Forcing:
 
     powers: Array
     """Value, slope and curvature at that instant, (n_loads, 3)."""
-    omega_rad_per_s: Array
-    """Angular frequencies of sinusoids on top, (n_harmonics,)."""
-    amplitudes: ComplexArray
-    """Their complex amplitudes at that instant, (n_loads, n_harmonics)."""
 
     def at(self, elapsed_s: Array) -> Array:
         """Return the loads at times since the instant, (n_loads, n_times)."""
         powers = np.stack((np.ones_like(elapsed_s), elapsed_s, elapsed_s**2 / 2))
-        turning = np.exp(1j * self.omega_rad_per_s[:, None] * elapsed_s)
-        return self.powers @ powers + (self.amplitudes @ turning).real
+        return self.powers @ powers
 
     def later(self, elapsed_s: float) -> "_Forcing":
         """Return the same loads, counted from a later instant on."""
         t = elapsed_s
         shift = np.array([[1, 0, 0], [t, 1, 0], [t**2 / 2, t, 1]])
-        turned = self.amplitudes * np.exp(1j * self.omega_rad_per_s * t)
-        return _Forcing(self.powers @ shift, self.omega_rad_per_s, turned)
+        return _Forcing(self.powers @ shift)
 
 
 def _pieces(torque: TorqueHistory) -> Iterator[tuple[float, float, _Forcing]]:
     """Yield start and length of each phase, and the torques of both arms in it."""
-    powers, swings = torque.of_arms
     lengths = np.diff(torque.time_s, append=torque.end_s)
-    for start, length, own, waves in zip(torque.time_s, lengths, powers, swings, strict=True):
-        omega = np.array([omega for omega, _ in waves])
-        amplitudes = np.array([a for _, a in waves]).reshape(-1, 2).T
-        yield float(start), float(length), _Forcing(own, omega, amplitudes)
+    for start, length, own in zip(torque.time_s, lengths, torque.of_arms, strict=True):
+        yield float(start), float(length), _Forcing(own)
 
 
 class _Modes:
@@ -175,7 +165,7 @@ class _Modes:
             self.rates[:, None],
             self._out,
             self._into @ state,
-            _Forcing(drive @ forcing.powers, forcing.omega_rad_per_s, drive @ forcing.amplitudes),
+            _Forcing(drive @ forcing.powers),
         )
 
 
@@ -208,9 +198,6 @@ class _Motion:
             load = self.forcing.powers[:, order, None]
             if np.any(load):
                 modes = modes + load * elapsed_s ** (order + 1) * phi_function(order + 1, z)
-        for omega, a in zip(self.forcing.omega_rad_per_s, self.forcing.amplitudes.T, strict=True):
-            swing = np.exp(1j * omega * elapsed_s) - np.exp(z)
-            modes = modes + (a[:, None] / (1j * omega + self.rates) * swing).real
         return modes
 
 
@@ -294,7 +281,7 @@ class _System:
         """Solve for the shortening and dampers of the unloaded sample."""
         if not self._has_damper and not self._branches:
             return lambda elapsed_s: np.zeros((1, len(elapsed_s)))
-        nothing = _Forcing(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 0), complex))
+        nothing = _Forcing(np.zeros((0, 3)))
         if self._has_damper:
             return self._sample.follow(state[2:], nothing).at
         dampers = self._sample.follow(state[3:], nothing)
@@ -315,46 +302,29 @@ def _coupled(arms: Array, shared: float, diagonal: Array) -> Array:
     return whole
 
 
-def _grid(fastest_per_s: float, omega_rad_per_s: Array, length_s: float) -> Iterator[Array]:
-    """Yield times from 0 to the end, at growing distances up to a part of a period."""
-    longest = np.inf
-    if len(omega_rad_per_s):
-        longest = 2 * np.pi / float(omega_rad_per_s.max()) / _PER_PERIOD
+def _grid(fastest_per_s: float, length_s: float) -> Array:
+    """Return times from 0 to the end, at growing distances, (n_times,)."""
     first = min(1e-2 / fastest_per_s, length_s)
     count = int(np.ceil(np.log(length_s / first) / np.log(_GROWTH))) + 1
-    here: Array = np.append(0.0, first * _GROWTH ** np.arange(count))
-    near = here[: int(np.searchsorted(np.diff(here), longest)) + 1]
-    near = near[near < length_s]
-    yield near
-    reached = float(near[-1])
-    while np.isfinite(longest) and reached + longest < length_s:
-        some = reached + longest * np.arange(1.0, _AT_ONCE + 1)
-        some = some[some < length_s]
-        yield some
-        reached = float(some[-1])
-    yield np.array([length_s])
+    growing = first * _GROWTH ** np.arange(count)
+    return np.concatenate(([0.0], growing[growing < length_s], [length_s]), dtype=float)
 
 
-def _first_below(
-    margin: Callable[[Array], Array], grid: Iterator[Array], least: float
-) -> float | None:
+def _first_below(margin: Callable[[Array], Array], times_s: Array, least: float) -> float | None:
     """Find the first time at which a margin falls to zero and then clearly below."""
-    before, last = None, 0.0
-    for times in grid:
-        values = margin(times)
-        below = np.flatnonzero(values < -least)
-        if len(below):
-            at = int(below[0])
-            if at > 0:
-                before, last = float(times[at - 1]), float(values[at - 1])
-            if before is None or last <= 0:
-                return before or 0.0
-            from scipy.optimize import brentq
+    values = margin(times_s)
+    below = np.flatnonzero(values < -least)
+    if not len(below):
+        return None
+    after = int(below[0])
+    before = max(after - 1, 0)
+    if after == 0 or values[before] <= 0:
+        return float(times_s[before])
+    # Imported here, for only what loses contact needs it.
+    from scipy.optimize import brentq
 
-            after = float(times[at])
-            end = brentq(
-                lambda t: float(margin(np.array([t]))[0]), before, after, xtol=1e-14 * after
-            )
-            return float(end)
-        before, last = float(times[-1]), float(values[-1])
-    return None
+    def at(time_s: float) -> float:
+        return float(margin(np.array([time_s]))[0])
+
+    end = brentq(at, times_s[before], times_s[after], xtol=1e-14 * times_s[after])
+    return float(end)

@@ -171,17 +171,6 @@ def difference_over_peak(
     return np.where(found.converged, share, np.nan)
 
 
-def scaled(torque: TorqueHistory, factor: float) -> TorqueHistory:
-    """Return the protocol with every torque multiplied by a factor."""
-    return replace(
-        torque,
-        left=factor * torque.left,
-        right=factor * torque.right,
-        harmonic_left=factor * torque.harmonic_left,
-        harmonic_right=factor * torque.harmonic_right,
-    )
-
-
 def _times(torque: TorqueHistory) -> Array:
     """Return times that are dense after every jump and reach up to the next."""
     ends = np.append(torque.time_s[1:], torque.end_s)

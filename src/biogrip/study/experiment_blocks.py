@@ -127,7 +127,7 @@ def _too_uncertain(path: tuple[str, ...], uncertainty: float, owner: object) -> 
 
 @dataclass(frozen=True)
 class PhaseBlock(Block):
-    """A phase of the protocol: a hold, a ramp or a sinusoid, of one quantity in all phases."""
+    """A phase of the protocol: a hold or a ramp, of one quantity in all phases."""
 
     duration_s: Annotated[float, Field(ge=SHORTEST_S, le=LONGEST_S)]
     """Duration of the phase; of all together at most 1e9 s."""
@@ -135,8 +135,6 @@ class PhaseBlock(Block):
     """Closing torque of both arms, held or, with to_torque_Nm, at the start of a ramp."""
     to_torque_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
     """Torque at the end of a ramp."""
-    amplitude_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
-    """Amplitude of a sinusoid on top of a held torque; needs frequency_Hz."""
     torque_right_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
     """Held torque of the right arm, where it differs."""
     voltage_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
@@ -145,8 +143,6 @@ class PhaseBlock(Block):
     top."""
     to_voltage_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
     """Voltage at the end of a ramp of the voltage."""
-    amplitude_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
-    """Amplitude of a sinusoid on top of a held voltage; needs frequency_Hz."""
     voltage_right_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
     """Held voltage of the right arm, where it differs."""
     force_N: _Signed = None
@@ -154,28 +150,18 @@ class PhaseBlock(Block):
     Where it is `relaxation`, displacement_m or strain."""
     to_force_N: _Signed = None
     """Force at the end of a ramp."""
-    amplitude_N: _Signed = None
-    """Amplitude of a sinusoid on top of a held force."""
     stress_Pa: _Signed = None
     """Stress on the sample."""
     to_stress_Pa: _Signed = None
     """Stress at the end of a ramp."""
-    amplitude_Pa: _Signed = None
-    """Amplitude of a sinusoid on top of a held stress."""
     displacement_m: _Signed = None
     """Displacement of the sample."""
     to_displacement_m: _Signed = None
     """Displacement at the end of a ramp, as the ramp of loading."""
-    amplitude_m: _Signed = None
-    """Amplitude of a sinusoid on top of a held displacement."""
     strain: _Signed = None
     """Strain of the sample."""
     to_strain: _Signed = None
     """Strain at the end of a ramp, as the ramp of loading."""
-    amplitude_strain: _Signed = None
-    """Amplitude of a sinusoid on top of a held strain."""
-    frequency_Hz: Annotated[float | None, Field(ge=1e-9, le=1e9)] = None
-    """Frequency of the sinusoid, which starts at its mean, rising."""
 
     @property
     def bases(self) -> list[str]:
@@ -185,13 +171,12 @@ class PhaseBlock(Block):
     @property
     def drives(self) -> bool:
         """True if anything that the phase controls differs from zero."""
-        return any(vars(self)[key] for key in vars(self).keys() - {"duration_s", "frequency_Hz"})
+        return any(vars(self)[key] for key in vars(self).keys() - {"duration_s"})
 
     def phase(self, per_square_volt: float) -> Phase:
         """Return the phase in torques; a voltage's torque is `per_square_volt` V^2 (eq. 9)."""
         (base,) = self.bases
-        value, to, amplitude = (getattr(self, key) for key in (base, *further_keys(base)))
-        left = right = load(self.duration_s, value, to, amplitude, self.frequency_Hz)
+        left = right = load(self.duration_s, getattr(self, base), getattr(self, f"to_{base}"))
         of_right = getattr(self, base.replace("_", "_right_")) if base in _PULLS else None
         if of_right is not None:
             right = replace(left, value_Nm=of_right)
@@ -208,19 +193,12 @@ class PhaseBlock(Block):
             yield (), f"{text}instrument of {others}."
             return
         by = self.bases[0]
-        ramp, swing = further_keys(by)
+        ramp = f"to_{by}"
         right = by.replace("_", "_right_") if by in _PULLS else ""
-        for key in sorted(given.keys() - {"duration_s", by, right, ramp, swing, "frequency_Hz"}):
+        for key in sorted(given.keys() - {"duration_s", by, right, ramp}):
             yield (key,), f"does not go with {by}."
-        if (swing in given) != ("frequency_Hz" in given):
-            yield (), f"has one of {swing} and frequency_Hz; allowed are both or neither."
         if right in given and ramp in given:
             yield (right,), "does not go with a ramp; allowed is a held torque."
-        if swing in given and ramp in given:
-            yield (), "has a ramp and a sinusoid; allowed is one of them in a phase."
-        if by in _PULLS and given.get(swing, 0) > min(given[by], given.get(right, given[by])):
-            text = f"found {given[swing]}, allowed is at most {by}: comb drives only pull."
-            yield (swing,), text
 
 
 @dataclass(frozen=True)
@@ -268,11 +246,6 @@ class ProtocolBlock(Block):
                 elif base not in _PULLS and base != self.phases[0].bases[0]:
                     text = f"does not go with {self.phases[0].bases[0]} in another phase; allowed "
                     yield ("phases", index, base), f"{text}is one of them."
-
-
-def further_keys(base: str) -> tuple[str, str]:
-    """Return the keys of a ramp's end and of a sinusoid's amplitude."""
-    return f"to_{base}", f"amplitude_{base.rpartition('_')[2]}"
 
 
 class SampleBlock(Checked, BaseModel):

@@ -4,8 +4,7 @@ A linear viscoelastic sample makes the gripper a sum of lags with real relaxatio
 proportional to the torque (a spring) and to its integral (a damper). So the trace is fitted by
 linear least squares with the torque lagged by three relaxation times: a negligible one, a tenth of
 the protocol, and ten protocols. Three lags are too few to identify a sample, but enough to find its
-response under noise. The peak of the readings would be a peak of the noise, and block means would
-lose a sinusoid.
+response under noise. The peak of the readings would be a peak of the noise.
 """
 
 import math
