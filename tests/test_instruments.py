@@ -11,7 +11,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.physics.protocol import Harmonic, Load, Phase, hold
+from biogrip.physics.protocol import hold
 from tests.helpers.default import study_of
 from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
 from tests.helpers.places import ROOT
@@ -133,23 +133,6 @@ def test_readings_at_the_instant_of_a_step_are_left_out(tmp_path: Path) -> None:
     assert found["fit"] == "ok"
     assert found["samples"] == len(TIMES)
     assert any("they were taken: 1 reading, at " in note["text"] for note in found["notes"])
-
-
-def test_oscillations_about_zero_are_identified(tmp_path: Path) -> None:
-    """Nothing is held at the ends of the phase: the amplitude is what a modulus is over."""
-    amplitude = 0.02
-    swing = Load(0.0, harmonics=(Harmonic(amplitude, np.pi, -np.pi / 2),))
-    experiment = set_up(INSTRUMENTS["stress"], (Phase(20.0, swing, swing),), SOLID)
-    times: Array = 0.02 * np.arange(1.0, 1000.0)
-    values = noisy(simulate(experiment, TRUTH, times)) / amplitude
-    trace = write_trace(tmp_path / "t.csv", times, values, "time_s,modulus_Pa")
-    phase = "{duration_s: 20, strain: 0, amplitude_strain: 0.02, frequency_Hz: 0.5}"
-    config = f"instrument: relaxation\nprotocol: {{phases: [{phase}]}}\n"
-    options = ["--reading", "modulus=modulus_Pa", "--model", SOLID.name]
-    for name, item in by_quantity(
-        identified(tmp_path, trace, *options, config=config + FEW)
-    ).items():
-        assert abs(item["value"] - FOUND[name]) < item["high"] - item["low"]
 
 
 def test_the_power_law_of_a_cell_in_an_optical_stretcher(tmp_path: Path) -> None:

@@ -19,16 +19,16 @@ from flint import acb, acb_mat, arb, ctx
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.models import MODELS
-from biogrip.physics.protocol import Harmonic, Load, Phase, TorqueHistory, hold
+from biogrip.physics.protocol import Load, Phase, TorqueHistory, hold
 from biogrip.physics.sample_model import SampleModel
 
-SWING = Load(1e-9, 0.0, 0.0, (Harmonic(4e-10, 0.3, -np.pi / 2),))
+FALLING = Load(1.4e-9, -4e-12)
 PROTOCOLS = {
     "steps": (hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)),
-    "ramp, parabola and sinusoid": (
+    "ramps and parabola": (
         Phase(50.0, Load(0.0, 2e-11), Load(0.0, 2e-11)),
         Phase(150.0, Load(1e-9, 1e-12, 1e-14), Load(1e-9, 1e-12, 1e-14)),
-        Phase(200.0, SWING, SWING),
+        Phase(200.0, FALLING, FALLING),
     ),
     "arms driven differently": (hold(200.0, 1.6e-9, 1.0e-9), hold(200.0, 0.3e-9, 0.5e-9)),
 }

@@ -26,12 +26,12 @@ def _alike(duration_s: float, given: Load) -> Phase:
     return Phase(duration_s, given, given)
 
 
-# A ramp of finite rate, a hold, a parabola, a sinusoid on a level that ends with a jump, recovery.
+# A ramp of finite rate, a hold, a parabola, a ramp down that ends with a jump, recovery.
 PHASES = (
     _alike(0.5, load(0.5, 0.0, 2.0)),
     hold(2.0, 2.0),
     _alike(1.0, Load(2.0, 0.5, -0.8)),
-    _alike(2.0, load(2.0, 1.0, None, 0.5, 0.3)),
+    _alike(2.0, load(2.0, 1.0, 0.7)),
     hold(2.0, 0.0),
 )
 
@@ -50,14 +50,10 @@ def by_laplace(given: Impedance, history: TorqueHistory, time_s: float) -> float
     def power(height: float, order: int) -> Impedance:
         return lambda s: height / s ** (order + 1)
 
-    def swing(a: complex, omega: float) -> Impedance:
-        return lambda s: (a.real * s - a.imag * omega) / (s * s + omega * omega)
-
     def response(held: Impedance) -> Impedance:
         return lambda s: held(s) * given(s) if history.deforms else held(s) / given(s)
 
     changes = [(start, power(height[0], order)) for start, order, height in history.jumps]
-    changes += [(start, swing(complex(a[0]), omega)) for start, omega, a in history.swings]
     return sum(
         inverted(response(held), time_s - start) for start, held in changes if start < time_s
     )
@@ -65,7 +61,7 @@ def by_laplace(given: Impedance, history: TorqueHistory, time_s: float) -> float
 
 @DRIVEN
 @pytest.mark.parametrize("name", ["kelvin_voigt", "generalized_maxwell", "burgers", "zener_kelvin"])
-def test_responses_to_ramps_and_sinusoids_are_inverse_laplace_transforms(
+def test_responses_to_ramps_and_parabolas_are_inverse_laplace_transforms(
     name: str, deforms: bool
 ) -> None:
     model, history = MODELS[name], torque_history(PHASES, deforms=deforms)

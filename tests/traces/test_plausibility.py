@@ -15,7 +15,6 @@ from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.models import MODELS
 from biogrip.physics.noise import Noise, add_noise
 from biogrip.physics.protocol import (
-    Harmonic,
     Load,
     Phase,
     TorqueHistory,
@@ -38,7 +37,6 @@ SAMPLES = {
     "liquid_drop_2": (1.0, 1.0e-4, 10.0, 1.0e-3),
 }
 TIMES = sample_times(400.0, 1.0)
-ALTERNATING = Load(0.0, harmonics=(Harmonic(1e-9, 2.0, 0.3),))
 NO_RESPONSE = "found no response to the torque"
 MIRRORED = "found a rotation that goes against the torque"
 
@@ -209,7 +207,6 @@ def test_the_free_rotation_is_that_of_the_left_arm() -> None:
         ((ramp,), 1.4e-9 / 4.4e-7),
         ((hold(1.0, 0.0, 1.6e-9),), 1.6e-9 / 9.9e-7),
         ((hold(1.0, 1.0e-9, -1.6e-9),), 2.6e-9 / 9.9e-7),
-        ((Phase(200.0, ALTERNATING, ALTERNATING),), 1e-9 / 4.4e-7),
     ):
         found = free_rotation(UNEQUAL, torque_history(phases))
         assert found == pytest.approx(largest_rad, rel=2e-3)
@@ -261,20 +258,12 @@ def test_a_share_of_the_protocol_is_enough_wherever_it_is() -> None:
         )
 
 
-def sinusoid(duration_s: float, mean_Nm: float, omega_rad_per_s: float) -> Phase:
-    """A torque between zero and twice its mean: comb drives only pull."""
-    load = Load(mean_Nm, harmonics=(Harmonic(mean_Nm, omega_rad_per_s, -np.pi / 2),))
-    return Phase(duration_s, load, load)
-
-
 PULLING = {
     "steps": (hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)),
     "hold": (hold(60.0, 1e-9),),
     "ramp": (Phase(100.0, Load(0.0, 2e-11), Load(0.0, 2e-11)), hold(50.0, 0.0)),
     "late": (hold(50.0, 0.0), hold(50.0, 1e-9), hold(100.0, 0.0)),
     "stairs": tuple(hold(40.0, 1e-10 * (step + 1)) for step in range(8)),
-    "sinusoid": (sinusoid(200.0, 1e-9, 2.0),),
-    "slow sinusoid": (sinusoid(200.0, 1e-9, 0.05),),
     "one arm": (hold(100.0, 1.6e-9, 0.0), hold(100.0, 0.0)),
     "the other arm": (hold(100.0, 0.0, 1.6e-9), hold(100.0, 0.0)),
     "one after the other": (
@@ -288,10 +277,7 @@ PULLING = {
 
 @pytest.mark.parametrize(
     "phases",
-    [
-        (Phase(200.0, ALTERNATING, ALTERNATING),),
-        *(PULLING[name] for name in ("hold", "ramp", "one arm", "the other arm", "opening")),
-    ],
+    [PULLING[name] for name in ("hold", "ramp", "one arm", "the other arm", "opening")],
 )
 @pytest.mark.parametrize("gripper", [GRIPPER, UNEQUAL])
 def test_other_protocols_and_samples_pass_and_not_in_a_wrong_unit(
