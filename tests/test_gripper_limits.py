@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biogrip.physics.gripper import voltage
 from biogrip.physics.simulation import simulated_rotation
 from tests.helpers.default import STUDY
 from tests.helpers.identified import by_quantity, identified, identify, write_trace
@@ -17,10 +16,6 @@ model_selection: {models: [maxwell, burgers]}
 """
 CASE = STUDY.cases["liquid_drop_2"]
 TIMES = np.linspace(0.0, 400.0, 801)
-# Torques of the default study, as voltages.
-VOLTS = [float(voltage(STUDY.actuator, torque)) for torque in (1.6e-9, 0.32e-9)]
-PHASES = ", ".join(f"{{duration_s: 200.0, voltage_V: {volts!r}}}" for volts in VOLTS)
-UNCERTAIN = "gripper: {uncertainty: {arm_length_m: 7.5e-5, "
 
 
 def simulated(
@@ -41,21 +36,18 @@ def test_limits_hold_the_truth_of_a_wrong_gripper_only_with_its_uncertainty(tmp_
     trace = simulated(tmp_path, CASE.parameters, torque=1.08, length=0.93)
     configs = {
         "exact": "",
-        "torque": f"{UNCERTAIN}torque_percent: 5}}}}\n",
-        "comb": f"{UNCERTAIN}finger_gap_m: 0.05e-6, voltage_percent: 2.4}}}}\n"
-        f"protocol: {{phases: [{PHASES}]}}\n",
+        "torque": "gripper: {uncertainty: {arm_length_m: 7.5e-5, torque_percent: 5}}\n",
     }
     told = {name: identified(tmp_path, trace, config=FEW + own) for name, own in configs.items()}
     assert told["exact"]["limits"].startswith("Limits are statistical only")
-    assert told["torque"]["limits"] == told["comb"]["limits"]
-    assert told["comb"]["limits"].endswith("gripper.arm_length_m, torque.")
+    assert told["torque"]["limits"].endswith("gripper.arm_length_m, torque.")
     truth = CASE.parameters["c"] + CASE.parameters["c_p"]
     for name, found in told.items():
         held = by_quantity(found)["c + c_p"]
         assert ((held["low"] or np.inf) < truth < (held["high"] or 0.0)) == (name != "exact")
         assert found["fit"] == ("rejected" if name == "exact" else "ok")
     # No model is asked for in place of the gripper's error.
-    assert "not adequate" not in told["comb"]["advice"]
+    assert "not adequate" not in told["torque"]["advice"]
 
 
 def test_a_stiff_sample_is_identified_where_the_noise_is_given(tmp_path: Path) -> None:

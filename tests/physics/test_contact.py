@@ -19,7 +19,6 @@ from biogrip.physics.gripper import (
     Gripper,
     capacitance_slope,
     torque,
-    torque_uncertainty,
     voltage,
 )
 
@@ -133,21 +132,3 @@ def test_voltage_inverts_torque_and_nothing_pushes() -> None:
     np.testing.assert_allclose(voltage(TABLE_2, torque(TABLE_2, volts)), volts, rtol=1e-14)
     with pytest.raises(ValueError, match="only pulls"):
         voltage(TABLE_2, -1e-9)
-
-
-def test_the_torque_is_as_uncertain_as_that_of_combs_that_vary() -> None:
-    """Torques of combs drawn at random scatter so, to the standard error of 8000 draws."""
-    rng = np.random.default_rng(3)
-    volts, gap, height = 16.3, 0.06e-6, 0.8e-6
-    drawn = [
-        torque(
-            CombDrive(40e-6 + height * z[0], 4e-6 - gap * z[1], 3e-6 + gap * z[1], *REST),
-            volts * (1 + 0.01 * z[2]),
-        )
-        for z in rng.standard_normal((8000, 3))
-    ]
-    scatter = np.std(drawn) / float(torque(TABLE_2, volts))
-    found = torque_uncertainty(TABLE_2, 0.01, gap, height)
-    assert found == pytest.approx(scatter, rel=3 / np.sqrt(2 * len(drawn)))
-    assert torque_uncertainty(TABLE_2, 0.01, 0.0, 0.0) == pytest.approx(0.02)
-    assert torque_uncertainty(TABLE_2, 0.0, 0.0, height) == pytest.approx(0.02)

@@ -5,7 +5,7 @@ The rotary comb drive turns a voltage into a torque (eqs. 7-9).
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -188,33 +188,3 @@ def voltage(comb: CombDrive, torque_Nm: ArrayLike) -> Array:
     if np.any(torques < 0):
         raise ValueError(f"a comb drive only pulls: torque {torques.min()} N m is negative")
     return np.sqrt(2 * torques / capacitance_slope(comb))
-
-
-def torque_uncertainty(
-    comb: CombDrive, voltage_share: float, finger_gap_m: float, thickness_m: float
-) -> float:
-    """Return the relative standard uncertainty of the torque, by eqs. (7)-(9).
-
-    The mask fixes the pitch of the fingers, so that a finger is narrower by what its gap is wider.
-
-    Parameters
-    ----------
-    comb
-        The comb drive.
-    voltage_share
-        Relative standard uncertainty of the voltage.
-    finger_gap_m, thickness_m
-        Standard uncertainties of the gap and of the height of the fingers.
-    """
-    wide, narrow = (
-        capacitance_slope(
-            replace(
-                comb,
-                finger_gap_m=comb.finger_gap_m + error,
-                finger_width_m=comb.finger_width_m - error,
-            )
-        )
-        for error in (0.5 * finger_gap_m, -0.5 * finger_gap_m)
-    )
-    by_gap = (wide - narrow) / capacitance_slope(comb)
-    return math.hypot(2 * voltage_share, by_gap, thickness_m / comb.thickness_m)

@@ -218,12 +218,8 @@ class CaseBlock(Shared):
                 yield path, f"is of the gripper; leave it out with {self.instrument}."
 
     def comb_problems(self, comb: CombDrive) -> Iterator[Problem]:
-        """Find a sample that does not fit between the jaws, and what is no comb drive's."""
-        if not self.instrument_used.has_jaws:
-            return
-        in_volts = all(phase.voltage_V is not None for phase in self.protocol.phases)
-        yield from below(("gripper",), self.gripper.comb_problems(comb, in_volts=in_volts))
-        if self.sample.size_m is not None:
+        """Find a sample that does not fit between the jaws."""
+        if self.instrument_used.has_jaws and self.sample.size_m is not None:
             try:
                 self.gripper.contact(comb, self.sample.size_m)
             except BiogripError as error:

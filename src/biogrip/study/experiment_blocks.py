@@ -5,7 +5,6 @@ controlled over time: torques or voltages of the comb drives or, of another inst
 deformation. The sample is a constitutive model with the true values of its parameters.
 """
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -16,7 +15,7 @@ from biogrip.errors import nearest
 from biogrip.keys import OPEN, Block, Checked, OneOf, Problem
 from biogrip.physics.calibration import ARM_KEYS
 from biogrip.physics.contact import LARGEST_M, SMALLEST_M, Contact, contact
-from biogrip.physics.gripper import CombDrive, Gripper, capacitance_slope, torque_uncertainty
+from biogrip.physics.gripper import CombDrive, Gripper, capacitance_slope
 from biogrip.physics.instruments import CONTROLLED, Instrument
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import Phase, largest_load, load
@@ -32,7 +31,6 @@ _PULLS = _BASES[:2]
 # Share of a property; a larger change of the response would not be linear.
 _MOST_UNCERTAIN = 0.5
 _OWN = ("arm_length_m", "reference_angle_deg")
-_OF_COMB = ("finger_gap_m", "thickness_m")
 
 # A load or a deformation, either way.
 _Signed = Annotated[float | None, Field(ge=-1e12, le=1e12)]
@@ -52,29 +50,16 @@ class Uncertainty(Block):
     reference_angle_deg: Annotated[float, Field(ge=0, le=45)] = 0.0
     """Uncertainty of the reference angle. At 90 degrees it has no effect."""
     torque_percent: Annotated[float, Field(ge=0, le=50)] = 0.0
-    """Uncertainty of the torque, a factor that both arms and all phases share."""
-    voltage_percent: Annotated[float, Field(ge=0, le=25)] = 0.0
-    """Uncertainty of the voltage, a factor likewise. This key and the next two are for a protocol
-    in voltages: the uncertainties of its torques (eq. 9) add up in quadrature."""
-    finger_gap_m: Annotated[float, Field(ge=0, le=1e-2)] = 0.0
-    """Uncertainty of the comb drives' gap. The mask fixes the pitch, so that a wider gap is a
-    narrower finger."""
-    thickness_m: Annotated[float, Field(ge=0, le=1e-2)] = 0.0
-    """Uncertainty of the height of the comb drives' fingers."""
+    """Uncertainty of the torque, a factor that both arms and all phases share; twice that of a
+    voltage."""
 
     @property
     def by_part(self) -> dict[str, Mapping[str, float]]:
-        """Uncertainties of the arms and of the gripper's own keys, as far as they are given."""
+        """Uncertainties by part and key, as far as they are given, see `CaseProblem`."""
         own = {key: known for key in _OWN if (known := getattr(self, key))}
-        parts = {"left": self.left, "right": self.right, "gripper": own}
+        torque = {"share": 0.01 * self.torque_percent} if self.torque_percent else None
+        parts = {"left": self.left, "right": self.right, "gripper": own, "torque": torque}
         return {name: known for name, known in parts.items() if known}
-
-    def torque_share(self, comb: CombDrive) -> float:
-        """Return the relative standard uncertainty of the torque."""
-        of_comb = torque_uncertainty(
-            comb, 0.01 * self.voltage_percent, self.finger_gap_m, self.thickness_m
-        )
-        return math.hypot(0.01 * self.torque_percent, of_comb)
 
 
 @dataclass(frozen=True)
@@ -85,29 +70,16 @@ class GripperBlock(Gripper):
     """Distance between the jaws in the neutral configuration."""
     uncertainty: Uncertainty | None = None
 
-    def uncertainties(self, comb: CombDrive) -> dict[str, Mapping[str, float]]:
-        """Return standard uncertainties by part of the gripper, see `CaseProblem`."""
-        if self.uncertainty is None:
-            return {}
-        share = self.uncertainty.torque_share(comb)
-        return self.uncertainty.by_part | ({"torque": {"share": share}} if share else {})
-
     def problems(self) -> Iterator[Problem]:
         """Refuse uncertainties of half a property or more."""
         for part, known in self.uncertainty.by_part.items() if self.uncertainty else ():
+            if part == "torque":
+                continue
             owner, path = (self, ()) if part == "gripper" else (getattr(self, part), (part,))
             for key, uncertainty in known.items():
-                yield from _too_uncertain(("uncertainty", *path, key), uncertainty, owner)
-
-    def comb_problems(self, comb: CombDrive, *, in_volts: bool) -> Iterator[Problem]:
-        """Refuse uncertainties of half the comb's size or more, or without voltages."""
-        for key in ("voltage_percent", *_OF_COMB) if self.uncertainty else ():
-            known, path = getattr(self.uncertainty, key), ("uncertainty", key)
-            if known and not in_volts:
-                text = "needs a protocol in voltages; allowed with torques is torque_percent."
-                yield path, text
-            elif key in _OF_COMB:
-                yield from _too_uncertain(path, known, comb)
+                if uncertainty >= _MOST_UNCERTAIN * (value := getattr(owner, key)):
+                    text = f"found {uncertainty:g}, allowed is less than half of {value:g}."
+                    yield ("uncertainty", *path, key), text
 
     @property
     def neutral(self) -> Gripper:
@@ -117,12 +89,6 @@ class GripperBlock(Gripper):
     def contact(self, comb: CombDrive, size_m: float) -> Contact:
         """Return the gripper's state when it is closed onto a sample."""
         return contact(self.neutral, self.jaw_gap_m, comb, size_m)
-
-
-def _too_uncertain(path: tuple[str, ...], uncertainty: float, owner: object) -> Iterator[Problem]:
-    value = getattr(owner, path[-1])
-    if uncertainty >= _MOST_UNCERTAIN * value:
-        yield path, f"found {uncertainty:g}, allowed is less than half of {value:g}."
 
 
 @dataclass(frozen=True)

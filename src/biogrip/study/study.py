@@ -130,8 +130,7 @@ class Case:
         gripper = self.gripper
         if isinstance(assumed, Mapping):
             gripper = built(Gripper, overlaid(plain(gripper), assumed))
-        own = self.block.gripper if self.instrument.has_jaws else None
-        uncertainty = own.uncertainties(self.actuator) if own else {}
+        uncertainty = self.block.gripper.uncertainty if self.instrument.has_jaws else None
         return CaseProblem(
             gripper,
             self.phases,
@@ -144,7 +143,7 @@ class Case:
             noise_rad=measurement.noise_rad,
             noise_share=measurement.noise_share,
             coloured=measurement.coloured,
-            uncertainty=uncertainty,
+            uncertainty=uncertainty.by_part if uncertainty else {},
             fit_start=measurement.fit_start,
         )
 
