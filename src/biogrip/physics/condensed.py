@@ -13,7 +13,6 @@ sum of the responses of modes to the protocol, g(t; r). Over all rates r these n
 of some fifty dimensions only, in which a function is determined by its values at as many
 well-chosen times [2]_, [3]_. So a response is simulated at those times, and a square matrix turns
 its values into rows with the sum of squares, and the gradients, of the residuals at all readings.
-If nodes are too many, every node has a row of its own.
 
 References
 ----------
@@ -52,9 +51,6 @@ _FEWEST, _LARGEST_CONDITION = 256, 100.0
 _AT_ONCE = 16_384
 # Most readings whose polynomials are kept for the next trace.
 _MOST_KEPT = 100_000
-
-MOST_NODES = 50_000
-"""Most nodes that are condensed further: with more, it would take gigabytes."""
 
 # Spacing of rates in log(1 - T r), T the last time: far closer than modes can be resolved.
 _SPACING = 0.25
@@ -214,34 +210,20 @@ class Condensed:
         """True if the noise is whitened."""
         return self.whitening is not None
 
-    @cached_property
-    def reduced(self) -> bool:
-        """True if rows are fewer than nodes."""
-        return len(self.dense.time_s) <= MOST_NODES
-
     def of_trace(self, rotation_rad: Array) -> Array:
         """Return rows of a trace without nuisance, (n_rows,); no response reaches the last."""
         projected, rest = self.dense.rows_of_samples(rotation_rad)
-        if not self.reduced:
-            return np.append(projected, rest)
         rows = projected @ self._basis
         return np.append(rows, np.hypot(np.linalg.norm(projected - self._basis @ rows), rest))
 
     @cached_property
     def time_s(self) -> Array:
         """Times at which responses are simulated, (n_times,)."""
-        return self.dense.time_s[self._chosen] if self.reduced else self.dense.time_s
+        return self.dense.time_s[self._chosen]
 
     def rows_of_nodes(self, values: Array) -> Array:
         """Return rows of responses without nuisance, from values at the nodes, (..., n_nodes)."""
         return self._cleared_rows(self.dense.rows_of_values(values))
-
-    def rows(self, values: Array) -> Array:
-        """Return rows of responses, (..., n_rows), from values at `time_s`, (..., n_times)."""
-        if self.reduced:
-            return values @ self.to_rows
-        rows = self.rows_of_nodes(values)
-        return np.pad(rows, ((0, 0),) * (rows.ndim - 1) + ((0, 1),))
 
     @cached_property
     def to_rows(self) -> Array:

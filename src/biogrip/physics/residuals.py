@@ -18,8 +18,6 @@ from biogrip.physics.whitening import estimate_noise, measure_rounding, taken_ou
 
 # Most numbers in the rows that are formed at once.
 _AT_ONCE = 100_000
-# Most readings whose derivatives are formed: more would double the memory.
-_SAMPLES_AT_ONCE = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,11 +163,7 @@ class Residuals:
 
     def rotation(self, log_parameters: Array) -> Array:
         """Return the simulated rotation, neither cleared nor whitened, (n_samples,) in rad."""
-        simulated = (
-            self._simulated(log_parameters[None], self.trace.time_s[some])[0, 0]
-            for some in parts(self.samples, _SAMPLES_AT_ONCE)
-        )
-        return np.concatenate(list(simulated))
+        return self._simulated(log_parameters[None], self.trace.time_s)[0, 0]
 
     def gradients(
         self, log_parameters: Array, others: Sequence["Residuals"]
@@ -191,26 +185,16 @@ class Residuals:
             Root mean squares.
         """
         n, parameters = log_parameters.shape
-        sums, numbers = np.empty((n, 1 + parameters)), self.samples * (1 + parameters)
-        for some in parts(n, max(1, _AT_ONCE // numbers)):
-            traces = [other.trace for other in others[some]]
-            rows, rest = self._complete_rows(log_parameters[some], traces)
+        condensed, sums = self.trace.condensed, np.empty((n, 1 + parameters))
+        nodes_s = condensed.dense.time_s
+        for some in parts(n, max(1, _AT_ONCE // (len(nodes_s) * (1 + parameters)))):
+            rows = condensed.rows_of_nodes(self._simulated(log_parameters[some], nodes_s))
+            measured, rest = zip(*(other.trace.at_nodes for other in others[some]), strict=True)
+            rows[:, 0] -= measured
             # One product per sample: the order of its sums does not depend on their number.
             sums[some] = (rows @ np.ascontiguousarray(rows[:, 0])[:, :, None])[:, :, 0]
-            sums[some, 0] += rest**2
+            sums[some, 0] += np.square(rest)
         return sums[:, 1:], np.sqrt(sums[:, 0] / self.samples)
-
-    def _complete_rows(self, log_parameters: Array, traces: Sequence[Trace]) -> tuple[Array, Array]:
-        """Return rows of residuals and derivatives, and norms of what no response reaches."""
-        condensed = self.trace.condensed
-        if self.samples <= _SAMPLES_AT_ONCE:
-            rows = condensed.cleared(self._simulated(log_parameters, self.trace.time_s))
-            rows[:, 0] -= [trace.cleared_rad for trace in traces]
-            return rows, np.zeros(len(rows))
-        # So many readings are dense: their sums equal those of nodes up to rounding.
-        rows = condensed.rows_of_nodes(self._simulated(log_parameters, condensed.dense.time_s))
-        rows[:, 0] -= [trace.at_nodes[0] for trace in traces]
-        return rows, np.array([trace.at_nodes[1] for trace in traces])
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Compute condensed rows of the responses of many samples.
@@ -230,9 +214,6 @@ class Residuals:
         """
         given = self.gripper, self.model, self.torque
         parameters, condensed = np.exp(log_parameters), self.trace.condensed
-        if not condensed.reduced:
-            rotations = linear_responses(*given, condensed.time_s, parameters, slopes=slopes)
-            return condensed.rows(rotations)
         return condensed.of_modes(compute_modes(*given, parameters, slopes=slopes))
 
     def condensed_misfit(self, parameters: Array) -> Array:
