@@ -5,7 +5,6 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics import modes
-from biogrip.physics import residuals as of_residuals
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
@@ -106,20 +105,20 @@ READ_S = np.arange(401.0)
 AT = np.log([2.0, 50.0])
 
 
-def test_the_gradient_of_many_samples_is_summed_in_parts(
-    gripper: Gripper, steps: TorqueHistory, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("count", [401, 4001])
+def test_the_gradient_is_that_of_all_readings(
+    gripper: Gripper, steps: TorqueHistory, count: int
 ) -> None:
-    """Whatever part of an amplitude is taken out, and whatever the residual leaves."""
-    offset = nuisance_basis(READ_S, offset=True, drift=False)
-    basis = with_uncertain(offset, 0.1 * np.sin(READ_S / 30)[None])
-    residuals = posed(steps, gripper, READ_S, basis, 0 * READ_S)
+    """Whatever part of an amplitude is taken out, and of many readings through their nodes."""
+    times = np.linspace(0.0, 400.0, count)
+    offset = nuisance_basis(times, offset=True, drift=False)
+    basis = with_uncertain(offset, 0.1 * np.sin(times / 30)[None])
+    residuals = posed(steps, gripper, times, basis, 0 * times)
     residual, slopes = residuals(AT)
     np.testing.assert_array_equal(residuals.left(AT), residual)
-    for at_once in (1000, 90):
-        monkeypatch.setattr(of_residuals, "_SAMPLES_AT_ONCE", at_once)
-        (gradient,), (misfit_rad,) = residuals.gradients(AT[None], [residuals])
-        np.testing.assert_allclose(gradient, slopes @ residual, rtol=1e-11)
-        assert misfit_rad == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
+    (gradient,), (misfit_rad,) = residuals.gradients(AT[None], [residuals])
+    np.testing.assert_allclose(gradient, slopes @ residual, rtol=1e-11)
+    assert misfit_rad == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
 
 
 def test_a_later_protocol_is_one_of_earlier_readings(
