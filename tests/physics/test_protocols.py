@@ -88,24 +88,32 @@ def test_phi_functions_against_50_digits() -> None:
                 assert ours == pytest.approx(float(exact), rel=1e-13)
 
 
-HELD = Load(1e-9)
+RAMP = Load(0.0, 1e-10)
 EVENLY = np.arange(0, 41, 2.0)
 
 
 @pytest.mark.parametrize(
-    ("load", "time_s", "offset", "by_series"),
+    ("name", "phases", "time_s", "offset", "by_series"),
     [
-        (HELD, EVENLY, False, True),
-        (HELD, np.sqrt(EVENLY), False, False),
-        (HELD, EVENLY, True, False),
-        (Load(0.0, 1e-10), EVENLY, False, False),
+        ("maxwell", (hold(40.0, 1e-9),), EVENLY, False, True),
+        ("maxwell", (hold(40.0, 1e-9),), np.sqrt(EVENLY), False, False),
+        ("maxwell", (hold(40.0, 1e-9),), EVENLY, True, False),
+        ("maxwell", (hold(3.0, 1e-9), hold(37.0, 2e-9)), EVENLY, False, False),
+        ("maxwell", (hold(40.0, 1e-9, 2e-9),), EVENLY, False, False),
+        ("maxwell", (Phase(40.0, RAMP, RAMP),), EVENLY, False, False),
+        ("burgers", (hold(40.0, 1e-9),), EVENLY, False, False),
     ],
 )
 def test_no_response_is_needed_of_steps_that_are_sampled_evenly(
-    gripper: Gripper, load: Load, time_s: Array, offset: bool, by_series: bool
+    gripper: Gripper,
+    name: str,
+    phases: tuple[Phase, ...],
+    time_s: Array,
+    offset: bool,
+    by_series: bool,
 ) -> None:
-    torque, trace = torque_history((Phase(40.0, load, load),)), np.zeros_like(time_s)
-    problem = problem_alone(gripper, MODELS["maxwell"], torque, time_s, trace, offset=offset)
+    torque, trace = torque_history(phases), np.zeros_like(time_s)
+    problem = problem_alone(gripper, MODELS[name], torque, time_s, trace, offset=offset)
     assert isinstance(problem.misfit, SeriesMisfit) == by_series
     assert by_series or problem.misfit == problem.residuals.condensed_misfit
 

@@ -1,11 +1,12 @@
 """RMS misfit of whole populations against traces, for the genetic algorithm.
 
-Between two torque steps the inertia-free response is a constant plus exponentials, so at uniform
-sampling it is sum_j a_j z_j^n. Its squared distance from the samples y_n expands into geometric
-series in z_i z_j, and into the projections of the trace on the response of each mode. These
-projections are long sums, but functions of the mode's rate alone: computed once at some hundred
-rates, they are interpolated for all others. No response is formed. Other protocols and samplings,
-and noise that is not white, need the condensed rows of `biogrip.physics.residuals`.
+Between two torque steps the inertia-free response of the paper's samples is a constant plus two
+exponentials, so at uniform sampling it is a_0 + a_1 z_1^n + a_2 z_2^n. Its squared distance from
+the samples y_n expands into geometric series in z_i z_j, and into the projections of the trace on
+the response of each mode. These projections are long sums, but functions of the mode's rate alone:
+computed once at some hundred rates, they are interpolated for all others. No response is formed.
+Other samples, grippers, protocols and samplings, and noise that is not white, need the condensed
+rows of `biogrip.physics.residuals`, which take two to seven times as long.
 
 The misfit of an individual is computed element by element, in a fixed order, without reductions of
 arrays: it does not depend, to the last bit, on the rest of the population or on the number of
@@ -14,14 +15,13 @@ populations.
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 
 from biogrip.arrays import Array, IntArray, parts
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.linear import LEFT, is_symmetric, step_response
-from biogrip.physics.protocol import TorqueHistory, drives
+from biogrip.physics.linear import is_symmetric
+from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.rate_tables import DecayTable
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.roots import real_quadratic_roots
@@ -29,9 +29,6 @@ from biogrip.physics.sample_model import Network, SampleModel
 
 # Individuals computed together: many enough for few calls, few enough for the cache.
 _AT_ONCE = 7000
-# Most modes with rates in closed form; the rates of more are iterated until all have converged.
-_CLOSED_FORM = 2
-
 
 Misfit = Callable[[Array], Array]
 """Function from parameters, (n, n_parameters), to RMS misfits in rad, (n,)."""
@@ -43,14 +40,20 @@ Misfits = Callable[[Array, IntArray], Array]
 def make_misfit(residuals: Residuals) -> Misfit:
     """Return the RMS misfit to the trace of residuals.
 
-    That of residuals serves any protocol, sampling and noise. `SeriesMisfit` is used for steps of
-    a torque, sampled uniformly from the start on, in white noise alone.
+    That of residuals serves any protocol, sampling, noise, sample and gripper. `SeriesMisfit` is
+    the paper's: of a sample with one Maxwell branch between equal arms that steps of a torque drive
+    alike, sampled uniformly from the start on, with a reading at each step, in white noise alone.
     """
     torque, trace = residuals.torque, residuals.trace
-    intervals, end_s = residuals.samples - 1, residuals.duration_s
-    uniform = np.arange(residuals.samples) * (end_s / max(intervals, 1))
-    is_uniform = np.allclose(trace.time_s, uniform, rtol=0, atol=1e-9 * end_s)
-    if is_uniform and torque.only_steps and not torque.deforms and residuals.plain:
+    intervals, end_s = max(residuals.samples - 1, 1), residuals.duration_s
+    steps = torque.time_s * intervals / end_s
+    even = np.allclose(trace.time_s * intervals / end_s, np.arange(residuals.samples), rtol=1e-9)
+    if (
+        (even and np.allclose(steps, np.rint(steps), rtol=0, atol=1e-9))
+        and (torque.only_steps and not torque.deforms and residuals.plain)
+        and is_symmetric(residuals.gripper, torque)
+        and residuals.model.network([residuals.model.example]).k.shape[1] == 1
+    ):
         given = residuals.gripper, residuals.model, torque, end_s / intervals
         return SeriesMisfit(*given, trace.rotation_rad)
     return residuals.condensed_misfit
@@ -76,8 +79,8 @@ def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:
 class SeriesMisfit:
     """RMS difference between the model's rotation and uniformly sampled traces.
 
-    For torque steps, by the linear model without inertia; the first sample is at t = 0. Traces of
-    the left arm are (n_samples,) or (n_traces, n_samples).
+    For torque steps, by the linear model without inertia; the first sample is at t = 0, and one is
+    at every step. Traces of the left arm are (n_samples,) or (n_traces, n_samples).
     """
 
     def __init__(
@@ -91,20 +94,14 @@ class SeriesMisfit:
         self._simulated = (gripper, model, torque, interval_s)
         self._traces = np.atleast_2d(rotation_rad)
         self._samples = self._traces.shape[1]
-        heights = drives(torque.left[:, 0], torque.right[:, 0], torque.symmetric)
-        # Change of each drive at the start of each phase, and level after it.
-        self._heights = heights[:, :, None, None]
-        self._levels = np.cumsum(heights, axis=1)[:, :, None]
-        # Times in sampling intervals; a reading at a step must not precede it by rounding.
-        steps, nearest = torque.time_s / interval_s, np.rint(torque.time_s / interval_s)
-        steps = np.where(np.isclose(steps, nearest, rtol=1e-12, atol=0), nearest, steps)
-        starts = np.minimum(np.ceil(steps), self._samples)
-        self._first_samples = starts.astype(np.int64)
-        # Time from a step to the first reading of its phase.
-        self._late = np.maximum(starts - steps, 0)
+        # Change of the torque at the start of each phase, and level after it.
+        self._heights = torque.left[:, 0, None, None]
+        self._levels = np.cumsum(torque.left[:, 0])[:, None, None]
+        starts = np.rint(torque.time_s / interval_s).astype(np.int64)
+        self._first_samples = np.minimum(starts, self._samples)
         # Numbers of readings: one, and those of each phase.
-        lengths = np.concatenate(([1], np.diff(starts, append=self._samples)))
-        self._lengths = lengths[:, None, None]
+        lengths = np.concatenate(([1], np.diff(self._first_samples, append=self._samples)))
+        self._lengths = lengths[:, None, None].astype(float)
         self._square_sums = np.array([np.dot(trace, trace) for trace in self._traces])
 
     @classmethod
@@ -120,25 +117,16 @@ class SeriesMisfit:
         return other
 
     def joins(self, other: "SeriesMisfit") -> bool:
-        """Return True if misfits to traces of both have the same bits together as apart."""
+        """Return True if only the traces of both may differ."""
         gripper, model, torque, interval_s = self._simulated
         others, others_model, others_torque, others_interval_s = other._simulated
-        return (
-            (model is others_model and torque is others_torque)
-            and (gripper, interval_s, self._samples) == (others, others_interval_s, other._samples)
-            and self._closed_form
-        )
-
-    @cached_property
-    def _closed_form(self) -> bool:
-        _, rates, _ = self._modes(np.full((1, len(self._simulated[1].parameters)), 0.5))
-        return len(rates) <= _CLOSED_FORM
+        same = model is others_model and torque is others_torque and gripper == others
+        return same and (interval_s, self._samples) == (others_interval_s, other._samples)
 
     @cached_property
     def projections(self) -> DecayTable:
         """Table that interpolates `exact_projections`; made when it is first needed."""
-        shortest = float(np.min(self._late, where=self._late > 0, initial=1.0))
-        return DecayTable(self.exact_projections, self._samples, shortest)
+        return DecayTable(self.exact_projections, self._samples)
 
     def __call__(self, parameters: Array) -> Array:
         """Compute misfits in rad, (n,), of parameters, (n, n_parameters), to the first trace."""
@@ -159,34 +147,20 @@ class SeriesMisfit:
 
     def _of_some(self, parameters: Array, traces: IntArray) -> Array:
         shape = parameters.shape[:2]
-        static, rates, weights = self._modes(parameters.reshape(-1, parameters.shape[2]))
+        gripper, model, _, interval_s = self._simulated
+        network = model.network(parameters.reshape(-1, parameters.shape[2]))
+        static, rates, weights = two_modes(gripper.left, gripper.lever_m, network)
+        rates *= interval_s
         trace = traces.repeat(shape[1])
         square = self._model_square_sums(static, rates, weights)
         square += self._square_sums.take(trace)
-        drives = len(weights)
-        for drive, (at_rest, decaying) in enumerate(zip(static, weights, strict=True)):
-            which = trace if drives == 1 else drives * trace + drive
-            product = at_rest * self._projections_of_constant.take(which)
-            product += _sum(decaying * self.projections.of(which, rates))
-            product *= 2
-            square -= product
+        product = static * self._projections_of_constant.take(trace)
+        product += _sum(weights * self.projections.of(trace, rates))
+        product *= 2
+        square -= product
         np.maximum(square, 0, out=square)
         square /= self._samples
         return np.sqrt(square, out=square).reshape(shape)
-
-    def _modes(self, parameters: Array) -> tuple[Array, Array, Array]:
-        """Return static (n_drives, n), rates (n_modes, n) and weights (n_drives, n_modes, n)."""
-        gripper, model, torque, interval_s = self._simulated
-        network = model.network(parameters)
-        if is_symmetric(gripper, torque) and network.k.shape[1] == 1:
-            static, rates, weights = two_modes(gripper.left, gripper.lever_m, network)
-            return static[None], rates * interval_s, weights[None]
-        response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
-        return (
-            np.ascontiguousarray(response.static[:, LEFT].T),
-            np.ascontiguousarray(response.rates.T) * interval_s,
-            np.ascontiguousarray(response.weights[:, LEFT].transpose(1, 2, 0)),
-        )
 
     @cached_property
     def _projections_of_constant(self) -> Array:
@@ -195,21 +169,20 @@ class SeriesMisfit:
     def _model_square_sums(self, static: Array, rates: Array, weights: Array) -> Array:
         """Sum squared responses over all readings, shape (n,).
 
-        A phase of N readings has ((z_i z_j)^N - 1) / (z_i z_j - 1) for each pair of modes, which
-        follows from z^N - 1 and z - 1 without cancellation.
+        A phase of N readings has ((z_1 z_2)^N - 1) / (z_1 z_2 - 1) for both modes together, which
+        follows from z^N - 1 and z - 1 of each without cancellation.
         """
         decayed = np.expm1(self._lengths * rates)
-        amplitudes = self._amplitudes(rates, weights, 1 + decayed[1:])
-        constants = _sum(self._levels * static[:, None])[:, None]
+        amplitudes = self._amplitudes(weights, 1 + decayed[1:])
+        constants = self._levels * static
         mixed = decayed[1:] / decayed[0]
         mixed *= constants
-        for i, j in combinations(range(len(rates)), 2):
-            both = decayed[:, i] * decayed[:, j]
-            both += decayed[:, i]
-            both += decayed[:, j]
-            series = both[1:] / both[0]
-            series *= amplitudes[:, i]
-            mixed[:, j] += series
+        both = decayed[:, 0] * decayed[:, 1]
+        both += decayed[:, 0]
+        both += decayed[:, 1]
+        series = both[1:] / both[0]
+        series *= amplitudes[:, 0]
+        mixed[:, 1] += series
         mixed *= 2
         decayed *= 2 + decayed
         terms = decayed[1:] / decayed[0]
@@ -220,33 +193,26 @@ class SeriesMisfit:
         constants *= self._lengths[1:]
         return _sum(_sum(terms)) + _sum(constants)[0]
 
-    def _amplitudes(self, rates: Array, weights: Array, decays: Array) -> Array:
+    def _amplitudes(self, weights: Array, decays: Array) -> Array:
         """Compute amplitudes of modes at the first reading of each phase, (n_phases, n_modes, n).
 
-        Weights, (n_drives, n_modes, n), are those of unit steps; decays, (n_phases, n_modes, n),
-        the shares that remain of modes at the end of each phase.
+        Weights, (n_modes, n), are those of unit steps; decays, (n_phases, n_modes, n), the shares
+        that remain of modes at the end of each phase.
         """
-        amplitudes = _sum(self._heights * weights[:, None])
-        for phase, late in enumerate(self._late):
-            if late > 0:
-                amplitudes[phase] *= np.exp(late * rates)
-            if phase > 0:
-                amplitudes[phase] += decays[phase - 1] * amplitudes[phase - 1]
+        amplitudes = self._heights * weights
+        for phase in range(1, len(amplitudes)):
+            amplitudes[phase] += decays[phase - 1] * amplitudes[phase - 1]
         return amplitudes
 
     def exact_projections(self, rates: Array) -> Array:
-        """Project each trace on the response of a mode to each drive, by direct summation.
+        """Project each trace on the response of a mode of unit weight, by direct summation.
 
-        For rates in units of the sampling rate, (n,), the result is (n_traces * n_drives, n).
+        For rates in units of the sampling rate, (n,), the result is (n_traces, n).
         """
         sums = _power_sums(self._traces, self._first_samples, rates)
         decays = np.exp(self._lengths[1:] * rates)
-        units = np.eye(len(self._heights))[:, :, None, None] * np.ones_like(rates)
-        projections = [
-            _sum(self._amplitudes(rates[None], unit, decays) * sums.swapaxes(0, 1))
-            for unit in units
-        ]
-        return np.stack(projections, axis=1).reshape(-1, len(rates))
+        amplitudes = self._amplitudes(np.ones((1, len(rates))), decays)
+        return _sum(amplitudes * sums.swapaxes(0, 1))
 
 
 def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array, Array]:

@@ -72,13 +72,13 @@ def _in_short_pieces(values: Array, shorter: int) -> Array:
 class DecayTable:
     """Sums of decaying exponentials at any rate from 0 to -infinity.
 
-    They are given by a function of rates, (n,), to (n_sums, n), with the largest t_i and the
-    smallest above zero.
+    They are given by a function of rates, (n,), to (n_sums, n), with the largest t_i; the smallest
+    above zero is one.
     """
 
-    def __init__(self, function: Callable[[Array], Array], longest: float, shortest: float) -> None:
+    def __init__(self, function: Callable[[Array], Array], longest: float) -> None:
         self._longest = longest
-        pieces = np.ceil(np.log1p(_DECAYED * longest / shortest) / _WIDTH)
+        pieces = np.ceil(np.log1p(_DECAYED * longest) / _WIDTH)
         u = _WIDTH * (np.arange(pieces)[:, None] + _NODES)
         values = function(-np.expm1(u).ravel() / longest).reshape(-1, *u.shape)
         powers = _in_short_pieces(values, _SHORTER).reshape(len(values), -1, len(_ORDERS))
