@@ -14,7 +14,6 @@ from biogrip.physics.calibration import read_calibrated_arms
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
-from biogrip.physics.misfit import Misfit, SeriesMisfit
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import Phase, TorqueHistory, torque_history
 from biogrip.physics.sample_model import SampleModel, with_fixed
@@ -179,12 +178,9 @@ class CaseProblem:
         return *held, sd, time_s.tobytes()
 
     def for_model(self, problem: Problem, model: SampleModel) -> Problem:
-        """Return one of its problems posed for another model; both share tables of the trace."""
+        """Return one of its problems posed for another model; both share rows of the trace."""
         residuals = problem.residuals.of_model(model)
-        misfit: Misfit = residuals.condensed_misfit
-        if isinstance(problem.misfit, SeriesMisfit):
-            misfit = problem.misfit.of_model(model)
-        return searched(misfit, residuals, self.ranges)
+        return searched(residuals.condensed_misfit, residuals, self.ranges)
 
     def nuisance(self, time_s: Array) -> Array:
         """Return the nuisance functions, offset and drift, (n_functions, n_samples)."""

@@ -109,13 +109,6 @@ class SeriesMisfit:
         """Combine the traces of several objects that agree in all else, see `joins`."""
         return cls(*misfits[0]._simulated, np.concatenate([one._traces for one in misfits]))
 
-    def of_model(self, model: SampleModel) -> "SeriesMisfit":
-        """Return the misfit of another model to the same traces, sharing their table."""
-        gripper, _, torque, interval_s = self._simulated
-        other = SeriesMisfit(gripper, model, torque, interval_s, self._traces)
-        other.projections = self.projections
-        return other
-
     def joins(self, other: "SeriesMisfit") -> bool:
         """Return True if only the traces of both may differ."""
         gripper, model, torque, interval_s = self._simulated
