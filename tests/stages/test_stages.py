@@ -114,7 +114,7 @@ def test_all_stages_weight_the_readings(tmp_path: Path) -> None:
     judgement.judge(case, traces, [], verdicts)
     judged = json.loads(verdicts.read_text())
     assert judged["threshold"] == pytest.approx(3.8415, abs=1e-4)
-    outputs = [tmp_path / name for name in ("p.csv", "h.npz", "t.csv")]
+    outputs = [tmp_path / name for name in ("p.csv", "h.npz")]
     identifications.identify(case, "least_squares", range(1), traces, [], *outputs)
     (found,) = pd.read_csv(outputs[0]).itertuples()
     assert found.misfit == pytest.approx(judged["misfit"], rel=1e-4)

@@ -13,7 +13,7 @@ from biogrip.physics.models import MODELS, UNPUBLISHED, Published, Sample, Truth
 from biogrip.records.identifications import MODEL_FITS, columns
 from biogrip.tables.cases import errors, errors_of_case, verdicts
 from biogrip.tables.layout import write
-from biogrip.tables.methods import methods, models, timings
+from biogrip.tables.methods import methods, models
 from tests.helpers.default import seen, study_of
 
 PAPER = Published(
@@ -183,10 +183,3 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     assert (total["target"], total["value"], total["high"]) == (1.5, None, 3.0)
     assert total["expected_verdict"] is None
     assert "c and c_p trade against each other: determined is c + c_p." in table.caption
-
-
-def test_timings_are_summed(tmp_path: Path) -> None:
-    path = tmp_path / "times.csv"
-    path.write_text("case,method,seed,cpu_s\nx,genetic,0,0.1\nx,genetic,1,0.3\nx,genetic,2,0.2\n")
-    (row,) = timings(seen(identifiers=METHODS), [path]).rows
-    assert (row["median_cpu_s"], row["total_cpu_s"]) == (pytest.approx(0.2), pytest.approx(0.6))

@@ -80,7 +80,6 @@ rule identification:
     output:
         parameters="results/identifications/{case}/{method}/{batch}.csv",
         history="results/histories/{case}/{method}/{batch}.npz",
-        timing="results/timings/{case}/{method}/{batch}.csv",
     log:
         "results/logs/identification/{case}/{method}/{batch}.log",
     resources:

@@ -23,7 +23,6 @@ with logged(snakemake):
         "errors": lambda: errors_of_case.errors(study, given["errors"]),
         "gene_ranges": lambda: inputs.gene_ranges(study),
         "parameter_ranges": lambda: inputs.parameter_ranges(study),
-        "timings": lambda: methods.timings(study, given["times"]),
         "gripper": lambda: inputs.gripper(study),
         "actuator": lambda: inputs.actuator(study),
         "contact": lambda: mechanics.contacts(study),

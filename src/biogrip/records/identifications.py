@@ -1,9 +1,8 @@
 """Results of stages: what was identified, a row a seed, and verdicts on a trace, JSON.
 
-Identifications by each method have a row per seed, with histories beside them and processor times,
-which are not reproducible, in a file of their own. Further files of rows have the fits of every
-sample model, the intervals of coverage tests, the difference of the linear from the nonlinear
-model, and identifications under other interpretations of the paper.
+Identifications by each method have a row per seed, with histories beside them. Further files of
+rows have the fits of every sample model, the intervals of coverage tests, the difference of the
+linear from the nonlinear model, and identifications under other interpretations of the paper.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -50,12 +49,6 @@ TRAILING = ("misfit", "noise_rms", "generations", "evaluations", "stop_reason")
 ENCODABLE = "encodable_misfit"
 """Last column of the identifications of a case: lowest misfit in rad that genes can encode of the
 trace, see `lowest_encodable`; empty if it was recorded."""
-
-TIMINGS = RowFile(
-    "processor times",
-    ("case", "method", "seed", "cpu_s"),
-    "results/timings/{case}/{method}/{batch}.csv",
-)
 
 MODEL_FITS = RowFile(
     "fits of models",
@@ -128,8 +121,6 @@ class Record:
     answer: Identification
     noise_rms: float | None
     """RMS of the noise in the trace; None for a recorded trace."""
-    cpu_s: float
-    """Processor time in seconds; the mean over seeds that are identified together."""
 
     def by_column(self, identified: Array) -> dict[str, Any]:
         """Return identified values, (n_searched, ...), fixed ones, and 0 for missing elements."""
@@ -179,11 +170,6 @@ def _history(record: Record) -> dict[str, Array]:
             for name, values in found.items()
         },
     }
-
-
-def write_timings(path: Path, records: list[Record]) -> None:
-    """Write the processor time of each seed as CSV."""
-    TIMINGS.write(path, ((r.case, r.method, r.seed, f"{r.cpu_s:.6f}") for r in records))
 
 
 def read_identifications(path: Path, method: str | None = None) -> "pd.DataFrame":

@@ -7,7 +7,6 @@ and `add_encodable` adds what the genes could have held of each trace.
 which are small enough for little memory; results do not depend on the grouping.
 """
 
-import time
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -28,7 +27,6 @@ from biogrip.records.identifications import (
     columns,
     write_histories,
     write_identifications,
-    write_timings,
 )
 from biogrip.records.rows import join_arrays, read_arrays, read_rows, write_arrays, write_rows
 from biogrip.records.traces import read_measurements
@@ -51,9 +49,8 @@ def identify(
     calibrated: list[Path],
     parameters: Path,
     history: Path,
-    timing: Path,
 ) -> None:
-    """Identify a batch of seeds with one method; traces identified together share their time."""
+    """Identify a batch of seeds with one method."""
     case_problem = case.problem.to_identify().calibrated(calibrated)
     identified = identifier(method, case.method(method))
     recorded = read_measurements(measurements, list(seeds))
@@ -65,17 +62,14 @@ def identify(
     for group in groups(seeds):
         traces = [recorded.rotation_rad[seed] for seed in group]
         rngs = [stream(case.study.study_seed, case.name, seed, method) for seed in group]
-        start = time.process_time()
         problems = case_problem.of_each(recorded.time_s, traces, condensed=condensed)
         answers = identified(problems, rngs, progress.within)
-        cpu_s = (time.process_time() - start) / len(group)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
             noise = None if recorded.target_rad is None else rms(trace - recorded.target_rad)
-            records.append(Record(*whose, seed, answer, noise, cpu_s))
+            records.append(Record(*whose, seed, answer, noise))
         progress.done(len(group))
     write_identifications(parameters, records)
     write_histories(history, records)
-    write_timings(timing, records)
 
 
 def join(
