@@ -122,8 +122,7 @@ def results_of(folder: Path) -> dict[str, bytes]:
     return {
         str(name): file.read_bytes()
         for name, file in files.items()
-        if file.is_file()
-        and name.parts[0] != "logs"
+        if file.is_file() and name.parts[0] != "logs"
     }
 
 

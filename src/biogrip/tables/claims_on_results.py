@@ -143,7 +143,6 @@ claim("sections 4, 6", "does not require to assume a priori the order of magnitu
 
 @claim("section 5", "reaching a stationary value")
 def judge_stationary(results: Results) -> Judged:
-    """Judge whether runs come to rest before the last generation allowed."""
     runs = [results.runs_of(n) for n in _TABLES]
     stalled = pd.concat([each.found["stop_reason"] == "stalled" for each in runs])
     changes = [each.history.groupby("seed")["best_misfit"].diff().fillna(0) for each in runs]
@@ -157,7 +156,6 @@ def judge_stationary(results: Results) -> Judged:
 
 @claim("section 5, Figure 8", "Generally, convergence is reached around the 60th generation")
 def judge_convergence(results: Results) -> Judged:
-    """Tell why the generation of convergence proves nothing."""
     last = {n: results.runs_of(n).last_improvement for n in _TABLES}
     said = ", ".join(f"{np.median(each):.0f} (Table {n})" for n, each in last.items())
     return Judged(
@@ -172,7 +170,6 @@ def judge_convergence(results: Results) -> Judged:
     "20 generations … verify if mutation can move the optimum from a local minimum",
 )
 def judge_further_generations(results: Results) -> Judged:
-    """Judge whether twenty further generations lead out of local minima."""
     near = {n: _near_noise(results, n) for n in _TABLES}
     points = results.of_sweep("interpretations")
     patient = points[points["interpretation"].isin(["as printed", "patience of 60 generations"])]
@@ -189,7 +186,6 @@ def judge_further_generations(results: Results) -> Judged:
 
 @claim("section 5", "for the case of endothelial cells")
 def judge_endothelial(results: Results) -> Judged:
-    """Judge whether Table 5's sample is as stiff as a cell."""
     table = results.table("mechanics")
     title = results.study.cases[results.case_of(5)].truth.title
     modulus = table.loc[table["case"] == title, "apparent_modulus_kPa"].to_numpy(float)
@@ -209,7 +205,6 @@ claim("Figure 9", "target response … and the best fit")(partial(judge_fits_res
 
 @claim("Figure 10", "except c_p, the order of magnitude … is obtained around the 20th generation")
 def judge_early_orders(results: Results) -> Judged:
-    """Judge whether orders of magnitude are there at the twentieth generation."""
     runs = results.runs_of(5)
     names = [name for name in runs.truth.model.names if name != "c_p"]
     early, later = (
@@ -231,7 +226,6 @@ claim("Table 5", "identified values")(partial(judge_values, number=5))
 
 @claim("Table 5", "k_p and c have a negligible error")
 def judge_negligible(results: Results) -> Judged:
-    """Judge whether errors of k_p and c are as small as printed in Table 5."""
     runs, said, verdicts = results.runs_of(5), [], []
     nearest = _nearest(results, runs, "target")
     for name in ("k_p", "c"):
@@ -260,7 +254,6 @@ def judge_negligible(results: Results) -> Judged:
 
 @claim("Table 5", "the error on k is lower than the noise level")
 def judge_below_noise(results: Results) -> Judged:
-    """Judge whether the error of k is below the level of the noise in Table 5."""
     runs = results.runs_of(5)
     errors = _errors_percent(runs, "k")
     below = errors < 100 * results.study.cases[runs.case].noise.level
@@ -270,7 +263,6 @@ def judge_below_noise(results: Results) -> Judged:
 
 @claim("Table 5", "c_p … has a very low value that does not affect the response")
 def judge_low_damper(results: Results) -> Judged:
-    """Judge whether runs show that c_p of Table 5 is low."""
     runs = results.runs_of(5)
     limits = results.table(f"verdicts_{runs.case}").set_index("quantity")
     most = float(limits.loc["c_p", "expected_high"])
@@ -290,7 +282,6 @@ claim("Table 6", "identified values")(partial(judge_values, number=6))
 
 @claim("Table 6", "response … is dominated basically by the damping value")
 def judge_damper_dominates(results: Results) -> Judged:
-    """Judge whether a bare damper says as much of Table 6's traces."""
     table = results.table("models")
     rows = table[(table["case"] == results.case_of(6)) & (table["model"] == "bare damper")]
     if rows.empty:
@@ -306,7 +297,6 @@ claim("Figure 11", "fits correctly the response")(partial(judge_fits_response, n
 
 @claim("Table 6", "identify with small error the key parameter c")
 def judge_key_damper(results: Results) -> Judged:
-    """Judge whether c of Table 6 is found; the sum may be where c is not."""
     runs = results.runs_of(6)
     printed = abs(runs.truth.published.identified["c"] / runs.truth.parameters["c"] - 1)
     alone, total = (
@@ -330,7 +320,6 @@ claim("Table 7", "identified values")(partial(judge_values, number=7))
 
 @claim("Table 7", "becomes affected by the k value, thus the identification improves")
 def judge_spring_shows(results: Results) -> Judged:
-    """Judge whether k is determined in Table 7's sample, and not in Table 6's."""
     determined = {}
     for number in (6, 7):
         table = results.table(f"verdicts_{results.case_of(number)}").set_index("quantity")
@@ -344,7 +333,6 @@ def judge_spring_shows(results: Results) -> Judged:
 
 @claim("Table 7", "good identification for k and c (error below 3%)")
 def judge_good_identification(results: Results) -> Judged:
-    """Judge whether k and c of Table 7 are found to within 3 %."""
     runs = results.runs_of(7)
     k, c = (_errors_percent(runs, name) <= 3 + _ROUNDING_PERCENT for name in ("k", "c"))
     return Judged(
@@ -356,7 +344,6 @@ def judge_good_identification(results: Results) -> Judged:
 
 @claim("Figure 12", "axis from -0.6 to 4.2 mrad")
 def judge_rotation(results: Results) -> Judged:
-    """Tell why the level of the rotation proves nothing."""
     rows = results.table("evidence")
     rows = rows[rows["unit"] == "mrad"]
     if rows.empty:
@@ -374,7 +361,6 @@ claim("Figure 12", "fit at generation 61")(partial(tell_of_generation, number=7)
 
 @claim("section 6", "confirm the feasibility of the approach")
 def judge_feasible(results: Results) -> Judged:
-    """Judge feasibility by what a trace determines."""
     said, verdicts = [], []
     for number in _TABLES:
         table = results.table(f"verdicts_{results.case_of(number)}")
@@ -389,7 +375,6 @@ def judge_feasible(results: Results) -> Judged:
 
 @claim("section 6", "highly robust with respect to measurement noise")
 def judge_robust(results: Results) -> Judged:
-    """Judge robustness by errors over a sweep of noise beside those that noise allows."""
     points = results.of_sweep("robustness_noise")
     points = points[(points["row"] > 0) & np.isfinite(points["bound_percent"])]
     fine = points["error_genetic"] <= _NEAR_BOUND * _OF_MEDIAN * points["bound_percent"]
@@ -408,7 +393,6 @@ def judge_robust(results: Results) -> Judged:
 
 @claim("section 6", "nor the specific cell model")
 def judge_cell_model(results: Results) -> Judged:
-    """Judge whether any simpler model would do, and whether a trace tells which was right."""
     table = results.table("models")
     verdicts, said = [], []
     for number in _TABLES:
