@@ -45,7 +45,6 @@ rule model_errors:
 
 rule tables:
     input:
-        errors=files("results/tables/errors_{case}.csv", STUDY.cases),
         fits=files("results/selection/{case}/{batch}.csv", SELECTING),
         identifications=files("results/identifications/{case}.csv", STUDY.cases),
         targets=files("results/targets/{case}.csv", STUDY.simulated),

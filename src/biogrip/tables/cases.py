@@ -1,6 +1,7 @@
 """What is found of each case: Tables 5 to 7 beside the paper's, and verdicts on its quantities."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,6 @@ from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, NOT_DETERMINED, WIDE
 from biogrip.physics.models import Truth
 from biogrip.records.identifications import INTERVALS, read_identifications, read_verdicts
-from biogrip.records.rows import read_rows
 from biogrip.study.study import Case, Study
 from biogrip.tables.coverage import holds
 from biogrip.tables.layout import Column, Row, Table
@@ -106,26 +106,16 @@ def _of_paper(truth: Truth, names: list[str], target: float | None) -> Row:
     return {"paper_identified": value, "paper_error_percent": error}
 
 
-def errors(study: Study, tables: list[Path]) -> Table:
-    """Join the error tables of all cases, CSV."""
+def errors(study: Study, identifications: list[Path]) -> Table:
+    """Join the tables of errors of all cases, given the identifications of each, CSV."""
+    files = zip(study.cases.values(), identifications, strict=True)
+    rows = [dict(row) for case, file in files for row in errors_of_case(case, file).rows]
+    for row in rows:
+        # Some are text, as ">100".
+        with suppress(ValueError):
+            row["paper_error_percent"] = float(row.get("paper_error_percent", np.nan))
     columns = _columns(study.near_noise_tolerance)
-    names = [column.name for column in columns]
-    rows = [
-        {name: _cell(name, text) for name, text in zip(names, row, strict=True)}
-        for path in tables
-        for row in read_rows(path, names)[1:]
-    ]
     return Table(f"Identification errors of all cases. {_BASINS}", columns, rows)
-
-
-def _cell(name: str, text: str) -> str | float:
-    if name == "seeds":
-        return int(text)
-    try:
-        return float(text)
-    except ValueError:
-        # As ">100", which the paper prints for an error.
-        return text
 
 
 _VERDICT_COLUMNS = (
