@@ -80,11 +80,6 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
         grippers of the cases that have them, which the file names tell.
     page
         HTML.
-
-    Raises
-    ------
-    BiogripError
-        If an input cannot be read.
     """
     texts = {
         (path.parent.name, path.stem): " ".join(path.read_text(encoding="utf-8").split())
@@ -146,13 +141,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
 
 
 def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -> None:
-    """Write what the judged trace of a case tells, with figures, PNG.
-
-    Raises
-    ------
-    BiogripError
-        If an input cannot be read.
-    """
+    """Write what the judged trace of a case tells, with figures, PNG."""
     text = _TEMPLATES.get_template("summary.html.j2").render(
         case=case,
         trace=case.file or f"seed {TRACE} of the simulated traces",
