@@ -21,7 +21,6 @@ from biogrip.figures.style import (
     TARGET,
     figure,
     line_of,
-    literal,
 )
 from biogrip.fit.methods import (
     chi_square_increase,
@@ -78,13 +77,13 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
     ticks = [tick for tick in _TICKS if tick < axes.get_ylim()[1]]
     axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
-    axes.set(xlim=(0, last), xlabel=method.step, title=literal(case.title))
+    axes.set(xlim=(0, last), xlabel=method.step, title=case.title)
     axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
     if noisy:
         words, near = near_noise_words(tolerance), 100 * tolerance
         axes.axhline(near, color=TARGET, linestyle="-.", linewidth=0.8, label=words)
         reached = near_noise(found, tolerance).sum()
-        axes.set_title(f"{literal(case.title)}: {reached} of {len(found)} {words}")
+        axes.set_title(f"{case.title}: {reached} of {len(found)} {words}")
     drawn.legend(loc="outside lower center", ncols=2)
     return drawn
 
@@ -143,7 +142,7 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
         grid[0].plot([], [], color=PAPER, linestyle=":", label="identified in the paper")
     handles, labels = grid[0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside upper center", ncols=4)
-    drawn.suptitle(literal(truth.title), x=0.01, ha="left", fontsize=8)
+    drawn.suptitle(truth.title, x=0.01, ha="left", fontsize=8)
     return drawn
 
 
@@ -170,6 +169,6 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
     axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
     axes.minorticks_off()
     axes.set(xlim=(0, 100), xlabel="seeds, sorted (%)", ylabel="Δχ² over the lowest known")
-    axes.set_title(f"{literal(case.title)}: best encodable point reached")
+    axes.set_title(f"{case.title}: best encodable point reached")
     drawn.legend(loc="outside lower left")
     return drawn

@@ -173,7 +173,7 @@ def draw_valley(case: Case, measured: Path, identifications: Path) -> Figure:
     for points, style, name in marked:
         labels = (name, "beyond the axis")
         points_within(axes, points, (0, 0), high, style, edge_size=4.5, labels=labels)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=literal(case.title))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=case.title)
     axes.set_xlabel(with_unit(x["symbol"], x["unit"]))
     axes.set_ylabel(with_unit(y["symbol"], y["unit"]))
     axes.set_box_aspect(1)

@@ -17,7 +17,6 @@ from biogrip.figures.style import (
     PAGE_IN,
     TARGET,
     figure,
-    literal,
     panel,
 )
 from biogrip.physics.linear import rotation, step_response
@@ -62,7 +61,7 @@ def draw_force(case: Case, target: Path) -> Figure:
     low, high = float(negative.min()), factor * float(sticking.max())
     forces.set_ylim(low - 0.08 * (high - low), high + (0.62 if apart else 0.42) * (high - low))
     forces.legend(loc="upper right")
-    forces.set_title(literal(case.title))
+    forces.set_title(case.title)
 
     factor, unit = scale_of(rotation, "rad")
     name = "target" + (", jaws that let go" if case.unilateral else "")
@@ -99,7 +98,7 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
     traces, *maps = drawn.subplots(1, 1 + len(cases), width_ratios=[1.2] + [1] * len(cases))
     last = list(cases)[-1]
     _difference(traces, cases[last])
-    panel(traces, "a", f"{literal(cases[last].title)}, {_SHOWN_FACTOR:g} x torque")
+    panel(traces, "a", f"{cases[last].title}, {_SHOWN_FACTOR:g} x torque")
     for index, name in enumerate(cases):
         rows = comparison[comparison["case"] == name]
         grid = rows.pivot(
@@ -119,7 +118,7 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
         axes.set_xlabel(r"$\hat\theta_2$ (deg)")
         if index == 0:
             axes.set_ylabel("torque / protocol's torque")
-        panel(axes, "bcd"[index], literal(cases[name].title), most_letters=19)
+        panel(axes, "bcd"[index], cases[name].title, most_letters=19)
     drawn.colorbar(mesh, ax=maps, label="difference (% of peak)", pad=0.01)
     return drawn
 

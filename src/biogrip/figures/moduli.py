@@ -21,7 +21,6 @@ from biogrip.figures.style import (
     SKY,
     figure,
     line_of,
-    literal,
     panel,
 )
 from biogrip.fit.methods import near_noise
@@ -56,7 +55,7 @@ def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) 
         relative = sensitivity / np.where(sigma > 0, sigma, np.nan)
         _moduli(axes[0, column], study, case, identified, time_s)
         _sensitivities(axes[1, column], case.problem.searched, time_s, relative)
-        panel(axes[0, column], "abc"[column], literal(case.truth.title), _TITLE_LETTERS)
+        panel(axes[0, column], "abc"[column], case.truth.title, _TITLE_LETTERS)
         panel(axes[1, column], "def"[column], "when each parameter shows", _TITLE_LETTERS)
     units = [case.problem.model.stiffness_unit for case in study.cases.values()]
     for column, unit in enumerate(units):

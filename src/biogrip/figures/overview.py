@@ -32,7 +32,6 @@ from biogrip.figures.style import (
     PAPER,
     TARGET,
     figure,
-    literal,
     panel,
     points_within,
 )
@@ -74,7 +73,7 @@ def draw_overview(
         bounded = bounded_on_a_side(read_verdicts(judged))
         _scatter(scatter, case.truth, first_seeds(found), study.near_noise_tolerance, bounded)
         scatter.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3], [""] * 7 if index else None)
-        panel(scatter, "bcd"[index], literal(case.truth.title), most_letters=_TITLE_LETTERS)
+        panel(scatter, "bcd"[index], case.truth.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
     legend: dict[str, Any] = {}
     for scatter in axes[1:]:
@@ -97,7 +96,7 @@ def _fits(axes: Axes, case: Truth, fits: Mapping[str, Fit]) -> None:
     axes.set_ylim(top=1.65 * factor * fit.measured_rad.max())
     axes.set(xlim=(fit.time_s[0], fit.time_s[-1]), xlabel="time (s)")
     axes.legend(loc="upper right")
-    panel(axes, "a", literal(case.title))
+    panel(axes, "a", case.title)
 
 
 def _scatter(

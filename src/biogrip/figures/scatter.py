@@ -18,7 +18,6 @@ from biogrip.figures.style import (
     SHADE,
     TARGET,
     line_of,
-    literal,
     panel,
     points_within,
     row_of_panels,
@@ -140,4 +139,4 @@ def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
         handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
     drawn.legend(handles=handles, loc="outside lower left", ncols=3)
     few = "" if seeds <= SHOWN_SEEDS else f": {seeds_in_words(seeds)}, quartiles of all"
-    drawn.suptitle(literal(truth.title) + few, x=0.01, ha="left", fontsize=8)
+    drawn.suptitle(truth.title + few, x=0.01, ha="left", fontsize=8)

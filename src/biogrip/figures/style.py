@@ -89,7 +89,7 @@ def styled() -> Iterator[None]:
 
 
 def literal(text: str) -> str:
-    """Return text of the user's so that its dollar signs set no mathematics."""
+    """Return the name of a file so that its dollar signs set no mathematics; titles have none."""
     return text.replace("$", r"\$")
 
 

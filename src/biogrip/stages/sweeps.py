@@ -100,7 +100,7 @@ def _rows(
                 found = found.assign(noise_rms=_resolution_rad(case, true))
             near = float(np.mean(near_noise(found, study.near_noise_tolerance)))
             for judged in _judged(case, true, found, bounds[point.name], heads, near):
-                yield point.name, point.row.text, point.column.text, method, *judged
+                yield point.name, point.row.shown, point.column.shown, method, *judged
 
 
 def _judged(

@@ -32,7 +32,6 @@ from biogrip.records.traces import (
     read_target,
     write_measurements,
     write_target,
-    write_target_without_jaws,
 )
 from biogrip.study.study import Case, Study
 from biogrip.terminal import warn
@@ -53,7 +52,7 @@ def simulate(case: Case, target: Path) -> None:
     if not case.instrument.has_jaws:
         read = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0]
         _check_finite(case, time_s, read)
-        write_target_without_jaws(target, time_s, controlled, read, case.instrument)
+        write_target(target, case.instrument, time_s, controlled, read)
         return
     rotation, force = _response(case, network, torque, time_s)
     _check_finite(case, time_s, rotation)
@@ -64,7 +63,7 @@ def simulate(case: Case, target: Path) -> None:
             f"drive's stroke leaves, {1e3 * case.stroke_rad:.4g} mrad."
         )
     _warn_if_contact_is_lost(case, network, torque)
-    write_target(target, time_s, controlled, rotation, force)
+    write_target(target, case.instrument, time_s, controlled, rotation, force)
 
 
 def _response(

@@ -33,11 +33,6 @@ def axis_title(study: Study, axis: AxisBlock) -> str:
     return axis.title + ", reconstructed" * any(key.startswith(reconstructed) for key in keys)
 
 
-def shown_values(axis: AxisBlock) -> dict[str, str]:
-    """Return the values of an axis as they are shown, by their text in files."""
-    return {value.text: value.shown for value in axis.levels}
-
-
 def read_points(path: Path, sweep: str, case: str) -> pd.DataFrame:
     """Read the judged points of a case in a sweep."""
     found = POINTS.read(path)
@@ -63,7 +58,6 @@ _BY_METHOD = {
 def robustness(study: Study, name: str, points: Path) -> Table:
     """Join the points of a sweep over all its cases."""
     sweep, methods = study.sweeps[name], study.identifiers
-    row_values, column_values = shown_values(sweep.rows), shown_values(sweep.columns)
     rows: list[Row] = []
     for case in sweep.cases:
         found = read_points(points, name, case)
@@ -73,8 +67,8 @@ def robustness(study: Study, name: str, points: Path) -> Table:
                 by_method = group.set_index("method")
                 head = {
                     "case": case,
-                    "row": row_values[row],
-                    "column": column_values[column],
+                    "row": row,
+                    "column": column,
                     "quantity": quantity,
                     "bound_percent": float(by_method["bound_percent"].iloc[0]),
                 }
