@@ -9,7 +9,7 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import Sample
-from biogrip.physics.protocol import Phase, Sampling, hold
+from biogrip.physics.protocol import Phase, Sampling, hold, torque_history
 from biogrip.records.traces import read_target
 from biogrip.stages import identification as identifications
 from biogrip.stages import judgement, recording
@@ -23,10 +23,10 @@ def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
         name="Drop",
         instrument=GRIPPER,
         gripper=STUDY.gripper,
-        phases=(hold(100.0, torque_Nm), *more),
+        torque=torque_history((hold(100.0, torque_Nm), *more)),
         sampling=Sampling(rate_Hz=1.0),
         sample=Sample("maxwell"),
-        parameters={"k": 1.0, "c": 1.0},
+        network=Sample("maxwell").model.sample({"k": 1.0, "c": 1.0}),
         nonlinear_target=False,
         unilateral=unilateral,
         stroke_rad=0.0785,

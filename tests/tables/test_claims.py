@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from biogrip.physics.models import Published, Sample, Truth
+from biogrip.physics.models import Published, Sample
 from biogrip.records.rows import read_table
 from biogrip.tables import claims_on_method as method
 from biogrip.tables import claims_on_results as results
@@ -84,12 +84,13 @@ def test_an_order_of_magnitude_is_half_a_decade_on_both_sides() -> None:
 def runs(rows: list[dict[str, float]], table: int = 5, **printed: float) -> Results:
     """Results with the runs on one sample, a row a seed and generation, and nothing else."""
     published = Published(table=table, generation=70, identified=printed, error_percent={})
-    truth = Truth("A sample", Sample("generalized_maxwell"), TRUE, published)
     history = pd.DataFrame(rows)
     found = history.groupby("seed").last().reset_index()
-    cases = {"mine": seen(truth=truth, noise=seen(level=0.1))}
-    study = seen(cases=cases, near_noise_tolerance=0.02)
-    return Results(study, {}, {table: Runs("mine", truth, found, history)}, {})
+    sample = Sample("generalized_maxwell")
+    known = {"sample": sample, "parameters": TRUE, "published": published}
+    case = seen(name="mine", noise=seen(level=0.1), **known)
+    study = seen(cases={"mine": case}, near_noise_tolerance=0.02)
+    return Results(study, {}, {table: Runs(case, found, history)}, {})
 
 
 def test_orders_of_magnitude_at_generation_20_are_those_of_that_generation() -> None:
@@ -190,7 +191,7 @@ def test_errors_are_held_against_the_level_of_the_noise() -> None:
 def test_jaws_that_would_have_to_pull_hold_one_sample_in_three() -> None:
     forces = pd.DataFrame({"case": ["a", "a", "b", "c"], "lowest_force_uN": [0.2, 0.3, -0.7, -0.6]})
     cases = {
-        name: seen(truth=seen(title=name, published=seen(table=table)))
+        name: seen(title=name, published=seen(table=table))
         for name, table in (("a", 5), ("b", 6), ("c", 7))
     }
     judged = method.judge_grip(Results(seen(cases=cases), {"mechanics": forces}, {}, {}))
@@ -217,7 +218,7 @@ def test_models_that_fit_as_well_are_held_against_the_one_that_made_the_traces(
         )
     ]
     tables = zip("abc", (5, 6, 7), strict=True)
-    cases = {name: seen(truth=seen(published=seen(table=table))) for name, table in tables}
+    cases = {name: seen(published=seen(table=table)) for name, table in tables}
     found = Results(seen(cases=cases), {"models": pd.DataFrame(rows)}, {}, {})
     judged = results.judge_cell_model(found)
     assert judged.verdict == verdict

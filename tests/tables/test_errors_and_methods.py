@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from biogrip.fit.methods import METHODS
-from biogrip.physics.models import MODELS, UNPUBLISHED, Published, Sample, Truth
+from biogrip.physics.models import MODELS, Published, Sample
 from biogrip.records.identifications import MODEL_FITS, columns
 from biogrip.tables.cases import errors, errors_of_case, verdicts
 from biogrip.tables.methods import methods, models
@@ -42,9 +42,9 @@ def eleven_seeds(tmp_path: Path) -> Path:
 
 
 def case_of(near_noise_tolerance: float = 0.02) -> Any:
-    truth = Truth("A drop", Sample("generalized_maxwell"), TRUE, PAPER)
     study = seen(shown="genetic", near_noise_tolerance=near_noise_tolerance)
-    return seen(name="drop", truth=truth, study=study)
+    known = {"sample": Sample("generalized_maxwell"), "parameters": TRUE, "published": PAPER}
+    return seen(name="drop", title="A drop", study=study, **known)
 
 
 def test_error_table_is_the_arithmetic_it_says(eleven_seeds: Path) -> None:
@@ -87,8 +87,8 @@ def test_joined_errors_are_within_the_tolerance_that_their_heading_names(
 
 def study(parameters: dict[str, float], samples: int) -> Any:
     """Of one case, a drop."""
-    truth = Truth("A drop", Sample("generalized_maxwell"), parameters, UNPUBLISHED)
-    cases = {"drop": seen(truth=truth, samples=samples)}
+    sample = Sample("generalized_maxwell")
+    cases = {"drop": seen(sample=sample, parameters=parameters, samples=samples)}
     return seen(cases=cases, identifiers=METHODS, optimum_tolerance=1.0, near_noise_tolerance=0.02)
 
 

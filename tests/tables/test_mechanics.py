@@ -11,7 +11,7 @@ import pytest
 
 from biogrip.fit.genome import GeneRange
 from biogrip.physics.gripper import torque
-from biogrip.physics.models import Published, Sample, Truth
+from biogrip.physics.models import Published, Sample
 from biogrip.records.identifications import DIFFERENCES
 from biogrip.tables.evidence import evidence, printed_values, sampling_evidence
 from biogrip.tables.mechanics import contact_loss, left_out, linear_cases, linearisation, mechanics
@@ -59,7 +59,8 @@ def test_the_linearisation_is_held_against_one_percent(tmp_path: Path) -> None:
 
 def test_a_damper_between_both_jaws_damps_a_rotation_twice() -> None:
     """Both arms close by b phi, so the damper by 2 b phi, and each arm's lever is b."""
-    drop = seen(sample=Sample("kelvin_voigt"), parameters={"k_p": 0.5, "c_p": 11.0})
+    sample = Sample("kelvin_voigt")
+    drop = seen(sample=sample, network=sample.model.sample({"k_p": 0.5, "c_p": 11.0}))
     device = {name: getattr(STUDY, name) for name in ("gripper", "actuator", "phases")}
     rows = left_out(seen(**device, gripped=["drop"], cases={"drop": drop})).rows
     (found,) = (row for row in rows if row["beside"].startswith("the sample's"))
@@ -115,9 +116,9 @@ CASES: Any = STUDY.of(STUDY.published)
 def test_distances_of_printed_values_are_shares_of_them() -> None:
     """Of 0.5 and 2.2, where 1.1 to 9.9 can be encoded."""
     published = Published(table=9, identified={"k_p": 2.2}, error_percent={"k_p": "-340"})
-    truth = Truth("A spring", Sample("kelvin_voigt"), {"k_p": 0.5, "c_p": 0.0}, published)
+    spring = seen(parameters={"k_p": 0.5, "c_p": 0.0}, published=published)
     ranges = {name: GeneRange((1, 1), (1, 9)) for name in ("k_p", "c_p")}
-    study = seen(cases={"spring": seen(truth=truth)}, ranges=ranges)
+    study = seen(cases={"spring": spring}, ranges=ranges)
     target, identified = printed_values(study).rows
     assert (target["nearest_encodable"], target["within_range"]) == (1.1, "no")
     assert target["distance_percent"] == pytest.approx(-120)

@@ -106,11 +106,11 @@ def _mark_mutation(axes: Axes, start: int, last: int) -> None:
 
 def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw every parameter over generations for all seeds, highlighting a run of each basin."""
-    truth, method = case.truth, case.study.shown_method
+    method = case.study.shown_method
     found = read_identifications(identifications, method.name)
     first = first_of_basins(found, case.study.near_noise_tolerance)
     shown = [int(run["seed"]) for run in first.values()]
-    parameters, identified = truth.model.parameters, truth.published.identified
+    parameters, identified = case.sample.model.parameters, case.published.identified
     columns = [parameter.column for parameter in parameters]
     history = read_history(histories, method.name, shown, columns)
     drawn = figure(PAGE_IN, 3.9)
@@ -119,7 +119,7 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
         for seed, rows in history.groupby("seed"):
             style = _line_of_seed(seed, shown, 0.6)
             axes.step(rows["generation"], rows[parameter.column], where="post", **style)
-        target = truth.parameters.get(parameter.name, 0)
+        target = case.parameters.get(parameter.name, 0)
         if target > 0:
             axes.axhline(target, color=TARGET, linestyle="--")
         if parameter.name in identified:
@@ -136,13 +136,13 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
         lowest.set_xlabel(method.step)
         lowest.tick_params(labelbottom=True)
     _name_seeds(grid[0], len(found), first)
-    if truth.parameters:
+    if case.parameters:
         grid[0].plot([], [], color=TARGET, linestyle="--", label="target")
     if identified:
         grid[0].plot([], [], color=PAPER, linestyle=":", label="identified in the paper")
     handles, labels = grid[0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside upper center", ncols=4)
-    drawn.suptitle(truth.title, x=0.01, ha="left", fontsize=8)
+    drawn.suptitle(case.title, x=0.01, ha="left", fontsize=8)
     return drawn
 
 

@@ -21,12 +21,11 @@ from biogrip.figures.style import (
 )
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.nonlinear import correction
-from biogrip.physics.protocol import torque_history
 from biogrip.physics.simulation import jaw_force
 from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
 from biogrip.records.identifications import DIFFERENCES
 from biogrip.records.traces import read_target
-from biogrip.stages.targets import network_of, scaled
+from biogrip.stages.targets import scaled
 from biogrip.study.study import Case, Study
 from biogrip.tables.mechanics import LIMIT_PERCENT
 
@@ -34,12 +33,9 @@ from biogrip.tables.mechanics import LIMIT_PERCENT
 def draw_force(case: Case, target: Path) -> Figure:
     """Draw the jaw force under bilateral contact, and the rotation with and without adhesion."""
     time_s, _, rotation = read_target(target)
-    torque = torque_history(case.phases)
-    network = case.sample.model.sample(case.parameters)
+    device = case.gripper, case.network, case.torque
     # Without inertia, since the jaws ring for less than a sampling interval after a step.
-    sticking = jaw_force(
-        case.gripper, network, torque, time_s, nonlinear=case.nonlinear_target, inertia=False
-    )[0]
+    sticking = jaw_force(*device, time_s, nonlinear=case.nonlinear_target, inertia=False)[0]
     drawn = figure(COLUMN_IN, 3.2)
     forces, rotations = drawn.subplots(2, 1, sharex=True, height_ratios=[1.25, 1])
     factor, unit = scale_of(sticking, "N")
@@ -54,7 +50,7 @@ def draw_force(case: Case, target: Path) -> Figure:
         )  # fmt: skip
     apart = None
     if pulling and not case.nonlinear_target:
-        apart = unilateral_response(case.gripper, network, torque, time_s)
+        apart = unilateral_response(*device, time_s)
         shown = _from_loss(apart, apart.jaw_force_N)
         forces.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
     forces.set_ylabel(f"jaw force ({unit})")
@@ -125,8 +121,8 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
 
 def _difference(axes: Axes, case: Case) -> None:
     """Draw the nonlinear minus the linear rotation, as the curves themselves look the same."""
-    gripper, network = case.gripper, network_of(case)
-    torque = scaled(torque_history(case.phases), _SHOWN_FACTOR)
+    gripper, network = case.gripper, case.network
+    torque = scaled(case.torque, _SHOWN_FACTOR)
     time_s = np.linspace(0, torque.end_s, 1001)
     response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
     linear = rotation(response, torque, time_s)[0]

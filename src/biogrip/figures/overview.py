@@ -36,7 +36,6 @@ from biogrip.figures.style import (
     points_within,
 )
 from biogrip.fit.methods import near_noise, near_noise_words
-from biogrip.physics.models import Truth
 from biogrip.records.identifications import bounded_on_a_side, read_identifications, read_verdicts
 from biogrip.study.study import Case, Study
 
@@ -66,14 +65,14 @@ def draw_overview(
     drawn = figure(PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
     fits = fits_of_basins(cases[0], identifications[0], measurements, calibrated)
-    _fits(axes[0], cases[0].truth, fits)
+    _fits(axes[0], cases[0], fits)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
         found = read_identifications(path, study.shown)
         bounded = bounded_on_a_side(read_verdicts(judged))
-        _scatter(scatter, case.truth, first_seeds(found), study.near_noise_tolerance, bounded)
+        _scatter(scatter, case, first_seeds(found), study.near_noise_tolerance, bounded)
         scatter.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3], [""] * 7 if index else None)
-        panel(scatter, "bcd"[index], case.truth.title, most_letters=_TITLE_LETTERS)
+        panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
     legend: dict[str, Any] = {}
     for scatter in axes[1:]:
@@ -90,7 +89,7 @@ def draw_overview(
     return drawn
 
 
-def _fits(axes: Axes, case: Truth, fits: Mapping[str, Fit]) -> None:
+def _fits(axes: Axes, case: Case, fits: Mapping[str, Fit]) -> None:
     factor, _ = draw_traces(axes, fits)
     fit = next(iter(fits.values()))
     axes.set_ylim(top=1.65 * factor * fit.measured_rad.max())
@@ -100,13 +99,13 @@ def _fits(axes: Axes, case: Truth, fits: Mapping[str, Fit]) -> None:
 
 
 def _scatter(
-    axes: Axes, case: Truth, found: pd.DataFrame, tolerance: float, bounded: set[str]
+    axes: Axes, case: Case, found: pd.DataFrame, tolerance: float, bounded: set[str]
 ) -> None:
     """Draw identified over target values of the quantities that are bounded."""
     reached = near_noise(found, tolerance)
     identified = case.published.identified
     ticks: list[str] = []
-    for group in case.model.quantities:
+    for group in case.sample.model.quantities:
         names = [parameter.name for parameter in group]
         target = sum(case.parameters[name] for name in names)
         if target <= 0 or " + ".join(names) not in bounded:

@@ -15,7 +15,7 @@ from biogrip.digits import counted
 from biogrip.fit.methods import ALL, basins, near_noise, near_noise_words, share_with_limits
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, NOT_DETERMINED, WIDE
-from biogrip.physics.models import Truth
+from biogrip.physics.models import Published
 from biogrip.records.identifications import INTERVALS, read_identifications, read_verdicts
 from biogrip.study.study import Case, Study
 from biogrip.tables.coverage import holds
@@ -53,7 +53,7 @@ def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:
 
 def errors_of_case(case: Case, identifications: Path) -> Table:
     """Compare target and identified values of one case, given its identifications, CSV."""
-    truth, tolerance = case.truth, case.study.near_noise_tolerance
+    tolerance = case.study.near_noise_tolerance
     found = read_identifications(identifications, case.study.shown)
     of_case: Row = {"case": case.name}
     if found["noise_rms"].notna().all():
@@ -61,12 +61,12 @@ def errors_of_case(case: Case, identifications: Path) -> Table:
         of_case |= zip((f"near_noise_{end}" for end in ("share", "from", "to")), near, strict=True)
     rows = []
     for basin, runs in ({ALL: found} | basins(found, tolerance)).items():
-        for quantity in truth.model.quantities:
+        for quantity in case.sample.model.quantities:
             names = [parameter.name for parameter in quantity]
-            target = truth.target(quantity)
+            target = target_of(label := " + ".join(names), case.parameters)
             values = runs[[parameter.column for parameter in quantity]].sum(axis=1).to_numpy(float)
             of_quantity = {
-                "parameter": " + ".join(names),
+                "parameter": label,
                 "unit": quantity[0].unit,
                 "target": target,
                 "basin": basin,
@@ -76,13 +76,13 @@ def errors_of_case(case: Case, identifications: Path) -> Table:
             }
             for name, percent in _PERCENTILES.items():
                 of_quantity[f"{name}_identified"] = np.percentile(values, percent)
-            rows.append(of_case | of_quantity | _of_paper(truth, names, target))
-    number = f"Table {truth.published.table}. " if truth.published.table is not None else ""
+            rows.append(of_case | of_quantity | _of_paper(case.published, names, target))
+    number = f"Table {case.published.table}. " if case.published.table is not None else ""
     caption = (
-        f"{number}{truth.title}: target and identified parameters over "
+        f"{number}{case.title}: target and identified parameters over "
         f"{counted(len(found), 'seed')}. {_BASINS}"
-        if truth.parameters
-        else f"{truth.title}: parameters identified in the recorded trace."
+        if case.parameters
+        else f"{case.title}: parameters identified in the recorded trace."
     )
     return Table(caption, _columns(tolerance), rows)
 
@@ -94,13 +94,13 @@ def error_percent(target: float | None, identified: Array) -> Array:
     return 100 * (target - identified) / target
 
 
-def _of_paper(truth: Truth, names: list[str], target: float | None) -> Row:
+def _of_paper(published: Published, names: list[str], target: float | None) -> Row:
     """Return the paper's value and error; the error of a sum is computed from its values."""
-    identified = truth.published.identified
+    identified = published.identified
     if not all(name in identified for name in names):
         return {}
     value = float(sum(identified[name] for name in names))
-    error: Any = truth.published.error_percent.get(names[0])
+    error: Any = published.error_percent.get(names[0])
     if len(names) > 1:
         error = error_percent(target, np.array([value]))[0]
     return {"paper_identified": value, "paper_error_percent": error}

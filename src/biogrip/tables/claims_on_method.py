@@ -44,7 +44,7 @@ def _as_printed(row: "pd.Series") -> str:
 @claim("section 2", "in order to maintain the grip with the sample")
 def judge_grip(results: Results) -> Judged:
     lowest = results.table("mechanics").groupby("case", sort=False)["lowest_force_uN"].min()
-    tables = {case.truth.title: case.truth.published.table for case in results.study.cases.values()}
+    tables = {case.title: case.published.table for case in results.study.cases.values()}
     lowest = lowest[lowest.index.isin(tables)]
     said = ", ".join(f"{force:.2g} µN (Table {tables[title]})" for title, force in lowest.items())
     return Judged(
@@ -133,7 +133,7 @@ def judge_free_arm(results: Results) -> Judged:
 @claim("section 3, (1)-(6)", "can be described by means of the following equations")
 def judge_equations(results: Results) -> Judged:
     case = results.study.cases[results.case_of(5)]
-    values = case.truth.parameters
+    values = case.parameters
     length_s = sum(phase.duration_s for phase in case.phases)
     decades = values["k"] / values["c"] * length_s / np.log(10)
     return Judged(

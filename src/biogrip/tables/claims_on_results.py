@@ -49,11 +49,11 @@ _APART = 10.0
 def judge_values(results: Results, number: int) -> Judged:
     """Judge the identified values of a table, and the sum of those that trade."""
     runs = results.runs_of(number)
-    identified = runs.truth.published.identified
+    identified = runs.case.published.identified
     nearest = _nearest(results, runs, "identified")
-    told = results.table(f"verdicts_{runs.case}").set_index("quantity")["expected_verdict"]
+    told = results.table(f"verdicts_{runs.case.name}").set_index("quantity")["expected_verdict"]
     said, verdicts = [], []
-    for quantity in runs.truth.model.quantities:
+    for quantity in runs.case.sample.model.quantities:
         names = [parameter.name for parameter in quantity]
         label, printed = " + ".join(names), sum(identified[name] for name in names)
         values = runs.found[names].sum(axis=1).to_numpy(float)
@@ -75,7 +75,7 @@ def judge_values(results: Results, number: int) -> Judged:
 def _nearest(results: Results, runs: Runs, which: str) -> "pd.Series[float]":
     """Return the genes' value nearest to each target or identified value of a case, by name."""
     table = results.table("printed_values")
-    mine = table[(table["case"] == runs.case) & (table["quantity"] == which)]
+    mine = table[(table["case"] == runs.case.name) & (table["quantity"] == which)]
     return mine.set_index("parameter")["nearest_encodable"]
 
 
@@ -95,7 +95,7 @@ def _near_noise(results: Results, number: int) -> BoolArray:
 def tell_of_generation(results: Results, number: int) -> Judged:
     """Tell why the generation at which the paper shows a fit proves nothing."""
     runs = results.runs_of(number)
-    if runs.truth.published.generation is None:
+    if runs.case.published.generation is None:
         raise LackingError("the config has no generation of the fit")
     stop, last = runs.found["generations"], runs.last_improvement
     low, high = np.percentile(stop, [5, 95])
@@ -122,7 +122,7 @@ def judge_orders(results: Results, names: dict[int, tuple[str, ...]]) -> Judged:
 
 
 def _within_a_decade(runs: Runs, names: Iterable[str], values: pd.DataFrame) -> list[BoolArray]:
-    return [within_a_decade(values[name], runs.truth.parameters[name]) for name in names]
+    return [within_a_decade(values[name], runs.case.parameters[name]) for name in names]
 
 
 def _listed(names: Iterable[str], those: Iterable[BoolArray]) -> str:
@@ -132,7 +132,7 @@ def _listed(names: Iterable[str], those: Iterable[BoolArray]) -> str:
 def _errors_percent(runs: Runs, *names: str) -> Array:
     """Return absolute errors of a parameter or a sum, one a seed."""
     values = runs.found[list(names)].sum(axis=1).to_numpy(float)
-    target = sum(runs.truth.parameters[name] for name in names)
+    target = sum(runs.case.parameters[name] for name in names)
     return np.asarray(100 * np.abs(values / target - 1))
 
 
@@ -187,7 +187,7 @@ def judge_further_generations(results: Results) -> Judged:
 @claim("section 5", "for the case of endothelial cells")
 def judge_endothelial(results: Results) -> Judged:
     table = results.table("mechanics")
-    title = results.study.cases[results.case_of(5)].truth.title
+    title = results.study.cases[results.case_of(5)].title
     modulus = table.loc[table["case"] == title, "apparent_modulus_kPa"].to_numpy(float)
     is_like = modulus.min() >= 1 / _SCATTER_OF_CELLS and modulus.max() <= _SCATTER_OF_CELLS
     return Judged(
@@ -206,7 +206,7 @@ claim("Figure 9", "target response … and the best fit")(partial(judge_fits_res
 @claim("Figure 10", "except c_p, the order of magnitude … is obtained around the 20th generation")
 def judge_early_orders(results: Results) -> Judged:
     runs = results.runs_of(5)
-    names = [name for name in runs.truth.model.names if name != "c_p"]
+    names = [name for name in runs.case.sample.model.names if name != "c_p"]
     early, later = (
         # Of a run that has stopped before, the last generation.
         _within_a_decade(
@@ -229,8 +229,8 @@ def judge_negligible(results: Results) -> Judged:
     runs, said, verdicts = results.runs_of(5), [], []
     nearest = _nearest(results, runs, "target")
     for name in ("k_p", "c"):
-        target = runs.truth.parameters[name]
-        printed = 100 * abs(runs.truth.published.identified[name] / target - 1)
+        target = runs.case.parameters[name]
+        printed = 100 * abs(runs.case.published.identified[name] / target - 1)
         least = 100 * abs(nearest[name] / target - 1)
         errors = _errors_percent(runs, name)
         close = errors <= printed + _ROUNDING_PERCENT
@@ -241,7 +241,9 @@ def judge_negligible(results: Results) -> Judged:
             f"genes allow {least:.2g} % at best"
         )
     methods = results.table("methods")
-    is_best = (methods["method"] == "multi-start least squares") & (methods["case"] == runs.case)
+    is_best = (methods["method"] == "multi-start least squares") & (
+        methods["case"] == runs.case.name
+    )
     polished = ""
     if is_best.any():
         best = methods[is_best].iloc[0]
@@ -256,7 +258,7 @@ def judge_negligible(results: Results) -> Judged:
 def judge_below_noise(results: Results) -> Judged:
     runs = results.runs_of(5)
     errors = _errors_percent(runs, "k")
-    below = errors < 100 * results.study.cases[runs.case].noise.level
+    below = errors < 100 * results.study.cases[runs.case.name].noise.level
     said = f"{of_seeds(below)} of the seeds; the median error of k is {np.median(errors):.2g} %."
     return Judged(by_share(float(np.mean(below))), said)
 
@@ -264,7 +266,7 @@ def judge_below_noise(results: Results) -> Judged:
 @claim("Table 5", "c_p … has a very low value that does not affect the response")
 def judge_low_damper(results: Results) -> Judged:
     runs = results.runs_of(5)
-    limits = results.table(f"verdicts_{runs.case}").set_index("quantity")
+    limits = results.table(f"verdicts_{runs.case.name}").set_index("quantity")
     most = float(limits.loc["c_p", "expected_high"])
     low = runs.found["c_p"] <= most
     return Judged(
@@ -298,7 +300,7 @@ claim("Figure 11", "fits correctly the response")(partial(judge_fits_response, n
 @claim("Table 6", "identify with small error the key parameter c")
 def judge_key_damper(results: Results) -> Judged:
     runs = results.runs_of(6)
-    printed = abs(runs.truth.published.identified["c"] / runs.truth.parameters["c"] - 1)
+    printed = abs(runs.case.published.identified["c"] / runs.case.parameters["c"] - 1)
     alone, total = (
         _errors_percent(runs, *names) <= 100 * printed + _ROUNDING_PERCENT
         for names in (("c",), ("c", "c_p"))

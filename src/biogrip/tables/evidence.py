@@ -16,8 +16,7 @@ from biogrip.fit.genome import nearest_encodable
 from biogrip.judging.likelihood import DETERMINED_PERCENT, bounds_percent
 from biogrip.judging.quantities import Quantity
 from biogrip.physics import gripper as actuator
-from biogrip.physics.models import Truth
-from biogrip.physics.protocol import sample_times, torque_history
+from biogrip.physics.protocol import sample_times
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import compute_grip
 from biogrip.records.identifications import read_identifications
@@ -46,12 +45,11 @@ def evidence(study: Study, identifications: list[Path], measurements: list[Path]
     """Compare statements of the paper with results of the study."""
     rows = _device_rows(study)
     for name, case in study.cases.items():
-        truth = case.truth
         rows += [_grip_row(case)] if name in study.gripped else []
-        rows += _axis_rows(truth, [path for path in measurements if path.parent.name == name])
+        rows += _axis_rows(case, [path for path in measurements if path.parent.name == name])
         if study.shown == "genetic":
             identified = [path for path in identifications if path.stem == name]
-            rows += _generation_rows(truth, identified)
+            rows += _generation_rows(case, identified)
     return Table("Statements of the paper beside what the study computes.", _COLUMNS, rows)
 
 
@@ -91,15 +89,14 @@ def _volts(study: Study, torque_Nm: float) -> float:
 
 def _grip_row(case: Case) -> Row:
     """Return the lowest jaw force; the paper says that the lower torque maintains the grip."""
-    network = case.sample.model.sample(case.parameters)
-    torque = torque_history(case.phases)
-    grip = compute_grip(case.gripper, network, torque, nonlinear=case.nonlinear_target)
+    device = case.gripper, case.network, case.torque
+    grip = compute_grip(*device, nonlinear=case.nonlinear_target)
     remark = f"at {grip.lowest_at_s:.4g} s, as in mechanics; negative: the jaws would have to pull"
     quantity = f"{case.title}: lowest jaw force"
     return _row(quantity, "uN", "maintains the grip", 1e6 * grip.lowest_N, remark)
 
 
-def _axis_rows(case: Truth, traces: list[Path]) -> list[Row]:
+def _axis_rows(case: Case, traces: list[Path]) -> list[Row]:
     """Return the ends of an axis that the paper shows, and of our traces."""
     axis = case.published.axis_rad
     if not axis or not traces:
@@ -116,7 +113,7 @@ def _axis_rows(case: Truth, traces: list[Path]) -> list[Row]:
     ]
 
 
-def _generation_rows(case: Truth, identified: list[Path]) -> list[Row]:
+def _generation_rows(case: Case, identified: list[Path]) -> list[Row]:
     generation = case.published.generation
     if not generation or not identified:
         return []
@@ -142,17 +139,16 @@ _PRINTED_COLUMNS = (
 def printed_values(study: Study) -> Table:
     """Compare published values with encoding, range and error formula."""
     rows = []
-    for case, reported in study.cases.items():
-        truth, printed = reported.truth, reported.truth.published
-        for name in truth.model.names:
-            target, genes = truth.parameters[name], study.ranges[name]
-            identified = printed.identified.get(name)
+    for name_of_case, case in study.cases.items():
+        printed = case.published
+        for name, target in case.parameters.items():
+            genes, identified = study.ranges[name], printed.identified.get(name)
             for quantity, value in (("target", target), ("identified", identified)):
                 if value is None or value <= 0:
                     continue
                 nearest = nearest_encodable(value, genes)
                 row: Row = {
-                    "case": case,
+                    "case": name_of_case,
                     "parameter": name,
                     "quantity": quantity,
                     "printed": value,
@@ -206,7 +202,7 @@ def sampling_evidence(study: Study) -> Table:
 
 def _errors_and_bounds(case: Case) -> list[tuple[Any, ...]]:
     """Return a row of each quantity that is determined at some rate and that the paper reports."""
-    truth, identified = case.truth.parameters, case.truth.published.identified
+    truth, identified = case.parameters, case.published.identified
     problem, noise = case.problem, case.noise
     names = list(problem.searched.names)
     times = [sample_times(problem.torque.end_s, rate) for rate in _RATES_HZ]

@@ -27,7 +27,7 @@ from biogrip.physics.contact import (
     rolling_of_contact,
 )
 from biogrip.physics.noise import add_noise, rms, stream
-from biogrip.physics.protocol import largest_load, torque_history
+from biogrip.physics.protocol import largest_load
 from biogrip.physics.simulation import (
     compute_grip,
     jaw_force,
@@ -121,8 +121,8 @@ def mechanics(study: Study) -> Table:
 
 def _mechanics_of(case: Case) -> list[Row]:
     """Return a row for every size of a case's sample."""
-    network = case.sample.model.sample(case.parameters)
-    given = case.gripper, network, torque_history(case.phases)
+    network = case.network
+    given = case.gripper, network, case.torque
     # Immediately before the first change of torque.
     end = np.array([np.nextafter(case.phases[0].duration_s, 0)])
     shortening = float(simulated_shortening(*given, end, nonlinear=case.nonlinear_target)[0, 0])
@@ -208,8 +208,7 @@ def _damping(case: Case) -> float:
     """Return the damping of all dampers of a case's sample in N s/m."""
     if case.sample.model.power_law:
         return 0.0
-    network = case.sample.model.sample(case.parameters)
-    return float(network.c_p[0] + network.c[0].sum())
+    return float(case.network.c_p[0] + case.network.c[0].sum())
 
 
 LIMIT_PERCENT = 1.0
@@ -291,15 +290,14 @@ def contact_loss(study: Study) -> Table:
 
 def _loss_of(study_seed: int, case: Case) -> list[Row]:
     """Return a row for every quantity and the misfit; none if the jaws keep contact."""
-    torque, model = torque_history(case.phases), case.sample.model
-    network = model.sample(case.parameters)
-    if compute_grip(case.gripper, network, torque, nonlinear=False).pulls_from_s is None:
+    device = case.gripper, case.network, case.torque
+    if compute_grip(*device, nonlinear=False).pulls_from_s is None:
         return []
-    time_s = case.sampling.over(torque.end_s)
-    free = unilateral_response(case.gripper, network, torque, time_s)
+    time_s = case.sampling.over(case.torque.end_s)
+    free = unilateral_response(*device, time_s)
     if not free.parted_s:
         return []
-    held = as_written(simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0])
+    held = as_written(simulated_rotation(*device, time_s, nonlinear=False)[0])
     let_go = as_written(free.rotation_rad[0])
     rngs = [
         stream(study_seed, case.name, seed, "noise") for seed in range(min(case.seeds, _MOST_SEEDS))
@@ -316,7 +314,7 @@ def _loss_of(study_seed: int, case: Case) -> list[Row]:
         )
     }
     rows: list[Row] = []
-    for quantity in (*model.quantities, []):
+    for quantity in (*case.sample.model.quantities, []):
         names = [parameter.name for parameter in quantity]
         label = " + ".join(names) or "misfit"
         target = sum(case.parameters[name] for name in names) if names else 1.0

@@ -9,7 +9,7 @@ from biogrip.fit.methods import chi_square_increase, reached_encodable, share_wi
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.records.identifications import ENCODABLE, MODEL_FITS, read_identifications
 from biogrip.study.study import Study
-from biogrip.tables.cases import error_percent
+from biogrip.tables.cases import error_percent, target_of
 from biogrip.tables.layout import Column, Row, Table
 
 _METHOD_COLUMNS = (
@@ -47,10 +47,10 @@ def methods(study: Study, identifications: list[Path]) -> Table:
                 "encodable_rise": np.median(mine["least"]),
                 "median_evaluations": float(mine["evaluations"].median()),
             }
-            for quantity in case.truth.model.quantities:
+            for quantity in case.sample.model.quantities:
                 label = " + ".join(p.name for p in quantity)
                 values = mine[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
-                error = np.abs(error_percent(case.truth.target(quantity), values))
+                error = np.abs(error_percent(target_of(label, case.parameters), values))
                 row[f"error_percent {label}"] = np.median(error)
                 labels[f"error_percent {label}"] = f"Error {label} %"
             rows.append(row)
