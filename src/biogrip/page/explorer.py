@@ -54,17 +54,9 @@ def fits_of(
 
 
 def explorer(cases: Sequence[tuple[str, Fits]]) -> str:
-    """Return an interactive figure of traces, targets and fits, with a menu of the cases.
+    """Return an interactive figure of the fits of each case, by title, with a menu of the cases.
 
-    Parameters
-    ----------
-    cases
-        Title and fits of each case.
-
-    Returns
-    -------
-    str
-        HTML element that holds Plotly's library and needs no network.
+    It is an HTML element that holds Plotly's library and needs no network.
     """
     lines = [_lines(fits) for _, fits in cases]
     axes = [_axes(fits[0][1]) for _, fits in cases]

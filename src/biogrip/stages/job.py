@@ -33,22 +33,10 @@ _OF_CASE = [field.name for field in fields(CaseBlock)]
 
 
 def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any]:
-    """Return some keys of a study's config as plain values, those of a case laid over them.
+    """Return some keys of a study, or of a case or a point of a sweep, plain; None for a default.
 
-    Parameters
-    ----------
-    study
-        The study.
-    keys
-        Names of blocks, or of single keys in a block, e.g. ``measurement.noise``; or
-        ``cases.NAME.KEY`` for a key of a case with the study's blocks merged in.
-    case
-        Name of the case, or of a point of a sweep; by default the study's own keys.
-
-    Returns
-    -------
-    values
-        By key; None for a default.
+    Keys name blocks, or single keys in a block, e.g. ``measurement.noise``; or ``cases.NAME.KEY``
+    for a key of a case with the study's blocks merged in.
     """
     blocks = study.plain
     if case:

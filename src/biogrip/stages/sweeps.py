@@ -53,18 +53,8 @@ def judge(
 ) -> None:
     """Compute errors and shares of successful seeds at every point of a sweep.
 
-    Parameters
-    ----------
-    study
-        The study.
-    sweep
-        Name of the sweep.
-    identifications
-        Batches of the points, in folders named like point and method.
-    calibrated
-        Calibrations, named like their point.
-    points
-        The file to write.
+    Batches of identifications are in folders named like point and method, calibrations are named
+    like their point.
     """
     files: dict[tuple[str, str], list[Path]] = {}
     for path in identifications:

@@ -40,10 +40,7 @@ from biogrip.terminal import warn
 def simulate(case: Case, target: Path) -> None:
     """Simulate a case, and write its target, CSV.
 
-    Raises
-    ------
-    BiogripError
-        If the response is not finite, or turns the arms beyond the stroke of the comb drives.
+    A response that is not finite, or turns the arms beyond the combs' stroke, is an error.
     """
     time_s = case.sampling.over(case.torque.end_s)
     controlled = torque_at(case.torque, time_s)

@@ -252,13 +252,10 @@ def _joint_rows(cases: list[tuple[Case, pd.DataFrame]]) -> Iterator[Row]:
 
 
 def limits(counts: list[tuple[int, int]]) -> tuple[float, float]:
-    """Return 95 % limits of the product of independent probabilities.
+    """Return 95 % limits of the product of probabilities, given successes and trials of each.
 
-    Parameters
-    ----------
-    counts
-        Successes and trials of each. Their posteriors under Jeffreys' prior are drawn from with a
-        Sobol sequence, so that the limits are the same wherever they are computed.
+    Their posteriors under Jeffreys' prior are drawn from with a Sobol sequence, so that the limits
+    are the same wherever they are computed.
     """
     points = qmc.Sobol(len(counts), scramble=False).random_base2(_LOG2_DRAWS)
     draws = [
@@ -273,12 +270,9 @@ def limits(counts: list[tuple[int, int]]) -> tuple[float, float]:
 
 
 def own_shares(errors: Array) -> Array:
-    """Return for every seed the share of seeds whose errors are all as small as its own.
+    """Return the share of seeds, itself among them, whose errors are all as small as each seed's.
 
-    Parameters
-    ----------
-    errors
-        Shape (n_parameters, n_seeds). A seed counts itself.
+    Errors have the shape (n_parameters, n_seeds).
     """
     within = np.all(errors[:, :, None] <= errors[:, None, :], axis=0)
     return np.asarray(within.mean(axis=0))
