@@ -110,6 +110,12 @@ def scale_of(values: Array, unit: str) -> tuple[float, str]:
     return 1e9, f"n{unit}"
 
 
+def scale_of_fit(fit: Fit) -> tuple[float, str]:
+    """Return factor and unit with a prefix, where the unit of the readings may have one."""
+    plain = fit.read.unit.isalpha()
+    return scale_of(fit.fitted_rad, fit.read.unit) if plain else (1.0, fit.read.unit)
+
+
 def _holding(seed: int, measurements: list[Path]) -> Path:
     for path in measurements:
         if seed in seeds_of(path.stem):
