@@ -1,7 +1,5 @@
 """Parts of the documentation that are written from code and results; `make docs` renews them."""
 
-import csv
-import importlib
 import json
 import re
 import textwrap
@@ -9,7 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout, suppress
 from io import StringIO
 from pathlib import Path
-from pkgutil import iter_modules
 from tempfile import TemporaryDirectory
 from typing import Any
 from unittest import mock
@@ -18,7 +15,6 @@ import numpy as np
 import pandas as pd
 import yaml
 
-import biogrip.records
 from biogrip.cli import main
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
@@ -28,8 +24,7 @@ from biogrip.page.answers import (
     say_what_traces_tell,
     say_which_method_finds_it,
 )
-from biogrip.records import identifications, traces
-from biogrip.records.rows import RowFile, read_table
+from biogrip.records.rows import read_table
 from biogrip.tables.claims import count_verdicts
 from biogrip.terminal import QUIET
 from tests.helpers.default import study_of
@@ -232,36 +227,6 @@ def _help(*command: str) -> str:
     return said.getvalue()
 
 
-def file_columns() -> str:
-    """The columns of every file of rows, as its kind declares them, and of the published tables."""
-    leading, trailing = identifications.LEADING, identifications.TRAILING
-    files: dict[str, tuple[str, ...]] = {
-        "results/targets/{case}.csv": traces.TARGET_COLUMNS,
-        "results/identifications/{case}.csv": (
-            *(*leading, "parameters ...", *trailing, identifications.ENCODABLE),
-        ),
-    }
-    files |= {kind.path: kind.columns for kind in _kinds()}
-    for table in sorted(PUBLISHED.rglob("tables/*.csv")):
-        of = re.match("(errors|verdicts|robustness)_", table.name)
-        whose = {"robustness": "{sweep}"}.get(of[1], "{case}") if of else ""
-        name = f"{of[1]}_{whose}.csv" if of else table.name
-        with table.open(encoding="utf-8", newline="") as stream:
-            files.setdefault(f"results/tables/{name}", tuple(next(csv.reader(stream))))
-    return _table(
-        {"file": f"`{path}`", "columns": ", ".join(f"`{name}`" for name in columns)}
-        for path, columns in files.items()
-    )
-
-
-def _kinds() -> Iterator[RowFile]:
-    package = biogrip.records
-    modules = [module.name for module in iter_modules(package.__path__, f"{package.__name__}.")]
-    for module in (*modules, "biogrip.stages.sweeps"):
-        values = vars(importlib.import_module(module)).values()
-        yield from (value for value in values if isinstance(value, RowFile))
-
-
 def _table(rows: Iterator[dict[str, str]]) -> str:
     return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))
 
@@ -271,7 +236,6 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "README.md": {"answer": answer, "example": identified_example},
     ROOT / "docs" / "tutorial.md": {"printed": printed_example, "shorter": shorter_arms},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
-    ROOT / "docs" / "reference" / "files.md": {"columns": file_columns},
     ROOT / "docs" / "identifiability.md": {"methods": methods_compared},
     ROOT / "docs" / "measured.md": {"measured": measured},
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},

@@ -53,7 +53,6 @@ trace, see `lowest_encodable`; empty if it was recorded."""
 MODEL_FITS = RowFile(
     "fits of models",
     ("case", "model", "seed", "parameters", "samples", "misfit"),
-    "results/selection/{case}/{batch}.csv",
 )
 
 INTERVALS = RowFile(
@@ -62,7 +61,6 @@ INTERVALS = RowFile(
         *("case", "quantity", "seed", "estimate", "low", "high", "estimate_rest_known"),
         *("verdict", "shown_low", "shown_high"),
     ),
-    "results/coverage/{case}/{batch}.csv",
     words=("verdict",),
 )
 """A row per quantity and seed. Quantities that traces should determine have an estimate, its
@@ -72,7 +70,6 @@ quantities also have the verdict and limits that users are shown, from whole pro
 DIFFERENCES = RowFile(
     "a comparison",
     ("case", "reference_angle_deg", "torque_factor", "difference_over_peak"),
-    "results/linearisation.csv",
 )
 
 INTERPRETATIONS = RowFile(
@@ -82,7 +79,6 @@ INTERPRETATIONS = RowFile(
         *(parameter.column for parameter in SINGLE_BRANCH),
         *("misfit", "noise_rms", "last_improvement"),
     ),
-    "results/interpretations/{case}.csv",
     words=("interpretation",),
 )
 

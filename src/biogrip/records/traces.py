@@ -13,8 +13,6 @@ from biogrip.physics.instruments import Instrument
 from biogrip.records.rows import read_arrays, write_arrays, write_rows
 from biogrip.traces.reader import Recognised
 
-TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
-
 # More than any instrument gives, and few enough that results on different processors agree.
 _DIGITS = 9
 _WRITTEN = f"{{:.{_DIGITS - 1}e}}"
@@ -63,7 +61,7 @@ def write_target(
     if jaw_force_N is not None:
         largest = float(np.max(np.abs(jaw_force_N)))
         digit = 10.0 ** (math.floor(math.log10(largest)) + 1 - _DIGITS) if largest else 1.0
-        columns.append(TARGET_COLUMNS[-1])
+        columns.append("jaw_force_N")
         simulated.append((np.round(jaw_force_N / digit) + 0.0) * digit)
     rows = (
         (f"{t:.10g}", f"{x:.10g}", *map(_WRITTEN.format, values))

@@ -36,7 +36,6 @@ POINTS = RowFile(
         *("near_noise_share", "basin_share"),
         *("median_absolute_error_percent", "basin_error_percent", "bound_percent"),
     ),
-    "results/robustness/{sweep}.csv",
     words=("row", "column"),
 )
 
