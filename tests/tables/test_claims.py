@@ -38,11 +38,27 @@ SEEDS = 40
 TRUE = {"k": 8.0, "k_p": 2.0, "c": 100.0, "c_p": 1e-3}
 
 
-def test_shares_and_numbers_have_verdicts() -> None:
-    assert [by_share(share) for share in (1, 0.9, 0.89, 0.11, 0.1, 0)] == [
-        *(REPLICATED, REPLICATED, IN_PART, IN_PART, NOT, NOT)
-    ]
-    assert [by_number(17, found) for found in (17.84, 17.86, 16.14)] == [REPLICATED, NOT, NOT]
+@pytest.mark.parametrize(
+    ("judged", "verdict"),
+    [
+        *((by_share(share), REPLICATED) for share in (1, 0.9)),
+        *((by_share(share), IN_PART) for share in (0.89, 0.11)),
+        *((by_share(share), NOT) for share in (0.1, 0)),
+        *(
+            (by_number(17, 17.84), REPLICATED),
+            (by_number(17, 17.86), NOT),
+            (by_number(17, 16), NOT),
+        ),
+        # Of several things, it holds in part if they differ.
+        *((altogether([REPLICATED, other]), IN_PART) for other in (NOT, IN_PART, OUTSIDE)),
+        *((altogether([NOT, NOT]), NOT), (altogether([UNDECIDED, IN_PART]), IN_PART)),
+        # What no run can meet neither flatters nor condemns.
+        *((altogether([OUTSIDE, UNDECIDED]), OUTSIDE), (altogether([]), UNDECIDED)),
+        (altogether([NOT, OUTSIDE, UNDECIDED]), NOT),
+    ],
+)
+def test_shares_numbers_and_several_things_have_verdicts(judged: str, verdict: str) -> None:
+    assert judged == verdict
 
 
 @pytest.mark.parametrize(
@@ -62,18 +78,6 @@ def test_genes_hold_a_printed_value_if_theirs_would_be_printed_alike(
 def test_shares_of_seeds_have_limits() -> None:
     """Wilson's for 23 of 50, by hand: 33 to 60 %."""
     assert of_seeds(np.arange(50) < 23) == "46 % (33 to 60)"
-
-
-def test_what_is_said_of_several_things_holds_in_part_if_they_differ() -> None:
-    assert altogether([NOT, NOT]) == NOT
-    assert altogether([REPLICATED, NOT]) == altogether([IN_PART, REPLICATED]) == IN_PART
-    assert altogether([REPLICATED, OUTSIDE]) == altogether([UNDECIDED, IN_PART]) == IN_PART
-
-
-def test_what_no_run_can_meet_neither_flatters_nor_condemns() -> None:
-    assert altogether([OUTSIDE, UNDECIDED, OUTSIDE]) == OUTSIDE
-    assert altogether([UNDECIDED]) == altogether([]) == UNDECIDED
-    assert altogether([NOT, OUTSIDE, UNDECIDED]) == NOT
 
 
 def test_an_order_of_magnitude_is_half_a_decade_on_both_sides() -> None:
