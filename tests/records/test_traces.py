@@ -10,7 +10,6 @@ from biogrip.errors import BiogripError
 from biogrip.physics.instruments import GRIPPER
 from biogrip.records.traces import (
     Measurements,
-    each_trace,
     read_measurements,
     read_target,
     write_measurements,
@@ -60,7 +59,6 @@ def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> No
             assert trace.flags.c_contiguous
         for name in ("time_s", "target_rad", "sd_rad"):
             np.testing.assert_array_equal(getattr(read, name), getattr(given, name))
-    np.testing.assert_array_equal(list(each_trace(path)), list(traces.values()))
 
 
 def test_damaged_measurements_are_named(tmp_path: Path) -> None:

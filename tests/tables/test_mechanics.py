@@ -14,7 +14,7 @@ from biogrip.physics.gripper import torque
 from biogrip.physics.models import Published, Sample
 from biogrip.records.identifications import DIFFERENCES
 from biogrip.tables.evidence import evidence, printed_values, sampling_evidence
-from biogrip.tables.mechanics import contact_loss, left_out, linear_cases, linearisation, mechanics
+from biogrip.tables.mechanics import contact_loss, left_out, linearisation, mechanics
 from tests.helpers.default import STUDY, seen, study_of
 
 
@@ -71,8 +71,7 @@ def test_a_damper_between_both_jaws_damps_a_rotation_twice() -> None:
 
 def rows_of(overlay: str) -> dict[tuple[str, str], Mapping[str, Any]]:
     study = study_of(f"seeds: 3\n{dedent(overlay)}")
-    found = contact_loss(study.of(linear_cases(study)))
-    return {(row["case"], row["quantity"]): row for row in found.rows}
+    return {(row["case"], row["quantity"]): row for row in contact_loss(study).rows}
 
 
 def test_what_nobody_notices_is_taken_for_the_sample() -> None:

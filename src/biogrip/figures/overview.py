@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures.fit import draw_traces, judged_fit
 from biogrip.figures.likelihood import draw_profile
@@ -119,7 +118,9 @@ def _scatter(
             (~reached, ALL_SEEDS, "other fits"),
             (reached, FITTED, f"fit {near_noise_words(tolerance)}"),
         ):
-            draw_ratios(axes, points[which], color, label)
+            style, labels = _DOTS | {"color": color}, (label, "")
+            ends = (-np.inf, 1 / _WORST), (np.inf, _WORST)
+            points_within(axes, points[which], *ends, style, edge_size=3.5, labels=labels)
         if set(names) <= set(identified):
             paper = sum(identified[name] for name in names) / target
             shown = float(np.clip(paper, 1 / _WORST, _WORST))
@@ -129,13 +130,6 @@ def _scatter(
     axes.plot([], [], "^", color=TARGET, markersize=1.6, label="beyond the axis")
     axes.set_ylim(1 / (2 * _WORST), 2 * _WORST)
     axes.set_xticks(range(len(ticks)), ticks)
-
-
-def draw_ratios(axes: Axes, points: Array, color: str, label: str) -> None:
-    """Draw places and ratios, (n, 2), with triangles at the edge for ratios beyond the axis."""
-    low, high = (-np.inf, 1 / _WORST), (np.inf, _WORST)
-    style = _DOTS | {"color": color}
-    points_within(axes, points, low, high, style, edge_size=3.5, labels=(label, ""))
 
 
 def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:

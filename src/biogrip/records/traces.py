@@ -1,7 +1,6 @@
 """Files of targets, CSV, and of measurements, npz: traces without and with noise."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -106,8 +105,3 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
         raise BiogripError(f"{path}: has no trace of seed {min(missing)}.")
     chosen = traces if seeds is None else {seed: traces[seed] for seed in seeds}
     return Measurements(found["time_s"], found.get("target"), chosen, sd_rad=found.get("sd"))
-
-
-def each_trace(path: Path) -> Iterator[Array]:
-    """Yield the noisy traces in a file, (n_samples,) each."""
-    yield from read_measurements(path).rotation_rad.values()

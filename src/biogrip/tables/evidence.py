@@ -20,7 +20,7 @@ from biogrip.physics.protocol import sample_times
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import compute_grip
 from biogrip.records.identifications import read_identifications
-from biogrip.records.traces import each_trace
+from biogrip.records.traces import read_measurements
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import error_percent
 from biogrip.tables.layout import Column, Row, Table
@@ -102,7 +102,11 @@ def _axis_rows(case: Case, traces: list[Path]) -> list[Row]:
     if not axis or not traces:
         return []
     # Keep only extremes: traces of many seeds exceed the memory.
-    extremes = [(trace.min(), trace.max()) for path in traces for trace in each_trace(path)]
+    extremes = [
+        (trace.min(), trace.max())
+        for path in traces
+        for trace in read_measurements(path).rotation_rad.values()
+    ]
     remark = (
         f"median of {counted(len(extremes), 'noisy trace')}; the paper's is the end of its axis"
     )

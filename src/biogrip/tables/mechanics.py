@@ -269,14 +269,10 @@ _COLUMNS = (
 )
 
 
-def linear_cases(study: Study) -> list[str]:
-    """Return the simulated cases whose target is linear."""
-    return [name for name in study.gripped if not study.cases[name].nonlinear_target]
-
-
 def contact_loss(study: Study) -> Table:
-    """Identify traces simulated with bilateral and with unilateral contact, and compare errors."""
-    rows = [row for case in study.cases.values() for row in _loss_of(study.study_seed, case)]
+    """Identify traces with bilateral and with unilateral contact, both linear; compare errors."""
+    linear = [case for name in study.gripped if not (case := study.cases[name]).nonlinear_target]
+    rows = [row for case in linear for row in _loss_of(study.study_seed, case)]
     caption = (
         "Cases in which the jaws would have to pull: what least squares identifies, assuming "
         "bilateral contact, in traces with bilateral contact, in traces with loss of contact where "
