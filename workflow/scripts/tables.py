@@ -31,7 +31,7 @@ with logged(snakemake):
         "coverage": lambda: coverage.coverage(
             covered, of(covered, "targets"), given["intervals"], of(covered, "calibrated")
         ),
-        "verdict_counts": lambda: cases.verdict_counts(
+        "verdict_counts": lambda: coverage.verdict_counts(
             counted, [file for file in given["intervals"] if file.parent.name in counted.cases]
         ),
         "models": lambda: methods.models(study, given["fits"]),
