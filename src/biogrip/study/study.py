@@ -159,8 +159,8 @@ class Case:
     @property
     def interpretations(self) -> dict[str, "Case"]:
         """The case under each interpretation of the paper, by the interpretation's name."""
-        changes = {name: it.changes for name, it in self.study.config.interpretations.items()}
-        blocks = {name: overlaid(self.plain, changed) for name, changed in changes.items()}
+        readings = self.study.interpretations.items()
+        blocks = {name: overlaid(self.plain, reading.changes) for name, reading in readings}
         return {name: replace(self, block=built(CaseBlock, it)) for name, it in blocks.items()}
 
     @property
@@ -223,9 +223,7 @@ class Study:
     """Names of cases that the paper reports results of."""
     identifiers = _of_study(lambda study: {name: METHODS[name] for name in study.methods})
     """Declarations of the methods, by name."""
-    interpretation_titles = _of_study(
-        lambda study: {name: it.title for name, it in study.config.interpretations.items()}
-    )
+    interpretations = _of_study(lambda study: study.config.interpretations)
     shown = _of_study(lambda study: study.methods[0])
     """Method that tables and figures of a single method show."""
     shown_method = _of_study(lambda study: METHODS[study.shown])

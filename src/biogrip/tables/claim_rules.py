@@ -85,8 +85,9 @@ def claim(place: str, words: str) -> Callable[[_Judge], _Judge]:
     return add
 
 
-def by_share(share: float) -> str:
-    """Judge something that holds for a share of seeds or settings."""
+def by_share(those: "BoolArray | pd.Series[bool] | float") -> str:
+    """Judge something by the share of seeds or settings for which it holds."""
+    share = np.mean(those)
     if share >= MOST:
         return REPLICATED
     return IN_PART if share > FEW else NOT
@@ -97,14 +98,14 @@ def by_number(printed: float, found: float) -> str:
     return REPLICATED if abs(found / printed - 1) <= CLOSE else NOT
 
 
-def by_value(share: float, *, encodable: bool, determined: bool) -> str:
+def by_value(near: BoolArray, *, encodable: bool, determined: bool) -> str:
     """Judge an identified value by the share of the seeds near it, if a run can come near.
 
     A value that the encoding has may still be one that no trace determines.
     """
     if not encodable:
         return OUTSIDE
-    return by_share(share) if determined else UNDECIDED
+    return by_share(near) if determined else UNDECIDED
 
 
 def is_encodable(printed: float, nearest: float) -> bool:

@@ -59,7 +59,7 @@ def judge_sizes(results: Results) -> Judged:
     stroke = results.study.actuator.stroke_deg
     needed = np.degrees(1e-3 * found["closing_mrad"].to_numpy(float))
     return Judged(
-        by_share(float(np.mean(needed <= stroke))),
+        by_share(needed <= stroke),
         f"Closing onto samples of {found['size_um'].min():g} to {found['size_um'].max():g} µm "
         f"takes {np.nanmin(needed):.2g} to {np.nanmax(needed):.2g} degrees of the stroke of "
         f"{stroke:g}, with the reconstructed arm, and {found['voltage_V'].min():.3g} to "
@@ -198,7 +198,7 @@ def judge_digits(results: Results) -> Judged:
     pairs = zip(found["printed"], found["nearest_encodable"], strict=True)
     fits = np.array([is_encodable(*pair) for pair in pairs]) & (found["within_range"] == "yes")
     return Judged(
-        by_share(float(fits.mean())),
+        by_share(fits),
         f"{fits.sum()} of the {len(fits)} values that Tables 5 to 7 call identified are two-digit "
         "numbers within the ranges of Table 4, rounded as printed.",
     )

@@ -59,7 +59,7 @@ def judge_values(results: Results, number: int) -> Judged:
         values = runs.found[names].sum(axis=1).to_numpy(float)
         near = np.abs(values / printed - 1) <= NEAR
         verdict = by_value(
-            float(np.mean(near)),
+            near,
             encodable=all(is_encodable(identified[name], nearest[name]) for name in names),
             determined=told[label] == DETERMINED,
         )
@@ -84,7 +84,7 @@ def judge_fits_response(results: Results, number: int) -> Judged:
     near = _near_noise(results, number)
     tolerance = 100 * results.study.near_noise_tolerance
     said = f"{of_seeds(near)} of the seeds fit to within {tolerance:g} % of the noise."
-    return Judged(by_share(float(np.mean(near))), said)
+    return Judged(by_share(near), said)
 
 
 def _near_noise(results: Results, number: int) -> BoolArray:
@@ -114,7 +114,7 @@ def judge_orders(results: Results, names: dict[int, tuple[str, ...]]) -> Judged:
     for number, each in names.items():
         runs = results.runs_of(number)
         those = _within_a_decade(runs, each, runs.found)
-        verdicts += [by_share(float(np.mean(it))) for it in those]
+        verdicts += [by_share(it) for it in those]
         said.append(f"Table {number}: {_listed(each, those)}")
     return Judged(
         altogether(verdicts), f"Seeds within half a decade of the target: {'; '.join(said)}."
@@ -148,7 +148,7 @@ def judge_stationary(results: Results) -> Judged:
     changes = [each.history.groupby("seed")["best_misfit"].diff().fillna(0) for each in runs]
     never_worse = bool((pd.concat(changes) <= 0).all())
     return Judged(
-        by_share(float(np.mean(stalled))) if never_worse else NOT,
+        by_share(stalled) if never_worse else NOT,
         f"{of_seeds(stalled)} of the runs end without improvement for 20 generations; the best "
         f"misfit {'never rises' if never_worse else 'rises at times'}.",
     )
@@ -178,7 +178,7 @@ def judge_further_generations(results: Results) -> Judged:
     ].to_numpy(float)
     said = ", ".join(f"Table {n} {of_seeds(those)}" for n, those in near.items())
     return Judged(
-        altogether(by_share(float(np.mean(those))) for those in near.values()),
+        altogether(by_share(those) for those in near.values()),
         f"Runs that come near the noise: {said}. With 60 further generations they are "
         f"{100 * longer:.1f} instead of {100 * printed:.1f} % for Table 5 (sweep interpretations).",
     )
@@ -215,7 +215,7 @@ def judge_early_orders(results: Results) -> Judged:
         for at in (_EARLY, _CONVERGED)
     )
     return Judged(
-        altogether(by_share(float(np.mean(it))) for it in early),
+        altogether(by_share(it) for it in early),
         f"Seeds within half a decade of the target at generation {_EARLY}: "
         f"{_listed(names, early)}; at {_CONVERGED}: {_listed(names, later)}.",
     )
@@ -235,7 +235,7 @@ def judge_negligible(results: Results) -> Judged:
         errors = _errors_percent(runs, name)
         close = errors <= printed + _ROUNDING_PERCENT
         can = least <= printed + _ROUNDING_PERCENT
-        verdicts.append(by_value(float(np.mean(close)), encodable=can, determined=True))
+        verdicts.append(by_value(close, encodable=can, determined=True))
         said.append(
             f"{name} {of_seeds(close)}, with a median error of {np.median(errors):.2g} %; the "
             f"genes allow {least:.2g} % at best"
@@ -260,7 +260,7 @@ def judge_below_noise(results: Results) -> Judged:
     errors = _errors_percent(runs, "k")
     below = errors < 100 * results.study.cases[runs.case.name].noise.level
     said = f"{of_seeds(below)} of the seeds; the median error of k is {np.median(errors):.2g} %."
-    return Judged(by_share(float(np.mean(below))), said)
+    return Judged(by_share(below), said)
 
 
 @claim("Table 5", "c_p … has a very low value that does not affect the response")
@@ -270,7 +270,7 @@ def judge_low_damper(results: Results) -> Judged:
     most = float(limits.loc["c_p", "expected_high"])
     low = runs.found["c_p"] <= most
     return Judged(
-        by_share(float(np.mean(low))),
+        by_share(low),
         f"{of_seeds(low)} of the seeds identify c_p below {most:.2g} N s/m, the largest that a "
         f"trace allows; the median is {runs.found['c_p'].median():.3g} N s/m.",
     )
@@ -305,8 +305,8 @@ def judge_key_damper(results: Results) -> Judged:
         _errors_percent(runs, *names) <= 100 * printed + _ROUNDING_PERCENT
         for names in (("c",), ("c", "c_p"))
     )
-    verdict = by_share(float(np.mean(alone)))
-    found = by_share(float(np.mean(total)))
+    verdict = by_share(alone)
+    found = by_share(total)
     return Judged(
         IN_PART if verdict == NOT and found != NOT else verdict,
         f"Seeds with an error up to {100 * printed:.2g} %: {of_seeds(alone)} for c, "
@@ -338,7 +338,7 @@ def judge_good_identification(results: Results) -> Judged:
     runs = results.runs_of(7)
     k, c = (_errors_percent(runs, name) <= 3 + _ROUNDING_PERCENT for name in ("k", "c"))
     return Judged(
-        by_share(float(np.mean(k & c))),
+        by_share(k & c),
         f"Seeds with errors below 3 %, rounded: k {of_seeds(k)}, "
         f"c {of_seeds(c)}, both {of_seeds(k & c)}.",
     )

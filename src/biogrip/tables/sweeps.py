@@ -149,11 +149,11 @@ def interpretations(study: Study, found: list[Path]) -> Table:
     rows: list[Row] = []
     for path, case in zip(found, study.cases.values(), strict=True):
         of_case = INTERPRETATIONS.read(path)
-        for name, title in study.interpretation_titles.items():
+        for name, reading in study.interpretations.items():
             mine = of_case[of_case["interpretation"] == name]
             row = {
                 "case": case.name,
-                "interpretation": title,
+                "interpretation": reading.title,
                 "seeds": len(mine),
                 "near_noise_share": near_noise(mine, study.near_noise_tolerance).mean(),
                 "last_improvement": mine["last_improvement"].median(),
@@ -220,8 +220,8 @@ def interpretations_jointly(study: Study, found: list[Path]) -> Table:
         if _compared(case)
     ]
     rows = [
-        {"interpretation": title, **row}
-        for name, title in study.interpretation_titles.items()
+        {"interpretation": reading.title, **row}
+        for name, reading in study.interpretations.items()
         for row in _joint_rows(
             [(case, rows[rows["interpretation"] == name]) for case, rows in cases]
         )
