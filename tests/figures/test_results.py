@@ -116,7 +116,7 @@ def test_histories_of_the_seeds_that_are_drawn_are_read(tmp_path: Path) -> None:
     write_arrays(path, {**columns, "generation": [9] * 8, "k": np.arange(8.0)})
     found = read_history(path, "least_squares", [SHOWN_SEEDS + 1], ["k"])
     expected = {"seed": [0, 1, SHOWN_SEEDS + 1], "generation": [9] * 3, "k": [4.0, 5.0, 7.0]}
-    pd.testing.assert_frame_equal(found, pd.DataFrame(expected))
+    pd.testing.assert_frame_equal(found.reset_index(drop=True), pd.DataFrame(expected))
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,8 @@ from biogrip.figures.style import (
     points_within,
 )
 from biogrip.fit.methods import near_noise, near_noise_words
-from biogrip.records.identifications import bounded_on_a_side, read_identifications, read_verdicts
+from biogrip.judging.verdicts import BOUNDED_ABOVE
+from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.study.study import Case, Study
 
 # End of the axis of identified over target values, on both sides of 1.
@@ -68,7 +69,8 @@ def draw_overview(
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
         found = read_identifications(path, study.shown)
-        bounded = bounded_on_a_side(read_verdicts(judged))
+        quantities = read_verdicts(judged)["quantities"]
+        bounded = {it["quantity"] for it in quantities if it["verdict"] != BOUNDED_ABOVE}
         _scatter(scatter, case, first_seeds(found), study.near_noise_tolerance, bounded)
         scatter.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3], [""] * 7 if index else None)
         panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)

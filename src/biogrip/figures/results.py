@@ -97,8 +97,8 @@ def read_history(
     path: Path, method: str, shown: Sequence[int], values: Sequence[str] = ("best_misfit",)
 ) -> pd.DataFrame:
     """Read one method's histories of the seeds drawn individually and of those shown."""
-    chosen = {*range(SHOWN_SEEDS), *shown}
-    return read_histories(path, method, values, lambda seed: seed.isin(chosen))
+    found = read_histories(path, method, values)
+    return found[found["seed"].isin({*range(SHOWN_SEEDS), *shown})]
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:

@@ -5,7 +5,7 @@ rows have the fits of every sample model, the intervals of coverage tests, the d
 linear from the nonlinear model, and identifications under other interpretations of the paper.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -179,17 +179,12 @@ def read_identifications(path: Path, method: str | None = None) -> "pd.DataFrame
     return chosen
 
 
-def read_histories(
-    path: Path,
-    method: str,
-    values: Sequence[str],
-    chosen: "Callable[[pd.Series[int]], pd.Series[bool]]" = lambda seed: seed >= 0,
-) -> "pd.DataFrame":
-    """Read columns of one method's histories of the chosen seeds."""
+def read_histories(path: Path, method: str, values: Sequence[str]) -> "pd.DataFrame":
+    """Read columns of one method's histories."""
     import pandas as pd
 
     frame = pd.DataFrame(read_arrays(path))
-    kept = (frame["method"] == method) & chosen(frame["seed"])
+    kept = frame["method"] == method
     return frame.loc[kept, ["seed", "generation", *values]].reset_index(drop=True)
 
 
@@ -244,11 +239,6 @@ def exact_data(
 def read_verdicts(path: Path) -> dict[str, Any]:
     """Read a file of verdicts."""
     return read_object(path, "verdicts", {"quantities", "trades", "notes"}, "holds no verdicts")
-
-
-def bounded_on_a_side(verdicts: dict[str, Any]) -> set[str]:
-    """Return the quantities whose verdict is not just an upper bound."""
-    return {q["quantity"] for q in verdicts["quantities"] if q["verdict"] != "bounded above"}
 
 
 def _finding(finding: "Finding", *, rejected: bool) -> dict[str, Any]:
