@@ -107,9 +107,9 @@ def errors(study: Study, identifications: list[Path]) -> Table:
     files = zip(study.cases.values(), identifications, strict=True)
     rows = [dict(row) for case, file in files for row in errors_of_case(case, file).rows]
     for row in rows:
-        # Some are text, as ">100".
-        with suppress(ValueError):
-            row["paper_error_percent"] = float(row.get("paper_error_percent", np.nan))
+        # Text, as ">100", stays; not every case or parameter has one.
+        with suppress(ValueError, TypeError, KeyError):
+            row["paper_error_percent"] = float(row["paper_error_percent"])
     columns = _columns(study.near_noise_tolerance)
     return Table(f"Identification errors of all cases. {_BASINS}", columns, rows)
 
