@@ -1,15 +1,12 @@
 """Parts of the documentation that are written from code and results; `make docs` renews them."""
 
-import csv
-import importlib
 import json
 import re
 import textwrap
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout, suppress
 from io import StringIO
 from pathlib import Path
-from pkgutil import iter_modules
 from tempfile import TemporaryDirectory
 from typing import Any
 from unittest import mock
@@ -17,25 +14,17 @@ from unittest import mock
 import numpy as np
 import pandas as pd
 import yaml
-from scipy.stats import chi2
 
-import biogrip.records
 from biogrip.cli import main
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
-from biogrip.fit.methods import best_fit, share_in_words, share_with_limits
-from biogrip.fit.problem import silent
 from biogrip.page.answers import (
     compared_rows,
     say_what_the_study_gives,
     say_what_traces_tell,
     say_which_method_finds_it,
 )
-from biogrip.physics.noise import add_noise, stream
-from biogrip.physics.protocol import sample_times
-from biogrip.physics.simulation import simulated_rotation
-from biogrip.records import identifications, traces
-from biogrip.records.rows import RowFile, read_table
+from biogrip.records.rows import read_table
 from biogrip.tables.claims import count_verdicts
 from biogrip.terminal import QUIET
 from tests.helpers.default import study_of
@@ -70,10 +59,6 @@ _MEASURED = {
 def config_keys() -> str:
     """Tables of every config key."""
     return reference(ROOT / "config" / "config.yaml")
-
-
-# N s/m
-_SLOW = 1000
 
 
 def paper_against_study() -> str:
@@ -140,88 +125,6 @@ def _limits_of(row: dict[str, str]) -> str:
     return row["verdict"]
 
 
-def choices() -> str:
-    """Every choice that the paper leaves, with other readings and their effects."""
-    study = study_of()
-    of, rate = study.config.genetic_algorithm, study.config.measurement.rate_Hz
-    genes = pd.read_csv(PUBLISHED / "tables" / "gene_ranges.csv")["values"]
-    beyond = pd.read_csv(PUBLISHED / "tables" / "linearisation.csv")
-    upright = beyond["reference_angle_deg"] == study.config.gripper.reference_angle_deg
-    differs = beyond[upright]["difference_percent"].max()
-    sampled = pd.read_csv(PUBLISHED / "tables" / "sampling_evidence.csv").iloc[-1]
-    rates = [name for name in sampled.index if name.startswith("bound_percent_")]
-    fits = ", ".join(
-        f"{sampled[it]:.2g} ({it.removeprefix('bound_percent_').replace('_', ' ')})" for it in rates
-    )
-    grips = pd.read_csv(PUBLISHED / "robustness" / "tables" / "robustness_gripper.csv")
-    damping = grips[grips["quantity"] == "c + c_p"]["error_genetic"]
-    view = "from its results"
-    rows = [
-        ("section 4", "all as below", _tried("as printed")),
-        ("“two significant digits”; Table 5 has more", "two, each from 1", _tried("from 0")),
-        ("Table 3, not in our copy", "the ranges that give Table 4", _tried("decade")),
-        ("“population … 500”", f"{of.population}", _tried("population")),
-        (
-            "the best half “are chosen to mate”, by “ranking”",
-            "they form random disjoint pairs",
-            _tried("mating"),
-        ),
-        ("mutate “some individuals”", "children alone", _tried("survivors")),
-        (
-            "mutation “at 20th generation”",
-            f"from generation {of.mutation_start}",
-            _tried("mutation from"),
-        ),
-        (
-            "“a single-point mutation”",
-            f"one gene is redrawn and keeps its value in {100 / genes.max():.0f} to "
-            f"{100 / genes.min():.0f} %",
-            "not tried",
-        ),
-        (
-            "“stationary”, then “further 20 generations”",
-            f"{of.patience} without improvement, at least {of.min_generations}, at most "
-            f"{of.max_generations} in all; {view}",
-            _tried("patience"),
-        ),
-        ("“sorting”", "misfits in single precision, ties by chromosome", "not tried"),
-        ("“10% random noise”", "Gaussian, additive, of the peak", _tried("noise")),
-        ("sampling rate: nothing", f"{rate:g} Hz, {view}", f"the paper's errors / bounds: {fits}"),
-        (
-            "arm stiffness (Table 1): not in our copy",
-            f"{study.config.gripper.left.stiffness_Nm_per_rad:.1e} N m/rad, {view} (Figure 12)",
-            f"from half to twice, arms of 1 to 2 mm: median error of drops' c + c_p "
-            f"{_range(damping, '.2g')} %",
-        ),
-        (
-            "“coupled nonlinear dynamics”",
-            f"{study.config.models.target} target",
-            f"nonlinear: responses differ by up to {differs:.2g} % of the peak",
-        ),
-        (
-            "“a dynamic simulation”",
-            "fits without inertia, targets with it",
-            "[bound](model.md#without-inertia)",
-        ),
-    ]
-    names = ("the paper", "this study", "alternatives and their effect")
-    return _table(dict(zip(names, row, strict=True)) for row in rows)
-
-
-def _tried(which: str) -> str:
-    """The interpretations whose titles match, each with the cell's runs near the noise."""
-    table = pd.read_csv(PUBLISHED / "interpretations" / "tables" / "interpretations.csv")
-    cell = table[table["case"] == "endothelial_cell"]
-    found = cell[cell["interpretation"].str.contains(which)]
-    return "; ".join(f"{row['interpretation']}: {_share(row)}" for row in found.to_dict("records"))
-
-
-def _share(row: Mapping[Hashable, Any]) -> str:
-    seeds = int(row["seeds"])
-    share, low, high = share_with_limits(round(row["near_noise_share"] * seeds), seeds)
-    return f"{100 * share:.0f} % ({100 * low:.0f}–{100 * high:.0f})"
-
-
 def errors_by_noise() -> str:
     """What the genetic algorithm errs by, and the bound, at several levels of noise."""
     table = pd.read_csv(PUBLISHED / "robustness" / "tables" / "robustness_noise.csv")
@@ -258,32 +161,6 @@ def methods_compared() -> str:
     shown = [in_digits(rise, 2) for rise in least]
     best = dict(zip(rows[0], ["*best encodable point*", *shown, ""], strict=True))
     return _table(iter([*rows, best]))
-
-
-def slow_branch() -> str:
-    """In how many traces of drop 1 a damper far above the truth fits as well as the best."""
-    case, slow = (
-        study_of(f"cases: {{liquid_drop_1: {{fixed: {fixed}}}}}").case("liquid_drop_1")
-        for fixed in ("{}", f"{{c: {_SLOW}}}")
-    )
-    posed = case.problem.to_identify(), slow.problem.to_identify()
-    torque = posed[0].torque
-    time_s = sample_times(torque.end_s, case.study.config.measurement.rate_Hz)
-    network = case.sample.model.sample(case.parameters)
-    (target,) = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)
-    seeds = range(case.seeds)
-    rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in seeds]
-    traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
-    free, held = (
-        np.array([best_fit(it, case.least_squares, rng, silent).misfit_rad for it, rng in each])
-        for each in (zip(problem.of_each(time_s, traces), rngs, strict=True) for problem in posed)
-    )
-    limit = chi2.ppf(case.confidence, 1)
-    fits = int(np.sum(len(time_s) * ((held / free) ** 2 - 1) < limit))
-    return (
-        f"With c fixed at {_SLOW:,} N s/m, a hundred times the truth, χ² of drop 1 rises by less "
-        f"than {limit:.3g} in {share_in_words(fits, len(seeds))} of {len(seeds)} traces."
-    )
 
 
 def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
@@ -350,67 +227,6 @@ def _help(*command: str) -> str:
     return said.getvalue()
 
 
-def file_columns() -> str:
-    """The columns of every file of rows, as its kind declares them, and of the published tables."""
-    leading, trailing = identifications.LEADING, identifications.TRAILING
-    files: dict[str, tuple[str, ...]] = {
-        "results/targets/{case}.csv": traces.TARGET_COLUMNS,
-        "results/identifications/{case}.csv": (
-            *(*leading, "parameters ...", *trailing, identifications.ENCODABLE),
-        ),
-    }
-    files |= {kind.path: kind.columns for kind in _kinds()}
-    for table in sorted(PUBLISHED.rglob("tables/*.csv")):
-        of = re.match("(errors|verdicts|robustness)_", table.name)
-        whose = {"robustness": "{sweep}"}.get(of[1], "{case}") if of else ""
-        name = f"{of[1]}_{whose}.csv" if of else table.name
-        with table.open(encoding="utf-8", newline="") as stream:
-            files.setdefault(f"results/tables/{name}", tuple(next(csv.reader(stream))))
-    return _table(
-        {"file": f"`{path}`", "columns": ", ".join(f"`{name}`" for name in columns)}
-        for path, columns in files.items()
-    )
-
-
-def _kinds() -> Iterator[RowFile]:
-    package = biogrip.records
-    modules = [module.name for module in iter_modules(package.__path__, f"{package.__name__}.")]
-    for module in (*modules, "biogrip.stages.sweeps"):
-        values = vars(importlib.import_module(module)).values()
-        yield from (value for value in values if isinstance(value, RowFile))
-
-
-def rules() -> str:
-    """Every rule that makes files, with what it makes and what it says."""
-    rows = []
-    for path in sorted((ROOT / "workflow" / "rules").glob("*.smk")):
-        text = path.read_text(encoding="utf-8")
-        for name, body in re.findall(
-            r"^ *rule (\w+):\n(.*?)(?=^ *(?:use )?rule |\Z)", text, re.DOTALL | re.MULTILINE
-        ):
-            made = re.search(r"output:\n(.*?)\n *log:", body, re.DOTALL)
-            said = re.search(r'message:\n *"(.*)"', body)
-            if made and said:
-                files = ", ".join(f"`{file}`" for file in _files(made[1]))
-                what = re.sub(r"{\w+\.(\w+)}", r"{\1}", said[1])
-                rows.append({"rule": f"`{name}`", "files": files, "what": what})
-    return _table(iter(rows))
-
-
-def _files(output: str) -> Iterator[str]:
-    """The files that a rule's output names, those of tables and figures without their endings."""
-    for plain, several, kind, name, whose in re.findall(
-        r'"(results/[^"]+)"|in (table|figure)\(name\)|(table|figure)\("(\w+)"(?:, "({\w+})")?\)',
-        output,
-    ):
-        if plain or several:
-            yield plain or f"results/{several}s/*"
-        else:
-            yield f"results/{kind}s/{name}{whose and f'_{whose}'}"
-    if "case_figures" in output:
-        yield from ("results/figures/*_{case}", "results/summaries/{case}.html")
-
-
 def _table(rows: Iterator[dict[str, str]]) -> str:
     return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))
 
@@ -420,11 +236,10 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "README.md": {"answer": answer, "example": identified_example},
     ROOT / "docs" / "tutorial.md": {"printed": printed_example, "shorter": shorter_arms},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
-    ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "rules": rules},
-    ROOT / "docs" / "identifiability.md": {"slow": slow_branch, "methods": methods_compared},
+    ROOT / "docs" / "identifiability.md": {"methods": methods_compared},
     ROOT / "docs" / "measured.md": {"measured": measured},
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
-    ROOT / "docs" / "reproduction.md": {"results": paper_against_study, "choices": choices},
+    ROOT / "docs" / "reproduction.md": {"results": paper_against_study},
 }
 """Parts of documents that are written, by what."""
 

@@ -23,7 +23,7 @@ BENCHMARKS = ROOT / "benchmarks" / "results" / "benchmarks.json"
 
 _NUMBER = re.compile(r"(<!--= *(?P<what>.*?) *-->)(?P<shown>.*?)(<!--/-->)", re.DOTALL)
 _WHAT = re.compile(
-    r"(?P<table>\w+)(?:\[(?P<rows>[^\]]*)\])?\.(?P<column>\w+)"
+    r"(?P<table>\w+)(?:\[(?P<rows>[^\]]*)\])?\.(?P<column>[\w.]+)"
     r" *\| *(?P<format>[^ |]+)(?: *\| *(?P<all>each))?"
 )
 _CONDITION = re.compile(r"(?P<column>\w+)(?P<sign>!?=)(?P<values>.*)")

@@ -51,7 +51,7 @@ _FINE = 10_000  # levels in the largest
 _ROOTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 _NODES, _SHARES = ((_ROOTS + 1) / 2) ** 3, 1.5 * ((_ROOTS + 1) / 2) ** 2 * _WEIGHTS
 _INSTANTS = np.linspace(0.0, 1.0, 16) ** 3
-_TIMES = ("rate_Hz", "times_s", "bursts")
+_TIMES = ("rate_Hz", "bursts")
 
 
 @dataclass(frozen=True, eq=False)

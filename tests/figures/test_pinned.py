@@ -58,8 +58,8 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 for q, quantity in enumerate(("k", "k_p", "c", "c_p", "c + c_p")):
                     share = ((3 * i + 2 * j + n) % 11) / 10
                     error = 0.004 * 7.0 ** (i + q)
-                    bound = np.nan if row.text == "0" else error * 2.0 ** (i - 3)
-                    values = (row.text, column.text, method, quantity, 20, share, error, bound)
+                    bound = np.nan if row.shown == "0" else error * 2.0 ** (i - 3)
+                    values = (row.shown, column.shown, method, quantity, 20, share, error, bound)
                     rows.append((f"{case}--level--{i}", *values))
     POINTS.write(folder / "level.csv", rows)
     return folder / "level.csv"

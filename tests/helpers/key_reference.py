@@ -1,7 +1,7 @@
 """Reference of all config keys in Markdown, and the JSON Schema of config files."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -34,9 +34,10 @@ def leaves(block: Schema, path: str = "") -> dict[str, Schema]:
     """Every key of a block and below, with what its value may look like."""
     found: dict[str, Schema] = {}
     for name, schema in block.keys.items():
-        found[f"{path}{name}"] = schema
-        for part in (schema, schema.inside(0), schema.values, *schema.inside(0).options):
-            found |= leaves(part, f"{path}{name}.")
+        own = f"{path}{name}"
+        found |= {own: schema} | leaves(schema, f"{own}.") | leaves(schema.values, f"{own}.NAME.")
+        for part in (schema.inside(0), *schema.inside(0).options):
+            found |= leaves(part, f"{own}[].")
     return found
 
 
@@ -46,18 +47,25 @@ def reference(config: Path) -> str:
     Where a file gives no default it is that of the class.
     """
     defaults = yaml.safe_load(config.read_text(encoding="utf-8"))
-    general: list[_Row] = []
-    sections: list[str] = []
-    for name, schema in STUDY.keys.items():
-        rows = list(_rows(name, schema, defaults.get(name)))
-        if named := schema.values.keys:
-            own = {key: inner for key, inner in named.items() if key not in OVERRIDABLE}
-            rows = [row for key, it in own.items() for row in _rows(f"{name}.NAME.{key}", it, None)]
-        if named or schema.keys:
-            sections.append(_section(name, schema.get("description", ""), rows))
-        else:
-            general += rows
-    return "\n\n".join([_section("General", "", general), *sections])
+    sections: dict[str, list[_Row]] = {"General": []}
+    for path, schema in leaves(STUDY).items():
+        top, *inner = path.split(".")
+        inherited = path.startswith("cases.NAME.") and inner[1] in OVERRIDABLE
+        if schema.keys and schema.values.node:
+            path, schema = f"{path}.NAME", schema.values
+        if not (schema.keys or schema.values.keys or inherited):
+            name = top if inner else "General"
+            sections.setdefault(name, []).append(_row(path, schema, _default(path, defaults)))
+    return "\n\n".join(
+        _section(name, STUDY.inside(name).get("description", ""), rows)
+        for name, rows in sections.items()
+    )
+
+
+def _default(path: str, defaults: Any) -> Any:
+    for part in path.split("."):
+        defaults = defaults.get(part) if isinstance(defaults, Mapping) else None
+    return defaults
 
 
 def file_schema() -> str:
@@ -89,28 +97,14 @@ def _section(title: str, text: str, rows: list[_Row]) -> str:
     return "\n\n".join(part for part in (f"### {title}", text, table) if part)
 
 
-def _rows(path: str, schema: Schema, default: Any) -> Iterator[_Row]:
-    items = schema.inside(0).keys
-    if schema.keys:
-        for key, inner in schema.keys.items():
-            given = default.get(key) if isinstance(default, Mapping) else None
-            yield from _rows(f"{path}.{key}", inner, given)
-        if schema.values.node:
-            yield _row(f"{path}.NAME", schema.values, _NO_DEFAULT)
-    elif items:
-        yield _row(
-            path, schema, _NO_DEFAULT if default is None else "see Figure 3 in `config.yaml`"
-        )
-        for key, inner in items.items():
-            yield from _rows(f"{path}[].{key}", inner, None)
+def _row(path: str, schema: Schema, default: Any) -> _Row:
+    if schema.inside(0).keys and default is not None:
+        shown = "see `config.yaml`"
     else:
         value = schema.get("default") if default is None else default
-        yield _row(path, schema, _NO_DEFAULT if value in (None, [], {}) else _shown(value))
-
-
-def _row(path: str, schema: Schema, default: str) -> _Row:
+        shown = _NO_DEFAULT if value in (None, [], {}) else _shown(value)
     text, unit = schema.get("description", ""), schema.get("unit", "")
-    return f"`{path}`", text, unit, default, _allowed(schema)
+    return f"`{path}`", text, unit, shown, _allowed(schema)
 
 
 def _allowed(schema: Schema) -> str:

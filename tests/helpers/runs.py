@@ -116,16 +116,13 @@ def planned(folder: Path, *targets: str, config: dict[str, Any]) -> dict[str, in
 
 
 def results_of(folder: Path) -> dict[str, bytes]:
-    """Return every result by name, but for logs and what tells times."""
+    """Return every result by name, but for logs."""
     results = folder / "results"
     files = {file.relative_to(results): file for file in sorted(results.rglob("*.*"))}
     return {
         str(name): file.read_bytes()
         for name, file in files.items()
-        if file.is_file()
-        and name.parts[0] not in ("logs", "timings")
-        # The processor times of the page's study.
-        and not name.name.startswith("timings.")
+        if file.is_file() and name.parts[0] != "logs"
     }
 
 

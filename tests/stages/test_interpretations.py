@@ -41,8 +41,7 @@ def test_one_that_changes_nothing_finds_what_the_study_finds(study: Study, tmp_p
     case = study.case(CASE)
     simulate(case, target)
     measure(case, range(3), target, measured)
-    others = tmp_path / "h.npz", tmp_path / "times.csv"
-    identify(case, "genetic", range(3), measured, [], ours_file, *others)
+    identify(case, "genetic", range(3), measured, [], ours_file, tmp_path / "h.npz")
     interpreted = tmp_path / f"{CASE}.csv"
     identify_interpreted(case, target, interpreted)
     ours = read_identifications(ours_file)

@@ -104,7 +104,7 @@ def test_judged_points_are_the_arithmetic_they_say(judged: Path) -> None:
     assert tuple(rows.columns) == stage.POINTS.columns
     assert len(rows) == 4 * 2 * 5
     index = rows.set_index(["row", "column", "method", "quantity"]).sort_index()
-    noisy = index.loc[("0.2", "additive, any", "genetic")]
+    noisy = index.loc[("20", "additive, any", "genetic")]
     # |35 - k| / 35: 0, 10, 20, 30 and 70 %, the last outside a factor of two.
     assert noisy.loc["k", "median_absolute_error_percent"] == pytest.approx(20.0)
     assert noisy.loc["k", "basin_error_percent"] == pytest.approx(15.0)
@@ -127,7 +127,7 @@ def test_without_noise_the_floor_is_what_two_digits_can_do(judged: Path) -> None
 @pytest.mark.parametrize("column", ["additive, any", "proportional"])
 def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
     rows = pd.read_csv(judged, dtype={"row": str})
-    chosen = rows[(rows["row"] == "0.2") & (rows["column"] == column)]
+    chosen = rows[(rows["row"] == "20") & (rows["column"] == column)]
     found = chosen[chosen["method"] == "genetic"].set_index("quantity")["bound_percent"]
     phi = _response(TRUTH)
     sigma = 0.2 * (np.full_like(phi, phi.max()) if column == "additive, any" else np.abs(phi))

@@ -1,5 +1,4 @@
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +8,8 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import GRIPPER
-from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.protocol import Phase, Sampling, hold
-from biogrip.records.identifications import columns
-from biogrip.records.rows import read_arrays, write_arrays, write_rows
+from biogrip.physics.models import Sample
+from biogrip.physics.protocol import Phase, Sampling, hold, torque_history
 from biogrip.records.traces import read_target
 from biogrip.stages import identification as identifications
 from biogrip.stages import judgement, recording
@@ -26,11 +23,10 @@ def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
         name="Drop",
         instrument=GRIPPER,
         gripper=STUDY.gripper,
-        phases=(hold(100.0, torque_Nm), *more),
-        averaged=(hold(100.0, torque_Nm), *more),
+        torque=torque_history((hold(100.0, torque_Nm), *more)),
         sampling=Sampling(rate_Hz=1.0),
         sample=Sample("maxwell"),
-        parameters={"k": 1.0, "c": 1.0},
+        network=Sample("maxwell").model.sample({"k": 1.0, "c": 1.0}),
         nonlinear_target=False,
         unilateral=unilateral,
         stroke_rad=0.0785,
@@ -74,35 +70,6 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     )
 
 
-def test_what_is_left_from_a_larger_study_is_not_joined(tmp_path: Path) -> None:
-    """Methods may have batches that end at different seeds; their files then have as many rows."""
-    model = MODELS["maxwell"]
-    batches = [tmp_path / name for name in "abc"]
-    case = seen(sample=Sample("maxwell"), seeds=3, study=seen(methods=["x", "y"]))
-
-    def written(seeds: Sequence[Sequence[int]]) -> None:
-        for batch, method, some in zip(batches, "xxy", seeds, strict=True):
-            rows = [("drop", method, seed, *range(len(columns(model)) - 3)) for seed in some]
-            write_rows(batch.with_suffix(".csv"), columns(model), rows)
-            values = {"method": [method] * len(some), "seed": list(some)}
-            write_arrays(batch.with_suffix(".npz"), values)
-
-    def joined() -> tuple[pd.DataFrame, pd.DataFrame]:
-        files, histories = ([b.with_suffix(s) for b in batches] for s in (".csv", ".npz"))
-        made, history = tmp_path / "all.csv", tmp_path / "all.npz"
-        identifications.join(case, files, histories, made, history)
-        return pd.read_csv(made), pd.DataFrame(read_arrays(history))
-
-    written(((0, 1), (2, 3), (0, 1, 2)))
-    for found in joined():
-        assert list(zip(found["method"], found["seed"], strict=True)) == [
-            (method, seed) for method in "xy" for seed in range(3)
-        ]
-    written(((0, 1), (1, 2), (0, 1, 2)))
-    with pytest.raises(BiogripError, match="do not hold each of the seeds 0 to 2 once for each"):
-        joined()
-
-
 def test_all_stages_weight_the_readings(tmp_path: Path) -> None:
     """They find the same optimum, with the noise that is known."""
     file = f"{{file: {EXAMPLE}, time: time_s, rotation: rotation_rad, noise_share: 0.1}}"
@@ -114,7 +81,7 @@ def test_all_stages_weight_the_readings(tmp_path: Path) -> None:
     judgement.judge(case, traces, [], verdicts)
     judged = json.loads(verdicts.read_text())
     assert judged["threshold"] == pytest.approx(3.8415, abs=1e-4)
-    outputs = [tmp_path / name for name in ("p.csv", "h.npz", "t.csv")]
+    outputs = [tmp_path / name for name in ("p.csv", "h.npz")]
     identifications.identify(case, "least_squares", range(1), traces, [], *outputs)
     (found,) = pd.read_csv(outputs[0]).itertuples()
     assert found.misfit == pytest.approx(judged["misfit"], rel=1e-4)

@@ -27,7 +27,7 @@ SINGLE = {
     for path, shape in leaves(STUDY).items()
     if not shape.keys
     and path.partition(".")[0] not in ("cases", "sweeps", "protocol")
-    and not path.startswith("measurement.bursts.")
+    and "[]" not in path
 }
 OF_A_CASE = sorted(path for path in SINGLE if path.partition(".")[0] in OVERRIDABLE)
 

@@ -75,7 +75,7 @@ def test_values_are_shown_in_the_axis_unit(tmp_path: Path) -> None:
     text = SWEEP.replace("{label: level,", '{label: level, unit: "%", unit_in_si: 0.01,')
     axis = load(tmp_path, text).sweeps["noise"].rows
     assert axis.title == "level (%)"
-    assert {it.text: it.shown for it in axis.levels} == {"0.1": "10", "0.02": "2"}
+    assert [it.shown for it in axis.levels] == ["10", "2"]
 
 
 LEVEL = "key: measurement.noise.level"

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from biogrip.physics.models import Published, Sample, Truth
+from biogrip.physics.models import Published, Sample
 from biogrip.records.rows import read_table
 from biogrip.tables import claims_on_method as method
 from biogrip.tables import claims_on_results as results
@@ -38,11 +38,27 @@ SEEDS = 40
 TRUE = {"k": 8.0, "k_p": 2.0, "c": 100.0, "c_p": 1e-3}
 
 
-def test_shares_and_numbers_have_verdicts() -> None:
-    assert [by_share(share) for share in (1, 0.9, 0.89, 0.11, 0.1, 0)] == [
-        *(REPLICATED, REPLICATED, IN_PART, IN_PART, NOT, NOT)
-    ]
-    assert [by_number(17, found) for found in (17.84, 17.86, 16.14)] == [REPLICATED, NOT, NOT]
+@pytest.mark.parametrize(
+    ("judged", "verdict"),
+    [
+        *((by_share(share), REPLICATED) for share in (1, 0.9)),
+        *((by_share(share), IN_PART) for share in (0.89, 0.11)),
+        *((by_share(share), NOT) for share in (0.1, 0)),
+        *(
+            (by_number(17, 17.84), REPLICATED),
+            (by_number(17, 17.86), NOT),
+            (by_number(17, 16), NOT),
+        ),
+        # Of several things, it holds in part if they differ.
+        *((altogether([REPLICATED, other]), IN_PART) for other in (NOT, IN_PART, OUTSIDE)),
+        *((altogether([NOT, NOT]), NOT), (altogether([UNDECIDED, IN_PART]), IN_PART)),
+        # What no run can meet neither flatters nor condemns.
+        *((altogether([OUTSIDE, UNDECIDED]), OUTSIDE), (altogether([]), UNDECIDED)),
+        (altogether([NOT, OUTSIDE, UNDECIDED]), NOT),
+    ],
+)
+def test_shares_numbers_and_several_things_have_verdicts(judged: str, verdict: str) -> None:
+    assert judged == verdict
 
 
 @pytest.mark.parametrize(
@@ -64,18 +80,6 @@ def test_shares_of_seeds_have_limits() -> None:
     assert of_seeds(np.arange(50) < 23) == "46 % (33 to 60)"
 
 
-def test_what_is_said_of_several_things_holds_in_part_if_they_differ() -> None:
-    assert altogether([NOT, NOT]) == NOT
-    assert altogether([REPLICATED, NOT]) == altogether([IN_PART, REPLICATED]) == IN_PART
-    assert altogether([REPLICATED, OUTSIDE]) == altogether([UNDECIDED, IN_PART]) == IN_PART
-
-
-def test_what_no_run_can_meet_neither_flatters_nor_condemns() -> None:
-    assert altogether([OUTSIDE, UNDECIDED, OUTSIDE]) == OUTSIDE
-    assert altogether([UNDECIDED]) == altogether([]) == UNDECIDED
-    assert altogether([NOT, OUTSIDE, UNDECIDED]) == NOT
-
-
 def test_an_order_of_magnitude_is_half_a_decade_on_both_sides() -> None:
     found = pd.Series([10 / 3.17, 10 / 3.16, 10, 31.6, 31.7])
     assert within_a_decade(found, 10).tolist() == [False, True, True, True, False]
@@ -84,12 +88,13 @@ def test_an_order_of_magnitude_is_half_a_decade_on_both_sides() -> None:
 def runs(rows: list[dict[str, float]], table: int = 5, **printed: float) -> Results:
     """Results with the runs on one sample, a row a seed and generation, and nothing else."""
     published = Published(table=table, generation=70, identified=printed, error_percent={})
-    truth = Truth("A sample", Sample("generalized_maxwell"), TRUE, published)
     history = pd.DataFrame(rows)
     found = history.groupby("seed").last().reset_index()
-    cases = {"mine": seen(truth=truth, noise=seen(level=0.1))}
-    study = seen(cases=cases, near_noise_tolerance=0.02)
-    return Results(study, {}, {table: Runs("mine", truth, found, history)}, {})
+    sample = Sample("generalized_maxwell")
+    known = {"sample": sample, "parameters": TRUE, "published": published}
+    case = seen(name="mine", noise=seen(level=0.1), **known)
+    study = seen(cases={"mine": case}, near_noise_tolerance=0.02)
+    return Results(study, {}, {table: Runs(case, found, history)}, {})
 
 
 def test_orders_of_magnitude_at_generation_20_are_those_of_that_generation() -> None:
@@ -190,7 +195,7 @@ def test_errors_are_held_against_the_level_of_the_noise() -> None:
 def test_jaws_that_would_have_to_pull_hold_one_sample_in_three() -> None:
     forces = pd.DataFrame({"case": ["a", "a", "b", "c"], "lowest_force_uN": [0.2, 0.3, -0.7, -0.6]})
     cases = {
-        name: seen(truth=seen(title=name, published=seen(table=table)))
+        name: seen(title=name, published=seen(table=table))
         for name, table in (("a", 5), ("b", 6), ("c", 7))
     }
     judged = method.judge_grip(Results(seen(cases=cases), {"mechanics": forces}, {}, {}))
@@ -217,7 +222,7 @@ def test_models_that_fit_as_well_are_held_against_the_one_that_made_the_traces(
         )
     ]
     tables = zip("abc", (5, 6, 7), strict=True)
-    cases = {name: seen(truth=seen(published=seen(table=table))) for name, table in tables}
+    cases = {name: seen(published=seen(table=table)) for name, table in tables}
     found = Results(seen(cases=cases), {"models": pd.DataFrame(rows)}, {}, {})
     judged = results.judge_cell_model(found)
     assert judged.verdict == verdict

@@ -9,8 +9,7 @@ from scipy.stats import f
 from biogrip.records.identifications import INTERVALS
 from biogrip.stages import intervals as stage
 from biogrip.stages import targets
-from biogrip.tables.cases import verdict_counts
-from biogrip.tables.coverage import coverage
+from biogrip.tables.coverage import coverage, verdict_counts
 from tests.helpers.default import study_of
 
 CASE = "liquid_drop_2"

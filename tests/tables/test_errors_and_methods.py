@@ -9,11 +9,10 @@ import pandas as pd
 import pytest
 
 from biogrip.fit.methods import METHODS
-from biogrip.physics.models import MODELS, UNPUBLISHED, Published, Sample, Truth
+from biogrip.physics.models import MODELS, Published, Sample
 from biogrip.records.identifications import MODEL_FITS, columns
 from biogrip.tables.cases import errors, errors_of_case, verdicts
-from biogrip.tables.layout import write
-from biogrip.tables.methods import methods, models, timings
+from biogrip.tables.methods import methods, models
 from tests.helpers.default import seen, study_of
 
 PAPER = Published(
@@ -43,9 +42,9 @@ def eleven_seeds(tmp_path: Path) -> Path:
 
 
 def case_of(near_noise_tolerance: float = 0.02) -> Any:
-    truth = Truth("A drop", Sample("generalized_maxwell"), TRUE, PAPER)
     study = seen(shown="genetic", near_noise_tolerance=near_noise_tolerance)
-    return seen(name="drop", truth=truth, study=study)
+    known = {"sample": Sample("generalized_maxwell"), "parameters": TRUE, "published": PAPER}
+    return seen(name="drop", title="A drop", study=study, **known)
 
 
 def test_error_table_is_the_arithmetic_it_says(eleven_seeds: Path) -> None:
@@ -74,23 +73,22 @@ def test_error_table_is_the_arithmetic_it_says(eleven_seeds: Path) -> None:
 
 
 def test_joined_errors_are_within_the_tolerance_that_their_heading_names(
-    eleven_seeds: Path, tmp_path: Path
+    eleven_seeds: Path,
 ) -> None:
-    case = case_of(0.005)
-    made = errors_of_case(case, eleven_seeds)
+    study = seen(near_noise_tolerance=0.005, cases={"drop": case_of(0.005)})
+    made = errors(study, [eleven_seeds])
     # 1.001 and 1.0046.
     assert made.rows[0]["near_noise_share"] == pytest.approx(2 / 11)
-    write(made, tmp_path / "t.csv")
-    joined = errors(case.study, [tmp_path / "t.csv"])
-    assert joined.columns == made.columns
-    assert joined.columns[-3].heading == "Share within 0.5 % of the noise"
-    assert joined.rows[0]["seeds"] == 11
+    assert made.columns[-3].heading == "Share within 0.5 % of the noise"
+    # Numbers where the paper has any.
+    printed = {row["parameter"]: row["paper_error_percent"] for row in made.rows}
+    assert printed == {"k": 10.0, "k_p": "-", "c": 25.0, "c_p": ">100", "c + c_p": 0.0}
 
 
 def study(parameters: dict[str, float], samples: int) -> Any:
     """Of one case, a drop."""
-    truth = Truth("A drop", Sample("generalized_maxwell"), parameters, UNPUBLISHED)
-    cases = {"drop": seen(truth=truth, samples=samples)}
+    sample = Sample("generalized_maxwell")
+    cases = {"drop": seen(sample=sample, parameters=parameters, samples=samples)}
     return seen(cases=cases, identifiers=METHODS, optimum_tolerance=1.0, near_noise_tolerance=0.02)
 
 
@@ -183,10 +181,3 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     assert (total["target"], total["value"], total["high"]) == (1.5, None, 3.0)
     assert total["expected_verdict"] is None
     assert "c and c_p trade against each other: determined is c + c_p." in table.caption
-
-
-def test_timings_are_summed(tmp_path: Path) -> None:
-    path = tmp_path / "times.csv"
-    path.write_text("case,method,seed,cpu_s\nx,genetic,0,0.1\nx,genetic,1,0.3\nx,genetic,2,0.2\n")
-    (row,) = timings(seen(identifiers=METHODS), [path]).rows
-    assert (row["median_cpu_s"], row["total_cpu_s"]) == (pytest.approx(0.2), pytest.approx(0.6))

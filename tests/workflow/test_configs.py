@@ -58,6 +58,13 @@ def test_a_wrong_config_stops_with_one_message(tmp_path: Path) -> None:
     assert len(run.output.splitlines()) < 16
 
 
+def test_batches_of_another_size_are_no_other_study(tmp_path: Path) -> None:
+    """As `profiles/slurm` has them: all that is published is made and compared."""
+    run = snakemake(tmp_path, "-n", "--quiet", "rules", "--config", "batch_size=9", "--", "check")
+    assert run.status == 0, run.output
+    assert run.jobs["tables"] == run.jobs["claims"] == run.jobs["check"] == 1
+
+
 def test_what_has_no_name_has_nothing_published(tmp_path: Path) -> None:
     """Nothing is compared with, and nothing replaced, where only a command line says the config."""
     run = snakemake(tmp_path, "-k", "--config", "seeds=2", "--", "check", "publish")

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.nightly
 # What is asked for, and what is removed so that there is something to do.
 ERRORS = "results/tables/errors_liquid_drop_2.csv"
 AGAIN = [ERRORS, "results/tables/methods.csv"]
-_REMOVED = ("identifications", "histories", "timings")
+_REMOVED = ("identifications", "histories")
 
 
 def started(folder: Path) -> "subprocess.Popen[bytes]":

@@ -1,8 +1,9 @@
 """The results beside those that are published: compared, or put in their place."""
 
 # A config of the same name has its published results in a folder of its own. What has no name, on
-# the command line or of a module, has nothing published.
-OVERLAYS = ["unnamed" if config else "", *(Path(it).stem for it in workflow.overwrite_configfiles)]
+# the command line or of a module, has nothing published; the size of batches changes no result.
+UNNAMED = "unnamed" if config.keys() - {"batch_size"} else ""
+OVERLAYS = [UNNAMED, *(Path(it).stem for it in workflow.overwrite_configfiles)]
 OVERLAY = OVERLAYS[-1]
 PUBLISHED = shipped("results/published") / OVERLAY
 

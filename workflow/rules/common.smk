@@ -57,7 +57,7 @@ def batches(case, stage):
     """The batches of the traces of a case, or of those that its intervals are tested with."""
     chosen = STUDY.case(case)
     seeds = chosen.coverage_seeds if stage == "coverage" else chosen.seeds
-    return batch_names(seeds, STUDY.config.batch_size, Path("results", stage, case))
+    return batch_names(seeds, STUDY.config.batch_size)
 
 
 def files(pattern, cases):

@@ -11,7 +11,7 @@ rule target:
     params:
         **settings_of(
             *"instrument gripper actuator protocol sample fixed contact models".split(),
-            *(f"measurement.{key}" for key in ("rate_Hz", "times_s", "bursts", "file")),
+            *(f"measurement.{key}" for key in ("rate_Hz", "bursts", "file")),
         ),
     message:
         "Simulating the response of {wildcards.case}"
@@ -80,7 +80,6 @@ rule identification:
     output:
         parameters="results/identifications/{case}/{method}/{batch}.csv",
         history="results/histories/{case}/{method}/{batch}.npz",
-        timing="results/timings/{case}/{method}/{batch}.csv",
     log:
         "results/logs/identification/{case}/{method}/{batch}.log",
     resources:

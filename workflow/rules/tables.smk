@@ -45,8 +45,6 @@ rule model_errors:
 
 rule tables:
     input:
-        errors=files("results/tables/errors_{case}.csv", STUDY.cases),
-        times=files("results/timings/{case}/{method}/{batch}.csv", STUDY.cases),
         fits=files("results/selection/{case}/{batch}.csv", SELECTING),
         identifications=files("results/identifications/{case}.csv", STUDY.cases),
         targets=files("results/targets/{case}.csv", STUDY.simulated),
@@ -56,9 +54,6 @@ rule tables:
         differences="results/linearisation.csv" if STUDY.gripped else [],
     output:
         [file for name in TABLES for file in table(name)],
-        # Not in tables/, since times are not reproducible.
-        multiext("results/timings", ".csv", ".md", ".tex"),
-        shown("results/timings.html", "tables", "timings", ""),
     log:
         "results/logs/tables.log",
     params:

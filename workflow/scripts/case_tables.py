@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from biogrip.stages.identification import add_encodable, join
+from biogrip.stages.identification import join
 from biogrip.stages.job import job_case, logged, paths
 from biogrip.tables.cases import errors_of_case, verdicts
 from biogrip.tables.layout import write
@@ -10,8 +10,12 @@ from biogrip.tables.layout import write
 with logged(snakemake):
     case, files, made = job_case(snakemake), snakemake.input, snakemake.output
     identifications = Path(made.identifications)
-    join(case, paths(files.batches), paths(files.histories), identifications, Path(made.history))
-    add_encodable(case, identifications, paths(files.measurements), paths(files.calibrated))
+    join(
+        case,
+        *map(paths, (files.batches, files.histories, files.measurements, files.calibrated)),
+        identifications,
+        Path(made.history),
+    )
     write(errors_of_case(case, identifications), Path(made.errors[0]))
     judged = verdicts(case, Path(files.verdicts), paths(files.expected))
     write(judged, Path(made.verdicts[0]))

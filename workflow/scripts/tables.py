@@ -3,9 +3,7 @@
 from pathlib import Path
 
 from biogrip.stages.job import job_study, logged, paths
-from biogrip.tables import cases as errors_of_case
-from biogrip.tables import cases as verdicts
-from biogrip.tables import coverage, evidence, inputs, mechanics, methods
+from biogrip.tables import cases, coverage, evidence, inputs, mechanics, methods
 from biogrip.tables.layout import write
 
 with logged(snakemake):
@@ -20,21 +18,20 @@ with logged(snakemake):
         return [file for file in given[name] if file.stem in study.cases]
 
     tables = {
-        "errors": lambda: errors_of_case.errors(study, given["errors"]),
+        "errors": lambda: cases.errors(study, given["identifications"]),
         "gene_ranges": lambda: inputs.gene_ranges(study),
         "parameter_ranges": lambda: inputs.parameter_ranges(study),
-        "timings": lambda: methods.timings(study, given["times"]),
         "gripper": lambda: inputs.gripper(study),
         "actuator": lambda: inputs.actuator(study),
         "contact": lambda: mechanics.contacts(study),
         "left_out": lambda: mechanics.left_out(study),
-        "linearisation": lambda: mechanics.linearisation(gripped, *given["differences"]),
+        "linearisation": lambda: mechanics.linearisation(*given["differences"]),
         "mechanics": lambda: mechanics.mechanics(gripped),
         "methods": lambda: methods.methods(simulated, of(simulated, "identifications")),
         "coverage": lambda: coverage.coverage(
             covered, of(covered, "targets"), given["intervals"], of(covered, "calibrated")
         ),
-        "verdict_counts": lambda: verdicts.verdict_counts(
+        "verdict_counts": lambda: coverage.verdict_counts(
             counted, [file for file in given["intervals"] if file.parent.name in counted.cases]
         ),
         "models": lambda: methods.models(study, given["fits"]),

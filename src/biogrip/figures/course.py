@@ -21,7 +21,6 @@ from biogrip.figures.style import (
     TARGET,
     figure,
     line_of,
-    literal,
 )
 from biogrip.fit.methods import (
     chi_square_increase,
@@ -78,13 +77,13 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
     ticks = [tick for tick in _TICKS if tick < axes.get_ylim()[1]]
     axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
-    axes.set(xlim=(0, last), xlabel=method.step, title=literal(case.title))
+    axes.set(xlim=(0, last), xlabel=method.step, title=case.title)
     axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
     if noisy:
         words, near = near_noise_words(tolerance), 100 * tolerance
         axes.axhline(near, color=TARGET, linestyle="-.", linewidth=0.8, label=words)
         reached = near_noise(found, tolerance).sum()
-        axes.set_title(f"{literal(case.title)}: {reached} of {len(found)} {words}")
+        axes.set_title(f"{case.title}: {reached} of {len(found)} {words}")
     drawn.legend(loc="outside lower center", ncols=2)
     return drawn
 
@@ -107,11 +106,11 @@ def _mark_mutation(axes: Axes, start: int, last: int) -> None:
 
 def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw every parameter over generations for all seeds, highlighting a run of each basin."""
-    truth, method = case.truth, case.study.shown_method
+    method = case.study.shown_method
     found = read_identifications(identifications, method.name)
     first = first_of_basins(found, case.study.near_noise_tolerance)
     shown = [int(run["seed"]) for run in first.values()]
-    parameters, identified = truth.model.parameters, truth.published.identified
+    parameters, identified = case.sample.model.parameters, case.published.identified
     columns = [parameter.column for parameter in parameters]
     history = read_history(histories, method.name, shown, columns)
     drawn = figure(PAGE_IN, 3.9)
@@ -120,7 +119,7 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
         for seed, rows in history.groupby("seed"):
             style = _line_of_seed(seed, shown, 0.6)
             axes.step(rows["generation"], rows[parameter.column], where="post", **style)
-        target = truth.parameters.get(parameter.name, 0)
+        target = case.parameters.get(parameter.name, 0)
         if target > 0:
             axes.axhline(target, color=TARGET, linestyle="--")
         if parameter.name in identified:
@@ -137,13 +136,13 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
         lowest.set_xlabel(method.step)
         lowest.tick_params(labelbottom=True)
     _name_seeds(grid[0], len(found), first)
-    if truth.parameters:
+    if case.parameters:
         grid[0].plot([], [], color=TARGET, linestyle="--", label="target")
     if identified:
         grid[0].plot([], [], color=PAPER, linestyle=":", label="identified in the paper")
     handles, labels = grid[0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside upper center", ncols=4)
-    drawn.suptitle(literal(truth.title), x=0.01, ha="left", fontsize=8)
+    drawn.suptitle(case.title, x=0.01, ha="left", fontsize=8)
     return drawn
 
 
@@ -170,6 +169,6 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
     axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
     axes.minorticks_off()
     axes.set(xlim=(0, 100), xlabel="seeds, sorted (%)", ylabel="Δχ² over the lowest known")
-    axes.set_title(f"{literal(case.title)}: best encodable point reached")
+    axes.set_title(f"{case.title}: best encodable point reached")
     drawn.legend(loc="outside lower left")
     return drawn

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.digits import with_unit
-from biogrip.figures.results import Fit, fit_of, fits_of_basins
+from biogrip.figures.results import Fit, fit_of, fits_of_basins, scale_of_fit
 from biogrip.figures.style import (
     COLUMN_IN,
     FITTED,
@@ -19,7 +19,6 @@ from biogrip.figures.style import (
     figure,
     is_over_decades,
     literal,
-    scale_of_fit,
 )
 from biogrip.records.identifications import read_verdicts
 from biogrip.records.traces import read_measurements

@@ -31,7 +31,6 @@ from biogrip.physics.contact import LARGEST_M, SMALLEST_M, contact
 from biogrip.physics.gripper import CombDrive, Gripper
 from biogrip.physics.protocol import torque_at, torque_history
 from biogrip.physics.simulation import simulated_rotation
-from biogrip.stages.targets import network_of
 from biogrip.study.study import Study
 
 
@@ -246,10 +245,9 @@ def _largest_rotation_rad(study: Study) -> float:
     """Return the largest rotation of all samples, or a visible one if there is none."""
     peaks = [0.0]
     for case in study.cases.values():
-        torque = torque_history(case.phases)
-        time_s = np.linspace(0.0, torque.end_s, 401)
-        network = network_of(case)
-        rotation = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)
+        time_s = np.linspace(0.0, case.torque.end_s, 401)
+        device = case.gripper, case.network, case.torque
+        rotation = simulated_rotation(*device, time_s, nonlinear=False)
         peaks.append(float(rotation.max()))
     return max(peaks) or _VISIBLE_RAD
 

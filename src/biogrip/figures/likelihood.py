@@ -1,5 +1,6 @@
 """Profile likelihoods of every quantity, and chi-squared over two that trade: a valley."""
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -14,30 +15,29 @@ from matplotlib.ticker import MaxNLocator
 from scipy.interpolate import PchipInterpolator
 
 from biogrip.arrays import Array
-from biogrip.digits import with_unit
+from biogrip.digits import SUPERSCRIPTS, with_unit
 from biogrip.figures.results import first_seeds, seeds_in_words
 from biogrip.figures.style import (
     BLUE,
     COLUMN_IN,
     FITTED,
     GREY,
-    HIGHEST_INCREASE,
     PAPER,
     SHADE,
     TARGET,
-    decade_ticks,
     figure,
-    is_wide,
     literal,
     panel,
     points_within,
-    profile_limits,
     row_of_panels,
 )
 from biogrip.judging.likelihood import CERTAIN
 from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.study.study import Case
 from biogrip.tables.cases import target_of
+
+# End of the axis of profiles, and ratio of the ends above which that of values is logarithmic.
+_HIGHEST_INCREASE, _WIDE = 12.0, 5.0
 
 
 def draw_profiles(case: Case, measured: Path, expected: list[Path]) -> Figure:
@@ -81,14 +81,14 @@ def draw_profile(axes: Axes, item: Mapping[str, Any]) -> None:
     """Draw the profile of a quantity's verdict, with its limits."""
     axes.plot(*_curve(item["profile"]), color=FITTED, label="this trace")
     _limits(axes, item)
-    low, high = profile_limits(item)
-    if is_wide(low, high):
+    low, high = _profile_limits(item)
+    if high / low > _WIDE:
         axes.set_xscale("log")
-        axes.set_xticks(*decade_ticks(low, high))
+        axes.set_xticks(*_decade_ticks(low, high))
         axes.minorticks_off()
     else:
         axes.xaxis.set_major_locator(MaxNLocator(2, steps=[1, 2, 5, 10]))
-    axes.set(xlim=(low, high), ylim=(0, HIGHEST_INCREASE))
+    axes.set(xlim=(low, high), ylim=(0, _HIGHEST_INCREASE))
     axes.set_xlabel(with_unit(item["symbol"], item["unit"]))
 
 
@@ -99,9 +99,34 @@ def _curve(profile: dict[str, Any]) -> tuple[Array, Array]:
     """
     # Rounding may have made neighbours equal.
     values, places = np.unique(np.array(profile["values"]), return_index=True)
-    roots = np.sqrt(np.clip(np.array(profile["increases"])[places], 0.0, 4 * HIGHEST_INCREASE))
+    roots = np.sqrt(np.clip(np.array(profile["increases"])[places], 0.0, 4 * _HIGHEST_INCREASE))
     dense = np.unique(np.concatenate([np.linspace(*pair, 6) for pair in pairwise(np.log(values))]))
     return np.exp(dense), PchipInterpolator(np.log(values), roots)(dense) ** 2
+
+
+def _profile_limits(item: Mapping[str, Any]) -> tuple[float, float]:
+    """Return limits of the x-axis: where the profile is inside the figure, plus a margin."""
+    values, increases = (np.array(item["profile"][key]) for key in ("values", "increases"))
+    inside = np.flatnonzero(increases < _HIGHEST_INCREASE)
+    ends = [item["low"], item["high"], values[inside[0]], values[inside[-1]]]
+    low, high = (float(end([x for x in ends if x is not None])) for end in (min, max))
+    margin = max((high / low) ** 0.05, 1.0002)
+    return max(float(values[0]), low / margin), min(float(values[-1]), high * margin)
+
+
+def _decade_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
+    """Return at most three ticks of a logarithmic axis whose labels do not overlap."""
+    first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
+    decades = list(range(first, last + 1))
+    if len(decades) >= 2:
+        step = -(-(len(decades) - 1) // 2)
+        chosen = decades[::step]
+        return [10.0**d for d in chosen], [f"10{str(d).translate(SUPERSCRIPTS)}" for d in chosen]
+    steps = [m * 10.0**d for d in range(first - 1, last + 2) for m in (1, 2, 5)]
+    found = [value for value in steps if low <= value <= high]
+    # Labels of these values are wide, so keep two.
+    inside = [found[0], found[-1]] if len(found) > 2 else found
+    return inside, [f"{value:g}" for value in inside]
 
 
 def _limits(axes: Axes, item: Mapping[str, Any]) -> None:
@@ -173,7 +198,7 @@ def draw_valley(case: Case, measured: Path, identifications: Path) -> Figure:
     for points, style, name in marked:
         labels = (name, "beyond the axis")
         points_within(axes, points, (0, 0), high, style, edge_size=4.5, labels=labels)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=literal(case.title))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=case.title)
     axes.set_xlabel(with_unit(x["symbol"], x["unit"]))
     axes.set_ylabel(with_unit(y["symbol"], y["unit"]))
     axes.set_box_aspect(1)

@@ -17,17 +17,14 @@ from biogrip.figures.style import (
     PAGE_IN,
     TARGET,
     figure,
-    literal,
     panel,
 )
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.nonlinear import correction
-from biogrip.physics.protocol import torque_history
 from biogrip.physics.simulation import jaw_force
 from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
 from biogrip.records.identifications import DIFFERENCES
 from biogrip.records.traces import read_target
-from biogrip.stages.targets import network_of
 from biogrip.study.study import Case, Study
 from biogrip.tables.mechanics import LIMIT_PERCENT
 
@@ -35,12 +32,9 @@ from biogrip.tables.mechanics import LIMIT_PERCENT
 def draw_force(case: Case, target: Path) -> Figure:
     """Draw the jaw force under bilateral contact, and the rotation with and without adhesion."""
     time_s, _, rotation = read_target(target)
-    torque = torque_history(case.phases)
-    network = case.sample.model.sample(case.parameters)
+    device = case.gripper, case.network, case.torque
     # Without inertia, since the jaws ring for less than a sampling interval after a step.
-    sticking = jaw_force(
-        case.gripper, network, torque, time_s, nonlinear=case.nonlinear_target, inertia=False
-    )[0]
+    sticking = jaw_force(*device, time_s, nonlinear=case.nonlinear_target, inertia=False)[0]
     drawn = figure(COLUMN_IN, 3.2)
     forces, rotations = drawn.subplots(2, 1, sharex=True, height_ratios=[1.25, 1])
     factor, unit = scale_of(sticking, "N")
@@ -55,14 +49,14 @@ def draw_force(case: Case, target: Path) -> Figure:
         )  # fmt: skip
     apart = None
     if pulling and not case.nonlinear_target:
-        apart = unilateral_response(case.gripper, network, torque, time_s)
+        apart = unilateral_response(*device, time_s)
         shown = _from_loss(apart, apart.jaw_force_N)
         forces.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
     forces.set_ylabel(f"jaw force ({unit})")
     low, high = float(negative.min()), factor * float(sticking.max())
     forces.set_ylim(low - 0.08 * (high - low), high + (0.62 if apart else 0.42) * (high - low))
     forces.legend(loc="upper right")
-    forces.set_title(literal(case.title))
+    forces.set_title(case.title)
 
     factor, unit = scale_of(rotation, "rad")
     name = "target" + (", jaws that let go" if case.unilateral else "")
@@ -99,7 +93,7 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
     traces, *maps = drawn.subplots(1, 1 + len(cases), width_ratios=[1.2] + [1] * len(cases))
     last = list(cases)[-1]
     _difference(traces, cases[last])
-    panel(traces, "a", f"{literal(cases[last].title)}, {_SHOWN_FACTOR:g} x torque")
+    panel(traces, "a", f"{cases[last].title}, {_SHOWN_FACTOR:g} x torque")
     for index, name in enumerate(cases):
         rows = comparison[comparison["case"] == name]
         grid = rows.pivot(
@@ -119,15 +113,14 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
         axes.set_xlabel(r"$\hat\theta_2$ (deg)")
         if index == 0:
             axes.set_ylabel("torque / protocol's torque")
-        panel(axes, "bcd"[index], literal(cases[name].title), most_letters=19)
+        panel(axes, "bcd"[index], cases[name].title, most_letters=19)
     drawn.colorbar(mesh, ax=maps, label="difference (% of peak)", pad=0.01)
     return drawn
 
 
 def _difference(axes: Axes, case: Case) -> None:
     """Draw the nonlinear minus the linear rotation, as the curves themselves look the same."""
-    gripper, network = case.gripper, network_of(case)
-    torque = torque_history(case.phases).times(_SHOWN_FACTOR)
+    gripper, network, torque = case.gripper, case.network, case.torque.times(_SHOWN_FACTOR)
     time_s = np.linspace(0, torque.end_s, 1001)
     response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
     linear = rotation(response, torque, time_s)[0]

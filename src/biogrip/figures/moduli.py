@@ -21,7 +21,6 @@ from biogrip.figures.style import (
     SKY,
     figure,
     line_of,
-    literal,
     panel,
 )
 from biogrip.fit.methods import near_noise
@@ -49,14 +48,14 @@ def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) 
     files = zip(study.cases.values(), identifications, targets, strict=True)
     for column, (case, identified, target) in enumerate(files):
         time_s, _, rotation = read_target(target)
-        logs = case.problem.logs(case.truth.parameters)
+        logs = case.problem.logs(case.parameters)
         _, sensitivity = case.problem.of(time_s, rotation).residuals(logs)
         sigma = standard_deviation(rotation, case.noise)
         # Without noise there is nothing to compare with: NaN.
         relative = sensitivity / np.where(sigma > 0, sigma, np.nan)
         _moduli(axes[0, column], study, case, identified, time_s)
         _sensitivities(axes[1, column], case.problem.searched, time_s, relative)
-        panel(axes[0, column], "abc"[column], literal(case.truth.title), _TITLE_LETTERS)
+        panel(axes[0, column], "abc"[column], case.title, _TITLE_LETTERS)
         panel(axes[1, column], "def"[column], "when each parameter shows", _TITLE_LETTERS)
     units = [case.problem.model.stiffness_unit for case in study.cases.values()]
     for column, unit in enumerate(units):
@@ -93,7 +92,7 @@ def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Arra
             omega[run[0]], omega[run[-1]], color=SHADE, linewidth=0, zorder=0,
             label="seen by the experiment" if run[0] == shown[0] else None,
         )  # fmt: skip
-    truth = _modulus(model.sample(case.truth.parameters), omega)[0]
+    truth = _modulus(model.sample(case.parameters), omega)[0]
     axes.plot(omega, truth.real, color=BLACK, label="truth, $G'$")
     axes.plot(omega, truth.imag, "--", color=BLACK, label="truth, $G''$")
     axes.set(xscale="log", yscale="log")

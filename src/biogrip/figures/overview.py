@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures.fit import draw_traces, judged_fit
 from biogrip.figures.likelihood import draw_profile
@@ -32,13 +31,12 @@ from biogrip.figures.style import (
     PAPER,
     TARGET,
     figure,
-    literal,
     panel,
     points_within,
 )
 from biogrip.fit.methods import near_noise, near_noise_words
-from biogrip.physics.models import Truth
-from biogrip.records.identifications import bounded_on_a_side, read_identifications, read_verdicts
+from biogrip.judging.verdicts import BOUNDED_ABOVE
+from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.study.study import Case, Study
 
 # End of the axis of identified over target values, on both sides of 1.
@@ -67,14 +65,15 @@ def draw_overview(
     drawn = figure(PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
     fits = fits_of_basins(cases[0], identifications[0], measurements, calibrated)
-    _fits(axes[0], cases[0].truth, fits)
+    _fits(axes[0], cases[0], fits)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
         found = read_identifications(path, study.shown)
-        bounded = bounded_on_a_side(read_verdicts(judged))
-        _scatter(scatter, case.truth, first_seeds(found), study.near_noise_tolerance, bounded)
+        quantities = read_verdicts(judged)["quantities"]
+        bounded = {it["quantity"] for it in quantities if it["verdict"] != BOUNDED_ABOVE}
+        _scatter(scatter, case, first_seeds(found), study.near_noise_tolerance, bounded)
         scatter.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3], [""] * 7 if index else None)
-        panel(scatter, "bcd"[index], literal(case.truth.title), most_letters=_TITLE_LETTERS)
+        panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
     legend: dict[str, Any] = {}
     for scatter in axes[1:]:
@@ -91,23 +90,23 @@ def draw_overview(
     return drawn
 
 
-def _fits(axes: Axes, case: Truth, fits: Mapping[str, Fit]) -> None:
+def _fits(axes: Axes, case: Case, fits: Mapping[str, Fit]) -> None:
     factor, _ = draw_traces(axes, fits)
     fit = next(iter(fits.values()))
     axes.set_ylim(top=1.65 * factor * fit.measured_rad.max())
     axes.set(xlim=(fit.time_s[0], fit.time_s[-1]), xlabel="time (s)")
     axes.legend(loc="upper right")
-    panel(axes, "a", literal(case.title))
+    panel(axes, "a", case.title)
 
 
 def _scatter(
-    axes: Axes, case: Truth, found: pd.DataFrame, tolerance: float, bounded: set[str]
+    axes: Axes, case: Case, found: pd.DataFrame, tolerance: float, bounded: set[str]
 ) -> None:
     """Draw identified over target values of the quantities that are bounded."""
     reached = near_noise(found, tolerance)
     identified = case.published.identified
     ticks: list[str] = []
-    for group in case.model.quantities:
+    for group in case.sample.model.quantities:
         names = [parameter.name for parameter in group]
         target = sum(case.parameters[name] for name in names)
         if target <= 0 or " + ".join(names) not in bounded:
@@ -121,7 +120,9 @@ def _scatter(
             (~reached, ALL_SEEDS, "other fits"),
             (reached, FITTED, f"fit {near_noise_words(tolerance)}"),
         ):
-            draw_ratios(axes, points[which], color, label)
+            style, labels = _DOTS | {"color": color}, (label, "")
+            ends = (-np.inf, 1 / _WORST), (np.inf, _WORST)
+            points_within(axes, points[which], *ends, style, edge_size=3.5, labels=labels)
         if set(names) <= set(identified):
             paper = sum(identified[name] for name in names) / target
             shown = float(np.clip(paper, 1 / _WORST, _WORST))
@@ -131,13 +132,6 @@ def _scatter(
     axes.plot([], [], "^", color=TARGET, markersize=1.6, label="beyond the axis")
     axes.set_ylim(1 / (2 * _WORST), 2 * _WORST)
     axes.set_xticks(range(len(ticks)), ticks)
-
-
-def draw_ratios(axes: Axes, points: Array, color: str, label: str) -> None:
-    """Draw places and ratios, (n, 2), with triangles at the edge for ratios beyond the axis."""
-    low, high = (-np.inf, 1 / _WORST), (np.inf, _WORST)
-    style = _DOTS | {"color": color}
-    points_within(axes, points, low, high, style, edge_size=3.5, labels=(label, ""))
 
 
 def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:

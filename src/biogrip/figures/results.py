@@ -97,8 +97,8 @@ def read_history(
     path: Path, method: str, shown: Sequence[int], values: Sequence[str] = ("best_misfit",)
 ) -> pd.DataFrame:
     """Read one method's histories of the seeds drawn individually and of those shown."""
-    chosen = {*range(SHOWN_SEEDS), *shown}
-    return read_histories(path, method, values, lambda seed: seed.isin(chosen))
+    found = read_histories(path, method, values)
+    return found[found["seed"].isin({*range(SHOWN_SEEDS), *shown})]
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:
@@ -108,6 +108,12 @@ def scale_of(values: Array, unit: str) -> tuple[float, str]:
         if largest * factor >= 1:
             return factor, prefix + unit
     return 1e9, f"n{unit}"
+
+
+def scale_of_fit(fit: Fit) -> tuple[float, str]:
+    """Return factor and unit with a prefix, where the unit of the readings may have one."""
+    plain = fit.read.unit.isalpha()
+    return scale_of(fit.fitted_rad, fit.read.unit) if plain else (1.0, fit.read.unit)
 
 
 def _holding(seed: int, measurements: list[Path]) -> Path:

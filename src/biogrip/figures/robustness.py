@@ -12,10 +12,10 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.figures.style import PAGE_IN, figure, literal, panel
+from biogrip.figures.style import PAGE_IN, figure, panel
 from biogrip.study.study import Study
 from biogrip.study.sweeps import SweepBlock
-from biogrip.tables.sweeps import axis_title, headlines_of, read_points, shown_values
+from biogrip.tables.sweeps import axis_title, headlines_of, read_points
 
 _MOST_CASES = 3
 _CELL_IN = 0.24
@@ -42,7 +42,7 @@ def draw_robustness(study: Study, name: str, points: Path) -> Figure:
     grid = drawn.subplots(3, len(cases), squeeze=False, sharex=True, sharey=True)
     for index, case in enumerate(cases):
         found = read_points(points, name, case)
-        panel(grid[0, index], "abc"[index], literal(study.cases[case].title), most_letters=24)
+        panel(grid[0, index], "abc"[index], study.cases[case].title, most_letters=24)
         first, *others = (found[found["method"] == method] for method in list(methods)[:2])
         shares = [100 * _grid(sweep, each, "basin_share") for each in (first, *others)]
         _heat_map(grid[0, index], sweep, shares[0], _SHARE, "cividis")
@@ -78,7 +78,7 @@ def draw_robustness(study: Study, name: str, points: Path) -> Figure:
 def _grid(sweep: SweepBlock, points: pd.DataFrame, column: str) -> Array:
     """Return a column's values as a grid, (n_rows, n_columns)."""
     wide = points.pivot_table(index="row", columns="column", values=column, dropna=False)
-    rows, columns = ([level.text for level in axis.levels] for axis in (sweep.rows, sweep.columns))
+    rows, columns = ([level.shown for level in axis.levels] for axis in (sweep.rows, sweep.columns))
     return wide.reindex(index=rows, columns=columns).to_numpy(float)
 
 
@@ -86,7 +86,7 @@ def _heat_map(axes: Axes, sweep: SweepBlock, values: Array, norm: Normalize, col
     axes.set_facecolor(_WITHOUT_BOUND)
     axes.pcolormesh(values, norm=norm, cmap=colours, edgecolors="white", linewidth=0.5)
     for axis, set_ticks in ((sweep.rows, axes.set_yticks), (sweep.columns, axes.set_xticks)):
-        shown = [text.replace(", ", ",\n") for text in shown_values(axis).values()]
+        shown = [level.shown.replace(", ", ",\n") for level in axis.levels]
         set_ticks(np.arange(len(shown)) + 0.5, shown)
     axes.tick_params(length=0, labelsize=6.5)
     for spine in axes.spines.values():

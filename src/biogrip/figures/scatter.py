@@ -18,7 +18,6 @@ from biogrip.figures.style import (
     SHADE,
     TARGET,
     line_of,
-    literal,
     panel,
     points_within,
     row_of_panels,
@@ -48,16 +47,16 @@ def draw_scatter(
     items = read_verdicts(expected)["quantities"]
     verdicts = {item["quantity"]: item["verdict"] for item in items}
     found = read_identifications(identifications)
-    truth, case_problem = case.truth, case.problem.calibrated(calibrated)
+    case_problem = case.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
-    log_truth = case_problem.logs(truth.parameters)
+    log_truth = case_problem.logs(case.parameters)
     _, sensitivity = case_problem.of(time_s, rotation).residuals(log_truth)
     noise_rad = standard_deviation(rotation, case.noise)
     quantities = parameters_and_sum(case_problem.searched)
     drawn, grid = row_of_panels(len(quantities), 3.1)
     for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
         names = [case_problem.searched.parameters[i] for i in quantity.members]
-        value = sum(truth.parameters[p.name] for p in names)
+        value = sum(case.parameters[p.name] for p in names)
         if value == 0:
             axes.axis("off")
             continue
@@ -68,7 +67,7 @@ def draw_scatter(
         # is zero.
         known = limit if limit and verdict == DETERMINED else np.inf
         _quantity(axes, case, found["method"], ratios.to_numpy(float), known)
-        _paper(axes, truth.published.identified, [p.name for p in names], value)
+        _paper(axes, case.published.identified, [p.name for p in names], value)
         panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
         if index == 0:
             axes.set_ylabel("identified / target")
@@ -127,7 +126,7 @@ def _title(quantity: Quantity, limit: float, verdict: str) -> str:
 
 
 def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
-    axes, truth = drawn.axes[0], case.truth
+    axes = drawn.axes[0]
     marks = [(case.study.identifiers[name].title, "o", name) for name in methods]
     handles: list[Any] = []
     for label, marker, name in [*marks, ("beyond the axis", "^", "")]:
@@ -136,8 +135,8 @@ def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
         handles += axes.plot([], [], marker, label=label, **style)
     label = f"{100 * case.confidence:g} % by the Cramér-Rao bound (named above), rest known"
     handles.append(axes.fill([], [], color=SHADE, label=label)[0])
-    if truth.published.identified:
+    if case.published.identified:
         handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
     drawn.legend(handles=handles, loc="outside lower left", ncols=3)
     few = "" if seeds <= SHOWN_SEEDS else f": {seeds_in_words(seeds)}, quartiles of all"
-    drawn.suptitle(literal(truth.title) + few, x=0.01, ha="left", fontsize=8)
+    drawn.suptitle(case.title + few, x=0.01, ha="left", fontsize=8)

@@ -1,13 +1,10 @@
 """Common style of all figures: legible at column width, safe for colour-blind readers.
 
-Colours and sizes; empty figures and their files; ticks, scales and limits of axes, for figures and
-for pages that draw in a browser. Ticks of logarithmic axes are plain text, as math text would take
-a tenth of a figure's time.
+Ticks of logarithmic axes are plain text, as math text would take a tenth of a figure's time.
 """
 
-import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -20,7 +17,6 @@ from matplotlib.ticker import LogFormatterSciNotation
 
 from biogrip.arrays import Array
 from biogrip.digits import SUPERSCRIPTS
-from biogrip.figures.results import Fit, scale_of
 from biogrip.files import atomic_write
 from biogrip.fit.methods import Method
 
@@ -89,7 +85,7 @@ def styled() -> Iterator[None]:
 
 
 def literal(text: str) -> str:
-    """Return text of the user's so that its dollar signs set no mathematics."""
+    """Return the name of a file so that its dollar signs set no mathematics; titles have none."""
     return text.replace("$", r"\$")
 
 
@@ -186,50 +182,10 @@ class _Plain(LogFormatterSciNotation):
         return re.sub(r"\$\\mathdefault\{(.*)\}\$", r"\1", plain).replace(r"\times", "×")
 
 
-def decade_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
-    """Return at most three ticks of a logarithmic axis whose labels do not overlap."""
-    first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
-    decades = list(range(first, last + 1))
-    if len(decades) >= 2:
-        step = -(-(len(decades) - 1) // 2)
-        chosen = decades[::step]
-        return [10.0**d for d in chosen], [f"10{str(d).translate(SUPERSCRIPTS)}" for d in chosen]
-    steps = [m * 10.0**d for d in range(first - 1, last + 2) for m in (1, 2, 5)]
-    found = [value for value in steps if low <= value <= high]
-    # Labels of these values are wide, so keep two.
-    inside = [found[0], found[-1]] if len(found) > 2 else found
-    return inside, [f"{value:g}" for value in inside]
-
-
-HIGHEST_INCREASE = 12.0
-"""End of the axis of profiles."""
 # Ratio of the longest to the shortest interval from which times are drawn on a logarithmic scale.
 _SPARSER = 30.0
-# Ratio of the ends above which an axis of a profile is logarithmic.
-_WIDE = 5.0
 
 
 def is_over_decades(time_s: Array) -> bool:
     """Return True for times that are dense at first and sparse at last, after zero."""
     return bool(time_s[0] > 0 and np.max(np.diff(time_s)) > _SPARSER * np.min(np.diff(time_s)))
-
-
-def is_wide(low: float, high: float) -> bool:
-    """Return True for limits of a profile that ask for a logarithmic axis."""
-    return high / low > _WIDE
-
-
-def scale_of_fit(fit: Fit) -> tuple[float, str]:
-    """Return factor and unit with a prefix, where the unit of the readings may have one."""
-    plain = fit.read.unit.isalpha()
-    return scale_of(fit.fitted_rad, fit.read.unit) if plain else (1.0, fit.read.unit)
-
-
-def profile_limits(item: Mapping[str, Any]) -> tuple[float, float]:
-    """Return limits of the x-axis: where the profile is inside the figure, plus a margin."""
-    values, increases = (np.array(item["profile"][key]) for key in ("values", "increases"))
-    inside = np.flatnonzero(increases < HIGHEST_INCREASE)
-    ends = [item["low"], item["high"], values[inside[0]], values[inside[-1]]]
-    low, high = (float(end([x for x in ends if x is not None])) for end in (min, max))
-    margin = max((high / low) ** 0.05, 1.0002)
-    return max(float(values[0]), low / margin), min(float(values[-1]), high * margin)

@@ -9,8 +9,8 @@ from plotly.graph_objects import Figure, Scatter
 
 from biogrip.arrays import Array
 from biogrip.digits import significant, with_unit
-from biogrip.figures.results import Fit, fit_of
-from biogrip.figures.style import COLORS, MEASURED, TARGET, is_over_decades, scale_of_fit
+from biogrip.figures.results import Fit, fit_of, scale_of_fit
+from biogrip.figures.style import COLORS, MEASURED, TARGET, is_over_decades
 from biogrip.fit.methods import Method
 from biogrip.records.identifications import read_identifications
 from biogrip.records.traces import read_measurements
@@ -54,17 +54,9 @@ def fits_of(
 
 
 def explorer(cases: Sequence[tuple[str, Fits]]) -> str:
-    """Return an interactive figure of traces, targets and fits, with a menu of the cases.
+    """Return an interactive figure of the fits of each case, by title, with a menu of the cases.
 
-    Parameters
-    ----------
-    cases
-        Title and fits of each case.
-
-    Returns
-    -------
-    str
-        HTML element that holds Plotly's library and needs no network.
+    It is an HTML element that holds Plotly's library and needs no network.
     """
     lines = [_lines(fits) for _, fits in cases]
     axes = [_axes(fits[0][1]) for _, fits in cases]

@@ -67,24 +67,12 @@ class Entry:
 
 
 def write_report(study: Study, config: str, files: Mapping[str, list[Path]], page: Path) -> None:
-    """Write the report of a study.
+    """Write the report of a study, with its config, YAML, as HTML.
 
-    Parameters
-    ----------
-    study, config
-        The study, and the whole config as YAML.
-    files
-        By what they have: `figures`, PNG; `tables`, HTML, and in their order their `downloads`,
-        CSV; `captions`, text, named like what they are of; of all cases in their order
-        `identifications`, `verdicts` and `measurements` with the judged trace; `calibrated`
-        grippers of the cases that have them, which the file names tell.
-    page
-        HTML.
-
-    Raises
-    ------
-    BiogripError
-        If an input cannot be read.
+    Files are, by what they have: `figures`, PNG; `tables`, HTML, and in their order their
+    `downloads`, CSV; `captions`, text, named like what they are of; of all cases in their order
+    `identifications`, `verdicts` and `measurements` with the judged trace; `calibrated` grippers of
+    the cases that have them, which the file names tell.
     """
     texts = {
         (path.parent.name, path.stem): " ".join(path.read_text(encoding="utf-8").split())
@@ -146,13 +134,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
 
 
 def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -> None:
-    """Write what the judged trace of a case tells, with figures, PNG.
-
-    Raises
-    ------
-    BiogripError
-        If an input cannot be read.
-    """
+    """Write what the judged trace of a case tells, with figures, PNG."""
     text = _TEMPLATES.get_template("summary.html.j2").render(
         case=case,
         trace=case.file or f"seed {TRACE} of the simulated traces",

@@ -25,7 +25,6 @@ from biogrip.physics.maxwell_models import MAXWELL_MODELS
 from biogrip.physics.sample_model import (
     MOST_BRANCHES,
     SINGLE_BRANCH,
-    Parameter,
     SampleModel,
     Turned,
     in_pascals,
@@ -159,26 +158,3 @@ class Published(Block):
 
 UNPUBLISHED = Published(table=None, identified={}, error_percent={})
 """Record of a sample that the paper does not have."""
-
-
-@dataclass(frozen=True)
-class Truth:
-    """Model and true parameters of a simulated sample, and the paper's results for it."""
-
-    title: str
-    """Name in print."""
-    sample: Sample
-    """Its constitutive model."""
-    parameters: Mapping[str, float]
-    """True values by name, SI units; empty if the trace was recorded."""
-    published: Published
-    """Results of the paper."""
-
-    @property
-    def model(self) -> SampleModel:
-        """Constitutive model."""
-        return self.sample.model
-
-    def target(self, quantity: list[Parameter]) -> float | None:
-        """Return the true value of a parameter or a sum; None if the trace was recorded."""
-        return sum(self.parameters[p.name] for p in quantity) if self.parameters else None

@@ -221,12 +221,10 @@ class Burst(Block):
 
 @dataclass(frozen=True)
 class Sampling:
-    """Sampling of the rotation: a uniform rate, listed times, or bursts."""
+    """Sampling of the rotation: a uniform rate or bursts."""
 
     rate_Hz: float = 0.0
     """Uniform rate, from 0 to the end of the protocol."""
-    times_s: tuple[float, ...] = ()
-    """Sampling times, instead of a rate."""
     bursts: tuple[Burst, ...] = ()
     """Bursts, instead of a rate."""
 
@@ -234,6 +232,4 @@ class Sampling:
         """Return the sampling times in s, (n_samples,), of a protocol that ends at `end_s`."""
         if self.bursts:
             return np.concatenate([burst.times_s for burst in self.bursts])
-        if self.times_s:
-            return np.array(self.times_s, dtype=float)
         return sample_times(end_s, self.rate_Hz)

@@ -1,12 +1,11 @@
 """Results of stages: what was identified, a row a seed, and verdicts on a trace, JSON.
 
-Identifications by each method have a row per seed, with histories beside them and processor times,
-which are not reproducible, in a file of their own. Further files of rows have the fits of every
-sample model, the intervals of coverage tests, the difference of the linear from the nonlinear
-model, and identifications under other interpretations of the paper.
+Identifications by each method have a row per seed, with histories beside them. Further files of
+rows have the fits of every sample model, the intervals of coverage tests, the difference of the
+linear from the nonlinear model, and identifications under other interpretations of the paper.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,16 +50,9 @@ ENCODABLE = "encodable_misfit"
 """Last column of the identifications of a case: lowest misfit in rad that genes can encode of the
 trace, see `lowest_encodable`; empty if it was recorded."""
 
-TIMINGS = RowFile(
-    "processor times",
-    ("case", "method", "seed", "cpu_s"),
-    "results/timings/{case}/{method}/{batch}.csv",
-)
-
 MODEL_FITS = RowFile(
     "fits of models",
     ("case", "model", "seed", "parameters", "samples", "misfit"),
-    "results/selection/{case}/{batch}.csv",
 )
 
 INTERVALS = RowFile(
@@ -69,7 +61,6 @@ INTERVALS = RowFile(
         *("case", "quantity", "seed", "estimate", "low", "high", "estimate_rest_known"),
         *("verdict", "shown_low", "shown_high"),
     ),
-    "results/coverage/{case}/{batch}.csv",
     words=("verdict",),
 )
 """A row per quantity and seed. Quantities that traces should determine have an estimate, its
@@ -79,7 +70,6 @@ quantities also have the verdict and limits that users are shown, from whole pro
 DIFFERENCES = RowFile(
     "a comparison",
     ("case", "reference_angle_deg", "torque_factor", "difference_over_peak"),
-    "results/linearisation.csv",
 )
 
 INTERPRETATIONS = RowFile(
@@ -89,7 +79,6 @@ INTERPRETATIONS = RowFile(
         *(parameter.column for parameter in SINGLE_BRANCH),
         *("misfit", "noise_rms", "last_improvement"),
     ),
-    "results/interpretations/{case}.csv",
     words=("interpretation",),
 )
 
@@ -128,8 +117,6 @@ class Record:
     answer: Identification
     noise_rms: float | None
     """RMS of the noise in the trace; None for a recorded trace."""
-    cpu_s: float
-    """Processor time in seconds; the mean over seeds that are identified together."""
 
     def by_column(self, identified: Array) -> dict[str, Any]:
         """Return identified values, (n_searched, ...), fixed ones, and 0 for missing elements."""
@@ -181,11 +168,6 @@ def _history(record: Record) -> dict[str, Array]:
     }
 
 
-def write_timings(path: Path, records: list[Record]) -> None:
-    """Write the processor time of each seed as CSV."""
-    TIMINGS.write(path, ((r.case, r.method, r.seed, f"{r.cpu_s:.6f}") for r in records))
-
-
 def read_identifications(path: Path, method: str | None = None) -> "pd.DataFrame":
     """Read identifications by all methods or by one, of which there must be some."""
     frame = read_frame(path, "identifications", (*LEADING, *TRAILING))
@@ -197,17 +179,12 @@ def read_identifications(path: Path, method: str | None = None) -> "pd.DataFrame
     return chosen
 
 
-def read_histories(
-    path: Path,
-    method: str,
-    values: Sequence[str],
-    chosen: "Callable[[pd.Series[int]], pd.Series[bool]]" = lambda seed: seed >= 0,
-) -> "pd.DataFrame":
-    """Read columns of one method's histories of the chosen seeds."""
+def read_histories(path: Path, method: str, values: Sequence[str]) -> "pd.DataFrame":
+    """Read columns of one method's histories."""
     import pandas as pd
 
     frame = pd.DataFrame(read_arrays(path))
-    kept = (frame["method"] == method) & chosen(frame["seed"])
+    kept = frame["method"] == method
     return frame.loc[kept, ["seed", "generation", *values]].reset_index(drop=True)
 
 
@@ -262,11 +239,6 @@ def exact_data(
 def read_verdicts(path: Path) -> dict[str, Any]:
     """Read a file of verdicts."""
     return read_object(path, "verdicts", {"quantities", "trades", "notes"}, "holds no verdicts")
-
-
-def bounded_on_a_side(verdicts: dict[str, Any]) -> set[str]:
-    """Return the quantities whose verdict is not just an upper bound."""
-    return {q["quantity"] for q in verdicts["quantities"] if q["verdict"] != "bounded above"}
 
 
 def _finding(finding: "Finding", *, rejected: bool) -> dict[str, Any]:

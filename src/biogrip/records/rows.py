@@ -42,8 +42,6 @@ class RowFile:
     """Content of a row, for messages."""
     columns: tuple[str, ...]
     """Column names."""
-    path: str
-    """Path, with wildcards."""
     words: tuple[str, ...] = ()
     """Columns to read as text even if they look like numbers."""
 

@@ -1,26 +1,17 @@
 """Files of targets, CSV, and of measurements, npz: traces without and with noise."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.digits import counted
 from biogrip.errors import BiogripError
-from biogrip.physics.instruments import INSTRUMENTS, Instrument
+from biogrip.physics.instruments import Instrument
 from biogrip.records.rows import read_arrays, write_arrays, write_rows
 from biogrip.traces.reader import Recognised
 
-TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
-
-_WITHOUT_JAWS = {
-    ("time_s", each.controlled.column, each.read.column)
-    for each in INSTRUMENTS.values()
-    if not each.has_jaws
-}
 # More than any instrument gives, and few enough that results on different processors agree.
 _DIGITS = 9
 _WRITTEN = f"{{:.{_DIGITS - 1}e}}"
@@ -52,30 +43,25 @@ class Measurements:
 
 
 def write_target(
-    path: Path, time_s: Array, torque_Nm: Array, rotation_rad: Array, jaw_force_N: Array
+    path: Path,
+    instrument: Instrument,
+    time_s: Array,
+    controlled: Array,
+    read: Array,
+    jaw_force_N: Array | None = None,
 ) -> None:
-    """Write a noise-free trace of the gripper as CSV, all arrays (n_samples,).
+    """Write a noise-free trace as CSV, all arrays (n_samples,), with the force if there are jaws.
 
     Numbers have nine significant digits. The force has these of its largest value, since values
     near its zeros are rounding errors.
     """
-    largest = float(np.max(np.abs(jaw_force_N)))
-    digit = 10.0 ** (math.floor(math.log10(largest)) + 1 - _DIGITS) if largest else 1.0
-    force = np.round(jaw_force_N / digit) + 0.0
-    _write_target(path, TARGET_COLUMNS, time_s, torque_Nm, rotation_rad, force * digit)
-
-
-def write_target_without_jaws(
-    path: Path, time_s: Array, controlled: Array, read: Array, instrument: Instrument
-) -> None:
-    """Write a noise-free trace of another instrument, as `write_target` does."""
-    columns = ("time_s", instrument.controlled.column, instrument.read.column)
-    _write_target(path, columns, time_s, controlled, read)
-
-
-def _write_target(
-    path: Path, columns: tuple[str, ...], time_s: Array, controlled: Array, *simulated: Array
-) -> None:
+    columns = ["time_s", instrument.controlled.column, instrument.read.column]
+    simulated = [read]
+    if jaw_force_N is not None:
+        largest = float(np.max(np.abs(jaw_force_N)))
+        digit = 10.0 ** (math.floor(math.log10(largest)) + 1 - _DIGITS) if largest else 1.0
+        columns.append("jaw_force_N")
+        simulated.append((np.round(jaw_force_N / digit) + 0.0) * digit)
     rows = (
         (f"{t:.10g}", f"{x:.10g}", *map(_WRITTEN.format, values))
         for t, x, *values in zip(time_s, controlled, *simulated, strict=True)
@@ -89,26 +75,13 @@ def as_written(rotation_rad: Array) -> Array:
 
 
 def read_target(path: Path) -> tuple[Array, Array, Array]:
-    """Read time, what is controlled and what is read of a target, all of them finite."""
+    """Read time, what is controlled and what is read of a target."""
     # Without pandas, which most jobs that read a target do not import.
     try:
-        with path.open() as stream:
-            header = tuple(stream.readline().strip().split(","))
-            if header != TARGET_COLUMNS and header not in _WITHOUT_JAWS:
-                raise BiogripError(
-                    f"{path}, line 1: found the columns {', '.join(header)}; "
-                    f"a target has {', '.join(TARGET_COLUMNS)}."
-                )
-            values = np.loadtxt(stream, delimiter=",", ndmin=2)
+        values = np.loadtxt(path, delimiter=",", skiprows=1, usecols=(0, 1, 2), ndmin=2)
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as a target: {error}.") from error
-    if values.shape[1] != len(header):
-        found = f"found {counted(values.shape[1], 'column')} in the rows"
-        raise BiogripError(f"{path}: {found}, allowed are {len(header)}.")
-    for row, column in np.argwhere(~np.isfinite(values))[:1]:
-        place = f"{path}, line {row + 2}, {header[column]}"
-        raise BiogripError(f"{place}: found {values[row, column]}, allowed is a finite number.")
-    time_s, controlled, read, *_ = values.T
+    time_s, controlled, read = values.T
     return time_s, controlled, read
 
 
@@ -132,8 +105,3 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
         raise BiogripError(f"{path}: has no trace of seed {min(missing)}.")
     chosen = traces if seeds is None else {seed: traces[seed] for seed in seeds}
     return Measurements(found["time_s"], found.get("target"), chosen, sd_rad=found.get("sd"))
-
-
-def each_trace(path: Path) -> Iterator[Array]:
-    """Yield the noisy traces in a file, (n_samples,) each."""
-    yield from read_measurements(path).rotation_rad.values()

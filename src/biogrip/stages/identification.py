@@ -2,12 +2,11 @@
 
 A job has a batch of the seeds of a case. `identify` writes what a method finds in each trace, with
 the history of its search; `join` puts the batches of a case together, a row per method and seed,
-and `add_encodable` adds what the genes could have held of each trace.
-`fit` writes the misfits of all sample models, for model selection. Traces are fitted in groups,
-which are small enough for little memory; results do not depend on the grouping.
+with what the genes could have held of each trace. `fit` writes the misfits of all sample models,
+for model selection. Traces are fitted in groups, which are small enough for little memory; results
+do not depend on the grouping.
 """
 
-import time
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -16,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import parts
-from biogrip.errors import BiogripError
 from biogrip.fit.genome import lowest_encodable
 from biogrip.fit.methods import identifier
 from biogrip.fit.nested_fits import fit_models
@@ -28,7 +26,6 @@ from biogrip.records.identifications import (
     columns,
     write_histories,
     write_identifications,
-    write_timings,
 )
 from biogrip.records.rows import join_arrays, read_arrays, read_rows, write_arrays, write_rows
 from biogrip.records.traces import read_measurements
@@ -51,9 +48,8 @@ def identify(
     calibrated: list[Path],
     parameters: Path,
     history: Path,
-    timing: Path,
 ) -> None:
-    """Identify a batch of seeds with one method; traces identified together share their time."""
+    """Identify a batch of seeds with one method."""
     case_problem = case.problem.to_identify().calibrated(calibrated)
     identified = identifier(method, case.method(method))
     recorded = read_measurements(measurements, list(seeds))
@@ -65,73 +61,47 @@ def identify(
     for group in groups(seeds):
         traces = [recorded.rotation_rad[seed] for seed in group]
         rngs = [stream(case.study.study_seed, case.name, seed, method) for seed in group]
-        start = time.process_time()
         problems = case_problem.of_each(recorded.time_s, traces, condensed=condensed)
         answers = identified(problems, rngs, progress.within)
-        cpu_s = (time.process_time() - start) / len(group)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
             noise = None if recorded.target_rad is None else rms(trace - recorded.target_rad)
-            records.append(Record(*whose, seed, answer, noise, cpu_s))
+            records.append(Record(*whose, seed, answer, noise))
         progress.done(len(group))
     write_identifications(parameters, records)
     write_histories(history, records)
-    write_timings(timing, records)
 
 
 def join(
     case: Case,
     batches: list[Path],
     history_batches: list[Path],
+    measurements: list[Path],
+    calibrated: list[Path],
     parameters: Path,
     history: Path,
 ) -> None:
-    """Join batches in the order of their methods and seeds.
-
-    Raises
-    ------
-    BiogripError
-        If a seed is missing or occurs twice.
-    """
-    header = columns(case.sample.model)
-    rows = [row for batch in batches for row in read_rows(batch, header)[1:]]
-    rows = [row for row in rows if int(row[2]) < case.seeds]
-    wanted = [(method, seed) for method in case.study.methods for seed in range(case.seeds)]
-    if [(row[1], int(row[2])) for row in rows] != wanted:
-        names, methods = ", ".join(map(str, batches)), ", ".join(case.study.methods)
-        raise BiogripError(
-            f"{names}: do not hold each of the seeds 0 to {case.seeds - 1} once for each of "
-            f"{methods}. Delete them and run again."
-        )
-    write_rows(parameters, header, rows)
-    histories = join_arrays([read_arrays(batch) for batch in history_batches])
-    kept = histories["seed"] < case.seeds
-    write_arrays(history, {name: values[kept] for name, values in histories.items()})
-
-
-def add_encodable(
-    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
-) -> None:
-    """Add the lowest encodable misfit of each trace to all identifications of a case.
+    """Join the batches of all methods, and add the lowest encodable misfit of each trace.
 
     It is looked for around the end of every run, since these surround the continuous optimum.
     """
-    header, *rows = read_rows(identifications, columns(case.sample.model))
+    header = columns(case.sample.model)
+    rows = [row for batch in batches for row in read_rows(batch, header)[1:]]
     problem = case.problem.to_identify().calibrated(calibrated)
     searched = problem.searched.parameters
     ranges = [problem.ranges[parameter.range_name] for parameter in searched]
     ends = defaultdict(list)
     for row in rows:
-        ends[int(row[2])].append([float(row[header.index(p.column)]) for p in searched])
-    lowest: dict[int, str] = {}
+        ends[row[2]].append([float(row[header.index(p.column)]) for p in searched])
+    lowest: dict[str, str] = {}
     for file in measurements:
         recorded = read_measurements(file)
-        traces = {seed: trace for seed, trace in recorded.rotation_rad.items() if seed in ends}
+        traces = recorded.rotation_rad
         posed = problem.weighted(recorded.sd_rad).of_each(recorded.time_s, traces.values())
-        for seed, of_trace in zip(traces, posed, strict=True):
+        for seed, of_trace in zip(map(str, traces), posed, strict=True):
             misfit = lowest_encodable(of_trace.misfit, ranges, np.array(ends[seed]))
             lowest[seed] = f"{misfit:.6e}"
-    added = ([*row, lowest.get(int(row[2]), "")] for row in rows)
-    write_rows(identifications, (*header, ENCODABLE), added)
+    write_rows(parameters, (*header, ENCODABLE), ([*row, lowest.get(row[2], "")] for row in rows))
+    write_arrays(history, join_arrays([read_arrays(batch) for batch in history_batches]))
 
 
 def fit(

@@ -16,7 +16,6 @@ from contextlib import contextmanager, redirect_stderr
 from dataclasses import MISSING, fields
 from functools import cache
 from importlib.metadata import version
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -29,30 +28,15 @@ from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.study import Case, Study
 
-# Least and most seeds of a job, and the number of jobs aimed at in between, as the key batch_size
-# says.
-_SMALLEST, _LARGEST, _USUAL = 500, 1000, 8
 _BATCH = re.compile(r"seeds_(\d+)-(\d+)")
 _OF_CASE = [field.name for field in fields(CaseBlock)]
 
 
 def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any]:
-    """Return some keys of a study's config as plain values, those of a case laid over them.
+    """Return some keys of a study, or of a case or a point of a sweep, plain; None for a default.
 
-    Parameters
-    ----------
-    study
-        The study.
-    keys
-        Names of blocks, or of single keys in a block, e.g. ``measurement.noise``; or
-        ``cases.NAME.KEY`` for a key of a case with the study's blocks merged in.
-    case
-        Name of the case, or of a point of a sweep; by default the study's own keys.
-
-    Returns
-    -------
-    values
-        By key; None for a default.
+    Keys name blocks, or single keys in a block, e.g. ``measurement.noise``; or ``cases.NAME.KEY``
+    for a key of a case with the study's blocks merged in.
     """
     blocks = study.plain
     if case:
@@ -155,23 +139,10 @@ def seeds_of(batch: str) -> range:
     return range(int(found[1]), int(found[2]) + 1)
 
 
-def batch_names(seeds: int, batch_size: int | None = None, folder: Path | None = None) -> list[str]:
-    """Return the names of the batches of a case.
-
-    Seeds are cut at multiples of the batch size, by default one that makes start-up a small part of
-    a job. Batches that a folder has files of are kept, so that more seeds renew none of them.
-    """
-    size = batch_size or min(max(_SMALLEST, -(-seeds // _USUAL)), _LARGEST)
-    there = {file.stem for file in (folder.glob("seeds_*") if folder else ())}
-    edges: list[tuple[int, int]] = []
-    covered = 0
-    kept = sorted((it.start, it.stop) for it in map(seeds_of, filter(_BATCH.fullmatch, there)))
-    for first, stop in [*kept, (seeds, seeds)]:
-        if covered <= first <= stop <= seeds:
-            multiples = range((covered // size + 1) * size, first, size)
-            edges += [*pairwise([covered, *multiples, first]), (first, stop)]
-            covered = stop
-    return [f"seeds_{first}-{stop - 1}" for first, stop in edges if first < stop]
+def batch_names(seeds: int, size: int) -> list[str]:
+    """Return the names of the batches of a case, cut at multiples of their size."""
+    starts = range(0, seeds, size)
+    return [f"seeds_{first}-{min(first + size, seeds) - 1}" for first in starts]
 
 
 @contextmanager

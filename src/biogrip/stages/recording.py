@@ -26,13 +26,7 @@ from biogrip.traces.reader import Recognised, Recording, read_recording
 
 
 def record(case: Case, recorded: Path, measurements: Path) -> None:
-    """Read, check and convert the user's file, and write it as Parquet.
-
-    Raises
-    ------
-    BiogripError
-        With file, line and column, if the trace cannot be used.
-    """
+    """Read, check and convert the user's file; errors name file, line and column."""
     if case.columns.load is not None:
         raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
     trace = read_checked(recorded, case.gripper, case.problem, case.columns)

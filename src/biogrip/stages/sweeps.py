@@ -36,7 +36,6 @@ POINTS = RowFile(
         *("near_noise_share", "basin_share"),
         *("median_absolute_error_percent", "basin_error_percent", "bound_percent"),
     ),
-    "results/robustness/{sweep}.csv",
     words=("row", "column"),
 )
 
@@ -53,18 +52,8 @@ def judge(
 ) -> None:
     """Compute errors and shares of successful seeds at every point of a sweep.
 
-    Parameters
-    ----------
-    study
-        The study.
-    sweep
-        Name of the sweep.
-    identifications
-        Batches of the points, in folders named like point and method.
-    calibrated
-        Calibrations, named like their point.
-    points
-        The file to write.
+    Batches of identifications are in folders named like point and method, calibrations are named
+    like their point.
     """
     files: dict[tuple[str, str], list[Path]] = {}
     for path in identifications:
@@ -100,7 +89,7 @@ def _rows(
                 found = found.assign(noise_rms=_resolution_rad(case, true))
             near = float(np.mean(near_noise(found, study.near_noise_tolerance)))
             for judged in _judged(case, true, found, bounds[point.name], heads, near):
-                yield point.name, point.row.text, point.column.text, method, *judged
+                yield point.name, point.row.shown, point.column.shown, method, *judged
 
 
 def _judged(

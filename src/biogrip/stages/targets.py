@@ -21,7 +21,7 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.nonlinear import correction
-from biogrip.physics.protocol import TorqueHistory, sample_times, torque_at, torque_history
+from biogrip.physics.protocol import TorqueHistory, sample_times, torque_at
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import compute_grip, jaw_force, simulated_rotation
 from biogrip.physics.unilateral import unilateral_response
@@ -32,7 +32,6 @@ from biogrip.records.traces import (
     read_target,
     write_measurements,
     write_target,
-    write_target_without_jaws,
 )
 from biogrip.study.study import Case, Study
 from biogrip.terminal import warn
@@ -41,21 +40,17 @@ from biogrip.terminal import warn
 def simulate(case: Case, target: Path) -> None:
     """Simulate a case, and write its target, CSV.
 
-    Raises
-    ------
-    BiogripError
-        If the response is not finite, or turns the arms beyond the stroke of the comb drives.
+    A response that is not finite, or turns the arms beyond the combs' stroke, is an error.
     """
-    torque = torque_history(case.phases, deforms=case.instrument.deforms)
-    network = case.sample.model.sample(case.parameters)
-    time_s = case.sampling.over(torque.end_s)
-    controlled = torque_at(torque, time_s)
+    time_s = case.sampling.over(case.torque.end_s)
+    controlled = torque_at(case.torque, time_s)
     if not case.instrument.has_jaws:
-        read = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0]
+        device = case.gripper, case.network, case.torque
+        read = simulated_rotation(*device, time_s, nonlinear=False)[0]
         _check_finite(case, time_s, read)
-        write_target_without_jaws(target, time_s, controlled, read, case.instrument)
+        write_target(target, case.instrument, time_s, controlled, read)
         return
-    rotation, force = _response(case, network, torque, time_s)
+    rotation, force = _response(case, time_s)
     _check_finite(case, time_s, rotation)
     largest = float(np.max(np.abs(rotation)))
     if largest > case.stroke_rad:
@@ -63,20 +58,18 @@ def simulate(case: Case, target: Path) -> None:
             f"the protocol turns the arms by {1e3 * largest:.4g} mrad, allowed is what the comb "
             f"drive's stroke leaves, {1e3 * case.stroke_rad:.4g} mrad."
         )
-    _warn_if_contact_is_lost(case, network, torque)
-    write_target(target, time_s, controlled, rotation, force)
+    _warn_if_contact_is_lost(case)
+    write_target(target, case.instrument, time_s, controlled, rotation, force)
 
 
-def _response(
-    case: Case, network: Network, torque: TorqueHistory, time_s: Array
-) -> tuple[Array, Array]:
+def _response(case: Case, time_s: Array) -> tuple[Array, Array]:
     """Return the rotation of the left arm and the jaw force, (n_samples,) each."""
-    gripper, nonlinear = case.gripper, case.nonlinear_target
+    device, nonlinear = (case.gripper, case.network, case.torque), case.nonlinear_target
     if case.unilateral:
-        found = unilateral_response(gripper, network, torque, time_s)
+        found = unilateral_response(*device, time_s)
         return found.rotation_rad[0], found.jaw_force_N
-    rotation = simulated_rotation(gripper, network, torque, time_s, nonlinear=nonlinear)
-    return rotation[0], jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear)[0]
+    rotation = simulated_rotation(*device, time_s, nonlinear=nonlinear)
+    return rotation[0], jaw_force(*device, time_s, nonlinear=nonlinear)[0]
 
 
 def _check_finite(case: Case, time_s: Array, simulated: Array) -> None:
@@ -90,8 +83,9 @@ def _check_finite(case: Case, time_s: Array, simulated: Array) -> None:
         )
 
 
-def _warn_if_contact_is_lost(case: Case, network: Network, torque: TorqueHistory) -> None:
-    grip = compute_grip(case.gripper, network, torque, nonlinear=case.nonlinear_target)
+def _warn_if_contact_is_lost(case: Case) -> None:
+    device = case.gripper, case.network, case.torque
+    grip = compute_grip(*device, nonlinear=case.nonlinear_target)
     if words := grip.words():
         then = "without adhesion contact is lost there (contact: unilateral simulates that)"
         if case.unilateral:
@@ -132,11 +126,6 @@ ANGLES_DEG = np.arange(40.0, 91.0, 5.0)
 FACTORS = np.geomspace(0.25, 32.0, 15)
 
 
-def network_of(case: Case) -> Network:
-    """Return the network of a case's sample."""
-    return case.sample.model.sample(case.parameters)
-
-
 def compare(study: Study, differences: Path) -> None:
     """Write a row per case, angle and torque factor, CSV."""
     DIFFERENCES.write(differences, _rows(study))
@@ -144,12 +133,12 @@ def compare(study: Study, differences: Path) -> None:
 
 def _rows(study: Study) -> Iterator[tuple[str, ...]]:
     for name, case in study.cases.items():
-        torque, model = torque_history(case.phases), case.sample.model
+        model = case.sample.model
         values = [case.parameters[p] for p in model.names]
         network = model.network(np.tile(values, (len(FACTORS), 1)))
         for angle in ANGLES_DEG:
             turned = replace(case.gripper, reference_angle_deg=float(angle))
-            shares = difference_over_peak(turned, network, torque, FACTORS)
+            shares = difference_over_peak(turned, network, case.torque, FACTORS)
             for factor, share in zip(FACTORS, shares, strict=True):
                 yield name, f"{angle:g}", f"{factor:.4g}", f"{share:.4g}"
 

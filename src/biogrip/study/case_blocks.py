@@ -244,16 +244,15 @@ class CaseBlock(Shared):
         if end_s > LONGEST_S:
             text = f"found a protocol of {end_s:g} s, allowed are at most {LONGEST_S:g} s"
             yield ("sample", "model"), f"{text} with {model}."
-        if not self.measurement.times_s and rate_Hz * SHORTEST_S > 1:
+        if rate_Hz * SHORTEST_S > 1:
             text = f"found {rate_Hz:g}, allowed is at most {1 / SHORTEST_S:g} Hz with {model}."
             yield ("measurement", "rate_Hz"), text
 
     def _sampling_problems(self) -> Iterator[Problem]:
         """Find too few or too many samples, or such as do not follow each other in the protocol."""
         measured, end = self.measurement, self.protocol.end_s
-        key = "bursts" if measured.bursts else "times_s" if measured.times_s else "rate_Hz"
-        bursts = sum(burst.samples for burst in measured.bursts)
-        samples = bursts or len(measured.times_s) or end * measured.rate_Hz + 1
+        key = "bursts" if measured.bursts else "rate_Hz"
+        samples = sum(burst.samples for burst in measured.bursts) or end * measured.rate_Hz + 1
         needed = len(self.searched) + measured.fits_offset + measured.fits_drift + 1
         coloured = measured.coloured and key == "rate_Hz"
         most = MOST_SAMPLES if coloured else _MOST_SAMPLES
@@ -263,9 +262,9 @@ class CaseBlock(Shared):
             how = " with a coloured noise model" if coloured else ""
             yield (key,), f"{found}; allowed are {needed} to {most}{how}."
             return
-        spans = [(it.from_s, it.from_s + (it.samples - 1) / it.rate_Hz) for it in measured.bursts]
         last = -1.0
-        for index, (first, ends) in enumerate(spans or [(time, time) for time in measured.times_s]):
+        for index, burst in enumerate(measured.bursts):
+            first, ends = burst.from_s, burst.from_s + (burst.samples - 1) / burst.rate_Hz
             if not last < first <= ends <= end:
                 found = f"{first:g}" if first == ends else f"{first:g} to {ends:g}"
                 allowed = f"later than {max(last, 0):g} and at most {end:g} s"

@@ -114,10 +114,10 @@ class StudyConfig(Shared):
     case's name and the seed's number."""
     seeds: Annotated[int, Field(ge=1, le=1_000_000)]
     """Number of noisy traces of each case that are made and identified. Raising it keeps the
-    results there are."""
-    batch_size: Annotated[int | None, Field(ge=1, le=100_000)] = None
-    """Number of seeds per job. By default 500; for more than 4000 seeds, 1/8 of them, for more than
-    8000, 1000. Changes no result, only how much of a job is start-up."""
+    batches that are full."""
+    batch_size: Annotated[int, Field(ge=1, le=100_000)] = 500
+    """Number of seeds per job, by default 500. Changes no result, only how much of a job is
+    start-up."""
     actuator: CombDrive
     """The rotary comb drive (Table 2)."""
     methods: Annotated[

@@ -1,6 +1,6 @@
 """Config block of the measurement: sampling, noise, and the file of a recorded trace.
 
-A simulated trace has a rate, times or bursts, and a noise. A recorded one has a file, the names of
+A simulated trace has a rate or bursts, and a noise. A recorded one has a file, the names of
 its columns with their units, and what is known of its noise; what identifications fit along
 with the sample is the same for both.
 """
@@ -50,13 +50,9 @@ class MeasurementBlock(Block):
 
     rate_Hz: Annotated[float, Field(ge=1e-9, le=1e9)]
     """Sampling rate; the first sample is at t = 0."""
-    times_s: Annotated[
-        tuple[Annotated[float, Field(ge=0, le=1e9)], ...], Field(min_length=2, max_length=5000)
-    ] = ()
-    """Sampling times, ascending, instead of a uniform rate; more of them need rate_Hz or bursts."""
     bursts: Annotated[tuple[Burst, ...], Field(min_length=1, max_length=20_000)] = ()
     """Successive bursts of samples instead of a uniform rate, as of a camera that is fast after
-    every step. See docs/design.md."""
+    every step; of one sample each they are single times. See docs/design.md."""
     file: _Name = None
     """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. See
     "Your own measurement"."""
@@ -175,7 +171,7 @@ class MeasurementBlock(Block):
     @property
     def sampling(self) -> Sampling:
         """Sampling of the rotation."""
-        return Sampling(self.rate_Hz, self.times_s, self.bursts)
+        return Sampling(self.rate_Hz, self.bursts)
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that are in conflict, and what a recorded trace lacks."""
@@ -186,9 +182,9 @@ class MeasurementBlock(Block):
                 yield (key,), "does not go with sd, which says all of the noise."
         if self.scale == 0:
             yield ("scale",), "found 0, allowed is another number."
-        for key, other in (("bursts", "times_s"), ("fit_start", "start_s"), ("fit_start", "load")):
-            if getattr(self, key) and getattr(self, other) not in (None, ()):
-                yield (key,), f"does not go with {other}; allowed is one of them."
+        for other in ("start_s", "load"):
+            if self.fit_start and getattr(self, other) is not None:
+                yield ("fit_start",), f"does not go with {other}; allowed is one of them."
         if self.file is None:
             for key in _OF_FILE:
                 given = getattr(self, key)

@@ -14,7 +14,7 @@ from biogrip.keys import built, plain
 from biogrip.physics.contact import Contact
 from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.instruments import GRIPPER
-from biogrip.physics.models import CANDIDATES, UNPUBLISHED, Sample, Truth
+from biogrip.physics.models import CANDIDATES, UNPUBLISHED, Sample
 from biogrip.physics.protocol import Phase, torque_history
 from biogrip.physics.sample_model import with_fixed
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
@@ -76,11 +76,13 @@ class Case:
     """Number of traces; 1 for a recorded trace."""
     fixed = _of_case(lambda case: {name: float(it) for name, it in case.block.fixed.items()})
     """Parameters that are not identified, by name."""
-    truth = _of_case(lambda case: Truth(case.title, case.sample, case.parameters, case.published))
-    """True values of the sample, with the paper's results."""
     searched = _of_case(lambda case: case.problem.searched)
     """Sample model without fixed parameters."""
-    samples = _of_case(lambda case: len(case.sampling.over(torque_history(case.phases).end_s)))
+    torque = _of_case(lambda it: torque_history(it.phases, deforms=it.instrument.deforms))
+    """What the instrument holds over time."""
+    network = _of_case(lambda case: case.sample.model.sample(case.parameters))
+    """Springs and dampers of the simulated sample."""
+    samples = _of_case(lambda case: len(case.sampling.over(case.torque.end_s)))
     """Number of samples in a simulated trace."""
     methods = _of_case(lambda case: {it: case.method(it) for it in case.study.config.methods})
     """Settings of the study's identification methods by name."""
@@ -156,8 +158,8 @@ class Case:
     @property
     def interpretations(self) -> dict[str, "Case"]:
         """The case under each interpretation of the paper, by the interpretation's name."""
-        changes = {name: it.changes for name, it in self.study.config.interpretations.items()}
-        blocks = {name: overlaid(self.plain, changed) for name, changed in changes.items()}
+        readings = self.study.interpretations.items()
+        blocks = {name: overlaid(self.plain, reading.changes) for name, reading in readings}
         return {name: replace(self, block=built(CaseBlock, it)) for name, it in blocks.items()}
 
     @property
@@ -220,9 +222,7 @@ class Study:
     """Names of cases that the paper reports results of."""
     identifiers = _of_study(lambda study: {name: METHODS[name] for name in study.methods})
     """Declarations of the methods, by name."""
-    interpretation_titles = _of_study(
-        lambda study: {name: it.title for name, it in study.config.interpretations.items()}
-    )
+    interpretations = _of_study(lambda study: study.config.interpretations)
     shown = _of_study(lambda study: study.methods[0])
     """Method that tables and figures of a single method show."""
     shown_method = _of_study(lambda study: METHODS[study.shown])

@@ -43,10 +43,8 @@ class Value:
 
     name: str
     """Text for case names."""
-    text: str
-    """Text for files; numbers as in the config."""
     shown: str
-    """Text for the axis; numbers in the axis' unit."""
+    """Text for the axis and its table; numbers in the axis' unit."""
     overrides: dict[str, float | str]
     """Values that replace those of the case, by dotted key."""
 
@@ -99,9 +97,9 @@ class AxisBlock(Block):
         if isinstance(value, ValueBlock):
             inner = dict(sorted(value.changes.items()))
             overrides = {f"{key}.{name}": inner[name] for key in self.keys for name in inner}
-            return Value("-".join(map(_word, inner.values())), value.label, value.label, overrides)
+            return Value("-".join(map(_word, inner.values())), value.label, overrides)
         shown = value if isinstance(value, str) else f"{value / self.unit_in_si:.4g}"
-        return Value(_word(value), _text(value), shown, dict.fromkeys(self.keys, value))
+        return Value(_word(value), shown, dict.fromkeys(self.keys, value))
 
     def problems(self) -> Iterator[Problem]:
         """Refuse values of one name, and keys that no case may change."""
@@ -109,7 +107,7 @@ class AxisBlock(Block):
             if key.partition(".")[0] not in OVERRIDABLE:
                 text = f"found '{key}', allowed is a key in a block that a case may change."
                 yield ("key",), text + nearest(key, OVERRIDABLE)
-        shown = [value.text for value in self.levels]
+        shown = [value.shown for value in self.levels]
         for index, value in enumerate(shown):
             if value in shown[:index]:
                 yield ("values", index), f"is called '{value}' like one before it."
@@ -200,10 +198,7 @@ def name_problems(sweeps: Mapping[str, SweepBlock], cases: Iterable[str]) -> Ite
         found.add(point.name)
 
 
-def _text(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.15g}"
-
-
 def _word(value: float | str) -> str:
     """Return a value as text that is safe in file names."""
-    return re.sub(r"[^A-Za-z0-9-]+", "_", _text(value))
+    text = value if isinstance(value, str) else f"{value:.15g}"
+    return re.sub(r"[^A-Za-z0-9-]+", "_", text)

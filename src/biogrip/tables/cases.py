@@ -1,24 +1,20 @@
 """What is found of each case: Tables 5 to 7 beside the paper's, and verdicts on its quantities."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
-from scipy.stats import binomtest
 
 from biogrip.arrays import Array
 from biogrip.digits import counted
 from biogrip.fit.methods import ALL, basins, near_noise, near_noise_words, share_with_limits
-from biogrip.judging.quantities import parameters_and_sum
-from biogrip.judging.verdicts import DETERMINED, NOT_DETERMINED, WIDE
-from biogrip.physics.models import Truth
-from biogrip.records.identifications import INTERVALS, read_identifications, read_verdicts
-from biogrip.records.rows import read_rows
+from biogrip.judging.verdicts import DETERMINED
+from biogrip.physics.models import Published
+from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.study.study import Case, Study
-from biogrip.tables.coverage import holds
 from biogrip.tables.layout import Column, Row, Table
 
 _COLUMNS = (
@@ -53,7 +49,7 @@ def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:
 
 def errors_of_case(case: Case, identifications: Path) -> Table:
     """Compare target and identified values of one case, given its identifications, CSV."""
-    truth, tolerance = case.truth, case.study.near_noise_tolerance
+    tolerance = case.study.near_noise_tolerance
     found = read_identifications(identifications, case.study.shown)
     of_case: Row = {"case": case.name}
     if found["noise_rms"].notna().all():
@@ -61,12 +57,12 @@ def errors_of_case(case: Case, identifications: Path) -> Table:
         of_case |= zip((f"near_noise_{end}" for end in ("share", "from", "to")), near, strict=True)
     rows = []
     for basin, runs in ({ALL: found} | basins(found, tolerance)).items():
-        for quantity in truth.model.quantities:
+        for quantity in case.sample.model.quantities:
             names = [parameter.name for parameter in quantity]
-            target = truth.target(quantity)
+            target = target_of(label := " + ".join(names), case.parameters)
             values = runs[[parameter.column for parameter in quantity]].sum(axis=1).to_numpy(float)
             of_quantity = {
-                "parameter": " + ".join(names),
+                "parameter": label,
                 "unit": quantity[0].unit,
                 "target": target,
                 "basin": basin,
@@ -76,13 +72,13 @@ def errors_of_case(case: Case, identifications: Path) -> Table:
             }
             for name, percent in _PERCENTILES.items():
                 of_quantity[f"{name}_identified"] = np.percentile(values, percent)
-            rows.append(of_case | of_quantity | _of_paper(truth, names, target))
-    number = f"Table {truth.published.table}. " if truth.published.table is not None else ""
+            rows.append(of_case | of_quantity | _of_paper(case.published, names, target))
+    number = f"Table {case.published.table}. " if case.published.table is not None else ""
     caption = (
-        f"{number}{truth.title}: target and identified parameters over "
+        f"{number}{case.title}: target and identified parameters over "
         f"{counted(len(found), 'seed')}. {_BASINS}"
-        if truth.parameters
-        else f"{truth.title}: parameters identified in the recorded trace."
+        if case.parameters
+        else f"{case.title}: parameters identified in the recorded trace."
     )
     return Table(caption, _columns(tolerance), rows)
 
@@ -94,38 +90,28 @@ def error_percent(target: float | None, identified: Array) -> Array:
     return 100 * (target - identified) / target
 
 
-def _of_paper(truth: Truth, names: list[str], target: float | None) -> Row:
+def _of_paper(published: Published, names: list[str], target: float | None) -> Row:
     """Return the paper's value and error; the error of a sum is computed from its values."""
-    identified = truth.published.identified
+    identified = published.identified
     if not all(name in identified for name in names):
         return {}
     value = float(sum(identified[name] for name in names))
-    error: Any = truth.published.error_percent.get(names[0])
+    error: Any = published.error_percent.get(names[0])
     if len(names) > 1:
         error = error_percent(target, np.array([value]))[0]
     return {"paper_identified": value, "paper_error_percent": error}
 
 
-def errors(study: Study, tables: list[Path]) -> Table:
-    """Join the error tables of all cases, CSV."""
+def errors(study: Study, identifications: list[Path]) -> Table:
+    """Join the tables of errors of all cases, given the identifications of each, CSV."""
+    files = zip(study.cases.values(), identifications, strict=True)
+    rows = [dict(row) for case, file in files for row in errors_of_case(case, file).rows]
+    for row in rows:
+        # Text, as ">100", stays; not every case or parameter has one.
+        with suppress(ValueError, TypeError, KeyError):
+            row["paper_error_percent"] = float(row["paper_error_percent"])
     columns = _columns(study.near_noise_tolerance)
-    names = [column.name for column in columns]
-    rows = [
-        {name: _cell(name, text) for name, text in zip(names, row, strict=True)}
-        for path in tables
-        for row in read_rows(path, names)[1:]
-    ]
     return Table(f"Identification errors of all cases. {_BASINS}", columns, rows)
-
-
-def _cell(name: str, text: str) -> str | float:
-    if name == "seeds":
-        return int(text)
-    try:
-        return float(text)
-    except ValueError:
-        # As ">100", which the paper prints for an error.
-        return text
 
 
 _VERDICT_COLUMNS = (
@@ -184,60 +170,3 @@ def target_of(quantity: str, parameters: Mapping[str, float]) -> float | None:
     """Return the true value of a parameter or a sum, None if unknown."""
     names = quantity.split(" + ")
     return sum(parameters[name] for name in names) if set(names) <= set(parameters) else None
-
-
-_COUNT_COLUMNS = (
-    Column("case", "Case"),
-    Column("quantity", "Quantity"),
-    Column("unit", "Unit"),
-    Column("target", "Target", 4),
-    Column("verdict", "Verdict"),
-    Column("seeds", "Seeds"),
-    Column("reached", "With this verdict"),
-    *(Column(f"reached_{end}_percent", f"{end.title()} %") for end in ("from", "to")),
-    Column("narrow", f"Within a factor of {WIDE:g}"),
-    Column("true", "True"),
-    Column("true_percent", "True %"),
-    *(Column(f"true_{end}_percent", f"{end.title()} %") for end in ("from", "to")),
-)
-
-
-def verdict_counts(study: Study, intervals: list[Path]) -> Table:
-    """Count verdicts of whole profiles, and those whose limits hold the true value."""
-    rows: list[Row] = []
-    estimated = pd.concat([INTERVALS.read(file) for file in intervals])
-    for name, case in study.cases.items():
-        found = estimated[estimated["case"] == name]
-        for quantity in parameters_and_sum(case.problem.searched):
-            mine = found[(found["quantity"] == quantity.label) & found["verdict"].notna()]
-            target = target_of(quantity.label, case.parameters)
-            head: Row = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
-            rows += [head | row for row in _counts(mine, target)]
-    percents = " or ".join(sorted({f"{100 * case.confidence:g}" for case in study.cases.values()}))
-    caption = (
-        f"Verdicts from whole profiles at {percents} %, as users are shown them, in every seed: "
-        "how often each is reached, with the 95 % interval of its share, and how often its limits "
-        "hold the true value, with the 95 % interval of that share (Clopper and Pearson)."
-    )
-    return Table(caption, _COUNT_COLUMNS, rows)
-
-
-def _counts(found: pd.DataFrame, target: float | None) -> Iterator[Row]:
-    """Yield a row for every verdict on a quantity."""
-    for verdict, mine in found.groupby("verdict"):
-        count = len(mine)
-        row: Row = {"target": target, "verdict": verdict, "seeds": len(found), "reached": count}
-        row |= _interval("reached", count, len(found))
-        if verdict == DETERMINED:
-            row["narrow"] = np.sum(mine["shown_high"] <= WIDE**2 * mine["shown_low"])
-        if verdict != NOT_DETERMINED and target is not None:
-            true = int(np.sum(holds(mine, target, "shown_")))
-            row |= {"true": true, "true_percent": 100 * true / count}
-            row |= _interval("true", true, count)
-        yield row
-
-
-def _interval(name: str, count: int, tried: int) -> Row:
-    """Return the 95 % interval of Clopper and Pearson for a share, in percent."""
-    low, high = binomtest(count, tried).proportion_ci(0.95, method="exact")
-    return {f"{name}_from_percent": 100 * low, f"{name}_to_percent": 100 * high}

@@ -15,10 +15,9 @@ import pandas as pd
 
 from biogrip.arrays import BoolArray
 from biogrip.fit.methods import share_with_limits
-from biogrip.physics.models import Truth
 from biogrip.records.identifications import read_histories, read_identifications
 from biogrip.records.rows import read_frame
-from biogrip.study.study import Study
+from biogrip.study.study import Case, Study
 
 REPLICATED, IN_PART, NOT = "replicated", "in part", "not"
 OUTSIDE = "outside the printed encoding"
@@ -86,8 +85,9 @@ def claim(place: str, words: str) -> Callable[[_Judge], _Judge]:
     return add
 
 
-def by_share(share: float) -> str:
-    """Judge something that holds for a share of seeds or settings."""
+def by_share(those: "BoolArray | pd.Series[bool] | float") -> str:
+    """Judge something by the share of seeds or settings for which it holds."""
+    share = np.mean(those)
     if share >= MOST:
         return REPLICATED
     return IN_PART if share > FEW else NOT
@@ -98,14 +98,14 @@ def by_number(printed: float, found: float) -> str:
     return REPLICATED if abs(found / printed - 1) <= CLOSE else NOT
 
 
-def by_value(share: float, *, encodable: bool, determined: bool) -> str:
+def by_value(near: BoolArray, *, encodable: bool, determined: bool) -> str:
     """Judge an identified value by the share of the seeds near it, if a run can come near.
 
     A value that the encoding has may still be one that no trace determines.
     """
     if not encodable:
         return OUTSIDE
-    return by_share(share) if determined else UNDECIDED
+    return by_share(near) if determined else UNDECIDED
 
 
 def is_encodable(printed: float, nearest: float) -> bool:
@@ -153,8 +153,7 @@ class LackingError(Exception):
 class Runs:
     """The genetic algorithm's runs on one of the paper's samples."""
 
-    case: str
-    truth: Truth
+    case: Case
     found: pd.DataFrame
     """Identifications, a row per seed; parameters by name."""
     history: pd.DataFrame
@@ -204,7 +203,7 @@ class Results:
     def case_of(self, number: int) -> str:
         """Return the name of the case of a table of the paper, else raise `LackingError`."""
         for name, case in self.study.cases.items():
-            if case.truth.published.table == number:
+            if case.published.table == number:
                 return str(name)
         raise LackingError(f"the study has no case of Table {number}")
 
@@ -218,14 +217,13 @@ def read_results(
 ) -> Results:
     """Read results from the files of all the paper's cases, in their order, and from tables."""
     runs = {}
-    for (name, case), identified, history in zip(
-        study.cases.items(), identifications, histories, strict=True
-    ):
-        truth, number = case.truth, case.truth.published.table
+    files = zip(study.cases.values(), identifications, histories, strict=True)
+    for case, identified, history in files:
+        number = case.published.table
         if study.shown == "genetic" and number is not None:
-            names = {p.column: p.name for p in truth.model.parameters}
+            names = {p.column: p.name for p in case.sample.model.parameters}
             found = read_identifications(identified, "genetic").rename(columns=names)
             best = read_histories(history, "genetic", ["best_misfit", *names])
-            runs[number] = Runs(name, truth, found, best.rename(columns=names))
+            runs[number] = Runs(case, found, best.rename(columns=names))
     of_study = {path.stem: read_frame(path, "a table", ()) for path in tables}
     return Results(study, of_study, runs, {file.stem: file for file in sweeps})

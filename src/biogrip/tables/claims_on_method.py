@@ -31,7 +31,6 @@ _FELT = 1.1
 
 @claim("section 2", "1.6e-3 µNm … corresponds to … about 17 V")
 def judge_voltage(results: Results) -> Judged:
-    """Judge the voltage of the first torque."""
     row = results.table("evidence").set_index("quantity").loc["voltage for 1.6e-09 N m"]
     volts = f"{row['this_study']:.3g} V"
     return Judged(_as_printed(row), f"Eqs. (7) to (9) with Table 2 give {volts}.")
@@ -44,9 +43,8 @@ def _as_printed(row: "pd.Series") -> str:
 
 @claim("section 2", "in order to maintain the grip with the sample")
 def judge_grip(results: Results) -> Judged:
-    """Judge whether the jaws press throughout."""
     lowest = results.table("mechanics").groupby("case", sort=False)["lowest_force_uN"].min()
-    tables = {case.truth.title: case.truth.published.table for case in results.study.cases.values()}
+    tables = {case.title: case.published.table for case in results.study.cases.values()}
     lowest = lowest[lowest.index.isin(tables)]
     said = ", ".join(f"{force:.2g} µN (Table {tables[title]})" for title, force in lowest.items())
     return Judged(
@@ -57,12 +55,11 @@ def judge_grip(results: Results) -> Judged:
 
 @claim("section 2", "samples … belonging to the range [30, 120] µm")
 def judge_sizes(results: Results) -> Judged:
-    """Judge whether the stroke suffices to close onto samples of all sizes."""
     found = results.table("contact")
     stroke = results.study.actuator.stroke_deg
     needed = np.degrees(1e-3 * found["closing_mrad"].to_numpy(float))
     return Judged(
-        by_share(float(np.mean(needed <= stroke))),
+        by_share(needed <= stroke),
         f"Closing onto samples of {found['size_um'].min():g} to {found['size_um'].max():g} µm "
         f"takes {np.nanmin(needed):.2g} to {np.nanmax(needed):.2g} degrees of the stroke of "
         f"{stroke:g}, with the reconstructed arm, and {found['voltage_V'].min():.3g} to "
@@ -72,7 +69,6 @@ def judge_sizes(results: Results) -> Judged:
 
 @claim("section 2", "[distance of the jaws] can be easily set-up … without affecting the results")
 def judge_jaw_gap(results: Results) -> Judged:
-    """Judge whether the gap matters: in the linear model only by the angle at contact."""
     angles = np.radians(results.table("contact")["reference_angle_deg"].to_numpy(float))
     scale = np.sin(angles) ** 2
     change = 100 * float(scale.max() / scale.min() - 1)
@@ -90,7 +86,6 @@ def judge_jaw_gap(results: Results) -> Judged:
     "capability … depends on the elastic properties of the device and on the implemented algorithm",
 )
 def judge_capability(results: Results) -> Judged:
-    """Judge whether the gripper's stiffness and the algorithm decide what is found."""
     points = results.of_sweep("robustness_gripper")
     found = points.groupby(["case", "quantity"], sort=False)["bound_percent"]
     ratio = (found.max() / found.min()).groupby("case", sort=False).max()
@@ -115,7 +110,6 @@ def _percents(low: float, high: float) -> str:
 
 @claim("section 2", "determined considering a standard impulse or a step response")
 def judge_free_arm(results: Results) -> Judged:
-    """Judge whether a step and an impulse on a free arm give its properties."""
     case = next(iter(results.study.cases.values()))
     test, arm = case.calibration, case.gripper.left
     time_s = sample_times(test.duration_s, test.rate_Hz)
@@ -138,9 +132,8 @@ def judge_free_arm(results: Results) -> Judged:
 
 @claim("section 3, (1)-(6)", "can be described by means of the following equations")
 def judge_equations(results: Results) -> Judged:
-    """Judge the printed balance of the massless node, which grows where it should decay."""
     case = results.study.cases[results.case_of(5)]
-    values = case.truth.parameters
+    values = case.parameters
     length_s = sum(phase.duration_s for phase in case.phases)
     decades = values["k"] / values["c"] * length_s / np.log(10)
     return Judged(
@@ -153,7 +146,6 @@ def judge_equations(results: Results) -> Judged:
 
 @claim("section 3, (4)-(6)", "an approximate linear set of equations can be obtained")
 def judge_linear_model(results: Results) -> Judged:
-    """Judge the linearised equations at the angle that is nearest to the gripper's."""
     table = results.table("linearisation")
     angle = results.study.gripper.reference_angle_deg
     used = table.iloc[(table["reference_angle_deg"] - angle).abs().argsort(kind="stable")]
@@ -168,7 +160,6 @@ def judge_linear_model(results: Results) -> Judged:
 
 @claim("section 3", "1.6 µNm is about 17 V, whereas … 0.32 µNm is about 7 V")
 def judge_voltages(results: Results) -> Judged:
-    """Judge both voltages for torques as section 3 prints them, and as it means them."""
     rows = results.table("evidence").set_index("quantity")
     misprinted = rows.loc["voltage for 1.6e-06 N m"]
     meant = [rows.loc[f"voltage for {torque} N m"] for torque in ("1.6e-09", "3.2e-10")]
@@ -183,7 +174,6 @@ def judge_voltages(results: Results) -> Judged:
 
 @claim("section 4", "three independent genes allows a faster convergence")
 def judge_splitting(results: Results) -> Judged:
-    """Tell what is known of the encoding in three genes."""
     table = results.table("methods").groupby("method", sort=False)["median_evaluations"].max()
     said = "; ".join(f"{name} {plain(count)}" for name, count in table.items())
     return Judged(
@@ -194,7 +184,6 @@ def judge_splitting(results: Results) -> Judged:
 
 @claim("section 4", "each one … few possible values (either 9 or 12)")
 def judge_genes(results: Results) -> Judged:
-    """Judge the numbers of values that a gene takes."""
     counts = sorted(set(results.table("gene_ranges")["values"].astype(int)))
     return Judged(
         altogether(REPLICATED if count in (9, 12) else NOT for count in counts),
@@ -204,13 +193,12 @@ def judge_genes(results: Results) -> Judged:
 
 @claim("section 4, Table 4", "range as reported in Table 4, with two significant digits")
 def judge_digits(results: Results) -> Judged:
-    """Judge whether the printed results can be encoded."""
     table = results.table("printed_values")
     found = table[table["quantity"] == "identified"]
     pairs = zip(found["printed"], found["nearest_encodable"], strict=True)
     fits = np.array([is_encodable(*pair) for pair in pairs]) & (found["within_range"] == "yes")
     return Judged(
-        by_share(float(fits.mean())),
+        by_share(fits),
         f"{fits.sum()} of the {len(fits)} values that Tables 5 to 7 call identified are two-digit "
         "numbers within the ranges of Table 4, rounded as printed.",
     )

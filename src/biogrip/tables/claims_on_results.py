@@ -49,17 +49,17 @@ _APART = 10.0
 def judge_values(results: Results, number: int) -> Judged:
     """Judge the identified values of a table, and the sum of those that trade."""
     runs = results.runs_of(number)
-    identified = runs.truth.published.identified
+    identified = runs.case.published.identified
     nearest = _nearest(results, runs, "identified")
-    told = results.table(f"verdicts_{runs.case}").set_index("quantity")["expected_verdict"]
+    told = results.table(f"verdicts_{runs.case.name}").set_index("quantity")["expected_verdict"]
     said, verdicts = [], []
-    for quantity in runs.truth.model.quantities:
+    for quantity in runs.case.sample.model.quantities:
         names = [parameter.name for parameter in quantity]
         label, printed = " + ".join(names), sum(identified[name] for name in names)
         values = runs.found[names].sum(axis=1).to_numpy(float)
         near = np.abs(values / printed - 1) <= NEAR
         verdict = by_value(
-            float(np.mean(near)),
+            near,
             encodable=all(is_encodable(identified[name], nearest[name]) for name in names),
             determined=told[label] == DETERMINED,
         )
@@ -75,7 +75,7 @@ def judge_values(results: Results, number: int) -> Judged:
 def _nearest(results: Results, runs: Runs, which: str) -> "pd.Series[float]":
     """Return the genes' value nearest to each target or identified value of a case, by name."""
     table = results.table("printed_values")
-    mine = table[(table["case"] == runs.case) & (table["quantity"] == which)]
+    mine = table[(table["case"] == runs.case.name) & (table["quantity"] == which)]
     return mine.set_index("parameter")["nearest_encodable"]
 
 
@@ -84,7 +84,7 @@ def judge_fits_response(results: Results, number: int) -> Judged:
     near = _near_noise(results, number)
     tolerance = 100 * results.study.near_noise_tolerance
     said = f"{of_seeds(near)} of the seeds fit to within {tolerance:g} % of the noise."
-    return Judged(by_share(float(np.mean(near))), said)
+    return Judged(by_share(near), said)
 
 
 def _near_noise(results: Results, number: int) -> BoolArray:
@@ -95,7 +95,7 @@ def _near_noise(results: Results, number: int) -> BoolArray:
 def tell_of_generation(results: Results, number: int) -> Judged:
     """Tell why the generation at which the paper shows a fit proves nothing."""
     runs = results.runs_of(number)
-    if runs.truth.published.generation is None:
+    if runs.case.published.generation is None:
         raise LackingError("the config has no generation of the fit")
     stop, last = runs.found["generations"], runs.last_improvement
     low, high = np.percentile(stop, [5, 95])
@@ -114,7 +114,7 @@ def judge_orders(results: Results, names: dict[int, tuple[str, ...]]) -> Judged:
     for number, each in names.items():
         runs = results.runs_of(number)
         those = _within_a_decade(runs, each, runs.found)
-        verdicts += [by_share(float(np.mean(it))) for it in those]
+        verdicts += [by_share(it) for it in those]
         said.append(f"Table {number}: {_listed(each, those)}")
     return Judged(
         altogether(verdicts), f"Seeds within half a decade of the target: {'; '.join(said)}."
@@ -122,7 +122,7 @@ def judge_orders(results: Results, names: dict[int, tuple[str, ...]]) -> Judged:
 
 
 def _within_a_decade(runs: Runs, names: Iterable[str], values: pd.DataFrame) -> list[BoolArray]:
-    return [within_a_decade(values[name], runs.truth.parameters[name]) for name in names]
+    return [within_a_decade(values[name], runs.case.parameters[name]) for name in names]
 
 
 def _listed(names: Iterable[str], those: Iterable[BoolArray]) -> str:
@@ -132,7 +132,7 @@ def _listed(names: Iterable[str], those: Iterable[BoolArray]) -> str:
 def _errors_percent(runs: Runs, *names: str) -> Array:
     """Return absolute errors of a parameter or a sum, one a seed."""
     values = runs.found[list(names)].sum(axis=1).to_numpy(float)
-    target = sum(runs.truth.parameters[name] for name in names)
+    target = sum(runs.case.parameters[name] for name in names)
     return np.asarray(100 * np.abs(values / target - 1))
 
 
@@ -143,13 +143,12 @@ claim("sections 4, 6", "does not require to assume a priori the order of magnitu
 
 @claim("section 5", "reaching a stationary value")
 def judge_stationary(results: Results) -> Judged:
-    """Judge whether runs come to rest before the last generation allowed."""
     runs = [results.runs_of(n) for n in _TABLES]
     stalled = pd.concat([each.found["stop_reason"] == "stalled" for each in runs])
     changes = [each.history.groupby("seed")["best_misfit"].diff().fillna(0) for each in runs]
     never_worse = bool((pd.concat(changes) <= 0).all())
     return Judged(
-        by_share(float(np.mean(stalled))) if never_worse else NOT,
+        by_share(stalled) if never_worse else NOT,
         f"{of_seeds(stalled)} of the runs end without improvement for 20 generations; the best "
         f"misfit {'never rises' if never_worse else 'rises at times'}.",
     )
@@ -157,7 +156,6 @@ def judge_stationary(results: Results) -> Judged:
 
 @claim("section 5, Figure 8", "Generally, convergence is reached around the 60th generation")
 def judge_convergence(results: Results) -> Judged:
-    """Tell why the generation of convergence proves nothing."""
     last = {n: results.runs_of(n).last_improvement for n in _TABLES}
     said = ", ".join(f"{np.median(each):.0f} (Table {n})" for n, each in last.items())
     return Judged(
@@ -172,7 +170,6 @@ def judge_convergence(results: Results) -> Judged:
     "20 generations … verify if mutation can move the optimum from a local minimum",
 )
 def judge_further_generations(results: Results) -> Judged:
-    """Judge whether twenty further generations lead out of local minima."""
     near = {n: _near_noise(results, n) for n in _TABLES}
     points = results.of_sweep("interpretations")
     patient = points[points["interpretation"].isin(["as printed", "patience of 60 generations"])]
@@ -181,7 +178,7 @@ def judge_further_generations(results: Results) -> Judged:
     ].to_numpy(float)
     said = ", ".join(f"Table {n} {of_seeds(those)}" for n, those in near.items())
     return Judged(
-        altogether(by_share(float(np.mean(those))) for those in near.values()),
+        altogether(by_share(those) for those in near.values()),
         f"Runs that come near the noise: {said}. With 60 further generations they are "
         f"{100 * longer:.1f} instead of {100 * printed:.1f} % for Table 5 (sweep interpretations).",
     )
@@ -189,9 +186,8 @@ def judge_further_generations(results: Results) -> Judged:
 
 @claim("section 5", "for the case of endothelial cells")
 def judge_endothelial(results: Results) -> Judged:
-    """Judge whether Table 5's sample is as stiff as a cell."""
     table = results.table("mechanics")
-    title = results.study.cases[results.case_of(5)].truth.title
+    title = results.study.cases[results.case_of(5)].title
     modulus = table.loc[table["case"] == title, "apparent_modulus_kPa"].to_numpy(float)
     is_like = modulus.min() >= 1 / _SCATTER_OF_CELLS and modulus.max() <= _SCATTER_OF_CELLS
     return Judged(
@@ -209,9 +205,8 @@ claim("Figure 9", "target response … and the best fit")(partial(judge_fits_res
 
 @claim("Figure 10", "except c_p, the order of magnitude … is obtained around the 20th generation")
 def judge_early_orders(results: Results) -> Judged:
-    """Judge whether orders of magnitude are there at the twentieth generation."""
     runs = results.runs_of(5)
-    names = [name for name in runs.truth.model.names if name != "c_p"]
+    names = [name for name in runs.case.sample.model.names if name != "c_p"]
     early, later = (
         # Of a run that has stopped before, the last generation.
         _within_a_decade(
@@ -220,7 +215,7 @@ def judge_early_orders(results: Results) -> Judged:
         for at in (_EARLY, _CONVERGED)
     )
     return Judged(
-        altogether(by_share(float(np.mean(it))) for it in early),
+        altogether(by_share(it) for it in early),
         f"Seeds within half a decade of the target at generation {_EARLY}: "
         f"{_listed(names, early)}; at {_CONVERGED}: {_listed(names, later)}.",
     )
@@ -231,23 +226,24 @@ claim("Table 5", "identified values")(partial(judge_values, number=5))
 
 @claim("Table 5", "k_p and c have a negligible error")
 def judge_negligible(results: Results) -> Judged:
-    """Judge whether errors of k_p and c are as small as printed in Table 5."""
     runs, said, verdicts = results.runs_of(5), [], []
     nearest = _nearest(results, runs, "target")
     for name in ("k_p", "c"):
-        target = runs.truth.parameters[name]
-        printed = 100 * abs(runs.truth.published.identified[name] / target - 1)
+        target = runs.case.parameters[name]
+        printed = 100 * abs(runs.case.published.identified[name] / target - 1)
         least = 100 * abs(nearest[name] / target - 1)
         errors = _errors_percent(runs, name)
         close = errors <= printed + _ROUNDING_PERCENT
         can = least <= printed + _ROUNDING_PERCENT
-        verdicts.append(by_value(float(np.mean(close)), encodable=can, determined=True))
+        verdicts.append(by_value(close, encodable=can, determined=True))
         said.append(
             f"{name} {of_seeds(close)}, with a median error of {np.median(errors):.2g} %; the "
             f"genes allow {least:.2g} % at best"
         )
     methods = results.table("methods")
-    is_best = (methods["method"] == "multi-start least squares") & (methods["case"] == runs.case)
+    is_best = (methods["method"] == "multi-start least squares") & (
+        methods["case"] == runs.case.name
+    )
     polished = ""
     if is_best.any():
         best = methods[is_best].iloc[0]
@@ -260,23 +256,21 @@ def judge_negligible(results: Results) -> Judged:
 
 @claim("Table 5", "the error on k is lower than the noise level")
 def judge_below_noise(results: Results) -> Judged:
-    """Judge whether the error of k is below the level of the noise in Table 5."""
     runs = results.runs_of(5)
     errors = _errors_percent(runs, "k")
-    below = errors < 100 * results.study.cases[runs.case].noise.level
+    below = errors < 100 * results.study.cases[runs.case.name].noise.level
     said = f"{of_seeds(below)} of the seeds; the median error of k is {np.median(errors):.2g} %."
-    return Judged(by_share(float(np.mean(below))), said)
+    return Judged(by_share(below), said)
 
 
 @claim("Table 5", "c_p … has a very low value that does not affect the response")
 def judge_low_damper(results: Results) -> Judged:
-    """Judge whether runs show that c_p of Table 5 is low."""
     runs = results.runs_of(5)
-    limits = results.table(f"verdicts_{runs.case}").set_index("quantity")
+    limits = results.table(f"verdicts_{runs.case.name}").set_index("quantity")
     most = float(limits.loc["c_p", "expected_high"])
     low = runs.found["c_p"] <= most
     return Judged(
-        by_share(float(np.mean(low))),
+        by_share(low),
         f"{of_seeds(low)} of the seeds identify c_p below {most:.2g} N s/m, the largest that a "
         f"trace allows; the median is {runs.found['c_p'].median():.3g} N s/m.",
     )
@@ -290,7 +284,6 @@ claim("Table 6", "identified values")(partial(judge_values, number=6))
 
 @claim("Table 6", "response … is dominated basically by the damping value")
 def judge_damper_dominates(results: Results) -> Judged:
-    """Judge whether a bare damper says as much of Table 6's traces."""
     table = results.table("models")
     rows = table[(table["case"] == results.case_of(6)) & (table["model"] == "bare damper")]
     if rows.empty:
@@ -306,15 +299,14 @@ claim("Figure 11", "fits correctly the response")(partial(judge_fits_response, n
 
 @claim("Table 6", "identify with small error the key parameter c")
 def judge_key_damper(results: Results) -> Judged:
-    """Judge whether c of Table 6 is found; the sum may be where c is not."""
     runs = results.runs_of(6)
-    printed = abs(runs.truth.published.identified["c"] / runs.truth.parameters["c"] - 1)
+    printed = abs(runs.case.published.identified["c"] / runs.case.parameters["c"] - 1)
     alone, total = (
         _errors_percent(runs, *names) <= 100 * printed + _ROUNDING_PERCENT
         for names in (("c",), ("c", "c_p"))
     )
-    verdict = by_share(float(np.mean(alone)))
-    found = by_share(float(np.mean(total)))
+    verdict = by_share(alone)
+    found = by_share(total)
     return Judged(
         IN_PART if verdict == NOT and found != NOT else verdict,
         f"Seeds with an error up to {100 * printed:.2g} %: {of_seeds(alone)} for c, "
@@ -330,7 +322,6 @@ claim("Table 7", "identified values")(partial(judge_values, number=7))
 
 @claim("Table 7", "becomes affected by the k value, thus the identification improves")
 def judge_spring_shows(results: Results) -> Judged:
-    """Judge whether k is determined in Table 7's sample, and not in Table 6's."""
     determined = {}
     for number in (6, 7):
         table = results.table(f"verdicts_{results.case_of(number)}").set_index("quantity")
@@ -344,11 +335,10 @@ def judge_spring_shows(results: Results) -> Judged:
 
 @claim("Table 7", "good identification for k and c (error below 3%)")
 def judge_good_identification(results: Results) -> Judged:
-    """Judge whether k and c of Table 7 are found to within 3 %."""
     runs = results.runs_of(7)
     k, c = (_errors_percent(runs, name) <= 3 + _ROUNDING_PERCENT for name in ("k", "c"))
     return Judged(
-        by_share(float(np.mean(k & c))),
+        by_share(k & c),
         f"Seeds with errors below 3 %, rounded: k {of_seeds(k)}, "
         f"c {of_seeds(c)}, both {of_seeds(k & c)}.",
     )
@@ -356,7 +346,6 @@ def judge_good_identification(results: Results) -> Judged:
 
 @claim("Figure 12", "axis from -0.6 to 4.2 mrad")
 def judge_rotation(results: Results) -> Judged:
-    """Tell why the level of the rotation proves nothing."""
     rows = results.table("evidence")
     rows = rows[rows["unit"] == "mrad"]
     if rows.empty:
@@ -374,7 +363,6 @@ claim("Figure 12", "fit at generation 61")(partial(tell_of_generation, number=7)
 
 @claim("section 6", "confirm the feasibility of the approach")
 def judge_feasible(results: Results) -> Judged:
-    """Judge feasibility by what a trace determines."""
     said, verdicts = [], []
     for number in _TABLES:
         table = results.table(f"verdicts_{results.case_of(number)}")
@@ -389,7 +377,6 @@ def judge_feasible(results: Results) -> Judged:
 
 @claim("section 6", "highly robust with respect to measurement noise")
 def judge_robust(results: Results) -> Judged:
-    """Judge robustness by errors over a sweep of noise beside those that noise allows."""
     points = results.of_sweep("robustness_noise")
     points = points[(points["row"] > 0) & np.isfinite(points["bound_percent"])]
     fine = points["error_genetic"] <= _NEAR_BOUND * _OF_MEDIAN * points["bound_percent"]
@@ -408,7 +395,6 @@ def judge_robust(results: Results) -> Judged:
 
 @claim("section 6", "nor the specific cell model")
 def judge_cell_model(results: Results) -> Judged:
-    """Judge whether any simpler model would do, and whether a trace tells which was right."""
     table = results.table("models")
     verdicts, said = [], []
     for number in _TABLES:

@@ -1,18 +1,26 @@
-"""Coverage of confidence intervals, and spread of estimates over the Cramér-Rao bound."""
+"""How often limits hold the truth: of intervals and verdicts, beside spreads and bounds."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.stats import binomtest
 
-from biogrip.arrays import Array
 from biogrip.judging.likelihood import bound
 from biogrip.judging.quantities import parameters_and_sum
-from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.judging.verdicts import (
+    BOUNDED_ABOVE,
+    BOUNDED_BELOW,
+    DETERMINED,
+    NOT_DETERMINED,
+    WIDE,
+)
 from biogrip.physics.noise import standard_deviation
 from biogrip.records.identifications import INTERVALS
 from biogrip.records.traces import read_target
 from biogrip.study.study import Study
+from biogrip.tables.cases import target_of
 from biogrip.tables.layout import Column, Row, Table
 
 _COLUMNS = (
@@ -48,7 +56,7 @@ def coverage(
     """
     calibrations = iter(calibrated)
     rows: list[Row] = []
-    estimated = pd.concat([INTERVALS.read(file) for file in intervals])
+    estimated = pd.concat([INTERVALS.read(it) for it in intervals], ignore_index=True)
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
         case_problem = case.problem.calibrated([next(calibrations)] if case.is_calibrated else [])
         log_truth = case_problem.logs(case.parameters)
@@ -106,7 +114,7 @@ def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float)
         "rest_known_over_bound": rest_known / bound,
         "bias_percent": np.mean(100 * np.log(found["estimate"].to_numpy(float) / truth)),
         "confidence_percent": 100 * confidence,
-        "coverage_percent": 100 * np.mean(holds(found, truth)),
+        "coverage_percent": 100 * np.mean(_holds(found, truth)),
         "seeds": len(found),
     }
 
@@ -114,16 +122,72 @@ def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float)
 def _shown(found: pd.DataFrame, truth: float) -> Row:
     """Count verdicts from whole profiles, and the true ones among them."""
     counts: Row = {"shown_seeds": len(found)}
-    held = holds(found, truth, "shown_")
+    held = _holds(found, truth, "shown_")
     for name, verdicts in _COUNTED.items():
-        chosen = found["verdict"].isin(verdicts).to_numpy()
+        chosen = found["verdict"].isin(verdicts)
         counts[f"shown_{name}"] = int(np.sum(chosen))
         counts[f"shown_{name}_true"] = int(np.sum(held[chosen]))
     return counts
 
 
-def holds(found: pd.DataFrame, truth: float, which: str = "") -> Array:
-    """Return 1 for every row whose limits hold the true value, else 0; (n_rows,)."""
-    low = found[f"{which}low"].fillna(0.0).to_numpy(float)
-    high = found[f"{which}high"].fillna(np.inf).to_numpy(float)
-    return ((low <= truth) & (truth <= high)).astype(float)
+def _holds(found: pd.DataFrame, truth: float, which: str = "") -> "pd.Series[bool]":
+    """Return whether limits hold the true value, (n_rows,); an open side does."""
+    low, high = found[f"{which}low"].fillna(0.0), found[f"{which}high"].fillna(np.inf)
+    return low.le(truth) & high.ge(truth)
+
+
+_COUNT_COLUMNS = (
+    Column("case", "Case"),
+    Column("quantity", "Quantity"),
+    Column("unit", "Unit"),
+    Column("target", "Target", 4),
+    Column("verdict", "Verdict"),
+    Column("seeds", "Seeds"),
+    Column("reached", "With this verdict"),
+    *(Column(f"reached_{end}_percent", f"{end.title()} %") for end in ("from", "to")),
+    Column("narrow", f"Within a factor of {WIDE:g}"),
+    Column("true", "True"),
+    Column("true_percent", "True %"),
+    *(Column(f"true_{end}_percent", f"{end.title()} %") for end in ("from", "to")),
+)
+
+
+def verdict_counts(study: Study, intervals: list[Path]) -> Table:
+    """Count verdicts of whole profiles, and those whose limits hold the true value."""
+    rows: list[Row] = []
+    estimated = pd.concat([INTERVALS.read(it) for it in intervals], ignore_index=True)
+    for name, case in study.cases.items():
+        found = estimated[estimated["case"] == name]
+        for quantity in parameters_and_sum(case.problem.searched):
+            mine = found[(found["quantity"] == quantity.label) & found["verdict"].notna()]
+            target = target_of(quantity.label, case.parameters)
+            head: Row = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
+            rows += [head | row for row in _counts(mine, target)]
+    percents = " or ".join(sorted({f"{100 * case.confidence:g}" for case in study.cases.values()}))
+    caption = (
+        f"Verdicts from whole profiles at {percents} %, as users are shown them, in every seed: "
+        "how often each is reached, with the 95 % interval of its share, and how often its limits "
+        "hold the true value, with the 95 % interval of that share (Clopper and Pearson)."
+    )
+    return Table(caption, _COUNT_COLUMNS, rows)
+
+
+def _counts(found: pd.DataFrame, target: float | None) -> Iterator[Row]:
+    """Yield a row for every verdict on a quantity."""
+    for verdict, mine in found.groupby("verdict"):
+        count = len(mine)
+        row: Row = {"target": target, "verdict": verdict, "seeds": len(found), "reached": count}
+        row |= _interval("reached", count, len(found))
+        if verdict == DETERMINED:
+            row["narrow"] = np.sum(mine["shown_high"] <= WIDE**2 * mine["shown_low"])
+        if verdict != NOT_DETERMINED and target is not None:
+            true = int(np.sum(_holds(mine, target, "shown_")))
+            row |= {"true": true, "true_percent": 100 * true / count}
+            row |= _interval("true", true, count)
+        yield row
+
+
+def _interval(name: str, count: int, tried: int) -> Row:
+    """Return the 95 % interval of Clopper and Pearson for a share, in percent."""
+    low, high = binomtest(count, tried).proportion_ci(0.95, method="exact")
+    return {f"{name}_from_percent": 100 * low, f"{name}_to_percent": 100 * high}

@@ -16,12 +16,11 @@ from biogrip.fit.genome import nearest_encodable
 from biogrip.judging.likelihood import DETERMINED_PERCENT, bounds_percent
 from biogrip.judging.quantities import Quantity
 from biogrip.physics import gripper as actuator
-from biogrip.physics.models import Truth
-from biogrip.physics.protocol import sample_times, torque_history
+from biogrip.physics.protocol import sample_times
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import compute_grip
 from biogrip.records.identifications import read_identifications
-from biogrip.records.traces import each_trace
+from biogrip.records.traces import read_measurements
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import error_percent
 from biogrip.tables.layout import Column, Row, Table
@@ -42,88 +41,83 @@ _PRINTED_VOLTAGES = (
 _PRINTED_GENE_VALUES = "9 or 12"
 
 
+# Quantity, unit, what the paper has, what the study has, and a remark.
+_Told = tuple[str, str, str | None, float, str]
+
+
 def evidence(study: Study, identifications: list[Path], measurements: list[Path]) -> Table:
     """Compare statements of the paper with results of the study."""
-    rows = _device_rows(study)
+    told = _of_device(study)
     for name, case in study.cases.items():
-        truth = case.truth
-        rows += [_grip_row(case)] if name in study.gripped else []
-        rows += _axis_rows(truth, [path for path in measurements if path.parent.name == name])
-        if study.shown == "genetic":
-            identified = [path for path in identifications if path.stem == name]
-            rows += _generation_rows(truth, identified)
+        told += [_grip(case)] if name in study.gripped else []
+        told += _axis(case, [path for path in measurements if path.parent.name == name])
+        if case.published.generation and study.shown == "genetic":
+            for path in (path for path in identifications if path.stem == name):
+                median = read_identifications(path, "genetic")["generations"].median()
+                remark = "median generation at which ours stops"
+                quantity = f"{case.title}: generation of the fit"
+                told.append((quantity, "", str(case.published.generation), median, remark))
+    names = [column.name for column in _COLUMNS]
+    rows = [dict(zip(names, cells, strict=True)) for cells in told]
     return Table("Statements of the paper beside what the study computes.", _COLUMNS, rows)
 
 
-def _row(quantity: str, unit: str, paper: str | None, this_study: float, remark: str) -> Row:
-    cells = quantity, unit, paper, this_study, remark
-    return {column.name: cell for column, cell in zip(_COLUMNS, cells, strict=True)}
-
-
-def _device_rows(study: Study) -> list[Row]:
+def _of_device(study: Study) -> list[_Told]:
     """Return what the paper says of actuator, gripper and genes."""
     comb, gripper, arm = study.actuator, study.gripper, study.gripper.left
-    rows = [
-        _row(f"voltage for {torque:g} N m", "V", printed, _volts(study, torque), remark)
-        for torque, printed, remark in _PRINTED_VOLTAGES
+    stroke = _volts(study, arm.stiffness_Nm_per_rad * math.radians(comb.stroke_deg))
+    remark, config = "has to be less than the arm length", "from the config"
+    told: list[_Told] = [
+        (f"voltage for {torque:g} N m", "V", printed, _volts(study, torque), source)
+        for torque, printed, source in _PRINTED_VOLTAGES
     ]
-    remark = "has to be less than the arm length"
-    rows.append(_row("outer radius of the comb", "mm", None, 1e3 * comb.outer_radius_m, remark))
-    stroke_Nm = arm.stiffness_Nm_per_rad * math.radians(comb.stroke_deg)
-    for quantity, unit, value, source in (
-        ("arm length", "mm", 1e3 * gripper.arm_length_m, "config"),
-        ("natural frequency of the free arm", "Hz", arm.natural_frequency_Hz, "config"),
-        ("quality factor of the free arm", "", arm.quality_factor, "config"),
-        ("voltage for the full stroke, no sample", "V", _volts(study, stroke_Nm), "config's k_2"),
-    ):
-        rows.append(_row(quantity, unit, None, value, f"from the {source}"))
+    told += [
+        ("outer radius of the comb", "mm", None, 1e3 * comb.outer_radius_m, remark),
+        ("arm length", "mm", None, 1e3 * gripper.arm_length_m, config),
+        ("natural frequency of the free arm", "Hz", None, arm.natural_frequency_Hz, config),
+        ("quality factor of the free arm", "", None, arm.quality_factor, config),
+        ("voltage for the full stroke, no sample", "V", None, stroke, f"{config}'s k_2"),
+    ]
     remark = "from the config, made after Table 4"
-    for name in (parameter.name for parameter in SINGLE_BRANCH):
-        low, high = study.ranges[name].exponent
-        quantity = f"values of the exponent gene of {name}"
-        rows.append(_row(quantity, "", _PRINTED_GENE_VALUES, high - low + 1, remark))
-    return rows
+    for p in SINGLE_BRANCH:
+        low, high = study.ranges[p.name].exponent
+        quantity = f"values of the exponent gene of {p.name}"
+        told.append((quantity, "", _PRINTED_GENE_VALUES, high - low + 1, remark))
+    return told
 
 
 def _volts(study: Study, torque_Nm: float) -> float:
     return float(actuator.voltage(study.actuator, torque_Nm))
 
 
-def _grip_row(case: Case) -> Row:
+def _grip(case: Case) -> _Told:
     """Return the lowest jaw force; the paper says that the lower torque maintains the grip."""
-    network = case.sample.model.sample(case.parameters)
-    torque = torque_history(case.phases)
-    grip = compute_grip(case.gripper, network, torque, nonlinear=case.nonlinear_target)
+    device = case.gripper, case.network, case.torque
+    grip = compute_grip(*device, nonlinear=case.nonlinear_target)
     remark = f"at {grip.lowest_at_s:.4g} s, as in mechanics; negative: the jaws would have to pull"
     quantity = f"{case.title}: lowest jaw force"
-    return _row(quantity, "uN", "maintains the grip", 1e6 * grip.lowest_N, remark)
+    return quantity, "uN", "maintains the grip", 1e6 * grip.lowest_N, remark
 
 
-def _axis_rows(case: Truth, traces: list[Path]) -> list[Row]:
+def _axis(case: Case, traces: list[Path]) -> list[_Told]:
     """Return the ends of an axis that the paper shows, and of our traces."""
     axis = case.published.axis_rad
     if not axis or not traces:
         return []
     # Keep only extremes: traces of many seeds exceed the memory.
-    extremes = [(trace.min(), trace.max()) for path in traces for trace in each_trace(path)]
+    extremes = [
+        (trace.min(), trace.max())
+        for path in traces
+        for trace in read_measurements(path).rotation_rad.values()
+    ]
     remark = (
         f"median of {counted(len(extremes), 'noisy trace')}; the paper's is the end of its axis"
     )
     ends = zip(("smallest", "largest"), axis, np.median(extremes, axis=0), strict=True)
     return [
-        _row(f"{case.title}: {end} sample", "mrad", f"{1e3 * printed:g}", 1e3 * ours, remark)
+        (f"{case.title}: {end} sample", "mrad", f"{1e3 * printed:g}", 1e3 * ours, remark)
         for end, printed, ours in ends
     ]
-
-
-def _generation_rows(case: Truth, identified: list[Path]) -> list[Row]:
-    generation = case.published.generation
-    if not generation or not identified:
-        return []
-    found = read_identifications(identified[0], "genetic")
-    median = float(np.median(found["generations"]))
-    quantity = f"{case.title}: generation of the fit"
-    return [_row(quantity, "", str(generation), median, "median generation at which ours stops")]
 
 
 _PRINTED_COLUMNS = (
@@ -142,17 +136,16 @@ _PRINTED_COLUMNS = (
 def printed_values(study: Study) -> Table:
     """Compare published values with encoding, range and error formula."""
     rows = []
-    for case, reported in study.cases.items():
-        truth, printed = reported.truth, reported.truth.published
-        for name in truth.model.names:
-            target, genes = truth.parameters[name], study.ranges[name]
-            identified = printed.identified.get(name)
+    for name_of_case, case in study.cases.items():
+        printed = case.published
+        for name, target in case.parameters.items():
+            genes, identified = study.ranges[name], printed.identified.get(name)
             for quantity, value in (("target", target), ("identified", identified)):
                 if value is None or value <= 0:
                     continue
                 nearest = nearest_encodable(value, genes)
                 row: Row = {
-                    "case": case,
+                    "case": name_of_case,
                     "parameter": name,
                     "quantity": quantity,
                     "printed": value,
@@ -206,7 +199,7 @@ def sampling_evidence(study: Study) -> Table:
 
 def _errors_and_bounds(case: Case) -> list[tuple[Any, ...]]:
     """Return a row of each quantity that is determined at some rate and that the paper reports."""
-    truth, identified = case.truth.parameters, case.truth.published.identified
+    truth, identified = case.parameters, case.published.identified
     problem, noise = case.problem, case.noise
     names = list(problem.searched.names)
     times = [sample_times(problem.torque.end_s, rate) for rate in _RATES_HZ]

@@ -113,11 +113,7 @@ def _without_bars(text: str) -> str:
 def compare(published: Path, made: Sequence[Path]) -> str:
     """Compare tables with published files of the same names, and say how many agree.
 
-    Raises
-    ------
-    BiogripError
-        If there is none to compare; or with the lines that differ, if a table is not published, or
-        has other bytes.
+    It is an error, which shows the lines that differ, if one has other bytes or is not published.
     """
     if not made:
         raise BiogripError(f"{published}: holds no tables to compare with.")

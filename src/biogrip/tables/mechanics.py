@@ -6,10 +6,10 @@ up to which the paper's linearisation is accurate; and errors of identifications
 bilateral contact.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
@@ -26,8 +26,8 @@ from biogrip.physics.contact import (
     mass_of_sample,
     rolling_of_contact,
 )
-from biogrip.physics.noise import add_noise, stream
-from biogrip.physics.protocol import largest_load, torque_history
+from biogrip.physics.noise import add_noise, rms, stream
+from biogrip.physics.protocol import largest_load
 from biogrip.physics.simulation import (
     compute_grip,
     jaw_force,
@@ -121,8 +121,8 @@ def mechanics(study: Study) -> Table:
 
 def _mechanics_of(case: Case) -> list[Row]:
     """Return a row for every size of a case's sample."""
-    network = case.sample.model.sample(case.parameters)
-    given = case.gripper, network, torque_history(case.phases)
+    network = case.network
+    given = case.gripper, network, case.torque
     # Immediately before the first change of torque.
     end = np.array([np.nextafter(case.phases[0].duration_s, 0)])
     shortening = float(simulated_shortening(*given, end, nonlinear=case.nonlinear_target)[0, 0])
@@ -208,8 +208,7 @@ def _damping(case: Case) -> float:
     """Return the damping of all dampers of a case's sample in N s/m."""
     if case.sample.model.power_law:
         return 0.0
-    network = case.sample.model.sample(case.parameters)
-    return float(network.c_p[0] + network.c[0].sum())
+    return float(case.network.c_p[0] + case.network.c[0].sum())
 
 
 LIMIT_PERCENT = 1.0
@@ -223,7 +222,7 @@ _LINEARISATION_COLUMNS = (
 )
 
 
-def linearisation(_: Study, differences: Path) -> Table:
+def linearisation(differences: Path) -> Table:
     """Return, for every case and angle, the torque factor that reaches `LIMIT_PERCENT`."""
     rows = []
     for (case, angle), group in DIFFERENCES.read(differences).groupby(
@@ -270,16 +269,10 @@ _COLUMNS = (
 )
 
 
-def linear_cases(study: Study) -> list[str]:
-    """Return the simulated cases whose target is linear."""
-    return [name for name in study.gripped if not study.cases[name].nonlinear_target]
-
-
 def contact_loss(study: Study) -> Table:
-    """Identify traces simulated with bilateral and with unilateral contact, and compare errors."""
-    rows = [
-        row for name, case in study.cases.items() for row in _rows(study.study_seed, name, case)
-    ]
+    """Identify traces with bilateral and with unilateral contact, both linear; compare errors."""
+    linear = [case for name in study.gripped if not (case := study.cases[name]).nonlinear_target]
+    rows = [row for case in linear for row in _loss_of(study.study_seed, case)]
     caption = (
         "Cases in which the jaws would have to pull: what least squares identifies, assuming "
         "bilateral contact, in traces with bilateral contact, in traces with loss of contact where "
@@ -291,75 +284,72 @@ def contact_loss(study: Study) -> Table:
     return Table(caption, _COLUMNS, rows)
 
 
-def _rows(study_seed: int, name: str, case: Case) -> list[Row]:
+def _loss_of(study_seed: int, case: Case) -> list[Row]:
     """Return a row for every quantity and the misfit; none if the jaws keep contact."""
-    torque, model = torque_history(case.phases), case.sample.model
-    network = model.sample(case.parameters)
-    if compute_grip(case.gripper, network, torque, nonlinear=False).pulls_from_s is None:
+    device = case.gripper, case.network, case.torque
+    if compute_grip(*device, nonlinear=False).pulls_from_s is None:
         return []
-    time_s = case.sampling.over(torque.end_s)
-    held = as_written(simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0])
-    free = unilateral_response(case.gripper, network, torque, time_s)
-    let_go = as_written(free.rotation_rad[0])
+    time_s = case.sampling.over(case.torque.end_s)
+    free = unilateral_response(*device, time_s)
     if not free.parted_s:
         return []
-    noise = [
-        add_noise(held, case.noise, stream(study_seed, name, seed, "noise"), time_s) - held
-        for seed in range(min(case.seeds, _MOST_SEEDS))
+    held = as_written(simulated_rotation(*device, time_s, nonlinear=False)[0])
+    let_go = as_written(free.rotation_rad[0])
+    rngs = [
+        stream(study_seed, case.name, seed, "noise") for seed in range(min(case.seeds, _MOST_SEEDS))
     ]
-    lost = free.parted_s[0]
-    whole, until = np.ones(len(time_s), dtype=bool), time_s < lost
-    medians, misfits = {}, {}
-    for column, rotation, kept in (
-        ("held", held, whole),
-        ("let_go", let_go, whole),
-        ("until_lost", let_go, until),
-    ):
-        traces = [(rotation + n)[kept] for n in noise]
-        medians[column] = _medians(study_seed, name, case, time_s[kept], traces)
-        rms = float(np.sqrt(np.mean(np.square([n[kept] for n in noise]))))
-        found = medians[column]
-        misfits[column] = found[-1] / rms if found and rms else None
-    rows: list[Row] = []
-    for index, quantity in enumerate(model.quantities):
-        names = [parameter.name for parameter in quantity]
-        target = sum(case.parameters[each] for each in names)
-        row: Row = {"case": name, "lost_at_s": lost, "quantity": " + ".join(names)}
-        row |= {"unit": quantity[0].unit, "target": target}
-        row |= {column: found[index] for column, found in medians.items() if found}
-        row["error_percent"] = _error_percent(target, row.get("let_go"))
-        row["until_lost_error_percent"] = _error_percent(target, row.get("until_lost"))
-        rows.append(row)
-    head: Row = {
-        "case": name,
-        "lost_at_s": lost,
-        "quantity": "misfit",
-        "unit": "noise",
-        "target": 1.0,
+    noise = np.array([add_noise(held, case.noise, rng, time_s) - held for rng in rngs])
+    lost_s, every = free.parted_s[0], len(time_s)
+    until = int(np.searchsorted(time_s, lost_s))
+    medians = {
+        column: _medians(study_seed, case, time_s[:readings], rotation, noise[:, :readings])
+        for column, rotation, readings in (
+            ("held", held, every),
+            ("let_go", let_go, every),
+            ("until_lost", let_go, until),
+        )
     }
-    return [*rows, head | misfits]
+    rows: list[Row] = []
+    for quantity in (*case.sample.model.quantities, []):
+        names = [parameter.name for parameter in quantity]
+        label = " + ".join(names) or "misfit"
+        target = sum(case.parameters[name] for name in names) if names else 1.0
+        unit = quantity[0].unit if quantity else "noise"
+        row: Row = {"case": case.name, "lost_at_s": lost_s, "quantity": label}
+        row |= {"unit": unit, "target": target}
+        row |= {column: found.get(label) for column, found in medians.items()}
+        if quantity:
+            row["error_percent"] = _error_percent(target, row["let_go"])
+            row["until_lost_error_percent"] = _error_percent(target, row["until_lost"])
+        rows.append(row)
+    return rows
 
 
 def _medians(
-    study_seed: int, name: str, case: Case, time_s: Array, traces: Sequence[Array]
-) -> list[float]:
-    """Return the median of every quantity and of the misfit in rad; none of too few readings."""
+    study_seed: int, case: Case, time_s: Array, rotation: Array, noise: Array
+) -> dict[str, float]:
+    """Return medians of all quantities and of the misfit over the noise; none of few readings.
+
+    Noise has the shape (n_seeds, n_samples).
+    """
     problem = case.problem.to_identify()
-    searched, model = problem.searched, problem.model
-    nuisance = problem.offset + problem.drift
-    if len(time_s) <= len(searched.names) + nuisance + 1:
-        return []
-    problems = problem.of_each(time_s, traces)
-    rngs = [stream(study_seed, name, seed, "contact_loss") for seed in range(len(traces))]
+    searched = problem.searched
+    if len(time_s) <= len(searched.names) + problem.offset + problem.drift + 1:
+        return {}
+    problems = problem.of_each(time_s, list(rotation[: len(time_s)] + noise))
+    rngs = [stream(study_seed, case.name, seed, "contact_loss") for seed in range(len(noise))]
     found = identify_many(problems, case.least_squares, rngs)
-    values = [
-        {**problem.fixed, **dict(zip(searched.names, one.parameters, strict=True))} for one in found
-    ]
-    medians = [
-        float(np.median([sum(value[p.name] for p in quantity) for value in values]))
-        for quantity in model.quantities
-    ]
-    return [*medians, float(np.median([one.misfit_rad for one in found]))]
+    values = pd.DataFrame([each.parameters for each in found], columns=searched.names)
+    values = values.assign(**problem.fixed)
+    medians = {
+        " + ".join(p.name for p in quantity): values[[p.name for p in quantity]]
+        .sum(axis=1)
+        .median()
+        for quantity in problem.model.quantities
+    }
+    if level := rms(noise):
+        medians["misfit"] = np.median([each.misfit_rad for each in found]) / level
+    return medians
 
 
 def _error_percent(target: float, value: float | None) -> float | None:

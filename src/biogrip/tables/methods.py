@@ -1,4 +1,4 @@
-"""The identification methods on the same traces, the models that fit them, and processor time."""
+"""The identification methods on the same traces, and the models that fit them."""
 
 from pathlib import Path
 
@@ -7,9 +7,9 @@ import pandas as pd
 
 from biogrip.fit.methods import chi_square_increase, reached_encodable, share_with_limits
 from biogrip.fit.nested_fits import aic_and_bic
-from biogrip.records.identifications import ENCODABLE, MODEL_FITS, TIMINGS, read_identifications
+from biogrip.records.identifications import ENCODABLE, MODEL_FITS, read_identifications
 from biogrip.study.study import Study
-from biogrip.tables.cases import error_percent
+from biogrip.tables.cases import error_percent, target_of
 from biogrip.tables.layout import Column, Row, Table
 
 _METHOD_COLUMNS = (
@@ -47,10 +47,10 @@ def methods(study: Study, identifications: list[Path]) -> Table:
                 "encodable_rise": np.median(mine["least"]),
                 "median_evaluations": float(mine["evaluations"].median()),
             }
-            for quantity in case.truth.model.quantities:
+            for quantity in case.sample.model.quantities:
                 label = " + ".join(p.name for p in quantity)
                 values = mine[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
-                error = np.abs(error_percent(case.truth.target(quantity), values))
+                error = np.abs(error_percent(target_of(label, case.parameters), values))
                 row[f"error_percent {label}"] = np.median(error)
                 labels[f"error_percent {label}"] = f"Error {label} %"
             rows.append(row)
@@ -103,23 +103,3 @@ def models(study: Study, fits: list[Path]) -> Table:
         "how many seeds it has the lowest."
     )
     return Table(caption, _MODEL_COLUMNS, rows)
-
-
-_TIMING_COLUMNS = (
-    Column("case", "Case"),
-    Column("method", "Method"),
-    Column("seeds", "Seeds"),
-    Column("median_cpu_s", "Median CPU time (s)", 2),
-    Column("total_cpu_s", "Total CPU time (s)", 3),
-)
-
-
-def timings(study: Study, times: list[Path]) -> Table:
-    """Summarise processor time per identification by case and method, from CSV."""
-    spent = pd.concat([TIMINGS.read(path) for path in times])
-    rows = [
-        {"case": case, "method": study.identifiers[method].title, "seeds": len(mine)}
-        | {"median_cpu_s": mine["cpu_s"].median(), "total_cpu_s": mine["cpu_s"].sum()}
-        for (case, method), mine in spent.groupby(["case", "method"], sort=False)
-    ]
-    return Table("Processor time of the identifications on this machine.", _TIMING_COLUMNS, rows)

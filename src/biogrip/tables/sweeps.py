@@ -17,11 +17,10 @@ from scipy.stats import qmc
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.methods import near_noise, near_noise_words
 from biogrip.judging.likelihood import headlines
-from biogrip.physics.models import Truth
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.records.identifications import INTERPRETATIONS
 from biogrip.stages.sweeps import POINTS
-from biogrip.study.study import Study
+from biogrip.study.study import Case, Study
 from biogrip.study.sweeps import AxisBlock
 from biogrip.tables.layout import Column, Row, Table
 
@@ -31,11 +30,6 @@ def axis_title(study: Study, axis: AxisBlock) -> str:
     keys = {f"{key}." for value in axis.levels for key in value.overrides}
     reconstructed = tuple(f"{name}." for name in study.reconstructed)
     return axis.title + ", reconstructed" * any(key.startswith(reconstructed) for key in keys)
-
-
-def shown_values(axis: AxisBlock) -> dict[str, str]:
-    """Return the values of an axis as they are shown, by their text in files."""
-    return {value.text: value.shown for value in axis.levels}
 
 
 def read_points(path: Path, sweep: str, case: str) -> pd.DataFrame:
@@ -63,7 +57,6 @@ _BY_METHOD = {
 def robustness(study: Study, name: str, points: Path) -> Table:
     """Join the points of a sweep over all its cases."""
     sweep, methods = study.sweeps[name], study.identifiers
-    row_values, column_values = shown_values(sweep.rows), shown_values(sweep.columns)
     rows: list[Row] = []
     for case in sweep.cases:
         found = read_points(points, name, case)
@@ -73,8 +66,8 @@ def robustness(study: Study, name: str, points: Path) -> Table:
                 by_method = group.set_index("method")
                 head = {
                     "case": case,
-                    "row": row_values[row],
-                    "column": column_values[column],
+                    "row": row,
+                    "column": column,
                     "quantity": quantity,
                     "bound_percent": float(by_method["bound_percent"].iloc[0]),
                 }
@@ -128,47 +121,47 @@ _RESOLVED = 0.01
 _AS_SMALL, _SAME_ORDER = "as small", "of the same order"
 
 
-def _compared(truth: Truth) -> list[str]:
+def _compared(case: Case) -> list[str]:
     """Return the parameters that are compared, of those that the paper identifies."""
-    published = truth.published.identified
-    return [name for name in _COMPARED if name in published and truth.parameters.get(name)]
+    published = case.published.identified
+    return [name for name in _COMPARED if name in published and case.parameters.get(name)]
 
 
-def _relative_errors(truth: Truth, found: pd.DataFrame) -> Array:
+def _relative_errors(case: Case, found: pd.DataFrame) -> Array:
     """Return absolute relative errors of every seed, shape (n_parameters, n_seeds)."""
     columns = {p.name: p.column for p in SINGLE_BRANCH}
     return np.abs(
-        [found[columns[n]].to_numpy(float) / truth.parameters[n] - 1 for n in _compared(truth)]
+        [found[columns[n]].to_numpy(float) / case.parameters[n] - 1 for n in _compared(case)]
     )
 
 
-def _is_close(truth: Truth, found: pd.DataFrame, criterion: str) -> BoolArray:
+def _is_close(case: Case, found: pd.DataFrame, criterion: str) -> BoolArray:
     """Return True for each seed whose errors are all as small as the paper's, or of its order."""
-    published = truth.published.identified
-    printed = np.array([abs(published[n] / truth.parameters[n] - 1) for n in _compared(truth)])
+    published = case.published.identified
+    printed = np.array([abs(published[n] / case.parameters[n] - 1) for n in _compared(case)])
     of_order = _HALF_A_DECADE * np.maximum(printed, _RESOLVED)
     allowed = printed + _ROUNDING if criterion == _AS_SMALL else of_order
-    return np.all(_relative_errors(truth, found) <= allowed[:, None], axis=0)
+    return np.all(_relative_errors(case, found) <= allowed[:, None], axis=0)
 
 
 def interpretations(study: Study, found: list[Path]) -> Table:
     """Compare the interpretations from the rows of each case, CSV."""
     rows: list[Row] = []
-    for path, (case, made) in zip(found, study.cases.items(), strict=True):
-        truth, of_case = made.truth, INTERPRETATIONS.read(path)
-        for name, title in study.interpretation_titles.items():
+    for path, case in zip(found, study.cases.values(), strict=True):
+        of_case = INTERPRETATIONS.read(path)
+        for name, reading in study.interpretations.items():
             mine = of_case[of_case["interpretation"] == name]
             row = {
-                "case": case,
-                "interpretation": title,
+                "case": case.name,
+                "interpretation": reading.title,
                 "seeds": len(mine),
                 "near_noise_share": near_noise(mine, study.near_noise_tolerance).mean(),
                 "last_improvement": mine["last_improvement"].median(),
             }
-            if _compared(truth):
-                row["as_close_share"] = _is_close(truth, mine, _AS_SMALL).mean()
+            if _compared(case):
+                row["as_close_share"] = _is_close(case, mine, _AS_SMALL).mean()
             for p in SINGLE_BRANCH:
-                if target := truth.parameters.get(p.name):
+                if target := case.parameters.get(p.name):
                     error = 100 * np.abs(mine[p.column].to_numpy(float) / target - 1)
                     row[f"error_percent {p.name}"] = np.median(error)
             rows.append(row)
@@ -222,30 +215,30 @@ def interpretations_jointly(study: Study, found: list[Path]) -> Table:
         "seeds for which, taken in the place of the paper's runs, it is not larger."
     )
     cases = [
-        (case.truth, INTERPRETATIONS.read(path))
+        (case, INTERPRETATIONS.read(path))
         for path, case in zip(found, study.cases.values(), strict=True)
-        if _compared(case.truth)
+        if _compared(case)
     ]
     rows = [
-        {"interpretation": title, **row}
-        for name, title in study.interpretation_titles.items()
+        {"interpretation": reading.title, **row}
+        for name, reading in study.interpretations.items()
         for row in _joint_rows(
-            [(truth, rows[rows["interpretation"] == name]) for truth, rows in cases]
+            [(case, rows[rows["interpretation"] == name]) for case, rows in cases]
         )
     ]
     return Table(caption, _JOINT_COLUMNS, rows)
 
 
-def _joint_rows(cases: list[tuple[Truth, pd.DataFrame]]) -> Iterator[Row]:
+def _joint_rows(cases: list[tuple[Case, pd.DataFrame]]) -> Iterator[Row]:
     """Yield by each criterion a row for every table of the paper, and one for all of them."""
-    own = [own_shares(_relative_errors(truth, found)) for truth, found in cases]
+    own = [own_shares(_relative_errors(case, found)) for case, found in cases]
     for criterion in (_AS_SMALL, _SAME_ORDER):
         counts = [
-            (int(_is_close(truth, found, criterion).sum()), len(found)) for truth, found in cases
+            (int(_is_close(case, found, criterion).sum()), len(found)) for case, found in cases
         ]
-        for (truth, _), (count, seeds) in zip(cases, counts, strict=True):
+        for (case, _), (count, seeds) in zip(cases, counts, strict=True):
             low, high = limits([(count, seeds)])
-            row: Row = {"errors": criterion, "table": truth.published.table, "seeds": seeds}
+            row: Row = {"errors": criterion, "table": case.published.table, "seeds": seeds}
             row |= {"as_close": count, "probability": count / seeds, "low": low, "high": high}
             yield row
         product = float(np.prod([count / seeds for count, seeds in counts]))
@@ -259,13 +252,10 @@ def _joint_rows(cases: list[tuple[Truth, pd.DataFrame]]) -> Iterator[Row]:
 
 
 def limits(counts: list[tuple[int, int]]) -> tuple[float, float]:
-    """Return 95 % limits of the product of independent probabilities.
+    """Return 95 % limits of the product of probabilities, given successes and trials of each.
 
-    Parameters
-    ----------
-    counts
-        Successes and trials of each. Their posteriors under Jeffreys' prior are drawn from with a
-        Sobol sequence, so that the limits are the same wherever they are computed.
+    Their posteriors under Jeffreys' prior are drawn from with a Sobol sequence, so that the limits
+    are the same wherever they are computed.
     """
     points = qmc.Sobol(len(counts), scramble=False).random_base2(_LOG2_DRAWS)
     draws = [
@@ -280,12 +270,9 @@ def limits(counts: list[tuple[int, int]]) -> tuple[float, float]:
 
 
 def own_shares(errors: Array) -> Array:
-    """Return for every seed the share of seeds whose errors are all as small as its own.
+    """Return the share of seeds, itself among them, whose errors are all as small as each seed's.
 
-    Parameters
-    ----------
-    errors
-        Shape (n_parameters, n_seeds). A seed counts itself.
+    Errors have the shape (n_parameters, n_seeds).
     """
     within = np.all(errors[:, :, None] <= errors[:, None, :], axis=0)
     return np.asarray(within.mean(axis=0))
