@@ -41,7 +41,7 @@ counted = $$(grep -o '^[a-z][^=]*' $(1) | sort -u | wc -l)
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) $(addprefix tests/workflow/,test_module.py test_rules.py test_study.py)
 
-.PHONY: study test test-nightly test-lowest test-pythons check check-overlays publish publish-overlays lint format bench bench-field levels report docs citation site pinned lock clean
+.PHONY: study test test-nightly test-lowest test-pythons check check-overlays publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
 
 study: $(READY)
 	$(BIN)/snakemake -j$(JOBS)
@@ -110,10 +110,6 @@ bench: $(BENCH_READY)
 
 bench-field: $(FIELD_READY)
 	$(FIELD_BIN)/python -m benchmarks.field
-
-# How often verdicts are right: the page docs/levels.md.
-levels: $(READY)
-	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.levels
 
 report: $(READY)
 	$(BIN)/snakemake -j$(JOBS) --report report.html

@@ -2,15 +2,12 @@
 
 A cell of the table is an instrument, a number of readings, their times, and what is read. The
 relaxation time of each trace's sample is drawn between 1 and 20 % of the trace. Every trace is
-fitted from random starts and judged as a user's is, but for what needs other models' fits. Run by
-`make levels`, which writes docs/levels.md; takes an hour or more.
+fitted from random starts and judged as a user's is, but for what needs other models' fits.
 """
 
 from collections import Counter
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator, Sequence
 from functools import partial
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array
+from biogrip.files import write_text
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
@@ -33,15 +31,9 @@ from biogrip.physics.noise import stream
 from biogrip.physics.protocol import Phase, hold, load
 from biogrip.physics.simulation import simulated_rotation
 
-_DOCS = Path(__file__).parents[1] / "docs"
-_COLUMNS = [
-    *("instrument", "readings", "times", "set_up", "traces"),
-    *("ok_percent", "doubtful_percent", "rejected_percent", "limits", "held_percent"),
-    *("misfit_over_noise", "chi_squared"),
-]
-_INSTRUMENTS = ("creep", "relaxation", "gripper")
-# Numbers of readings of a trace.
-_READINGS = (10, 20, 40, 80, 400, 4000)
+INSTRUMENTS_JUDGED = ("creep", "relaxation", "gripper")
+READINGS = (10, 20, 40, 80, 400, 4000)
+"""Numbers of readings of a trace."""
 
 _SEED, _LASTS_S, _CONFIDENCE = 2019, 100.0, 0.95
 _DECADES = (0, 3, 6)
@@ -49,8 +41,8 @@ _DECADES = (0, 3, 6)
 _NOISE, _OUTLIER, _STEP = 0.02, 15.0, 2.0
 _LATE_S, _RAMP_S, _MINUTE_S = 5.0, 10.0, 60.0
 _BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
-# Traces of a cell, and those of them whose misfit is computed without noise, too.
-_TRACES, _SOME = 20, 10
+# Traces that are fitted together; and those whose misfit is computed without noise.
+_TOGETHER, _SOME = 50, 10
 _RANGES = dict.fromkeys(("k", "k_p", "c", "c_p"), GeneRange((-6, 8), (1, 9)))
 # Without inertia, as fits are: its ringing would be read where times begin within milliseconds.
 _ARM = Arm(inertia_kgm2=0.0, damping_Nms_per_rad=3.3e-12, stiffness_Nm_per_rad=4.4e-7)
@@ -76,7 +68,7 @@ _PAGE = """# How often a verdict is right
 Simulated traces of creep, relaxation and the gripper, at times that are even or spread over three
 or six decades, with noise of 2 % of the peak: {traces} of each row, with the 95 % interval of a
 share (Wilson's). `levels.csv` has every instrument and spacing.
-`make levels` makes this page.
+`snakemake -j2 docs/levels.md` makes this page.
 
 **The set-up is right.** All should be ok, none rejected, and 95 % of limits should hold the truth.
 Noise that grows with what is read is to be told: if it is not, traces are doubtful once there are
@@ -167,77 +159,99 @@ def _noisy(clean: Array, set_up: str, rng: np.random.Generator) -> Array:
     return found
 
 
-def summarise(rows: pd.DataFrame) -> str:
-    """Return the page with shares over instruments and times, of the rows of all cells."""
-    rows = rows.assign(set_up=pd.Categorical(rows["set_up"], [*RIGHT, *WRONG]))
+def judge_cells(instrument: str, readings: int, traces: int, output: Path) -> None:
+    """Write the rows of an instrument with a number of readings, each of so many traces."""
+    rows = [
+        _cell(instrument, readings, decades, set_up, traces)
+        for decades in _DECADES
+        for set_up in (*RIGHT, *WRONG)
+    ]
+    pd.DataFrame(rows).to_csv(output, index=False, float_format="%.4g")
+
+
+def summarise(files: Sequence[Path], table: Path, summary: Path) -> None:
+    """Write the rows of all files, and a page with shares over instruments and times."""
+    rows = pd.concat([pd.read_csv(file) for file in files], ignore_index=True)
+    rows.to_csv(table, index=False)
+    rows["set_up"] = pd.Categorical(rows["set_up"], [*RIGHT, *WRONG])
     shown = []
     for (set_up, readings), cells in rows.groupby(["set_up", "readings"], observed=True):
         traces = int(cells["traces"].sum())
-        row = {"set-up": set_up, "readings": readings}
-        for status in (OK, DOUBTFUL, REJECTED):
-            count = round((cells[f"{status}_percent"] * cells["traces"]).sum() / 100)
-            row[status] = share_in_words(count, traces)
-        if set_up in RIGHT:
-            held = (cells["held_percent"] * cells["limits"]).sum() / cells["limits"].sum()
-            row["limits that hold"] = f"{held:.1f} %"
-        else:
-            row["misfit / noise"] = f"{cells['misfit_over_noise'].median():.1f}"
-        shown.append(row)
+        counts = {
+            status: round((cells[f"{status}_percent"] * cells["traces"]).sum() / 100)
+            for status in (OK, DOUBTFUL, REJECTED)
+        }
+        held = (cells["held_percent"] * cells["limits"]).sum() / max(cells["limits"].sum(), 1)
+        shown.append(
+            {"set-up": set_up, "readings": readings}
+            | {status: share_in_words(count, traces) for status, count in counts.items()}
+            | ({"limits that hold": f"{held:.1f} %"} if set_up in RIGHT else {})
+            | (
+                {"misfit / noise": f"{cells['misfit_over_noise'].median():.1f}"}
+                if set_up in WRONG
+                else {}
+            )
+        )
     right, wrong = (
         pd.DataFrame([row for row in shown if row["set-up"] in own]).to_markdown(index=False)
         for own in (RIGHT, WRONG)
     )
-    return _PAGE.format(traces=traces, right=right, wrong=wrong)
+    write_text(summary, _PAGE.format(traces=traces, right=right, wrong=wrong))
 
 
-def judge_cell(cell: tuple[str, int, int, str]) -> dict[str, Any]:
-    """Return the row of a cell: instrument, number of readings, decades of times, and set-up."""
-    instrument, readings, decades, set_up = cell
+def _cell(instrument: str, readings: int, decades: int, set_up: str, traces: int) -> dict[str, Any]:
     experiment = _experiment(instrument, _protocol(instrument), _MODELS[instrument])
     time_s = _times(readings, decades)
     # A clock in minutes that is taken for one in seconds.
     told_s = time_s / _MINUTE_S if set_up == "wrong unit of time" else time_s
+    status: Counter[str] = Counter()
+    held: list[bool] = []
+    misfits: list[float] = []
     name = f"{instrument} {readings} {decades} {set_up}"
-    rngs = [stream(_SEED, name, seed, "noise") for seed in range(_TRACES)]
-    taus = [_LASTS_S * 10 ** rng.uniform(-2, -0.7) for rng in rngs]
-    cleans = [_read(instrument, set_up, tau, time_s) for tau in taus]
-    given = [
-        experiment.weighted(_NOISE * np.abs(clean)) if set_up == _TOLD else experiment
-        for clean in cleans
-    ]
-    read = [_noisy(clean, set_up, rng) for clean, rng in zip(cleans, rngs, strict=True)]
-    problems = [it.of(told_s, each) for it, each in zip(given, read, strict=True)]
-    found = identify_many(problems, _BUDGET, rngs, silent)
+    for first in range(0, traces, _TOGETHER):
+        seeds = range(first, min(first + _TOGETHER, traces))
+        rngs = [stream(_SEED, name, seed, "noise") for seed in seeds]
+        taus = [_LASTS_S * 10 ** rng.uniform(-2, -0.7) for rng in rngs]
+        cleans = [_read(instrument, set_up, tau, time_s) for tau in taus]
+        given = [
+            experiment.weighted(_NOISE * np.abs(clean)) if set_up == _TOLD else experiment
+            for clean in cleans
+        ]
+        read = [_noisy(clean, set_up, rng) for clean, rng in zip(cleans, rngs, strict=True)]
+        problems = [it.of(told_s, each) for it, each in zip(given, read, strict=True)]
+        found = identify_many(problems, _BUDGET, rngs, silent)
+        if set_up in RIGHT:
+            judged = diagnose_all(
+                problems,
+                experiment.searched,
+                found,
+                confidence=_CONFIDENCE,
+                noise_rad=[it.noise_rad for it in given],
+            )
+            status.update(each.status for each in judged)
+            for each, tau in zip(judged, taus, strict=True):
+                held += _held(each, experiment, _parameters(instrument, tau))
+        else:
+            status.update(map(_status_of, problems, found))
+            some = cleans[: _SOME if not first else 0]
+            exact = [experiment.of(told_s, clean) for clean in some]
+            fits = identify_many(exact, _BUDGET, rngs[: len(exact)], silent) if exact else []
+            sds = [_NOISE * float(np.max(np.abs(clean))) for clean in some]
+            misfits += [fit.misfit_rad / sd for fit, sd in zip(fits, sds, strict=True)]
     row: dict[str, Any] = {
         "instrument": instrument,
         "readings": readings,
         "times": f"log, {decades} decades" if decades else "even",
         "set_up": set_up,
-        "traces": _TRACES,
+        "traces": traces,
     }
-    if set_up in RIGHT:
-        judged = diagnose_all(
-            problems,
-            experiment.searched,
-            found,
-            confidence=_CONFIDENCE,
-            noise_rad=[it.noise_rad for it in given],
-        )
-        held = [
-            holds
-            for each, tau in zip(judged, taus, strict=True)
-            for holds in _held(each, experiment, _parameters(instrument, tau))
-        ]
-        row |= {"limits": len(held), "held_percent": 100 * np.mean(held) if held else np.nan}
-        status = Counter(each.status for each in judged)
-    else:
-        exact = [experiment.of(told_s, clean) for clean in cleans[:_SOME]]
-        fits = identify_many(exact, _BUDGET, rngs[:_SOME], silent)
-        sds = [_NOISE * float(np.max(np.abs(clean))) for clean in cleans[:_SOME]]
-        typical = np.median([fit.misfit_rad / sd for fit, sd in zip(fits, sds, strict=True)])
+    row |= {f"{each}_percent": 100 * status[each] / traces for each in (OK, DOUBTFUL, REJECTED)}
+    if held:
+        row |= {"limits": len(held), "held_percent": 100 * float(np.mean(held))}
+    if misfits:
+        typical = float(np.median(misfits))
         row |= {"misfit_over_noise": typical, "chi_squared": readings * typical**2}
-        status = Counter(map(_status_of, problems, found))
-    return row | {f"{it}_percent": 100 * status[it] / _TRACES for it in (OK, DOUBTFUL, REJECTED)}
+    return row
 
 
 def _held(judged: Diagnosis, experiment: CaseProblem, truth: dict[str, float]) -> Iterator[bool]:
@@ -254,11 +268,3 @@ def _status_of(problem: Problem, found: Identification) -> str:
     best = np.log(found.parameters)
     likelihood = make_likelihood(problem, best, found.misfit_rad, confidence=_CONFIDENCE)
     return compute_status(examine_residuals(likelihood).notes)
-
-
-if __name__ == "__main__":
-    with ProcessPoolExecutor() as pool:
-        cells = product(_INSTRUMENTS, _READINGS, _DECADES, (*RIGHT, *WRONG))
-        rows = pd.DataFrame(pool.map(judge_cell, cells), columns=_COLUMNS)
-    rows.to_csv(_DOCS / "levels.csv", index=False, float_format="%.4g")
-    (_DOCS / "levels.md").write_text(summarise(rows), encoding="utf-8")
