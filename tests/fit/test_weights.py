@@ -16,7 +16,7 @@ from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import hold
-from biogrip.traces.any_sample import proportional_deviations
+from biogrip.fit.any_sample import proportional_deviations
 from tests.helpers.problems import run
 
 # The fit of polystyrene at 190 degC that pyRheo publishes, with weights of 5 % of the compliance.

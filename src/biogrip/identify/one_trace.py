@@ -34,7 +34,7 @@ from biogrip.identify.other_fits import (
 )
 from biogrip.identify.outputs import WRITTEN_BY, Outcome, in_own_units
 from biogrip.identify.settings import Asked, case_of
-from biogrip.identify.trace_case import TraceCase, read_trace
+from biogrip.identify.trace_case import TraceCase, note_saturated, read_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
 from biogrip.judging.onset_profiles import profile_over_onset
@@ -50,7 +50,6 @@ from biogrip.stages.judgement import fits_judged, notes_on_fit
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
 from biogrip.traces.onset import note_hidden_ramp, note_late_onset, note_tare
-from biogrip.traces.plausibility import note_saturated
 
 # Most traces of a batch, and most readings of traces that are fitted together.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
@@ -231,9 +230,8 @@ def identify_alike(
     for index, own in enumerate(traces):
         # Beside another start, an offset and a drift mean nothing.
         opinions[index] *= not any(note.weight != HARMLESS for note in starts[index])
-        notes = [*again[index][1], *starts[index], *opinions[index], *note_flow(own)]
-        started = own.recorded.time_s > 0
-        notes += note_saturated(own.readings[1][started], own.problem.instrument.read.unit)
+        notes = [*again[index][1], *starts[index], *opinions[index]]
+        notes += [*note_flow(own), *note_saturated(own)]
         data = _data(own, fits[index], diagnoses[index], models[index], notes)
         if index in onsets_s:
             data["onset_limits_s"] = [data["onset_s"] + end_s for end_s in onsets_s[index]]

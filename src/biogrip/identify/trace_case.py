@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.digits import plain
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
+from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.protocol import is_held, largest_load
 from biogrip.physics.whitening import drift_is_flow, estimate_noise
 from biogrip.records.traces import Measurements
@@ -27,6 +29,10 @@ from biogrip.traces.reader import Recognised
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
 _CLEAREST, _MARGIN = 1e5, 10.0
 _LEAST, _MOST = -16, 18
+
+# Share of readings at an end of their scale from which on they are saturated, how many times as
+# often as each of the next values, and fewest values.
+_SATURATED, _MORE_OFTEN, _VALUES = 0.05, 5, 5
 
 _FLOWS = {"damper": "c_p", "maxwell": "c", "burgers": "c_s"}
 
@@ -80,6 +86,27 @@ class TraceCase:
         return _with_ranges(case, self.recorded, self.given)
 
 
+def note_saturated(trace: TraceCase) -> list[Note]:
+    """Return a doubt if many readings after the start are exactly the largest, or the smallest.
+
+    Readings that are only rounded have neighbouring values nearly as often.
+    """
+    time_s, readings = trace.readings
+    values, counts = np.unique(readings[time_s > 0], return_counts=True)
+    unit, notes = f" {trace.problem.instrument.read.unit}".rstrip(), []
+    for end, at, near in (("largest", -1, slice(-_VALUES, -1)), ("smallest", 0, slice(1, _VALUES))):
+        if len(values) < _VALUES or counts[at] <= _SATURATED * np.sum(counts):
+            continue
+        if counts[at] > _MORE_OFTEN * np.max(counts[near]):
+            text = (
+                f"{counts[at]} of {np.sum(counts)} readings are exactly the {end}, "
+                f"{plain(values[at])}{unit}: the instrument looks saturated, and what it cut off "
+                "is missing."
+            )
+            notes.append(Note(DOUBT, text))
+    return notes
+
+
 def read_trace(
     file: Path, case: Case, given: Mapping[str, Any], show: Callable[[str], None]
 ) -> TraceCase:
@@ -95,7 +122,7 @@ def read_trace(
     columns = replace(case.columns, by_options=True)
     declared = case.block.measurement
     problem = replace(case.problem, offset=bool(declared.offset), drift=bool(declared.drift))
-    trace = recording.read_checked(file, case.gripper, problem, columns, show_unusual)
+    trace = recording.read_checked(file, problem, columns, show_unusual)
     if case.problem.coloured:
         case = _without_likenesses(case, trace.time_s)
     read = _with_ranges(case, trace, given)

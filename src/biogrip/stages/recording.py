@@ -10,15 +10,14 @@ import numpy as np
 from biogrip.arrays import BoolArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
+from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFits
-from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.whitening import MOST_SAMPLES
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.study.study import Case
 from biogrip.terminal import warn
-from biogrip.traces.any_sample import proportional_deviations
 from biogrip.traces.columns import Columns, place
 from biogrip.traces.onset import estimate_onset
 from biogrip.traces.plausibility import check_recording
@@ -35,7 +34,7 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
     """
     if case.columns.load is not None:
         raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
-    trace = read_checked(recorded, case.gripper, case.problem, case.columns)
+    trace = read_checked(recorded, case.problem, case.columns)
     trace = with_fitted_onset(trace, case.problem)
     for note in notes_on_recording(trace):
         warn(f"{place(recorded)}: {note}")
@@ -44,7 +43,6 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
 
 def read_checked(
     recorded: Path,
-    gripper: Gripper,
     problem: CaseProblem,
     columns: Columns,
     show: Callable[[Recognised], None] = lambda _: None,
@@ -78,27 +76,16 @@ def read_checked(
             f"{place(recorded)}: found {len(trace.time_s)} readings for {problem.unknowns} unknown "
             "parameters; allowed are more readings than parameters, or a simpler model."
         )
-    nuisance = problem.nuisance(trace.time_s)
-    suspicion = check_recording(
-        trace,
-        gripper,
-        problem.torque,
-        recorded,
-        columns,
-        nuisance,
-        problem.instrument,
-        None if weighted else problem.noise_rad,
-        _typical_noise(trace, problem),
-        onset_s,
-    )
+    noise_rad = _typical_noise(trace, problem)
+    suspicion = check_recording(trace, problem, recorded, columns, noise_rad, onset_s)
     sd_rad = trace.sd_rad
     if problem.noise_share is not None:
         sd_rad = proportional_deviations(
             trace.time_s,
             trace.rotation_rad,
-            gripper,
+            problem.gripper,
             problem.torque,
-            nuisance,
+            problem.nuisance(trace.time_s),
             problem.noise_share,
             problem.noise_rad,
         )

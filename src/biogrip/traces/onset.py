@@ -17,6 +17,7 @@ from scipy.special import chdtri, stdtrit
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import instant, plain
+from biogrip.fit.any_sample import extreme_responses, fit_responses
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFit, OnsetFits
 from biogrip.judging.diagnosis import Diagnosis
@@ -27,7 +28,6 @@ from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.modes import lagged_torques
 from biogrip.physics.protocol import Load, Phase
 from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
-from biogrip.traces.any_sample import extreme_responses, left_over
 
 # Longest relaxation time over the protocol's duration, and how many a decade; the shortest is that
 # between the closest readings.
@@ -70,7 +70,7 @@ def estimate_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> 
     def square_sum(onset_s: float, some: BoolArray) -> float:
         nuisance = nuisance_basis(time_s[some], offset=offset, drift=problem.drift)
         own = extreme_responses(lagged(time_s[some] - onset_s), gripper, len(shares))
-        return left_over(without(nuisance, rotation_rad[some]), without(nuisance, own))
+        return fit_responses(without(nuisance, rotation_rad[some]), without(nuisance, own))[1]
 
     low, high = time_s[0], max(time_s[0], time_s[-1] - _LEAST_AFTER * torque.end_s)
     while True:

@@ -12,6 +12,7 @@ References
 """
 
 import numpy as np
+from scipy.optimize import nnls
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
@@ -54,15 +55,17 @@ def extreme_responses(lagged: Array, gripper: Gripper, lags: int) -> Array:
     return np.vstack((alone - pushed + pushed[0], pushed[0]))
 
 
-def left_over(trace: Array, responses: Array) -> float:
-    """Return the residual sum of squares of a non-negative least-squares fit of the responses."""
-    from scipy.optimize import nnls
+def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:
+    """Fit non-negative amplitudes of responses, (n, n_rows), to a trace, (n_rows,).
 
-    scale = np.linalg.norm(responses, axis=1)
-    scaled = scale > 0
-    if not np.any(scaled):
-        return float(trace @ trace)
-    return float(nnls((responses[scaled] / scale[scaled, None]).T, trace)[1] ** 2)
+    Returns the amplitudes, (n,), and the residual sum of squares.
+    """
+    # As many rows as functions have the same inner products.
+    rows = np.asarray(np.linalg.qr(np.vstack((responses, trace)).T, mode="r"))
+    sizes = np.linalg.norm(responses, axis=1)
+    sizes[sizes == 0] = 1.0
+    amplitudes, norm = nnls(rows[:, :-1] / sizes, rows[:, -1])
+    return amplitudes / sizes, float(norm**2)
 
 
 def proportional_deviations(
@@ -101,31 +104,17 @@ def proportional_deviations(
     lags = np.append(np.geomspace(shortest, _LONGEST, count), _LASTING)
     lagged = lagged_torques(torque, lags.tolist())(time_s)
     family = extreme_responses(lagged, gripper, len(lags))
-    sizes = np.linalg.norm(family, axis=1)
-    family = family[sizes > 0] / sizes[sizes > 0, None]
+    functions = np.vstack((family, nuisance, -nuisance))
     deviations = np.full(len(time_s), share * np.max(np.abs(rotation_rad)))
     for _ in range(_ROUNDS):
-        smooth, rest = _smooth(family, nuisance, rotation_rad, deviations)
+        amplitudes, _ = fit_responses(rotation_rad / deviations, functions / deviations)
+        smooth, rest = amplitudes[: len(family)] @ family, rotation_rad - amplitudes @ functions
         deviations = share * np.abs(smooth)
         if noise_rad is not None:
             deviations = np.hypot(deviations, noise_rad)
         else:
             deviations = np.maximum(deviations, _least(np.abs(smooth), rest, share))
     return np.maximum(deviations, _ROUNDING * float(np.max(np.abs(rotation_rad))))
-
-
-def _smooth(
-    family: Array, nuisance: Array, rotation_rad: Array, deviations: Array
-) -> tuple[Array, Array]:
-    """Return the smooth rotation and what it and the nuisance leave, (n_samples,) each."""
-    from scipy.optimize import nnls
-
-    functions = np.vstack((family, nuisance, -nuisance))
-    rows = np.vstack((functions, rotation_rad)) / deviations
-    triangle = np.asarray(np.linalg.qr(rows.T, mode="r"))
-    amplitudes = nnls(triangle[:, :-1], triangle[:, -1])[0]
-    smooth: Array = amplitudes[: len(family)] @ family
-    return smooth, rotation_rad - amplitudes @ functions
 
 
 def _least(sizes: Array, rest: Array, share: float) -> float:
