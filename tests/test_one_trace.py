@@ -28,11 +28,11 @@ from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.identify.settings import HOLD, Asked, Setting, case_of
 from biogrip.identify.trace_case import read_trace
 from biogrip.identify.words import for_a_paper, side_by_side
+from biogrip.judging.onset import notes_on_start
 from biogrip.judging.profiles import Profile
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.models import CANDIDATES, MODELS
-from biogrip.traces.onset import note_late_onset
 from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
 from tests.helpers.problems import clean
@@ -276,12 +276,12 @@ def test_a_trace_whose_fit_fails_costs_no_other_its_result(
     bad.write_text("".join(EXAMPLE.read_text().splitlines(keepends=True)[:-1]))
     whole_length = len(pd.read_csv(EXAMPLE))
 
-    def fails(problem: Any, time_s: Array, values: Array, told: Any) -> Any:
+    def fails(problem: Any, time_s: Array, *given: Any, **more: Any) -> Any:
         if len(time_s) < whole_length:
             raise ValueError("min() arg is an empty sequence")
-        return note_late_onset(problem, time_s, values, told)
+        return notes_on_start(problem, time_s, *given, **more)
 
-    monkeypatch.setattr(one_trace, "note_late_onset", fails)
+    monkeypatch.setattr(one_trace, "notes_on_start", fails)
     table, options = tmp_path / "found.csv", ("--config", few, "--model", "liquid_drop")
     status, said, error = identify(bad, good, "--csv", table, *options)
     assert (status, "Traceback" in error) == (1, False)

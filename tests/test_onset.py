@@ -10,12 +10,12 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.fit.fitted_onset import OnsetFits
+from biogrip.fit.fitted_onset import OnsetFits, begins_constant, estimate_onset
 from biogrip.identify.notebook import identify_trace
+from biogrip.judging.onset import is_cut_off
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import Phase, hold, load
-from biogrip.traces.onset import begins_constant, estimate_onset, is_cut_off
 from tests.helpers import identified as command
 from tests.helpers.default import STUDY
 from tests.helpers.identified import by_quantity, identify, write_trace
@@ -324,7 +324,7 @@ def test_a_clock_may_count_seconds_since_1970() -> None:
             "maxwell",
             "force",
             2.0 * np.exp(-HOLD / 8),
-            " relaxation times of the fit. If it starts at 16 s",
+            "after the step of the protocol. If it starts at 16 s",
         ),
         ("maxwell", "strain", 1 / 100 + HOLD / 5000, "k would be 100"),
         ("kelvin_voigt", "strain", (1 - np.exp(-HOLD / 8)) / 100, "If it starts at 16 s of the"),

@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import curve_fit
 
 from biogrip.arrays import Array
+from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.problem import Identification, Problem
 from biogrip.fit.trace_fit import trace_fit
@@ -16,7 +17,6 @@ from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import hold
-from biogrip.fit.any_sample import proportional_deviations
 from tests.helpers.problems import run
 
 # The fit of polystyrene at 190 degC that pyRheo publishes, with weights of 5 % of the compliance.

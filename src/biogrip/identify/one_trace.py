@@ -37,7 +37,7 @@ from biogrip.identify.settings import Asked, case_of
 from biogrip.identify.trace_case import TraceCase, note_saturated, read_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
-from biogrip.judging.onset_profiles import profile_over_onset
+from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.keys import plain
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.simulation import simulated_rotation
@@ -49,7 +49,6 @@ from biogrip.stages import recording
 from biogrip.stages.judgement import fits_judged, notes_on_fit
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
-from biogrip.traces.onset import note_hidden_ramp, note_late_onset, note_tare
 
 # Most traces of a batch, and most readings of traces that are fitted together.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
@@ -224,7 +223,10 @@ def identify_alike(
             diagnoses[index], onsets_s[index] = merged
     progress.done()
     progress.doing("trying an offset and a drift")
-    starts = [_about_start(*each) for each in zip(traces, diagnoses, strict=True)]
+    starts = [
+        notes_on_start(own.problem, *own.readings, told, may_be_late=own.case.may_start_late)
+        for own, told in zip(traces, diagnoses, strict=True)
+    ]
     opinions = second_opinions(traces, diagnoses, progress.within, [own.lead for own in models])
     found = []
     for index, own in enumerate(traces):
@@ -243,14 +245,6 @@ def identify_alike(
         read = INSTRUMENTS[data["reads"]["quantity"]].read
         write_text(output, json.dumps(in_own_units(rounded, read), indent=1) + "\n")
     return found
-
-
-def _about_start(trace: TraceCase, diagnosis: Diagnosis) -> list[Note]:
-    """Return notes on when the protocol starts, and on a ramp that no reading shows."""
-    given = trace.problem, *trace.readings, diagnosis
-    late = note_late_onset(*given) if trace.case.may_start_late else []
-    tare = note_tare(trace.problem, trace.readings, diagnosis, late=bool(late))
-    return [*(late or note_hidden_ramp(*given)), *tare]
 
 
 def _data(

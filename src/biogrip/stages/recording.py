@@ -12,14 +12,13 @@ from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.fitted_onset import OnsetFits
+from biogrip.fit.fitted_onset import OnsetFits, estimate_onset
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.whitening import MOST_SAMPLES
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.study.study import Case
 from biogrip.terminal import warn
 from biogrip.traces.columns import Columns, place
-from biogrip.traces.onset import estimate_onset
 from biogrip.traces.plausibility import check_recording
 from biogrip.traces.reader import Recognised, Recording, read_recording
 
