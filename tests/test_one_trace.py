@@ -20,19 +20,13 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.cli import _parser, main
 from biogrip.errors import BiogripError
-from biogrip.fit.nested_fits import ranked
-from biogrip.fit.problem import History, Identification
 from biogrip.identify import one_trace
-from biogrip.identify.other_fits import FittedModels
 from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.identify.settings import HOLD, Asked, Setting, case_of
 from biogrip.identify.trace_case import read_trace
 from biogrip.identify.words import for_a_paper, side_by_side
 from biogrip.judging.onset import notes_on_start
-from biogrip.judging.profiles import Profile
-from biogrip.judging.quantities import parameters_and_sum
-from biogrip.judging.verdicts import Finding
-from biogrip.physics.models import CANDIDATES, MODELS
+from biogrip.physics.models import CANDIDATES
 from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
 from tests.helpers.problems import clean
@@ -196,7 +190,7 @@ REFUSED = {
     **{f"identify a.csv --output {name}": said for name, said in WRITTEN.items()},
     **{f"identify a.csv --csv {name}": said for name, said in WRITTEN.items()},
     **dict.fromkeys(PIPES, "no regular file; allowed is one."),
-    "identify .": "TRACE: found the folder '.', allowed is a file.",
+    "identify .": "TRACE: found '.', which is no regular file; allowed is one.",
     "identify tabel.csv": "found 'tabel.csv', allowed is a file that exists in the folder /",
     f"identify {'x/' * 3000}": "allowed is a file that exists in",
     "identify a.csv b.csv --output x.json": "--output: only for one trace",
@@ -368,7 +362,6 @@ def test_models_that_are_named_are_held_against_the_chosen_one(
     """The example is of a drop with a membrane; its parallel damper does not show."""
     said, found = example
     assert "model is richer than the trace asks for: Maxwell liquid drop" in said
-    assert found["advice"].endswith(" Its values lie within the limits.")
     tried = [row["model"] for row in found["models"]]
     assert tried[-2:] == ["fractional_kelvin_voigt", "fractional_maxwell"]
     assert sum(CANDIDATES[name].model.power_law for name in tried) == 2
@@ -397,32 +390,6 @@ def test_a_rejected_fit_names_a_better_model_though_it_is_simpler(tmp_path: Path
     found = identified(tmp_path, trace, *options, config=models)
     assert found["fit"] == "rejected"
     assert "(--model springpot) is preferred" in found["advice"]
-
-
-def test_values_of_a_simpler_model_are_held_against_limits() -> None:
-    """A drop's c is c + c_p of the richer model, whose c_p it has not."""
-    names = ["generalized_maxwell", "liquid_drop"]
-    answers = {
-        name: Identification(x, 1.0, 1, 1, "converged", History.of([(x, 1.0, 1.0, 1)]))
-        for name, x in zip(
-            names, (np.array([20.0, 5.0, 79.0, 1.0]), np.array([20.0, 5.0, 80.0])), strict=True
-        )
-    }
-    models = FittedModels(names[0], ranked(names, [1.0, 1.0], 400), answers)
-
-    def advised(**limits: tuple[float | None, float | None]) -> str:
-        findings = []
-        for quantity in parameters_and_sum(MODELS[names[0]]):
-            ends = limits.get(quantity.label.replace(" + ", "_and_"), (None, None))
-            low, high = (None if end is None else float(np.log(end)) for end in ends)
-            profile = Profile(np.zeros(1), np.zeros(1), 0.0, low, high, np.zeros(4))
-            findings.append(Finding(quantity, profile, 0.1))
-        return str(models.data(findings)["advice"])
-
-    assert advised(k=(19.0, 21.0), c_p=(None, 3.0)).endswith("Its values lie within the limits.")
-    outside = advised(k=(21.0, None), c=(None, 90.0), c_and_c_p=(70.0, 79.0))
-    assert outside.endswith("Outside the limits lies its k, 20 N/m and its c + c_p, 80 N s/m.")
-    assert "limits" not in advised()
 
 
 def test_colours_are_for_terminals(

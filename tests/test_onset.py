@@ -296,11 +296,6 @@ def test_a_fitted_onset_lies_between_its_readings_on_any_clock(unit_s: float) ->
     assert found.to_frame().loc["k", "value"] == pytest.approx(1000, rel=0.02)
 
 
-def test_a_start_that_is_no_number_is_refused() -> None:
-    with pytest.raises(BiogripError, match="start: found 'soon', allowed is a number of seconds"):
-        identify_trace(HOLD, HOLD, reads="strain", start="soon")
-
-
 HOLD = np.arange(0.4, 44, 0.4)
 
 

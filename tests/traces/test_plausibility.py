@@ -56,7 +56,8 @@ def said(
     offset: bool = False,
 ) -> str:
     """What is said of a trace on lines 2, 3, ...: why it is refused, a note on it, or nothing."""
-    recording = Recording(time_s, values, np.arange(len(time_s)) + 2, 0)
+    units = columns.time.removeprefix("time_"), columns.reading.removeprefix("rotation_")
+    recording = Recording(time_s, values, np.arange(len(time_s)) + 2, 0, units)
     problem = replace(set_up(gripper, phases, Sample("maxwell")), offset=offset)
     try:
         return check_recording(recording, problem, Path("trace.csv"), columns, noise_rad) or ""
@@ -113,10 +114,9 @@ def test_the_largest_reading_and_the_smoothed_one_are_told() -> None:
 )
 def test_the_unit_that_would_fit_is_named(unit: str, factor: float, hint: str) -> None:
     values = factor * trace(SAMPLES["liquid_drop_1"])
-    for columns in (Columns("time_s", f"phi_{unit}"), Columns("time_s", "phi", None, unit)):
-        found = said(TIMES, values, columns)
-        assert f"column '{columns.reading}'" in found
-        assert found.endswith(f"It would fit if it were {hint}")
+    found = said(TIMES, values, Columns("time_s", f"rotation_{unit}"))
+    assert f"column 'rotation_{unit}'" in found
+    assert found.endswith(f"It would fit if it were {hint}")
 
 
 def test_a_stiff_sample_passes_if_its_rotation_is_far_above_a_given_noise() -> None:

@@ -22,29 +22,16 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-# Options of the command in what it says, and the arguments and keys that they are here.
-_ARGUMENTS = (
-    ("--start fit", 'start="fit"'),
-    ("--offset --drift", "offset=True, drift=True"),
-    ("--(offset|drift)", r"\1=True"),
-    (r"--model (\w+)", r'model="\1"'),
-    (r"--noise-model (\w+)", r'noise_model="\1"'),
-    (r"--noise-share (\S+)\.", r"measurement.noise_share \1 in config."),
-    ("--(from|until)", r"measurement.\1_s in config"),
-    ("--load", "measurement.load of the command"),
-    ("--(?=[a-z])", ""),
-)
-
 
 def _with_arguments(said: Any) -> Any:
-    """Return what the command says, plain data, with arguments in the place of options."""
+    """Return what the command says, plain data, with names of arguments for its options."""
     if isinstance(said, dict):
         return {key: _with_arguments(value) for key, value in said.items()}
     if isinstance(said, list):
         return [_with_arguments(value) for value in said]
-    for option, argument in _ARGUMENTS if isinstance(said, str) else ():
-        said = re.sub(option, argument, said)
-    return said
+    if not isinstance(said, str):
+        return said
+    return re.sub(r"--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), said)
 
 
 @dataclass(frozen=True, repr=False)
@@ -138,16 +125,12 @@ def identify_trace(
     """
     if reads not in INSTRUMENTS:
         raise BiogripError(f"reads: found '{reads}', allowed are {', '.join(INSTRUMENTS)}.")
-    if hold is not None and "protocol" in (config or {}):
-        raise BiogripError("hold: does not go with config's protocol; allowed is one of them.")
     column = INSTRUMENTS[reads].read.column
     given = {"time_s": time_s, column: readings, **({} if sd is None else {"sd": sd})}
     columns = {name: as_column(values, name) for name, values in given.items()}
     if len({len(values) for values in columns.values()}) > 1:
         found = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
         raise BiogripError(f"found {found}; allowed are as many of each.")
-    if isinstance(start, str) and start != "fit":
-        raise BiogripError(f"start: found '{start}', allowed is a number of seconds, or 'fit'.")
     late = ("fit_start", True) if start == "fit" else ("start_s", start)
     measured = (
         *(("reads", reads, column), ("start", *late), ("sd", "sd", None if sd is None else "sd")),

@@ -10,7 +10,8 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -50,7 +51,7 @@ from biogrip.stages.judgement import fits_judged, notes_on_fit
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
 
-# Most traces of a batch, and most readings of traces that are fitted together.
+# Most traces of a batch, and most readings that are fitted together, of short traces.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
 _NOT_COMPARED = (
     "With fixed parameters no other sample models are tried: a value that is known in this model "
@@ -114,7 +115,13 @@ def identify_batch(
                 traces[index] = read
         progress.done()
 
-        def identify(group: Sequence[int]) -> None:
+        alike = defaultdict[Hashable, list[int]](list)
+        for index, trace in traces.items():
+            few = len(trace.readings[0]) * _MOST_IN_BATCH <= _MOST_READINGS
+            alike[trace.budget, None if few else index].append(index)
+        groups = [*alike.values()]
+        # An error is of one of a group: it is then identified one by one.
+        for group in groups:
             found = _tried(
                 asked[group[0]],
                 identify_alike,
@@ -128,12 +135,7 @@ def identify_batch(
             elif len(group) == 1:
                 results[group[0]] = found
             else:
-                # The error is of one of them.
-                for index in group:
-                    identify([index])
-
-        for group in _alike(traces):
-            identify(group)
+                groups += ([index] for index in group)
     outcome = Outcome([], {})
     for index, own in enumerate(asked):
         result = results[index]
@@ -171,20 +173,6 @@ def _tried(asked: Asked, work: Callable[..., T], *given: Any) -> T | BiogripErro
             f"trace: {type(error).__name__}: {error} ({Path(where.filename).name}, line "
             f"{where.lineno}). Please report it, with the trace if it may be shared."
         )
-
-
-def _alike(traces: Mapping[int, TraceCase]) -> list[list[int]]:
-    """Group the indices of traces that can be fitted together, none with too many readings."""
-    groups: list[list[int]] = []
-    for index, trace in traces.items():
-        for group in groups:
-            readings = sum(len(traces[other].readings[0]) for other in (*group, index))
-            if readings <= _MOST_READINGS and trace.is_like(traces[group[0]]):
-                group.append(index)
-                break
-        else:
-            groups.append([index])
-    return groups
 
 
 def identify_alike(
@@ -261,7 +249,7 @@ def _data(
     assumptions = [Note(HARMLESS, _NOT_COMPARED)] if problem.fixed else []
     read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
     said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *notes], read)
-    form = recorded.recognised
+    form, rejected = recorded.recognised, said["fit"] == REJECTED
     unusual = form and not form.is_usual(case.columns)
     return {
         "model": problem.model.name,
@@ -275,8 +263,8 @@ def _data(
         **_fitted_along(problem, recorded, np.exp(best)),
         **said,
         "noise_model": fit.noise_data(),
-        **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
-        "moduli": None if said["fit"] == REJECTED else _moduli(problem, recorded.time_s, best),
+        **models.data(rejected=rejected),
+        "moduli": None if rejected else _moduli(problem, recorded.time_s, best),
         "assumed": _assumed(case, list(models.answers or case.models)),
         "by_default": _by_default(trace.given) if instrument.has_jaws else [],
         "versions": {

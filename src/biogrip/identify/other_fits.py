@@ -24,7 +24,6 @@ from biogrip.fit.nested_fits import (
     fit_models,
     fits_far_better,
     is_within,
-    preferred_simpler,
     ranked,
     within_range,
 )
@@ -46,7 +45,7 @@ from biogrip.judging.doubts import (
 from biogrip.judging.likelihood import MISSED, compute_fall
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.fractional import LONGEST_S
-from biogrip.physics.models import CANDIDATES, as_richer, contained
+from biogrip.physics.models import CANDIDATES
 from biogrip.physics.noise import stream
 from biogrip.physics.protocol import is_held
 from biogrip.physics.whitening import drift_is_flow, without
@@ -79,14 +78,12 @@ class FittedModels:
             (own.delta_bic for own in self.tried if own.candidate == self.chosen), default=0.0
         )
 
-    def data(self, findings: Sequence[Finding] | None) -> dict[str, Any]:
+    def data(self, *, rejected: bool) -> dict[str, Any]:
         """Return one row per model, and advice in words, as plain data.
 
-        Findings are those on the quantities of the chosen model; None if its fit is rejected.
-        Advice is then only another model, simpler or richer, that may suit the trace.
+        If the fit of the chosen model is rejected, advice is only another model, simpler or richer,
+        that may suit the trace.
         """
-        if not self.tried:
-            return {"models": [], "advice": None}
         rows = [
             {
                 "model": each.candidate,
@@ -100,28 +97,8 @@ class FittedModels:
             }
             for each in self.tried
         ]
-        words = advice(self.tried, self.chosen)
-        if findings is not None:
-            return {"models": rows, "advice": f"{words} {self._compared(findings)}".rstrip()}
-        better = fits_far_better(self.tried, self.chosen)
-        return {"models": rows, "advice": words if better else None}
-
-    def _compared(self, findings: Sequence[Finding]) -> str:
-        """Return a sentence on where a preferred simpler model's values are, if it is nested."""
-        simpler = preferred_simpler(self.tried, self.chosen)
-        bounded = [each for each in findings if each.is_bounded]
-        if simpler is None or simpler not in contained(self.chosen) or not bounded:
-            return ""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x = np.log(as_richer(self.chosen, simpler, self.answers[simpler].parameters))
-            outside = [
-                f"{each.quantity.label}, {plain(np.exp(each.quantity.log(x)))} {each.quantity.unit}"
-                for each in bounded
-                if not each.allows(x)
-            ]
-        if not outside:
-            return "Its values lie within the limits."
-        return f"Outside the limits lies its {' and its '.join(outside)}."
+        said = rows and (not rejected or fits_far_better(self.tried, self.chosen))
+        return {"models": rows, "advice": advice(self.tried, self.chosen) if said else None}
 
 
 def _vanished(candidate: str, answer: Identification) -> list[str]:
@@ -347,14 +324,14 @@ def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnos
     better = f"{'explain' if many else 'explains'} the trace far better (χ² falls by "
     better += f"{plain(other.fall)}; by chance it would {one_in(other.chance)} traces)"
     controlled, deforms = case_problem.instrument.controlled.name, case_problem.instrument.deforms
-    time_s = trace.recorded.time_s
-    if drifts and drift_is_flow(case_problem.torque, time_s):
+    torque, time_s = case_problem.torque, trace.recorded.time_s
+    if drifts and drift_is_flow(torque, time_s):
         text = (
             f"A constant and a line in time, fitted along, {better}: the "
             f"instrument drifts, or the sample flows. Under this {controlled} both give the same "
             f"line, and the trace cannot tell which it is: a {controlled} that changes would."
         )
-    elif not drifts and is_held(case_problem.torque, time_s):
+    elif not drifts and is_held(torque, time_s):
         text = (
             f"A constant, fitted along, {better}: the instrument has an offset, or the sample "
             f"{'holds a load' if deforms else 'yields at once'}. Under this {controlled} both give "
@@ -363,16 +340,15 @@ def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnos
     else:
         terms = "An offset and a drift" if many else "A drift" if drifts else "An offset"
         options = " --offset" * other.trace.problem.offset + " --drift" * other.trace.problem.drift
-        or_flows = ""
+        text = (
+            f"{terms} of the instrument, fitted along, {better}: {changes or 'no verdict changes'}."
+            f" If the instrument may have that, identify the trace with{options}."
+        )
         if drifts and not deforms:
-            or_flows = (
+            text += (
                 f" Or the sample flows: as long as the {controlled} is constant, a drift and a "
                 "damper without a spring give the same line."
             )
-        text = (
-            f"{terms} of the instrument, fitted along, {better}: {changes or 'no verdict changes'}."
-            f" If the instrument may have that, identify the trace with{options}.{or_flows}"
-        )
     weight = DOUBT if changed else HARMLESS
     return Note(REJECTION if rejected else weight, text)
 

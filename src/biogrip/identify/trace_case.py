@@ -7,7 +7,7 @@ together resolve. A damper is as stiff as c/t after a time t, which is between t
 interval and the duration; so is a springpot, with a power of t.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -70,13 +70,10 @@ class TraceCase:
         """True if the user names the sample models to compare."""
         return "models" in (self.given.get("model_selection") or {})
 
-    def is_like(self, other: "TraceCase") -> bool:
-        """Return True if the model, the budget of fits and the confidence are the same."""
-        return (
-            self.problem.searched == other.problem.searched
-            and self.case.confidence == other.case.confidence
-            and self.case.least_squares == other.case.least_squares
-        )
+    @property
+    def budget(self) -> Hashable:
+        """What traces that are fitted together have in common: model, fits and confidence."""
+        return self.problem.searched, self.case.least_squares, self.case.confidence
 
     def with_terms(self, *, drift: bool) -> "TraceCase":
         """Return the trace as if the user had declared an offset, or a drift, too."""

@@ -53,7 +53,6 @@ def read_checked(
     trace = read_recording(recorded, columns)
     if trace.recognised is not None:
         show(trace.recognised)
-        columns = trace.recognised.stated(columns)
     weighted = columns.sd is not None or problem.noise_share is not None
     if (problem.coloured or weighted) and len(trace.time_s) > MOST_SAMPLES:
         raise BiogripError(

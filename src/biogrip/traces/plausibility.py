@@ -21,7 +21,7 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lagged_torques
 from biogrip.physics.protocol import TorqueHistory, torque_at
 from biogrip.physics.whitening import nuisance_basis, without
-from biogrip.traces.columns import TIME_UNITS, Columns, place, unit_of
+from biogrip.traces.columns import TIME_UNITS, Columns, place
 from biogrip.traces.reader import Recording
 
 LARGEST_SHARE = 1.5
@@ -182,8 +182,7 @@ def _check_times(
 
     if fits(1.0):
         return
-    unit = unit_of(path, columns.time, columns.time_unit, TIME_UNITS, columns.said_by("time_unit"))
-    hint = _other_units(unit, TIME_UNITS, fits)
+    hint = _other_units(recording.units[0], TIME_UNITS, fits)
     for sample in np.flatnonzero((time_s < earliest) | (time_s > end_s + slack))[:1]:
         if not hint and onset_s is None:
             how = "--start says when, or --start fit finds it"
@@ -217,9 +216,7 @@ def _check_turn(
 
     if fits(1.0):
         return None
-    allowed, said_by = columns.quantity.units, columns.said_by(columns.unit_key)
-    unit = unit_of(path, columns.reading, columns.reading_unit, allowed, said_by)
-    hint = _other_units(unit, allowed, fits)
+    hint = _other_units(recording.units[1], columns.quantity.units, fits)
     alone = f"without any sample the arm turns by {free:.3g} rad"
     if noise_rad is not None and _FAR_ABOVE * noise_rad < turn < smallest:
         return (

@@ -1,6 +1,6 @@
 """Reader of recorded traces in the user's own files, with gaps, units and line numbers."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -68,11 +68,6 @@ class Recognised:
             and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
         )
 
-    def stated(self, columns: Columns) -> Columns:
-        """Return columns with the units that the file has."""
-        time_unit, unit, *_ = (each["unit"] for each in self.columns.values())
-        return replace(columns, time_unit=time_unit, reading_unit=unit)
-
     def data(self) -> dict[str, Any]:
         """Return the form as plain data, without what there is not."""
         return {key: value for key, value in asdict(self).items() if value is not None}
@@ -98,6 +93,8 @@ class Recording:
     """Line number of each sample, from 1, (n_samples,)."""
     without_number: int
     """Number of rows left out as gaps."""
+    units: tuple[str, str] = ("s", "rad")
+    """Units of the times and of the readings in the file."""
     sd_rad: Array | None = None
     """Standard deviations of the rotations, (n_samples,), where the file has them."""
     recognised: Recognised | None = None
@@ -108,7 +105,7 @@ class Recording:
 
 
 def read_recording(path: Path, columns: Columns) -> Recording:
-    """Read a recorded trace.
+    """Read the columns of a recorded trace from a file.
 
     The file is text in UTF-8, UTF-16 or Windows-1252. Empty lines and lines that start with ``#``
     are ignored. The header is the line that has the columns, or has a row of units below it; of
@@ -119,16 +116,6 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
     row is left out and counted; nothing is interpolated. Other spreadsheet errors, as ``#REF!``,
     are refused.
-
-    Parameters
-    ----------
-    path, columns
-        The file, and its columns to read; units as `unit_of` finds them.
-
-    Returns
-    -------
-    Recording
-        Trace in SI units.
 
     Raises
     ------
@@ -161,9 +148,11 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         kept, lines, averaged = _averaged(kept, lines)
     _check_order(path, columns, kept[:, 0], lines)
     time_s = kept[:, 0] * TIME_UNITS[units[0]]
-    first = -np.inf if columns.from_s is None else columns.from_s
-    last = np.inf if columns.until_s is None else columns.until_s
-    used = (time_s >= first) & (time_s <= last)
+    used = np.ones(len(time_s), bool)
+    if columns.from_s is not None:
+        used &= time_s >= columns.from_s
+    if columns.until_s is not None:
+        used &= time_s <= columns.until_s
     kept, lines, time_s = kept[used], lines[used], time_s[used]
     _check_count(path, columns, len(kept), without_number, "usable time")
     names_and_units = (
@@ -189,9 +178,16 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         last_s=float(time_s[-1]),
     )
     unit = columns.quantity.units[units[1]]
-    sd_rad = None if columns.sd is None else kept[:, 2] * (unit * abs(columns.scale))
-    rotation_rad = kept[:, 1] * (unit * columns.scale)
-    return Recording(time_s, rotation_rad, lines, without_number, sd_rad, recognised, load)
+    return Recording(
+        time_s,
+        kept[:, 1] * (unit * columns.scale),
+        lines,
+        without_number,
+        units=(units[0], units[1]),
+        sd_rad=None if columns.sd is None else kept[:, 2] * (unit * abs(columns.scale)),
+        recognised=recognised,
+        load=load,
+    )
 
 
 def _columns_of(

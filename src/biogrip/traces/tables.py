@@ -328,12 +328,8 @@ def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
 def _likely_table(sheet: Sheet) -> Table:
     """Return what may be the table of a file without the columns: names above numbers."""
     numbers = [*map(_count_numbers, sheet.cells[:_LINES_SEARCHED])]
-    likely = [
-        at
-        for at, (here, below) in enumerate(pairwise(numbers))
-        if below > here == 0 and sum(map(bool, sheet.cells[at])) > 1
-    ]
-    at = likely[0] if likely else 0
+    pairs = enumerate(pairwise(numbers))
+    at = next((at for at, (here, below) in pairs if below > here == 0), 0)
     return Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1, end=at + 1)
 
 
