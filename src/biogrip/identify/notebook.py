@@ -149,7 +149,8 @@ def identify_trace(
     with TemporaryDirectory() as folder:
         file = Path(folder) / "trace.csv"
         pd.DataFrame(columns).to_csv(file, index=False)
-        asked = Asked(file, settings=tuple(each for each in settings if each.value is not None))
+        chosen = tuple(each for each in settings if each.value is not None)
+        asked = Asked(file, None, chosen, file.name)
         try:
             trace = read_trace(file, case_of(asked), asked.given, lambda text: None)
             with Progress("", 5, live=False, quiet=True) as progress:
