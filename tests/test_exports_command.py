@@ -17,9 +17,9 @@ TIMES = 0.25 * np.arange(1, 61)
 MODULI = 5 + 20 * np.exp(-TIMES / 3) + 0.1 * np.random.default_rng(1).standard_normal(60)
 
 
-def exported(path: Path, clock: np.ndarray = TIMES) -> Path:
+def exported(path: Path) -> Path:
     """A conditioning of 7 s, and a relaxation modulus of 5 + 20 exp(-t / 3) Pa, in two blocks."""
-    blocks = [0.5 * np.arange(1, 15), np.full(14, 0.01)], [BEGINS_S + clock, 1e-3 * MODULI]
+    blocks = [0.5 * np.arange(1, 15), np.full(14, 0.01)], [BEGINS_S + TIMES, 1e-3 * MODULI]
     lines = ["Test:\tgel"]
     for number, block in enumerate(blocks, 1):
         lines += [f"Interval:\t{number}", "Point No.\tTime\tRelaxation Modulus", "\t\t"]
@@ -66,25 +66,3 @@ def test_the_block_that_is_asked_for_is_identified(
     assert (status, said) == (0, "")
     assert found(trace)["quantities"] == by_options["quantities"]
     assert found(trace)["assumed"]["measurement"] == by_options["assumed"]["measurement"]
-
-
-def test_readings_of_a_rounded_clock_are_averaged_and_counted(tmp_path: Path) -> None:
-    trace = exported(tmp_path / "gel.csv", np.floor(TIMES / 0.5) * 0.5)
-    few = config(tmp_path / "few.yaml")
-    command: list[str | Path] = [
-        trace,
-        *READ,
-        "--config",
-        few,
-        "--set",
-        "measurement.block=2",
-        "--start",
-        "7",
-    ]
-    status, _, said = identify(*command)
-    assert status == 1
-    assert "are averaged by --set measurement.average_repeated=true." in said
-    assert identify(*command, "--set", "measurement.average_repeated=true")[0] == 0
-    notes = found(trace)["notes"]
-    assert {"weight": "harmless", "text": "Averaged at repeated times: 58 readings."} in notes
-    assert found(trace)["samples"] in (30, 31)

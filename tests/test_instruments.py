@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 
@@ -13,10 +14,9 @@ from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import Harmonic, Load, Phase, hold
 from tests.helpers.default import study_of
-from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
+from tests.helpers.identified import FEW, by_quantity, identify, told, write_trace
 from tests.helpers.places import ROOT
 
-MEASURED = ROOT / "data/measured"
 SOLID = Sample("zener_maxwell")
 TRUTH = {"k": 300.0, "k_p": 200.0, "c": 900.0}
 FOUND = TRUTH | {"tau": 3.0}
@@ -124,42 +124,34 @@ def test_a_study_mixes_instruments() -> None:
     assert not study.cases["pipette"].problem.torque.deforms
 
 
-def test_readings_at_the_instant_of_a_step_are_left_out(tmp_path: Path) -> None:
+def test_readings_at_the_instant_of_a_step_are_left_out() -> None:
     """A rheometer's first row is at 0, with the modulus that it jumped to."""
-    times = np.append(0.0, TIMES)
     values = np.append(500.0, noisy(response("stress", 1.0)))
-    trace = write_trace(tmp_path / "g.csv", times, values, "time_s,modulus_Pa")
-    found = identified(tmp_path, trace, "--reading", "modulus=modulus_Pa", "--model", SOLID.name)
-    assert found["fit"] == "ok"
-    assert found["samples"] == len(TIMES)
-    assert any("they were taken: 1 reading, at " in note["text"] for note in found["notes"])
+    found = told(np.append(0.0, TIMES), values, reads="modulus", model=SOLID.name)
+    assert (found.status, found.data["samples"]) == ("ok", len(TIMES))
+    assert "they were taken: 1 reading, at " in str(found)
 
 
-def test_oscillations_about_zero_are_identified(tmp_path: Path) -> None:
+def test_oscillations_about_zero_are_identified() -> None:
     """Nothing is held at the ends of the phase: the amplitude is what a modulus is over."""
     amplitude = 0.02
     swing = Load(0.0, harmonics=(Harmonic(amplitude, np.pi, -np.pi / 2),))
     experiment = set_up(INSTRUMENTS["stress"], (Phase(20.0, swing, swing),), SOLID)
     times: Array = 0.02 * np.arange(1.0, 1000.0)
     values = noisy(simulate(experiment, TRUTH, times)) / amplitude
-    trace = write_trace(tmp_path / "t.csv", times, values, "time_s,modulus_Pa")
-    phase = "{duration_s: 20, strain: 0, amplitude_strain: 0.02, frequency_Hz: 0.5}"
-    config = f"instrument: relaxation\nprotocol: {{phases: [{phase}]}}\n"
-    options = ["--reading", "modulus=modulus_Pa", "--model", SOLID.name]
-    for name, item in by_quantity(
-        identified(tmp_path, trace, *options, config=config + FEW)
-    ).items():
-        assert abs(item["value"] - FOUND[name]) < item["high"] - item["low"]
+    phase = {"duration_s": 20, "strain": 0, "amplitude_strain": 0.02, "frequency_Hz": 0.5}
+    config = {"instrument": "relaxation", "protocol": {"phases": [phase]}}
+    limits = told(times, values, reads="modulus", model=SOLID.name, config=config).to_frame()
+    for name, truth in FOUND.items():
+        assert abs(limits["value"][name] - truth) < limits["high"][name] - limits["low"][name]
 
 
-def test_the_power_law_of_a_cell_in_an_optical_stretcher(tmp_path: Path) -> None:
+def test_the_power_law_of_a_cell_in_an_optical_stretcher() -> None:
     """The exponent is that of a published, independent fit."""
     config = yaml.safe_load((ROOT / "config/measured.yaml").read_text())["cases"]["hl60"]
-    trace = MEASURED / "hl60.csv"
-    text = yaml.safe_dump({key: config[key] for key in ("instrument", "protocol")}) + FEW
-    found = identified(
-        tmp_path, trace, "--reading", "strain=strain", "--model", "springpot", config=text
-    )
-    alpha = by_quantity(found)["alpha"]
+    given = {key: config[key] for key in ("instrument", "protocol")}
+    trace = pd.read_csv(ROOT / "data/measured/hl60.csv")
+    found = told(trace["time_s"], trace["strain"], reads="strain", model="springpot", config=given)
+    alpha = found.to_frame().loc["alpha"]
     assert alpha["value"] == pytest.approx(0.701, abs=0.011)
     assert alpha["low"] < 0.701 < alpha["high"]

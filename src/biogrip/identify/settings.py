@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field
+from io import StringIO
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -344,9 +345,10 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
     if problem := trace_file_problem(path):
         raise BiogripError(f"{place(path)}: {problem}")
     try:
-        lines = path.read_text(encoding="utf-8-sig").split("\n")
-        separator = "\t" if path.suffix == ".tsv" else max(_SEPARATORS, key=lines[0].count)
-        reader = csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=True)
+        text = path.read_text(encoding="utf-8-sig")
+        header = text.partition("\n")[0]
+        separator = "\t" if path.suffix == ".tsv" else max(_SEPARATORS, key=header.count)
+        reader = csv.reader(StringIO(text), delimiter=separator, skipinitialspace=True, strict=True)
         return [(reader.line_num, [*map(str.strip, row)]) for row in reader]
     except (OSError, ValueError, csv.Error) as error:
         raise BiogripError(f"{place(path)}: cannot be read as a table: {error}.") from error
