@@ -43,7 +43,7 @@ def test_limits_hold_the_truth_of_a_wrong_gripper_only_with_its_uncertainty() ->
         "torque": {"torque_percent": 5},
         "comb": {"finger_gap_m": 0.05e-6, "voltage_percent": 2.4},
     }
-    configs = {
+    configs: dict[str, dict[str, Any]] = {
         name: {"gripper": {"uncertainty": {"arm_length_m": 7.5e-5, **own}}}
         for name, own in uncertain.items()
     }

@@ -74,8 +74,7 @@ def test_a_kept_file_is_read_or_refused_as_its_table_says(
     )
     form: dict[str, Any] = PLAIN_FORM | kept.get("form", {})
     form["columns"] = dict(zip(columns.named, names_and_units, strict=True))
-    assert found.recognised is not None
-    assert found.recognised.data() == {key: it for key, it in form.items() if it is not None}
+    assert found.form == {key: it for key, it in form.items() if it is not None}
     assert found.without_number == form["gaps"]
     assert found.time_s[[0, -1]].tolist() == [form["first_s"], form["last_s"]]
     assert first_last_sum(found.rotation_rad) == pytest.approx(kept["reading"], rel=1e-14)
@@ -157,8 +156,7 @@ def test_what_pandas_writes_is_read_to_the_last_bit(
         lines.insert(int(rng.integers(len(lines) + 1)), line)
     path.write_bytes(encoded("".join(line + line_end for line in lines), encoding))
     found = read_recording(path, Columns("time_s", "angle, left (urad)"))
-    assert found.recognised is not None
-    assert found.recognised.encoding == ENCODINGS[encoding]
+    assert found.form["encoding"] == ENCODINGS[encoding]
     np.testing.assert_array_equal(found.time_s, times)
     np.testing.assert_array_equal(found.rotation_rad, np.array(values) * 1e-6)
     assert found.without_number == 1
@@ -270,8 +268,7 @@ def test_readings_of_equal_times_are_averaged(tmp_path: Path, sd: dict[str, str]
     np.testing.assert_array_equal(found.time_s, np.arange(15))
     np.testing.assert_allclose(found.rotation_rad, groups["rotation_rad"].mean(), rtol=1e-13)
     np.testing.assert_array_equal(found.lines, frame.drop_duplicates("time_s").index + 2)
-    assert found.recognised is not None
-    assert found.recognised.averaged == counts[counts > 1].sum() > 0
+    assert found.form["averaged"] == counts[counts > 1].sum() > 0
     if sd:
         of_means = groups["sd"].apply(lambda own: np.sqrt((own**2).sum())) / counts
         assert found.sd_rad is not None

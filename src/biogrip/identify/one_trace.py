@@ -50,6 +50,7 @@ from biogrip.stages import recording
 from biogrip.stages.judgement import fits_judged, notes_on_fit
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
+from biogrip.traces.reader import is_usual
 
 # Most traces of a batch, and most readings that are fitted together, of short traces.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
@@ -249,15 +250,14 @@ def _data(
     assumptions = [Note(HARMLESS, _NOT_COMPARED)] if problem.fixed else []
     read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
     said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *notes], read)
-    form, rejected = recorded.recognised, said["fit"] == REJECTED
-    unusual = form and not form.is_usual(case.columns)
+    rejected, usual = said["fit"] == REJECTED, is_usual(recorded.form, case.columns)
     return {
         "model": problem.model.name,
         "model_title": problem.model.title,
         "confidence": case.confidence,
         "instrument": instrument.kind,
         "reads": {"quantity": instrument.read.name, "unit": instrument.read.unit},
-        **({"read_as": form.data()} if form and unusual else {}),
+        **({} if usual else {"read_as": recorded.form}),
         **_fixed(problem),
         "limits": _gripper_in_limits(problem),
         **_fitted_along(problem, recorded, np.exp(best)),

@@ -24,7 +24,7 @@ from biogrip.physics.whitening import drift_is_flow, estimate_noise
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
 from biogrip.study.study import Case
-from biogrip.traces.reader import Recognised
+from biogrip.traces.reader import form_in_words, is_usual
 
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
 _CLEAREST, _MARGIN = 1e5, 10.0
@@ -112,9 +112,9 @@ def read_trace(
     A `BiogripError` has file, line and column, if the trace cannot be used.
     """
 
-    def show_unusual(form: Recognised) -> None:
-        if not form.is_usual(case.columns):
-            show(form.in_words(file))
+    def show_unusual(form: Mapping[str, Any]) -> None:
+        if not is_usual(form, case.columns):
+            show(form_in_words(file, form))
 
     columns = replace(case.columns, by_options=True)
     declared = case.block.measurement

@@ -1,9 +1,10 @@
 """Files of targets, CSV, and of measurements, npz: traces without and with noise."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import INSTRUMENTS, Instrument
 from biogrip.records.rows import read_arrays, write_arrays, write_rows
-from biogrip.traces.reader import Recognised
 
 TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
 
@@ -47,8 +47,8 @@ class Measurements:
     at_steps: tuple[float, ...] = ()
     """Times by the recording's clock of readings that were left out, for they are at the very
     instant of a step of what is controlled."""
-    recognised: Recognised | None = None
-    """What was recognised in the file of a recording."""
+    form: Mapping[str, Any] = field(default_factory=dict)
+    """What was recognised in the file of a recording, see `Recording.form`."""
 
 
 def write_target(

@@ -1,9 +1,10 @@
 """Stage 2 for recorded traces: conversion of the user's file to a measurement."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from biogrip.study.study import Case
 from biogrip.terminal import warn
 from biogrip.traces.columns import Columns, place
 from biogrip.traces.plausibility import check_recording
-from biogrip.traces.reader import Recognised, Recording, read_recording
+from biogrip.traces.reader import Recording, read_recording
 
 
 def record(case: Case, recorded: Path, measurements: Path) -> None:
@@ -44,15 +45,14 @@ def read_checked(
     recorded: Path,
     problem: CaseProblem,
     columns: Columns,
-    show: Callable[[Recognised], None] = lambda _: None,
+    show: Callable[[Mapping[str, Any]], None] = lambda form: None,
 ) -> Measurements:
     """Read a recorded trace, and refuse one that is impossible with its gripper and protocol.
 
     Before it is refused, `show` is called with what was recognised in the file.
     """
     trace = read_recording(recorded, columns)
-    if trace.recognised is not None:
-        show(trace.recognised)
+    show(trace.form)
     weighted = columns.sd is not None or problem.noise_share is not None
     if (problem.coloured or weighted) and len(trace.time_s) > MOST_SAMPLES:
         raise BiogripError(
@@ -96,7 +96,7 @@ def read_checked(
         suspicion=suspicion,
         onset_s=onset_s,
         at_steps=at_steps,
-        recognised=trace.recognised,
+        form=trace.form,
     )
 
 
@@ -158,14 +158,15 @@ def notes_on_recording(trace: Measurements) -> list[str]:
     if trace.gaps:
         rows = f"{counted(trace.gaps, 'row')} of {len(trace.time_s) + trace.gaps}"
         notes.append(f"Left out for want of a number: {rows}.")
-    if (form := trace.recognised) is not None and form.averaged:
-        notes.append(f"Averaged at repeated times: {counted(form.averaged, 'reading')}.")
-    if form is not None and form.outside:
-        notes.append(f"Left out by from_s and until_s: {counted(form.outside, 'reading')}.")
-    if form is not None and form.others:
-        notes.append(f"Left out, for rows asks for others: {counted(form.others, 'row')}.")
-    if form is not None and form.load:
-        notes.append(f"The protocol is {form.load}.")
+    form = trace.form
+    if "averaged" in form:
+        notes.append(f"Averaged at repeated times: {counted(form['averaged'], 'reading')}.")
+    if "outside" in form:
+        notes.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
+    if "others" in form:
+        notes.append(f"Left out, for rows asks for others: {counted(form['others'], 'row')}.")
+    if "load" in form:
+        notes.append(f"The protocol is {form['load']}.")
     if trace.at_steps:
         times = ", ".join(f"{time_s:.6g} s" for time_s in trace.at_steps)
         notes.append(

@@ -1,6 +1,7 @@
 """Reader of recorded traces in the user's own files, with gaps, units and line numbers."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -29,56 +30,24 @@ _SHORTEST_STEP = 1e-18
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
 
 
-@dataclass(frozen=True)
-class Recognised:
-    """What was recognised in a file, for people to check before they believe a fit."""
+def is_usual(form: Mapping[str, Any], columns: Columns) -> bool:
+    """Return True if a file, by its `Recording.form`, is a table as biogrip itself would write."""
+    odd = ("units_line", "block", "preamble", "averaged", "outside", "others", "load")
+    return (
+        (form["encoding"], form["separator"], form["decimal"]) == ("UTF-8", "commas", "point")
+        and not any(key in form for key in odd)
+        and columns.block is None
+        and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
+    )
 
-    encoding: str
-    separator: str
-    """``commas``, ``semicolons``, ``tabs`` or ``blanks``."""
-    decimal: str
-    """``point`` or ``comma``."""
-    header_line: int | None
-    units_line: int | None
-    block: int | None
-    """Number of the table, from 1, and of all tables; None if the file has only one."""
-    blocks: int | None
-    preamble: str | None
-    """Some words above the table."""
-    columns: dict[str, dict[str, str]]
-    """Name, as `column`, and `unit` of each column by its quantity."""
-    rows: int
-    gaps: int
-    """Rows left out as gaps, then readings averaged, outside of the times to use, and left out by
-    `rows`, None for none."""
-    averaged: int | None
-    outside: int | None
-    others: int | None
-    load: str | None
-    """How the column of what was controlled is followed, if it is read."""
-    first_s: float
-    last_s: float
 
-    def is_usual(self, columns: Columns) -> bool:
-        """Return True if the file is a table as biogrip itself would write it."""
-        odd = (self.units_line, self.block, self.preamble, self.averaged, self.outside)
-        return (
-            (self.encoding, self.separator, self.decimal) == ("UTF-8", "commas", "point")
-            and not any((*odd, self.others, self.load, columns.block))
-            and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
-        )
-
-    def data(self) -> dict[str, Any]:
-        """Return the form as plain data, without what there is not."""
-        return {key: value for key, value in asdict(self).items() if value is not None}
-
-    def in_words(self, path: Path) -> str:
-        """Return the form as a small table."""
-        found = self.data()
-        columns = found.pop("columns")
-        named = {key: f"{each['column']}, in {each['unit']}" for key, each in columns.items()}
-        rows = (f"\n  {key:<13}{visible(value)}" for key, value in (found | named).items())
-        return f"{visible(path)} is read as{''.join(rows)}"
+def form_in_words(path: Path, form: Mapping[str, Any]) -> str:
+    """Return a `Recording.form` as a small table."""
+    columns = form["columns"].items()
+    named = {key: f"{each['column']}, in {each['unit']}" for key, each in columns}
+    found = {key: value for key, value in form.items() if key != "columns"} | named
+    rows = (f"\n  {key:<13}{visible(value)}" for key, value in found.items())
+    return f"{visible(path)} is read as{''.join(rows)}"
 
 
 @dataclass(frozen=True)
@@ -93,12 +62,13 @@ class Recording:
     """Line number of each sample, from 1, (n_samples,)."""
     without_number: int
     """Number of rows left out as gaps."""
-    units: tuple[str, str] = ("s", "rad")
+    units: tuple[str, str]
     """Units of the times and of the readings in the file."""
     sd_rad: Array | None = None
     """Standard deviations of the rotations, (n_samples,), where the file has them."""
-    recognised: Recognised | None = None
-    """What was recognised in the file."""
+    form: Mapping[str, Any] = field(default_factory=dict)
+    """What was recognised in the file, for people to check before they believe a fit: `read_as` of
+    the JSON file, see docs/reference/files.md."""
     load: Array | None = None
     """Times and loads, or deformations, in SI units, linear between them, (n, 2), where they are
     read: of all rows, used or not. See `ramps`."""
@@ -158,34 +128,35 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     names_and_units = (
         {"column": table.names[i], "unit": unit} for i, unit in zip(indices, units, strict=True)
     )
-    recognised = Recognised(
-        encoding=sheet.encoding,
-        separator=_SEPARATORS[sheet.separator],
-        decimal=decimal,
-        header_line=header_line,
-        units_line=None if table.units is None else int(sheet.numbers[table.first - 1]),
-        block=index + 1 if len(tables) > 1 else None,
-        blocks=len(tables) if len(tables) > 1 else None,
-        preamble=table.title or None,
-        columns=dict(zip(columns.named, names_and_units, strict=True)),
-        rows=len(values),
-        gaps=without_number,
-        averaged=averaged or None,
-        outside=int(np.count_nonzero(~used)) or None,
-        others=int(np.count_nonzero(~chosen)) or None,
-        load=followed,
-        first_s=float(time_s[0]),
-        last_s=float(time_s[-1]),
-    )
+    several = len(tables) > 1
+    form = {
+        "encoding": sheet.encoding,
+        "separator": _SEPARATORS[sheet.separator],
+        "decimal": decimal,
+        "header_line": header_line,
+        "units_line": None if table.units is None else int(sheet.numbers[table.first - 1]),
+        "block": index + 1 if several else None,
+        "blocks": len(tables) if several else None,
+        "preamble": table.title or None,
+        "columns": dict(zip(columns.named, names_and_units, strict=True)),
+        "rows": len(values),
+        "gaps": without_number,
+        "averaged": averaged or None,
+        "outside": int(np.count_nonzero(~used)) or None,
+        "others": int(np.count_nonzero(~chosen)) or None,
+        "load": followed,
+        "first_s": float(time_s[0]),
+        "last_s": float(time_s[-1]),
+    }
     unit = columns.quantity.units[units[1]]
     return Recording(
         time_s,
         kept[:, 1] * (unit * columns.scale),
         lines,
         without_number,
-        units=(units[0], units[1]),
+        (units[0], units[1]),
         sd_rad=None if columns.sd is None else kept[:, 2] * (unit * abs(columns.scale)),
-        recognised=recognised,
+        form={key: value for key, value in form.items() if value is not None},
         load=load,
     )
 
