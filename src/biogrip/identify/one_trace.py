@@ -28,6 +28,7 @@ from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.identify.other_fits import (
     FittedModels,
+    fits_of,
     judge_again,
     models_tried,
     note_flow,
@@ -47,7 +48,7 @@ from biogrip.processes import worker_processes
 from biogrip.records.identifications import exact_data
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
-from biogrip.stages.judgement import fits_judged, notes_on_fit
+from biogrip.stages.judgement import notes_on_fit
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
 from biogrip.traces.reader import is_usual
@@ -189,8 +190,7 @@ def identify_alike(
     """
     first = traces[0]
     progress.doing(f"fitting {counted(sum(len(own.readings[0]) for own in traces), 'sample')}")
-    cases, problems = [own.case for own in traces], [own.problem for own in traces]
-    fits = fits_judged(cases, problems, [own.readings for own in traces], 0, progress.within)
+    fits = fits_of(traces, progress.within)
     progress.done()
     progress.doing("finding confidence limits")
     diagnoses = diagnose_all(
@@ -198,7 +198,7 @@ def identify_alike(
         first.problem.searched,
         [fit.found for fit in fits],
         confidence=first.case.confidence,
-        noise_rad=[problem.noise_rad for problem in problems],
+        noise_rad=[own.problem.noise_rad for own in traces],
     )
     progress.done()
     progress.doing("trying other sample models")

@@ -67,8 +67,8 @@ class Recording:
     sd_rad: Array | None = None
     """Standard deviations of the rotations, (n_samples,), where the file has them."""
     form: Mapping[str, Any] = field(default_factory=dict)
-    """What was recognised in the file, for people to check before they believe a fit: `read_as` of
-    the JSON file, see docs/reference/files.md."""
+    """What was recognised in the file, for people to check before they believe a fit; `read_as` of
+    the JSON file."""
     load: Array | None = None
     """Times and loads, or deformations, in SI units, linear between them, (n, 2), where they are
     read: of all rows, used or not. See `ramps`."""
