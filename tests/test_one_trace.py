@@ -133,7 +133,7 @@ def test_known_deviations_are_weights_of_the_fit(tmp_path: Path) -> None:
     usual = Setting("--reading", ("measurement", "rotation"), "rotation_urad")
     for name, value in (("sd", "sd"), ("noise_share", 0.04)):
         asked = Asked(file, settings=(usual, Setting(f"--{name}", ("measurement", name), value)))
-        sd_rad = read_trace(file, case_of(asked), asked.given, print).problem.sd_rad
+        sd_rad = read_trace(file, case_of(asked), asked.given).problem.sd_rad
         expected = 0.04 * rotation[1:] + (1e-6 if name == "sd" else 0.0)
         assert sd_rad is not None
         np.testing.assert_allclose(sd_rad[100:], expected[100:], rtol=0.02)

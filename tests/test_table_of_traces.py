@@ -13,13 +13,10 @@ import yaml
 from biogrip.errors import BiogripError
 from biogrip.identify import identify as command
 from biogrip.identify.settings import Setting, is_table, read_table
-from biogrip.library import hold
-from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.models import MODELS
-from biogrip.physics.protocol import torque_history
+from biogrip.library import Sample, hold, set_up, simulate
+from tests.helpers.default import STUDY
 from tests.helpers.identified import by_quantity, write_trace
 from tests.helpers.identified import identify as run
-from tests.helpers.problems import GRIPPER, TORQUE
 
 SHORT = {"phases": [{"duration_s": 100.0, "torque_Nm": 2e-9}]}
 FEW = {"least_squares": {"candidates": 50, "starts": 2}, "model_selection": {"models": []}}
@@ -30,31 +27,23 @@ TABLE = [
 ]
 
 
-@pytest.fixture(scope="module")
-def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a trace of the usual protocol, one of another, a table and a config."""
-    folder = tmp_path_factory.mktemp("laboratory")
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder, worked in: a trace of the usual protocol, one of another, a table and a config."""
     rng = np.random.default_rng(4)
-    network = MODELS["kelvin_voigt"].network([[10.0, 300.0]])
-    for name, column, torque, end in (
-        ("usual", "time_s", TORQUE, 400),
-        ("other", "t_s", torque_history((hold(100.0, 2e-9),)), 100),
+    for name, column, phases, end in (
+        ("usual", "time_s", STUDY.phases, 400),
+        ("other", "t_s", (hold(100.0, 2e-9),), 100),
     ):
         times = np.linspace(0, end, 81)
-        clean = rotation(step_response(GRIPPER, network), torque, times)[0]
+        experiment = set_up(STUDY.gripper, phases, Sample("kelvin_voigt"))
+        clean = simulate(experiment, {"k_p": 10.0, "c_p": 300.0}, times)
         measured = clean + 0.05 * clean.max() * rng.standard_normal(len(times))
-        write_trace(folder / f"{name}.csv", times, measured, f"{column},rotation_rad")
-    write(folder / "cells.tsv", TABLE)
-    (folder / "few.yaml").write_text(yaml.safe_dump(FEW))
-    return folder
-
-
-@pytest.fixture
-def here(laboratory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the folder, worked in."""
-    shutil.copytree(laboratory, tmp_path / "l")
-    monkeypatch.chdir(tmp_path / "l")
-    return tmp_path / "l"
+        write_trace(tmp_path / f"{name}.csv", times, measured, f"{column},rotation_rad")
+    write(tmp_path / "cells.tsv", TABLE)
+    (tmp_path / "few.yaml").write_text(yaml.safe_dump(FEW))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 def write(path: Path, rows: list[list[str]], separator: str = "\t") -> None:
@@ -206,20 +195,17 @@ def test_traces_of_a_command_read_one_quantity(here: Path) -> None:
 def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
     """In its place, with what the table says of it; of a single row, too."""
     rows = [["file", "dish"], ["gone.csv", "lost"], ["usual.csv", "left"]]
-    write(here / "cells.tsv", rows)
-    status, printed, _ = identify("cells.tsv", "--csv", "found.csv", "--report", "page.html")
-    assert status == 1
-    assert "Not identified, 1 of 2:" in printed
-    assert "cells.tsv, line 2: found 'gone.csv', allowed is a file that exists in the" in printed
-    assert [(row["trace"], row["dish"], row["fit"]) for row in listed()] == [
-        ("gone.csv", "lost", "failed"),
-        ("usual.csv", "left", "ok"),
-    ]
-    assert [row["failed"] != "" for row in listed()] == [True, False]
-    assert "<td>lost</td>" in (here / "page.html").read_text()
-    write(here / "cells.tsv", [rows[0], rows[1]])
-    assert identify("cells.tsv", "--csv", "found.csv")[0] == 1
-    assert [row["fit"] for row in listed()] == ["failed"]
+    for few in (3, 2):
+        write(here / "cells.tsv", rows[:few])
+        given = ("--csv", "found.csv", "--report", "page.html")
+        status, printed, _ = identify("cells.tsv", *given)
+        assert status == 1
+        assert f"Not identified, 1 of {few - 1}:" in printed
+        assert "cells.tsv, line 2: found 'gone.csv', allowed is a file that exists in" in printed
+        whole = [("gone.csv", "lost", "failed", True), ("usual.csv", "left", "ok", False)]
+        row = ((it["trace"], it["dish"], it["fit"], it["failed"] != "") for it in listed())
+        assert [*row] == whole[: few - 1]
+        assert "<td>lost</td>" in (here / "page.html").read_text()
 
 
 def test_what_a_row_says_goes_before_options(here: Path) -> None:

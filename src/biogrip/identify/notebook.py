@@ -152,9 +152,9 @@ def identify_trace(
         chosen = tuple(each for each in settings if each.value is not None)
         asked = Asked(file, None, chosen, file.name)
         try:
-            trace = read_trace(file, case_of(asked), asked.given, lambda text: None)
+            trace = read_trace(file, case_of(asked), asked.given)
             with Progress("", 5, live=False, quiet=True) as progress:
-                (result,) = identify_alike([Path(file.name)], [trace], None, progress)
+                (result,) = identify_alike([Path(file.name)], [trace], progress)
         except BiogripError as error:
             said = _with_arguments(str(error).replace(str(file), file.name))
             raise BiogripError(said) from None

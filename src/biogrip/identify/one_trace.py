@@ -41,7 +41,6 @@ from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
 from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.keys import plain
-from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.physics.whitening import within
 from biogrip.processes import worker_processes
@@ -51,7 +50,7 @@ from biogrip.stages import recording
 from biogrip.stages.judgement import notes_on_fit
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
-from biogrip.traces.reader import is_usual
+from biogrip.traces.reader import form_in_words, is_usual
 
 # Most traces of a batch, and most readings that are fitted together, of short traces.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
@@ -129,7 +128,6 @@ def identify_batch(
                 identify_alike,
                 [asked[index].trace for index in group],
                 [traces[index] for index in group],
-                outputs and [outputs[index] for index in group],
                 progress,
             )
             if not isinstance(found, BiogripError):
@@ -145,6 +143,11 @@ def identify_batch(
             outcome.refused[str(own.trace)] = str(result)
             continue
         outcome.found.append(result.data)
+        if outputs is not None:
+            # Assumptions, which must be repeatable, are not rounded.
+            data = rounded_numbers(result.data) | {"assumed": result.data["assumed"]}
+            data = in_own_units(data, result.problem.instrument.read)
+            write_text(outputs[index], json.dumps(data, indent=1) + "\n")
         if drawn:
             # Imported here: loading Matplotlib takes long.
             from biogrip.identify.page import draw
@@ -156,7 +159,11 @@ def identify_batch(
 
 
 def _read(asked: Asked, progress: Progress) -> TraceCase:
-    return read_trace(asked.trace, case_of(asked), asked.given, progress.note)
+    """Read a trace, and tell what is recognised in an unusual file."""
+    trace = read_trace(asked.trace, case_of(asked), asked.given)
+    if not is_usual(trace.recorded.form, trace.case.columns):
+        progress.note(form_in_words(asked.trace, trace.recorded.form))
+    return trace
 
 
 def _tried(asked: Asked, work: Callable[..., T], *given: Any) -> T | BiogripError:
@@ -178,15 +185,12 @@ def _tried(asked: Asked, work: Callable[..., T], *given: Any) -> T | BiogripErro
 
 
 def identify_alike(
-    files: Sequence[Path],
-    traces: Sequence[TraceCase],
-    outputs: Sequence[Path] | None,
-    progress: Progress,
+    files: Sequence[Path], traces: Sequence[TraceCase], progress: Progress
 ) -> list[Identified]:
     """Identify traces of the same model, budget of fits and confidence, each as if it were alone.
 
-    A JSON file of each is written, if `outputs` has any. The counter's last four of five steps are
-    made here. A `BiogripError` says that one of the traces cannot be fitted; nothing is written.
+    The counter's last four of five steps are made here. A `BiogripError` says that one of the
+    traces cannot be fitted.
     """
     first = traces[0]
     progress.doing(f"fitting {counted(sum(len(own.readings[0]) for own in traces), 'sample')}")
@@ -228,11 +232,6 @@ def identify_alike(
             data["onset_limits_s"] = [data["onset_s"] + end_s for end_s in onsets_s[index]]
         data = {WRITTEN_BY: __version__, "trace": str(files[index]), **data}
         found.append(Identified(data, own.problem, own.recorded))
-    for data, output in zip((each.data for each in found), outputs or (), strict=False):
-        # Assumptions, which must be repeatable, are not rounded.
-        rounded = rounded_numbers(data) | {"assumed": data["assumed"]}
-        read = INSTRUMENTS[data["reads"]["quantity"]].read
-        write_text(output, json.dumps(in_own_units(rounded, read), indent=1) + "\n")
     return found
 
 

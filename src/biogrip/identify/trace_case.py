@@ -7,7 +7,7 @@ together resolve. A damper is as stiff as c/t after a time t, which is between t
 interval and the duration; so is a springpot, with a power of t.
 """
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,6 @@ from biogrip.physics.whitening import drift_is_flow, estimate_noise
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
 from biogrip.study.study import Case
-from biogrip.traces.reader import form_in_words, is_usual
 
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
 _CLEAREST, _MARGIN = 1e5, 10.0
@@ -104,22 +103,15 @@ def note_saturated(trace: TraceCase) -> list[Note]:
     return notes
 
 
-def read_trace(
-    file: Path, case: Case, given: Mapping[str, Any], show: Callable[[str], None]
-) -> TraceCase:
-    """Read a trace as a case; `show` is given a table of what is recognised in an unusual file.
+def read_trace(file: Path, case: Case, given: Mapping[str, Any]) -> TraceCase:
+    """Read a trace as a case.
 
     A `BiogripError` has file, line and column, if the trace cannot be used.
     """
-
-    def show_unusual(form: Mapping[str, Any]) -> None:
-        if not is_usual(form, case.columns):
-            show(form_in_words(file, form))
-
     columns = replace(case.columns, by_options=True)
     declared = case.block.measurement
     problem = replace(case.problem, offset=bool(declared.offset), drift=bool(declared.drift))
-    trace = recording.read_checked(file, problem, columns, show_unusual)
+    trace = recording.read_checked(file, problem, columns)
     if case.problem.coloured:
         case = _without_likenesses(case, trace.time_s)
     read = _with_ranges(case, trace, given)

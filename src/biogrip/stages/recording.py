@@ -1,10 +1,8 @@
 """Stage 2 for recorded traces: conversion of the user's file to a measurement."""
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -45,14 +43,9 @@ def read_checked(
     recorded: Path,
     problem: CaseProblem,
     columns: Columns,
-    show: Callable[[Mapping[str, Any]], None] = lambda form: None,
 ) -> Measurements:
-    """Read a recorded trace, and refuse one that is impossible with its gripper and protocol.
-
-    Before it is refused, `show` is called with what was recognised in the file.
-    """
+    """Read a recorded trace, and refuse one that is impossible with its gripper and protocol."""
     trace = read_recording(recorded, columns)
-    show(trace.form)
     weighted = columns.sd is not None or problem.noise_share is not None
     if (problem.coloured or weighted) and len(trace.time_s) > MOST_SAMPLES:
         raise BiogripError(

@@ -139,20 +139,10 @@ def unit_of(
     said_by: str,
     below: str = "",
 ) -> str:
-    """Return the unit of a column, a key of `allowed`.
+    """Return the unit of a column, a key of `allowed`; if ``1`` is among them, none need be given.
 
-    Parameters
-    ----------
-    path, column
-        File, for messages, and name of the column, which may end with the unit.
-    given
-        Unit that the user states, or None.
-    allowed
-        Allowed units; if ``1`` is among them, none need be given.
-    said_by
-        What states the unit, for messages.
-    below
-        The column's cell in a row of units, if there is one.
+    It is `given`, at the end of the column's name, or in its cell `below` in a row of units. What
+    states it, `said_by`, is for messages.
 
     Raises
     ------

@@ -24,32 +24,20 @@ from biogrip.physics.whitening import nuisance_basis, without
 from biogrip.traces.columns import TIME_UNITS, Columns, place
 from biogrip.traces.reader import Recording
 
-LARGEST_SHARE = 1.5
-"""Largest plausible rotation, as a multiple of the free rotation.
-
-No sample makes the arm turn further than without it. The excess allows for errors of the fit
-and of the gripper's stiffness.
-"""
-
-SMALLEST_SHARE = 2e-3
-"""Smallest plausible rotation, as a multiple of the free rotation.
-
-The paper's stiffest sample, the endothelial cell, turns by 8e-3. The ratio of the limits,
-`LARGEST_SHARE` / `SMALLEST_SHARE` = 750, is below 1000, so no trace passes both in its unit and
-in one a thousand times larger or smaller.
-"""
-
-SHORTEST_SHARE = 0.02
-"""Least share of the protocol that a trace must cover: more than min/h = s/min = 1/60."""
-
-FALSE_ALARM = 1e-3
-"""Share of pure-noise traces that are accepted as a response."""
-
+# Plausible rotations over that of the free arm. No sample makes the arm turn further than without
+# it: the excess allows for errors of the fit and of the gripper's stiffness. The paper's stiffest
+# sample turns it by 8e-3. The ratio, 750, is below 1000, so that no trace passes both in its unit
+# and in one a thousand times larger or smaller.
+_SMALLEST_SHARE, _LARGEST_SHARE = 2e-3, 1.5
+# Least share of the protocol that a trace must cover: more than min/h = s/min = 1/60.
+_SHORTEST_SHARE = 0.02
+# Share of traces of pure noise that are accepted as a response.
+_FALSE_ALARM = 1e-3
 # Relative tolerance, since times are written with few digits.
 _TIME_SLACK = 1e-5
 _LAG_SHARES = (1e-6, 0.1, 10.0)
 # Log-likelihood ratio, times two, above which a trace counts as mirrored.
-_FAR_LIKELIER = -2 * math.log(FALSE_ALARM)
+_FAR_LIKELIER = -2 * math.log(_FALSE_ALARM)
 # Share of a function's norm that may be rounding error.
 _ROUNDING = 1e-9
 # Multiple of a given noise from which a rotation is seen, however small it is.
@@ -150,7 +138,7 @@ def _responds(trace: Array, nuisance: Array, rest: float, unknowns: int) -> bool
 
     freedom = len(trace) - unknowns
     explained = float(np.sum(without(nuisance, trace) ** 2)) - rest
-    return bool(explained > unknowns * fdtri(unknowns, freedom, 1 - FALSE_ALARM) * rest / freedom)
+    return bool(explained > unknowns * fdtri(unknowns, freedom, 1 - _FALSE_ALARM) * rest / freedom)
 
 
 def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
@@ -174,7 +162,7 @@ def _check_times(
     begins = onset_s or 0.0
     time_s, earliest = recording.time_s, -slack if onset_s is None else -np.inf
     clock_s = time_s + begins
-    shortest = SHORTEST_SHARE * end_s
+    shortest = _SHORTEST_SHARE * end_s
 
     def fits(factor: float) -> bool:
         first, last = factor * clock_s[[0, -1]] - begins
@@ -209,7 +197,7 @@ def _check_turn(
     columns: Columns,
     noise_rad: float | None,
 ) -> str | None:
-    smallest, largest = SMALLEST_SHARE * free, LARGEST_SHARE * free
+    smallest, largest = _SMALLEST_SHARE * free, _LARGEST_SHARE * free
 
     def fits(factor: float) -> bool:
         return smallest <= factor * turn <= largest
