@@ -23,11 +23,10 @@ from biogrip.errors import BiogripError
 from biogrip.identify import one_trace
 from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.identify.settings import HOLD, Asked, Setting, case_of
-from biogrip.identify.trace_case import read_trace
 from biogrip.identify.words import for_a_paper, side_by_side
 from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES
-from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
+from tests.helpers.identified import FEW, identified, identify, told
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
 from tests.helpers.problems import clean
 
@@ -72,18 +71,14 @@ def test_the_example_gives_its_truth(example: tuple[str, dict[str, Any]]) -> Non
     assert found["by_default"] == ["gripper", "protocol"]
 
 
-def test_a_declared_offset_and_drift_are_fitted_along(tmp_path: Path) -> None:
+def test_a_declared_offset_and_drift_are_fitted_along() -> None:
     times, response = clean("liquid_drop_2")
     values = response + 0.05 * response.max() * np.random.default_rng(0).standard_normal(401)
-    plain = identified(tmp_path, write_trace(tmp_path / "a.csv", times, values))
-    shifted = 1e3 * (values + 5e-4 + 1e-6 * times)
-    file = write_trace(tmp_path / "b.csv", times / 60, shifted, "t,phi_mrad")
-    columns = ("--time", "t", "--set", "measurement.time_unit=min", "--reading", "phi_mrad")
-    found = identified(tmp_path, file, *columns, "--offset", "--drift")
+    found = told(times, values + 5e-4 + 1e-6 * times, offset=True, drift=True)
     # Both are known to some per cent of the rotation.
-    assert found["offset_rad"] == pytest.approx(5e-4, abs=1e-4)
-    assert found["drift_rad_per_s"] == pytest.approx(1e-6, abs=1e-6)
-    total, before = (by_quantity(each)["c + c_p"] for each in (found, plain))
+    assert found.data["offset_rad"] == pytest.approx(5e-4, abs=1e-4)
+    assert found.data["drift_rad_per_s"] == pytest.approx(1e-6, abs=1e-6)
+    total, before = (each.to_frame().loc["c + c_p"] for each in (found, told(times, values)))
     assert total["high"] - total["low"] > before["high"] - before["low"]
     assert total["low"] < before["value"] < total["high"]
 
@@ -125,18 +120,15 @@ def test_what_was_held_is_stated_once(beside: str, order: int) -> None:
     assert str(error.value) == f"t.tsv, line 2: found --hold and {beside}; allowed is one of them."
 
 
-def test_known_deviations_are_weights_of_the_fit(tmp_path: Path) -> None:
-    """By a column in the unit of the readings, or as a share of a smooth course."""
+@pytest.mark.parametrize("floor", [1e-6, 0.0])
+def test_known_deviations_are_weights_of_the_fit(floor: float) -> None:
+    """As a column, or as a share of a smooth course."""
     times, rotation = clean("liquid_drop_2")
-    values = 1e6 * np.c_[rotation, 0.04 * rotation + 1e-6]
-    file = write_trace(tmp_path / "a.csv", times[1:], values[1:], "time_s,rotation_urad,sd")
-    usual = Setting("--reading", ("measurement", "rotation"), "rotation_urad")
-    for name, value in (("sd", "sd"), ("noise_share", 0.04)):
-        asked = Asked(file, settings=(usual, Setting(f"--{name}", ("measurement", name), value)))
-        sd_rad = read_trace(file, case_of(asked), asked.given).problem.sd_rad
-        expected = 0.04 * rotation[1:] + (1e-6 if name == "sd" else 0.0)
-        assert sd_rad is not None
-        np.testing.assert_allclose(sd_rad[100:], expected[100:], rtol=0.02)
+    sd = 0.04 * rotation[1:] + floor
+    given: dict[str, Any] = {"config": {"measurement": {"noise_share": 0.04}}}
+    found = told(times[1:], rotation[1:], **({"sd": sd} if floor else given)).problem.sd_rad
+    assert found is not None
+    np.testing.assert_allclose(found[100:], sd[100:], rtol=0.02)
 
 
 # Arguments of `identify`, and what is said of them.
@@ -371,19 +363,17 @@ def test_models_that_are_named_are_held_against_the_chosen_one(
         assert advice in str(found["advice"])
 
 
-def test_a_rejected_fit_names_a_better_model_though_it_is_simpler(tmp_path: Path) -> None:
+def test_a_rejected_fit_names_a_better_model_though_it_is_simpler() -> None:
     """The creep of cells, a power law, read at times in a geometric series."""
     times = np.geomspace(1e-3, 1e3, 120)
     noise = 1e-4 * np.random.default_rng(1).standard_normal(len(times))
-    trace = write_trace(tmp_path / "t.csv", times, 0.01 * times**0.3 + noise, "time_s,strain")
-    models = "model_selection: {models: [springpot, maxwell]}"
-    options = ("--reading", "strain", "--hold", "1")
-    found = identified(tmp_path, trace, *options, config=models)
+    models = ["springpot", "maxwell"]
+    found = told(times, 0.01 * times**0.3 + noise, models, reads="strain", hold=1.0).data
     assert found["fit"] == "rejected"
-    assert "(--model springpot) is preferred" in found["advice"]
+    assert "(model springpot) is preferred" in found["advice"]
     lines = side_by_side([found, found | {"fit": "ok"}], {}).splitlines()
-    assert [line for line in lines if "springpot" in line] == [f"{trace}: {found['advice']}"]
-    assert f"{trace}: rejected: {found['reasons'][0]}" in lines
+    assert [line for line in lines if "springpot" in line] == [f"trace.csv: {found['advice']}"]
+    assert f"trace.csv: rejected: {found['reasons'][0]}" in lines
 
 
 def test_colours_are_not_for_all_terminals(
