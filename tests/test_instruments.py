@@ -85,30 +85,6 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
         assert not OF_A_GRIPPER.search(said), OF_A_GRIPPER.search(said)
 
 
-def test_what_is_not_held_is_asked_for_and_kinds_do_not_mix(tmp_path: Path) -> None:
-    trace = write_trace(tmp_path / "t.csv", TIMES, response("strain", 1.0), "time_s,strain")
-    held = "protocol: {phases: [{duration_s: 5, stress_Pa: 1}]}\n"
-    (relaxing := tmp_path / "relaxing.yaml").write_text(f"instrument: relaxation\n{held}")
-    (mistyped := tmp_path / "mistyped.yaml").write_text(f"instrument: creeep\n{held}")
-    strain = ("--reading", "strain=strain")
-    refusals = {
-        strain: "--hold: is missing; allowed is the stress in Pa that was",
-        ("--reading", "strian=strain"): "--reading: measurement.strian: unknown key. Did you mean",
-        ("--reading", "modulus=strain", "--set", "measurement.reading_unit=mm"): "--set: "
-        "measurement.reading_unit: found 'mm', allowed are Pa, kPa",
-        ("--reading", "strain=x", "--hold", "1"): "Say which is which by --time and --reading",
-        (*strain, "--hold", "1e99"): "--hold: protocol.phases[0].stress_Pa: found 1e+99, allowed",
-        (*strain, "--config", str(relaxing)): "--reading: measurement.strain: is not what "
-        "relaxation reads where",
-        (*strain, "--config", str(mistyped)): "mistyped.yaml, line 1: instrument: found 'creeep'. "
-        "Did you mean 'creep'?",
-    }
-    for options, message in refusals.items():
-        status, _, error = identify(trace, *options)
-        assert status == 1
-        assert message in error
-
-
 def test_a_study_mixes_instruments() -> None:
     study = study_of(
         "only: [pipette, endothelial_cell]\n"

@@ -145,6 +145,12 @@ OPTIONS = {
     "--model maxwel": "--model: sample.model: found 'maxwel'. Did you mean 'maxwell'?",
     "--sd sd": "found no such column, allowed are time_s, rotation_rad.",
     "--reading strian=x": "--reading: measurement.strian: unknown key. Did you mean 'strain'?",
+    "--reading strain=x": "--hold: is missing; allowed is the stress in Pa that was held",
+    "--reading strain=rotation_rad --hold 1e99": "phases[0].stress_Pa: found 1e+99, allowed is",
+    "--reading modulus=x --set measurement.reading_unit=mm": "found 'mm', allowed are Pa, kPa",
+    "--reading strain=x --set instrument=relaxation --set "
+    'protocol.phases=[{"duration_s":5,"strain":1}]': "measurement.strain: is not what relaxation",
+    "--set instrument=creeep": "--set: instrument: found 'creeep'. Did you mean 'creep'?",
     "--time=": "--time: measurement.time: found '' of 0 characters, allowed are at least 1.",
     f"--config {'x' * 300}": "File name too long",
     "--report theirs.html": "biogrip did not write it",

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from biogrip.arrays import as_column
 from biogrip.errors import BiogripError
 from biogrip.identify.one_trace import Identified, identify_alike
-from biogrip.identify.settings import HOLD, MODEL, Asked, Setting, case_of
+from biogrip.identify.settings import HOLD, MODEL, Asked, Setting
 from biogrip.identify.trace_case import read_trace
 from biogrip.identify.words import in_words
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS
@@ -152,7 +152,7 @@ def identify_trace(
         chosen = tuple(each for each in settings if each.value is not None)
         asked = Asked(file, None, chosen, file.name)
         try:
-            trace = read_trace(file, case_of(asked), asked.given)
+            trace = read_trace(asked)
             with Progress("", 5, live=False, quiet=True) as progress:
                 (result,) = identify_alike([Path(file.name)], [trace], progress)
         except BiogripError as error:

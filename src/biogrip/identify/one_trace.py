@@ -35,7 +35,7 @@ from biogrip.identify.other_fits import (
     second_opinions,
 )
 from biogrip.identify.outputs import WRITTEN_BY, Outcome, in_own_units
-from biogrip.identify.settings import Asked, case_of
+from biogrip.identify.settings import Asked
 from biogrip.identify.trace_case import TraceCase, note_saturated, read_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
@@ -160,7 +160,7 @@ def identify_batch(
 
 def _read(asked: Asked, progress: Progress) -> TraceCase:
     """Read a trace, and tell what is recognised in an unusual file."""
-    trace = read_trace(asked.trace, case_of(asked), asked.given)
+    trace = read_trace(asked)
     if not is_usual(trace.recorded.form, trace.case.columns):
         progress.note(form_in_words(asked.trace, trace.recorded.form))
     return trace

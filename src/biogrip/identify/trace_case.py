@@ -9,7 +9,6 @@ interval and the duration; so is a springpot, with a power of t.
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
+from biogrip.identify.settings import Asked, case_of
 from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.protocol import is_held, largest_load
 from biogrip.physics.whitening import drift_is_flow, estimate_noise
@@ -103,15 +103,16 @@ def note_saturated(trace: TraceCase) -> list[Note]:
     return notes
 
 
-def read_trace(file: Path, case: Case, given: Mapping[str, Any]) -> TraceCase:
+def read_trace(asked: Asked) -> TraceCase:
     """Read a trace as a case.
 
-    A `BiogripError` has file, line and column, if the trace cannot be used.
+    A `BiogripError` has file, line and column, or setting, that cannot be used.
     """
+    case, given = case_of(asked), asked.given
     columns = replace(case.columns, by_options=True)
     declared = case.block.measurement
     problem = replace(case.problem, offset=bool(declared.offset), drift=bool(declared.drift))
-    trace = recording.read_checked(file, problem, columns)
+    trace = recording.read_checked(asked.trace, problem, columns)
     if case.problem.coloured:
         case = _without_likenesses(case, trace.time_s)
     read = _with_ranges(case, trace, given)
