@@ -9,6 +9,7 @@ smooth only between neighbouring ones, and is minimised there.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -19,7 +20,7 @@ from biogrip.fit.any_sample import extreme_responses, fit_responses
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.multi_start import fit_from
-from biogrip.fit.problem import silent
+from biogrip.fit.problem import Problem, silent
 from biogrip.physics.modes import lagged_torques
 from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
 
@@ -110,27 +111,34 @@ def _misfit_rad(fit: OnsetFit) -> float:
     return fit.misfit_rad
 
 
+@dataclass(frozen=True)
 class OnsetFits:
-    """Fits of a trace for given onsets, linear and in white noise.
+    """Fits of a trace for given onsets, linear and in white noise."""
 
-    Parameters
-    ----------
-    case_problem
-        Assumptions of the identification.
-    time_s, rotation_rad : (n_samples,)
-        The trace, times ascending on any clock.
-    """
+    case_problem: CaseProblem
+    """Assumptions of the identification."""
+    time_s: Array
+    """Times, ascending on any clock, (n_samples,)."""
+    rotation_rad: Array
+    """The trace, (n_samples,)."""
 
-    def __init__(self, case_problem: CaseProblem, time_s: Array, rotation_rad: Array) -> None:
-        self._case_problem = case_problem.to_identify()
-        self._time_s, self._rotation_rad = time_s, rotation_rad
-        self._interval_s = float(np.median(np.diff(time_s)))
-        self.noise_rad = estimate_noise(rotation_rad)
+    @cached_property
+    def _identified(self) -> CaseProblem:
+        return self.case_problem.to_identify()
+
+    def posed(self, onset_s: float) -> Problem:
+        """Return the problem for an onset."""
+        return self._identified.of(self.time_s - onset_s, self.rotation_rad)
+
+    def at(self, onset_s: float, near: Array) -> OnsetFit:
+        """Fit the sample for an onset by a local fit from log-parameters, (n_parameters,)."""
+        fit = fit_from([self.posed(onset_s)], near)
+        return OnsetFit(onset_s, fit.x[0], float(fit.misfit_rad[0]))
 
     def best(self, guess_s: float) -> OnsetFit:
         """Fit the onset along, beginning with a guess in s."""
-        problem = self._case_problem.of(self._time_s - guess_s, self._rotation_rad)
-        (found,) = identify_many([problem], _BUDGET, [np.random.default_rng(0)], silent)
+        rngs = [np.random.default_rng(0)]
+        (found,) = identify_many([self.posed(guess_s)], _BUDGET, rngs, silent)
         start = OnsetFit(guess_s, np.log(found.parameters), found.misfit_rad)
         return self.near(start, _FIRST_STEP)
 
@@ -141,9 +149,10 @@ class OnsetFits:
         direction is better. The last ones are half as long as the readings are apart where the
         onset is, which of times with equal ratios is much less than the median.
         """
-        step_s = first_step * self._interval_s
+        interval_s = float(np.median(np.diff(self.time_s)))
+        step_s = first_step * interval_s
         for _ in range(_MOST_STEPS):
-            if step_s < _LAST_STEP * min(self._interval_s, spacing_at(self._time_s, best.onset_s)):
+            if step_s < _LAST_STEP * min(interval_s, spacing_at(self.time_s, best.onset_s)):
                 break
             sides = (self.at(best.onset_s + s, best.log_parameters) for s in (-step_s, step_s))
             lower = min(sides, key=_misfit_rad)
@@ -162,22 +171,16 @@ class OnsetFits:
             minimize_scalar(misfit_rad, bounds=(low, high), method="bounded", options=accurate)
         return min(tried, key=_misfit_rad)
 
-    def at(self, onset_s: float, near: Array) -> OnsetFit:
-        """Fit the sample for an onset by a local fit from log-parameters, (n_parameters,)."""
-        problem = self._case_problem.of(self._time_s - onset_s, self._rotation_rad)
-        fit = fit_from([problem], near)
-        return OnsetFit(onset_s, fit.x[0], float(fit.misfit_rad[0]))
-
     def _smooth_intervals(self, onset_s: float) -> Iterator[tuple[float, float]]:
         """Yield intervals of onsets around one, within which no reading passes a change of torque.
 
         An onset before the first reading passes none, however early: the first interval then
         begins some times as far before it.
         """
-        torque = self._case_problem.torque
+        torque = self._identified.torque
         changes_s = np.unique([start for start, *_ in (*torque.jumps, *torque.swings)])
-        edges = np.unique(np.subtract.outer(self._time_s, changes_s))
-        equal_s = _ROUNDING * max(np.abs(self._time_s).max(), np.abs(changes_s).max())
+        edges = np.unique(np.subtract.outer(self.time_s, changes_s))
+        equal_s = _ROUNDING * max(np.abs(self.time_s).max(), np.abs(changes_s).max())
         edges = edges[np.diff(edges, prepend=-np.inf) > equal_s]
         after = int(np.searchsorted(edges, onset_s))
         if after < _NEAR:

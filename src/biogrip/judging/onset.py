@@ -37,6 +37,7 @@ from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.protocol import Load, Phase
+from biogrip.physics.whitening import estimate_noise
 
 # So that correlated noise does not look like a late onset; and level of other tests.
 _FALSE_ALARM, _AS_GOOD = 1e-9, 1e-3
@@ -79,62 +80,51 @@ def notes_on_start(
     may_be_late
         True if the user says nothing of the start.
     """
-    ramp, given = _with_ramp(case_problem, time_s), (time_s, rotation_rad, diagnosis)
+    fits, ramp = OnsetFits(case_problem, time_s, rotation_rad), _with_ramp(case_problem, time_s)
     notes: list[Note] = []
     if may_be_late and ramp and is_cut_off(time_s):
-        notes += _about_clock(OnsetFits(case_problem, time_s, rotation_rad), time_s, diagnosis)
+        notes += _about_clock(fits, diagnosis)
     elif begins_constant(time_s, rotation_rad):
         # A constant that is not zero is an offset, with which the onset would be biased.
         free, onset_s = replace(case_problem, offset=True), 0.0
         if may_be_late or case_problem.fit_start:
             onset_s = estimate_onset(free, time_s, rotation_rad)
         if begins_constant(time_s, rotation_rad, onset_s):
-            notes += _about_late_onset(free, *given, onset_s) if may_be_late else []
+            if may_be_late:
+                notes += _about_late_onset(replace(fits, case_problem=free), diagnosis, onset_s)
             if not case_problem.offset and (notes or not may_be_late):
-                notes += _about_tare(case_problem, *given, onset_s)
+                notes += _about_tare(fits, diagnosis, onset_s)
     if diagnosis.status != REJECTED and ramp and not notes:
-        notes += _about_ramp(case_problem, *given, ramp)
+        notes += _about_ramp(fits, diagnosis, ramp)
     return notes
 
 
-def _about_late_onset(
-    case_problem: CaseProblem,
-    time_s: Array,
-    rotation_rad: Array,
-    diagnosis: Diagnosis,
-    guess_s: float,
-) -> Iterator[Note]:
-    fits = OnsetFits(case_problem, time_s, rotation_rad)
+def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> Iterator[Note]:
+    """Yield a note if a trace is constant up to an onset, with which it fits far better."""
+    trace, noise_rad = (fits.time_s, fits.rotation_rad), fits.case_problem.noise_rad
     found, given = fits.best(guess_s), fits.at(0.0, diagnosis.likelihood.best)
-    fall = compute_fall(len(time_s), given.misfit_rad, found.misfit_rad, case_problem.noise_rad)
-    if fall < chdtri(1, _FALSE_ALARM) or not begins_constant(time_s, rotation_rad, found.onset_s):
+    fall = compute_fall(len(trace[0]), given.misfit_rad, found.misfit_rad, noise_rad)
+    if fall < chdtri(1, _FALSE_ALARM) or not begins_constant(*trace, found.onset_s):
         return
-    later_s = time_s - found.onset_s
-    posed = case_problem.to_identify().of(later_s, rotation_rad)
-    fit = found.log_parameters, found.misfit_rad
-    likelihood = make_likelihood(posed, *fit, confidence=diagnosis.likelihood.confidence)
-    ends_s = [found.onset_s + end_s for end_s in onset_limits(likelihood, later_s)]
+    fit = fits.posed(found.onset_s), found.log_parameters, found.misfit_rad
+    likelihood = make_likelihood(*fit, confidence=diagnosis.likelihood.confidence)
+    limits = onset_limits(likelihood, fits.time_s - found.onset_s)
+    when = instant(found.onset_s, *(found.onset_s + end_s for end_s in limits))
     yield Note(
         REJECTION,
-        f"The trace is constant until {instant(found.onset_s, *ends_s)} of its clock, and fits far "
-        f"better if the protocol starts there (χ² falls by {plain(fall)}). If it does, say --start "
-        "fit (measurement.fit_start), which allows for its uncertainty, or when it was, if that is "
+        f"The trace is constant until {when} of its clock, and fits far better if the protocol "
+        f"starts there (χ² falls by {plain(fall)}). If it does, say --start fit "
+        "(measurement.fit_start), which allows for its uncertainty, or when it was, if that is "
         "known (--start, measurement.start_s).",
     )
 
 
-def _about_tare(
-    case_problem: CaseProblem,
-    time_s: Array,
-    rotation_rad: Array,
-    diagnosis: Diagnosis,
-    onset_s: float,
-) -> Iterator[Note]:
+def _about_tare(fits: OnsetFits, diagnosis: Diagnosis, onset_s: float) -> Iterator[Note]:
     """Yield a note if the readings before an onset are not zero, by a t test."""
-    before = rotation_rad[time_s < onset_s][:-1]
+    before = fits.rotation_rad[fits.time_s < onset_s][:-1]
     mean, error = float(np.mean(before)), float(np.std(before, ddof=1)) / np.sqrt(len(before))
     if abs(mean) > error * stdtrit(len(before) - 1, 1 - _AS_GOOD / 2):
-        unit = f" {case_problem.instrument.read.unit}".rstrip()
+        unit = f" {fits.case_problem.instrument.read.unit}".rstrip()
         yield Note(
             REJECTION if diagnosis.status == REJECTED else DOUBT,
             f"The {len(before)} readings before the start are constant, but {plain(mean)}{unit} "
@@ -158,14 +148,15 @@ def is_cut_off(time_s: Array) -> bool:
     return not _PLANNED[0] < growth < _PLANNED[1]
 
 
-def _about_clock(fits: OnsetFits, time_s: Array, diagnosis: Diagnosis) -> Iterator[Note]:
+def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
     """Yield a note if a trace may be on another clock, with its step just before it."""
+    time_s, noise_rad = fits.time_s, estimate_noise(fits.rotation_rad)
     later_s, best = 2 * time_s[0] - time_s[1], diagnosis.likelihood.best
     given, rejected = fits.at(0.0, best), diagnosis.status == REJECTED
     other = fits.best(later_s) if rejected else fits.at(later_s, best)
     fall = compute_fall(len(time_s), given.misfit_rad, other.misfit_rad, None)
     found = ""
-    if rejected and 0 < other.onset_s < time_s[0] and other.misfit_rad < _WHITE * fits.noise_rad:
+    if rejected and 0 < other.onset_s < time_s[0] and other.misfit_rad < _WHITE * noise_rad:
         far = fall > chdtri(1, _FALSE_ALARM)
         found = f"the fit is far better (χ² falls by {plain(fall)})" if far else ""
     elif not rejected and fall > -chdtri(1, _AS_GOOD):
@@ -194,25 +185,15 @@ def _moved(diagnosis: Diagnosis, given: OnsetFit, other: OnsetFit, widths: float
     return "; ".join(said)
 
 
-def _about_ramp(
-    case_problem: CaseProblem,
-    time_s: Array,
-    rotation_rad: Array,
-    diagnosis: Diagnosis,
-    ramp: tuple[Phase, ...],
-) -> Iterator[Note]:
+def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramp: tuple[Phase, ...]) -> Iterator[Note]:
     """Yield a note if a ramp up to the first reading moves a value by the width of its limits."""
-    given, ramped = (
-        OnsetFits(replace(case_problem, phases=own), time_s, rotation_rad).at(
-            0.0, diagnosis.likelihood.best
-        )
-        for own in (case_problem.phases, ramp)
-    )
+    ramped_fits = replace(fits, case_problem=replace(fits.case_problem, phases=ramp))
+    given, ramped = (own.at(0.0, diagnosis.likelihood.best) for own in (fits, ramped_fits))
     if moved := _moved(diagnosis, given, ramped, 1.0):
         yield Note(
             HARMLESS,
             "If the load was no step but a ramp that ends with the first reading, at "
-            f"{plain(time_s[0])} s: {moved}. A ramp is given by a protocol (--config), or as "
+            f"{plain(fits.time_s[0])} s: {moved}. A ramp is given by a protocol (--config), or as "
             "recorded (--load).",
         )
 
