@@ -2,7 +2,6 @@
 
 import csv
 import json
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,8 @@ from biogrip.identify import identify as command
 from biogrip.identify.settings import Setting, is_table, read_table
 from biogrip.library import Sample, hold, set_up, simulate
 from tests.helpers.default import STUDY
-from tests.helpers.identified import by_quantity, write_trace
 from tests.helpers.identified import identify as run
+from tests.helpers.identified import write_trace
 
 SHORT = {"phases": [{"duration_s": 100.0, "torque_Nm": 2e-9}]}
 FEW = {"least_squares": {"candidates": 50, "starts": 2}, "model_selection": {"models": []}}
@@ -251,17 +250,3 @@ def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None
         write(here / "cells.tsv", [header, row])
         assert identify("cells.tsv")[0] == 0
         assert found(row[0]) == written[row[0]]
-
-
-def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met(here: Path) -> None:
-    """A trace tells stiffnesses times the square of the sine: smaller samples seem stiffer."""
-    shutil.copy(here / "usual.csv", here / "small.csv")
-    rows = [["file", "sample.size_m"], ["usual.csv", ""], ["small.csv", "30e-6"]]
-    write(here / "cells.tsv", rows)
-    assert identify("cells.tsv")[0] == 0
-    unsized, sized = (by_quantity(found(name)) for name in ("usual.csv", "small.csv"))
-    # From 150 to 30 um each jaw moves by 60 um, on a circle of 1.5 mm.
-    angle = np.arccos(np.cos(np.radians(75)) + 60e-6 / 1.5e-3)
-    ratio = (np.sin(angle) / np.sin(np.radians(75))) ** 2
-    for name in ("k_p", "c_p"):
-        assert unsized[name]["value"] / sized[name]["value"] == pytest.approx(ratio, rel=1e-3)

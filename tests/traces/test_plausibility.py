@@ -69,7 +69,7 @@ def said(
 @pytest.mark.parametrize("rate_Hz", [10.0, 0.1])
 @pytest.mark.parametrize("level", [0.0, 0.1, 0.4])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_the_papers_traces_pass_and_not_in_a_wrong_unit(
+def test_the_papers_traces_pass_and_not_in_a_wrong_unit_or_mirrored(
     sample: str, rate_Hz: float, level: float, seed: int
 ) -> None:
     times = sample_times(400.0, rate_Hz)
@@ -77,6 +77,11 @@ def test_the_papers_traces_pass_and_not_in_a_wrong_unit(
     kind = ("gaussian", "uniform")[seed]
     noisy = add_noise(clean, Noise(kind, level, "peak"), np.random.default_rng([7, seed]))
     assert said(times, noisy) == ""
+    assert said(times, -noisy).startswith(
+        f"trace.csv, lines 2 to {len(times) + 1}, column 'rotation_rad': {MIRRORED}, allowed is "
+        "the closing rotation, positive where the arm closes. It would fit if it were -1 times "
+        "(then say scale: -1 under measurement)"
+    )
     found = f"trace.csv, line {np.argmax(np.abs(noisy)) + 2}, column 'rotation_rad': found "
     large, small = (said(times, factor * noisy) for factor in (1e3, 1e-3))
     assert large.startswith(found)
@@ -121,15 +126,13 @@ def test_the_unit_that_would_fit_is_named(unit: str, factor: float, hint: str) -
 
 def test_a_stiff_sample_passes_if_its_rotation_is_far_above_a_given_noise() -> None:
     values = trace((35e3, 12.3e3, 3e5, 1.0))
-    refused = said(TIMES, values)
-    assert "allowed is at least 7.27e-06 rad, or less with a given noise (--noise)" in refused
+    refused = "allowed is at least 7.27e-06 rad, or less with a given noise (--noise)"
+    assert refused in said(TIMES, values)
+    assert refused in said(TIMES, values, noise_rad=values.max() / 5)
     note = said(TIMES, values, noise_rad=values.max() / 20)
     assert note.startswith("The largest rotation is")
     assert "the sample is very stiff, or the unit is not the right one. It would fit if" in note
-    refused = said(TIMES, values, noise_rad=values.max() / 5)
-    assert "allowed is at least" in refused
-    plausible = trace(SAMPLES["liquid_drop_1"])
-    assert said(TIMES, plausible, noise_rad=1e-6) == ""
+    assert said(TIMES, trace(SAMPLES["liquid_drop_1"]), noise_rad=1e-6) == ""
 
 
 @pytest.mark.parametrize("rate_Hz", [10.0, 0.1])
@@ -316,14 +319,3 @@ def test_the_sign_of_a_trace_is_told(gripper: Gripper, protocol: str) -> None:
     assert mirrored >= 20
     # An arm that the other one pushes back differs little from one that opens.
     assert missed <= (12 if protocol == "unequal" else 3)
-
-
-def test_a_mirrored_trace_is_refused_with_its_place_and_a_hint() -> None:
-    values = trace(SAMPLES["liquid_drop_2"])
-    assert said(TIMES, -values).startswith(
-        f"trace.csv, lines 2 to 402, column 'rotation_rad': {MIRRORED}, allowed is the closing "
-        "rotation, positive where the arm closes. It would fit if it were -1 times (then say "
-        "scale: -1 under measurement)"
-    )
-    noise = 0.1 * values.max() * np.random.default_rng(0).standard_normal(len(TIMES))
-    assert MIRRORED in said(TIMES, noise - values)
