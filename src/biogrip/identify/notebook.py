@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.arrays import as_column
@@ -131,26 +132,26 @@ def identify_trace(
     if len({len(values) for values in columns.values()}) > 1:
         found = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
         raise BiogripError(f"found {found}; allowed are as many of each.")
-    late = ("fit_start", True) if start == "fit" else ("start_s", start)
-    measured = (
-        *(("reads", reads, column), ("start", *late), ("sd", "sd", None if sd is None else "sd")),
-        *(("noise", "noise_rad", noise), ("noise_model", "noise_model", noise_model)),
-        *(("offset", "offset", offset), ("drift", "drift", drift)),
-    )
-    settings = [
-        *(Setting("config", (block,), value) for block, value in (config or {}).items()),
-        *(Setting("model", ("sample", "model"), model), Setting("hold", HOLD, hold)),
-        *(Setting(by, ("measurement", key), value) for by, key, value in measured),
-        Setting("fixed", ("fixed",), fixed and {**fixed}),
+    onset = ("fit_start", True) if start == "fit" else ("start_s", start)
+    chosen: list[tuple[str, str, Any]] = [
+        *(("config", block, value) for block, value in (config or {}).items()),
+        ("model", "sample.model", model),
+        ("hold", *HOLD, hold),
+        ("reads", f"measurement.{reads}", column),
+        ("start", f"measurement.{onset[0]}", onset[1]),
+        ("sd", "measurement.sd", None if sd is None else "sd"),
+        ("noise", "measurement.noise_rad", noise),
+        ("noise_model", "measurement.noise_model", noise_model),
+        ("offset", "measurement.offset", offset),
+        ("drift", "measurement.drift", drift),
+        ("fixed", "fixed", fixed and {**fixed}),
     ]
-    # Imported here: loading pandas takes long.
-    import pandas as pd
-
+    settings = [Setting(by, tuple(key.split(".")), it) for by, key, it in chosen if it is not None]
     with TemporaryDirectory() as folder:
         file = Path(folder) / "trace.csv"
-        pd.DataFrame(columns).to_csv(file, index=False)
-        chosen = tuple(each for each in settings if each.value is not None)
-        asked = Asked(file, None, chosen, file.name)
+        rows, header = np.transpose([*columns.values()]), ",".join(columns)
+        np.savetxt(file, rows, "%.17g", ",", header=header, comments="")
+        asked = Asked(file, None, tuple(settings), file.name)
         try:
             trace = read_trace(asked)
             with Progress("", 5, live=False, quiet=True) as progress:
