@@ -57,10 +57,11 @@ def said(
 ) -> str:
     """What is said of a trace on lines 2, 3, ...: why it is refused, a note on it, or nothing."""
     units = columns.time.removeprefix("time_"), columns.reading.removeprefix("rotation_")
-    recording = Recording(time_s, values, np.arange(len(time_s)) + 2, 0, units)
+    lines, file = np.arange(len(time_s)) + 2, Path("trace.csv")
+    recording = Recording(time_s, values, lines, 0, file, columns, units)
     problem = replace(set_up(gripper, phases, Sample("maxwell")), offset=offset)
     try:
-        return check_recording(recording, problem, Path("trace.csv"), columns, noise_rad) or ""
+        return check_recording(recording, problem, noise_rad) or ""
     except BiogripError as error:
         return str(error)
 

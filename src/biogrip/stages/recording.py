@@ -68,7 +68,7 @@ def read_checked(
             "parameters; allowed are more readings than parameters, or a simpler model."
         )
     noise_rad = _typical_noise(trace, problem)
-    suspicion = check_recording(trace, problem, recorded, columns, noise_rad, onset_s)
+    suspicion = check_recording(trace, problem, noise_rad, onset_s)
     sd_rad = trace.sd_rad
     if problem.noise_share is not None:
         sd_rad = proportional_deviations(

@@ -8,7 +8,6 @@ and block means would lose a sinusoid.
 
 import math
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lagged_torques
 from biogrip.physics.protocol import TorqueHistory, torque_at
 from biogrip.physics.whitening import nuisance_basis, without
-from biogrip.traces.columns import TIME_UNITS, Columns, place
+from biogrip.traces.columns import TIME_UNITS, place
 from biogrip.traces.reader import Recording
 
 # Plausible rotations over that of the free arm. No sample makes the arm turn further than without
@@ -49,8 +48,6 @@ _ABSURD = 1e9
 def check_recording(
     recording: Recording,
     problem: CaseProblem,
-    path: Path,
-    columns: Columns,
     noise_rad: float | None = None,
     onset_s: float | None = None,
 ) -> str | None:
@@ -64,8 +61,8 @@ def check_recording(
 
     Parameters
     ----------
-    recording, path, columns
-        Trace, its times counted from the start of the protocol, and its source, for messages.
+    recording
+        Trace, its times counted from the start of the protocol.
     problem
         What it was recorded with.
     noise_rad
@@ -85,17 +82,17 @@ def check_recording(
         With file, line, column, what was found and allowed, and a unit that would be plausible.
     """
     torque, instrument = problem.torque, problem.instrument
-    _check_times(recording, torque, path, columns, onset_s)
+    _check_times(recording, torque, onset_s)
     time_s, trace = recording.time_s, recording.rotation_rad
     free, largest = free_rotation(problem.gripper, torque), float(np.abs(trace).max())
     if largest > _ABSURD * free:
-        return _check_turn(recording, largest, free, path, columns, None)
+        return _check_turn(recording, largest, free, None)
     lagged = lagged_torques(torque, _LAG_SHARES)(time_s)
     responses = extreme_responses(lagged, problem.gripper, len(_LAG_SHARES))
     nuisance = problem.nuisance(time_s)
     (amplitudes, rest), (_, mirrored) = _either_sign(trace, responses, nuisance)
-    where = f"{_extent(recording, path)}, column '{columns.reading}'"
-    read, controlled = columns.quantity, instrument.controlled.name
+    where = _extent(recording, recording.read.reading)
+    read, controlled = recording.read.quantity, instrument.controlled.name
     least = min(rest, mirrored)
     is_constant = not instrument.deforms and len(trace) * np.var(trace) <= least
     # Without any scatter nothing tells noise from sample.
@@ -115,13 +112,13 @@ def check_recording(
             sign = "the closing rotation, positive where the arm closes"
         raise BiogripError(
             f"{where}: found a {read.name} that goes against the {controlled}, allowed is {sign}. "
-            f"It would fit if it were -1 times (then say {columns.said_by('scale')}), or if an "
-            "offset or drift of the instrument, where it has one, were declared."
+            f"It would fit if it were -1 times (then say {recording.read.said_by('scale')}), or if "
+            "an offset or drift of the instrument, where it has one, were declared."
         )
     if not instrument.has_jaws:
         return None
     turn = float(np.abs(amplitudes @ responses).max())
-    return _check_turn(recording, turn, free, path, columns, noise_rad)
+    return _check_turn(recording, turn, free, noise_rad)
 
 
 def _either_sign(trace: Array, responses: Array, nuisance: Array) -> list[tuple[Array, float]]:
@@ -155,10 +152,8 @@ def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
     return float(max(alone.max(), pushed.max()))
 
 
-def _check_times(
-    recording: Recording, torque: TorqueHistory, path: Path, columns: Columns, onset_s: float | None
-) -> None:
-    end_s, slack = torque.end_s, _TIME_SLACK * torque.end_s
+def _check_times(recording: Recording, torque: TorqueHistory, onset_s: float | None) -> None:
+    columns, end_s, slack = recording.read, torque.end_s, _TIME_SLACK * torque.end_s
     begins = onset_s or 0.0
     time_s, earliest = recording.time_s, -slack if onset_s is None else -np.inf
     clock_s = time_s + begins
@@ -178,26 +173,21 @@ def _check_times(
                 how = "start_s under measurement says when, or fit_start: true finds it"
             hint = f" If the protocol starts at another time of the clock than 0, {how}."
         raise BiogripError(
-            f"{place(path, recording.lines[sample], columns.time)}: found "
+            f"{place(recording.path, recording.lines[sample], columns.time)}: found "
             f"{clock_s[sample]:.12g} s, allowed is the protocol's time, {begins:g} to "
             f"{begins + end_s:g} s.{hint}"
         )
     raise BiogripError(
-        f"{_extent(recording, path)}, column '{columns.time}': found only {clock_s[0]:g} to "
+        f"{_extent(recording, columns.time)}: found only {clock_s[0]:g} to "
         f"{clock_s[-1]:g} s of the protocol's {end_s:g} s, allowed are at least {shortest:g} s of "
         f"it.{hint}"
     )
 
 
 def _check_turn(
-    recording: Recording,
-    turn: float,
-    free: float,
-    path: Path,
-    columns: Columns,
-    noise_rad: float | None,
+    recording: Recording, turn: float, free: float, noise_rad: float | None
 ) -> str | None:
-    smallest, largest = _SMALLEST_SHARE * free, _LARGEST_SHARE * free
+    columns, smallest, largest = recording.read, _SMALLEST_SHARE * free, _LARGEST_SHARE * free
 
     def fits(factor: float) -> bool:
         return smallest <= factor * turn <= largest
@@ -219,7 +209,7 @@ def _check_turn(
         )
     sample = np.argmax(np.abs(recording.rotation_rad))
     raise BiogripError(
-        f"{place(path, recording.lines[sample], columns.reading)}: found "
+        f"{place(recording.path, recording.lines[sample], columns.reading)}: found "
         f"{recording.rotation_rad[sample]:.3g} rad as the largest rotation, and {turn:.3g} rad as "
         f"the largest with the noise smoothed out; allowed is {limit}.{hint}"
     )
@@ -233,5 +223,6 @@ def _other_units(unit: str, units: Mapping[str, float], fits: Callable[[float], 
     return f" It would fit if it were {' or '.join(found)}." if found else ""
 
 
-def _extent(recording: Recording, path: Path) -> str:
-    return f"{place(path)}, lines {recording.lines[0]} to {recording.lines[-1]}"
+def _extent(recording: Recording, column: str) -> str:
+    first, last = recording.lines[[0, -1]]
+    return f"{place(recording.path)}, lines {first} to {last}, column '{column}'"

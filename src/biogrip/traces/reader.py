@@ -62,6 +62,10 @@ class Recording:
     """Line number of each sample, from 1, (n_samples,)."""
     without_number: int
     """Number of rows left out as gaps."""
+    path: Path
+    """The file."""
+    read: Columns
+    """What was read of it."""
     units: tuple[str, str]
     """Units of the times and of the readings in the file."""
     sd_rad: Array | None = None
@@ -154,6 +158,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         kept[:, 1] * (unit * columns.scale),
         lines,
         without_number,
+        path,
+        columns,
         (units[0], units[1]),
         sd_rad=None if columns.sd is None else kept[:, 2] * (unit * abs(columns.scale)),
         form={key: value for key, value in form.items() if value is not None},
