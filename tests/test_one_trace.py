@@ -114,7 +114,7 @@ def test_what_was_held_is_stated_once(beside: str, order: int) -> None:
     """In any order."""
     phases = {"phases": [{"duration_s": 400.0, "torque_Nm": 1e-9}]}
     value = phases if beside == "protocol" else "torque_Nm"
-    settings = Setting("--hold", HOLD, 3e-9), Setting("t.tsv", tuple(beside.split(".")), value, 2)
+    settings = Setting("--hold", HOLD, 3e-9), Setting("t.tsv", tuple(beside.split(".")), value)
     with pytest.raises(BiogripError) as error:
         case_of(Asked(EXAMPLE, None, settings[::order], "t.tsv, line 2"))
     assert str(error.value) == f"t.tsv, line 2: found --hold and {beside}; allowed is one of them."

@@ -108,7 +108,7 @@ def test_a_table_is_told_by_its_column(tmp_path: Path, name: str, separator: str
     text = "\ufefffile|dish||fixed.c_p|'cell, no'\nd1/a.csv|left|||\n\n|||\nb.csv||| 0\nc.csv|NA\n"
     path.write_text(text.replace("|", separator).replace("'", '"'), encoding="utf-8")
     assert is_table(path)
-    setting = Setting(str(path), ("fixed", "c_p"), 0, 5)
+    setting = Setting(f"{path}, line 5", ("fixed", "c_p"), 0)
     assert [(row.place, row.trace, row.settings, row.copied) for row in read_table(path)] == [
         (f"{path}, line {line}", tmp_path / trace, settings, {"dish": dish, "cell, no": ""})
         for line, trace, settings, dish in (

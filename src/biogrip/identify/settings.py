@@ -60,11 +60,8 @@ LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
-# Of each group, the key that is set last replaces the others.
-_ONE_OF: Sequence[Sequence[tuple[str, ...]]] = (
-    [("measurement", "start_s"), ("measurement", "fit_start")],
-    [("measurement", name) for name in READINGS],
-)
+# Of each group of keys of the measurement, the one that is set last replaces the others.
+_ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
 _SEPARATORS = ",;\t"
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
@@ -76,13 +73,11 @@ class Setting:
     """A key of the config, and the value that an option or a cell of a table gives it."""
 
     by: str
-    """The option or the table, for messages."""
+    """The option, or the line of the table, for messages."""
     path: tuple[str, ...]
     """The key."""
     value: Any
     """Plain value, not yet checked."""
-    line: int | None = None
-    """Line of the table."""
 
 
 @dataclass(frozen=True)
@@ -127,12 +122,10 @@ def value_of(text: str, key: str = "") -> Any:
 def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     """Return the blocks with a setting, and without what it replaces."""
     path, value = setting.path, deepcopy(setting.value)
-    for group in _ONE_OF:
-        if any(path[: len(key)] == key for key in group):
-            for *above, name in (key for key in group if path[: len(key)] != key):
-                block = blocks.get(above[0]) if above else blocks
-                if isinstance(block, dict):
-                    block.pop(name, None)
+    measured = blocks.get("measurement")
+    if path[0] == "measurement" and isinstance(measured, dict):
+        for name in (name for group in _ONE_OF if group & {*path[1:2]} for name in group):
+            measured.pop(name, None)
     # A candidate's name says its branches, too.
     sample = CANDIDATES.get(str(value)) if path == ("sample", "model") else None
     if sample:
@@ -180,7 +173,7 @@ def _source(
     own = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
     known = set(keys_in(below))
     above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
-    return setting.by, dict.fromkeys([*above, path, *own], setting.line)
+    return setting.by, dict.fromkeys([*above, path, *own])
 
 
 def _with_instrument(
@@ -328,8 +321,8 @@ def read_table(
         for name, cell in by_name.items():
             if "." in name and cell:
                 try:
-                    value = value_of(cell, name)
-                    settings.append(Setting(visible(path), tuple(name.split(".")), value, line))
+                    key = tuple(name.split("."))
+                    settings.append(Setting(place(path, line), key, value_of(cell, name)))
                 except BiogripError as error:
                     problems.append(f"{place(path, line, name)}: {error}")
         copied = {name: cell for name, cell in by_name.items() if name and "." not in name}

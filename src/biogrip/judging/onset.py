@@ -13,7 +13,7 @@ a rotation jumps between two readings, sums of squares have kinks as a function 
 which a linear approximation fails.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -230,23 +230,17 @@ def profile_over_onset(
     ends = onset_limits(best, time_s)
     others = [_at(best, float(change_s)) for end in ends for change_s in end * _SHARES]
     others = [each for each in others if each.threshold > 0]
-    trades = diagnosis.trades
-    found = [*diagnosis.findings, *(trade.finding for trade in trades)]
-    of_others = [
-        compute_profiles([each], [finding.quantity for finding in found], smooth=False)[0]
-        for each in others
-    ]
+    if not others:
+        return diagnosis, ends
+    found = [*diagnosis.findings, *(trade.finding for trade in diagnosis.trades)]
+    every = compute_profiles(others, [finding.quantity for finding in found], smooth=False)
     costs = [best.threshold - each.threshold for each in others]
-    merged = [
-        _merged(finding, [own[place] for own in of_others], costs)
-        for place, finding in enumerate(found)
-    ]
+    by_quantity = zip(*every, strict=True)
+    merged = [_merged(*each, costs) for each in zip(found, by_quantity, strict=True)]
     kept = len(diagnosis.findings)
-    again = [
-        replace(trade, finding=finding)
-        for trade, finding in zip(trades, merged[kept:], strict=True)
-    ]
-    return replace(diagnosis, findings=merged[:kept], trades=again), ends
+    pairs = zip(diagnosis.trades, merged[kept:], strict=True)
+    trades = [replace(trade, finding=finding) for trade, finding in pairs]
+    return replace(diagnosis, findings=merged[:kept], trades=trades), ends
 
 
 def _at(best: Likelihood, change_s: float) -> Likelihood:
@@ -277,7 +271,7 @@ def _end(best: Likelihood, step_s: float) -> float:
     return float(brentq(lambda s: _at(best, s).threshold, inside, outside, xtol=accuracy))
 
 
-def _merged(finding: Finding, profiles: list[Profile], costs: list[float]) -> Finding:
+def _merged(finding: Finding, profiles: Sequence[Profile], costs: list[float]) -> Finding:
     """Return a finding with the lowest of its profile and of those of other onsets.
 
     It has no gaps: between two of the onsets nothing is known to be excluded.
