@@ -26,10 +26,12 @@ from biogrip.identify.settings import HOLD, Asked, Setting, case_of
 from biogrip.identify.words import for_a_paper, side_by_side
 from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES
+from biogrip.terminal import QUIET
 from tests.helpers.identified import FEW, identified, identify, told
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
 from tests.helpers.problems import clean
 
+EXPORT = Path(__file__).parent / "traces/files/anton_paar_intervals.utf16.csv"
 TRUTH = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]
 
 
@@ -106,6 +108,30 @@ def test_options_are_keys_of_the_config_and_the_last_one_counts(
     by_options = case_of(Asked(EXAMPLE, None, tuple(settings)))
     assert by_options.block == case_of(Asked(EXAMPLE, tmp_path / "same.yaml", (model,))).block
     assert by_options.sample.candidate == "generalized_maxwell_2"
+
+
+def test_an_export_is_read_by_options_or_keys_and_what_is_recognised_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And that is not said with QUIET."""
+    trace = Path(shutil.copy(EXPORT, tmp_path / "gel.csv"))
+    (tmp_path / "few.yaml").write_text(FEW)
+    command: list[str | Path] = [trace, "--model", "maxwell", "--config"]
+    reading = ["--reading", "modulus=Relaxation Modulus", "--set", "measurement.block=3"]
+    options: list[str | Path] = [tmp_path / "few.yaml", "--time", "Time", *reading, "--start", "24"]
+    status, _, said = identify(*command, *options)
+    assert status == 0
+    assert "gel.csv is read as\n  encoding     UTF-16\n  separator    tabs\n" in said
+    assert "\n  modulus      Relaxation Modulus, in kPa\n" in said
+    by_options = json.loads((tmp_path / "gel.identified.json").read_text())
+    assert by_options["read_as"]["block"] == 3
+    monkeypatch.setenv(QUIET, "1")
+    keys = {"time": "Time", "modulus": "Relaxation Modulus", "start_s": 24.0, "block": 3}
+    given = {**yaml.safe_load(FEW), "instrument": "relaxation", "measurement": keys}
+    (tmp_path / "keys.yaml").write_text(yaml.safe_dump(given))
+    status, _, said = identify(*command, tmp_path / "keys.yaml")
+    assert (status, said) == (0, "")
+    assert json.loads((tmp_path / "gel.identified.json").read_text()) == by_options
 
 
 @pytest.mark.parametrize("order", [1, -1])
