@@ -1,5 +1,6 @@
 """Readings of known standard deviations, against SciPy's weighted least squares."""
 
+from dataclasses import replace
 from math import gamma
 
 import numpy as np
@@ -103,8 +104,5 @@ def test_a_plateau_is_no_noise() -> None:
     smooth = 800 + 700 * np.exp(-times / 20)
     readings = smooth * (1 + 0.01 * np.random.default_rng(0).standard_normal(len(times)))
     relaxation = set_up(INSTRUMENTS["modulus"], (hold(1e3, 1.0),), Sample("zener_maxwell"))
-    none = np.zeros((0, len(times)))
-    found = proportional_deviations(
-        times, readings, relaxation.gripper, relaxation.torque, none, 0.01
-    )
+    found = proportional_deviations(replace(relaxation, noise_share=0.01), times, readings)
     assert found == pytest.approx(0.01 * smooth, rel=0.02)

@@ -11,13 +11,14 @@ References
    chapter 23.
 """
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from scipy.optimize import nnls
 
 from biogrip.arrays import Array
-from biogrip.physics.gripper import Gripper
+from biogrip.fit.case_problem import CaseProblem
 from biogrip.physics.modes import lagged_torques
-from biogrip.physics.protocol import TorqueHistory
 
 # Retardation times a decade; shortest over the sampling interval, longest over the protocol, and
 # that of what does not relax.
@@ -33,26 +34,24 @@ _EXCESS = 2.03
 _ROUNDING = 1e-7
 
 
-def extreme_responses(lagged: Array, gripper: Gripper, lags: int) -> Array:
-    """Return extreme responses, (n, n_rows), of which all samples' are non-negative combinations.
+def extreme_responses(problem: CaseProblem, lags: Sequence[float]) -> Callable[[Array], Array]:
+    """Return a function of times, (n_rows,), that computes extreme responses, (n, n_rows).
 
-    A sample turns the left arm by phi_2 = tau_2/k_2 - x (tau_2/k_2 - (tau_2 - tau_4)/(k_2 + k_4)),
-    where x is the sample's rigidity and decreases, as it relaxes, from at most 1 to at least 0.
-    The extremes are: no sample, rigid ones that relax with one of the lags, and a rigid one.
-
-    Parameters
-    ----------
-    lagged : (n_lagged, n_rows)
-        Torques from `lagged_torques`; the shortest lag is negligible.
-    gripper, lags
-        The gripper, and the number of lags.
+    All samples' are non-negative combinations of them. A sample turns the left arm by
+    phi_2 = tau_2/k_2 - x (tau_2/k_2 - (tau_2 - tau_4)/(k_2 + k_4)), where x is the sample's
+    rigidity and decreases, as it relaxes, from at most 1 to at least 0. The extremes are: no
+    sample, rigid ones that relax with one of the lags, and a rigid one. Lags are shares of the
+    protocol; the shortest is negligible.
     """
+    lagged, gripper = lagged_torques(problem.torque, lags), problem.gripper
     k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
-    alone = lagged[:lags] / k_2
-    if len(lagged) == lags:
-        return alone
-    pushed = lagged[lags:] / (k_2 + k_4)
-    return np.vstack((alone - pushed + pushed[0], pushed[0]))
+
+    def responses(time_s: Array) -> Array:
+        torques = lagged(time_s)
+        alone, pushed = torques[: len(lags)] / k_2, torques[len(lags) :] / (k_2 + k_4)
+        return np.vstack((alone - pushed + pushed[0], pushed[0])) if len(pushed) else alone
+
+    return responses
 
 
 def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:
@@ -68,42 +67,26 @@ def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:
     return amplitudes / sizes, float(norm**2)
 
 
-def proportional_deviations(
-    time_s: Array,
-    rotation_rad: Array,
-    gripper: Gripper,
-    torque: TorqueHistory,
-    nuisance: Array,
-    share: float,
-    noise_rad: float | None = None,
-) -> Array:
-    """Compute standard deviations of readings in proportion to the smooth rotation.
+def proportional_deviations(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> Array:
+    """Compute standard deviations of readings in proportion to the smooth rotation, (n_samples,).
+
+    The problem has that share, and the standard deviation of further noise. If it is not known, no
+    deviation is less than that of the median of the smallest rotations, nor than they scatter: of
+    a rotation of zero, no instrument is certain.
 
     Parameters
     ----------
+    problem
+        What the trace was recorded with, and what is known of its noise.
     time_s, rotation_rad : (n_samples,)
         A recorded trace, times ascending.
-    gripper, torque
-        Gripper and protocol it was recorded with.
-    nuisance : (n_functions, n_samples)
-        Nuisance functions of the instrument, see `nuisance_basis`.
-    share
-        Standard deviation over the rotation.
-    noise_rad
-        Standard deviation of further noise, the same everywhere. By default no deviation is less
-        than that of the median of the smallest rotations, nor than they scatter: of a rotation
-        of zero, no instrument is certain.
-
-    Returns
-    -------
-    (n_samples,)
-        In rad.
     """
-    shortest = _SHORTEST * float(np.diff(time_s).min()) / torque.end_s
+    share, noise_rad = problem.noise_share or 0.0, problem.noise_rad
+    nuisance = problem.nuisance(time_s)
+    shortest = _SHORTEST * float(np.diff(time_s).min()) / problem.torque.end_s
     count = 2 + int(_A_DECADE * np.log10(_LONGEST / shortest))
     lags = np.append(np.geomspace(shortest, _LONGEST, count), _LASTING)
-    lagged = lagged_torques(torque, lags.tolist())(time_s)
-    family = extreme_responses(lagged, gripper, len(lags))
+    family = extreme_responses(problem, lags.tolist())(time_s)
     functions = np.vstack((family, nuisance, -nuisance))
     deviations = np.full(len(time_s), share * np.max(np.abs(rotation_rad)))
     for _ in range(_ROUNDS):

@@ -21,7 +21,6 @@ from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.problem import Problem, silent
-from biogrip.physics.modes import lagged_torques
 from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
 
 # Longest relaxation time over the protocol's duration, and how many a decade; the shortest is that
@@ -57,12 +56,12 @@ def estimate_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> 
     shortest = float(np.min(np.diff(time_s)))
     decades = np.log10(_LONGEST * torque.end_s / shortest)
     shares = np.geomspace(shortest / torque.end_s, _LONGEST, 2 + int(_A_DECADE * decades))
-    lagged = lagged_torques(torque, shares.tolist())
+    responses = extreme_responses(problem, shares.tolist())
 
     def square_sum(onset_s: float, some: IntArray) -> float:
         nuisance = nuisance_basis(time_s[some], offset=offset, drift=problem.drift)
-        own = extreme_responses(lagged(time_s[some] - onset_s), problem.gripper, len(shares))
-        return fit_responses(without(nuisance, rotation_rad[some]), without(nuisance, own))[1]
+        own = without(nuisance, responses(time_s[some] - onset_s))
+        return fit_responses(without(nuisance, rotation_rad[some]), own)[1]
 
     low, high = time_s[0], max(time_s[0], time_s[-1] - _LEAST_AFTER * torque.end_s)
     while True:

@@ -71,15 +71,7 @@ def read_checked(
     suspicion = check_recording(trace, problem, noise_rad, onset_s)
     sd_rad = trace.sd_rad
     if problem.noise_share is not None:
-        sd_rad = proportional_deviations(
-            trace.time_s,
-            trace.rotation_rad,
-            problem.gripper,
-            problem.torque,
-            problem.nuisance(trace.time_s),
-            problem.noise_share,
-            problem.noise_rad,
-        )
+        sd_rad = proportional_deviations(problem, trace.time_s, trace.rotation_rad)
     return Measurements(
         trace.time_s,
         None,

@@ -17,7 +17,6 @@ from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import extreme_responses, fit_responses
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.modes import lagged_torques
 from biogrip.physics.protocol import TorqueHistory, torque_at
 from biogrip.physics.whitening import nuisance_basis, without
 from biogrip.traces.columns import TIME_UNITS, place
@@ -87,8 +86,7 @@ def check_recording(
     free, largest = free_rotation(problem.gripper, torque), float(np.abs(trace).max())
     if largest > _ABSURD * free:
         return _check_turn(recording, largest, free, None)
-    lagged = lagged_torques(torque, _LAG_SHARES)(time_s)
-    responses = extreme_responses(lagged, problem.gripper, len(_LAG_SHARES))
+    responses = extreme_responses(problem, _LAG_SHARES)(time_s)
     nuisance = problem.nuisance(time_s)
     (amplitudes, rest), (_, mirrored) = _either_sign(trace, responses, nuisance)
     where = _extent(recording, recording.read.reading)
