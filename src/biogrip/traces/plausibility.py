@@ -101,10 +101,11 @@ def check_recording(
             f"throughout, give or take {plain(trace.std(), 2)}{unit}; allowed is a {read.name} "
             f"from zero that follows the {controlled} and stands out of the noise."
         )
-    likelier = rest > mirrored * math.exp(_FAR_LIKELIER / len(trace))
     # An undeclared offset may look like the wrong sign.
     also = nuisance_basis(time_s, offset=True, drift=problem.drift)
-    if likelier and np.diff([left for _, left in _either_sign(trace, responses, also)]) < 0:
+    (_, beside), (_, mirrored_beside) = _either_sign(trace, responses, also)
+    likelier = rest > mirrored * math.exp(_FAR_LIKELIER / len(trace))
+    if likelier and beside > mirrored_beside:
         sign = "one of the same sign"
         if instrument.has_jaws:
             sign = "the closing rotation, positive where the arm closes"
