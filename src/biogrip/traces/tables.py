@@ -10,7 +10,7 @@ table without names has numbers of columns.
 import csv
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from math import inf, isfinite, nan
@@ -102,10 +102,6 @@ class Table:
         """Count the columns to read that it has."""
         return sum(bool(self.indices(name)) for name in columns.named.values())
 
-    def has(self, columns: Columns) -> bool:
-        """Return True if it has all columns to read."""
-        return self.common(columns) == len(columns.named)
-
 
 def read_sheet(path: Path, columns: Columns) -> Sheet:
     """Read the cells of a text file.
@@ -169,10 +165,8 @@ def _read_lines(path: Path) -> tuple[str, list[str]]:
 def _with_names(lines: Sequence[str], wanted: set[str]) -> list[tuple[str, int]]:
     """Return lines with numbers from 1, without comments and empty ones, but with those of names.
 
-    Where no other line has the wanted names, comments may have them, also behind ``columns:``, or
-    the last before the first row is as long as that; then comments like ``key: value`` above are
-    a preamble, and one with ``units:`` below is kept. Numbers of columns are names above the first
-    row.
+    Numbers of columns are names above the first row. Where no other line has the wanted names,
+    comments may have them.
     """
     every = [(line, number) for number, line in enumerate(lines, 1)]
     kept = [own for own in every if not _LEFT_OUT.match(own[0])]
@@ -185,30 +179,45 @@ def _with_names(lines: Sequence[str], wanted: set[str]) -> list[tuple[str, int]]
         widest = range(1, len(_split(first[0], separator)) + 1)
         names = (separator.join(map(str, widest)), 0)
         return [*(own for own in plain if own[1] < first[1]), names, *plain[plain.index(first) :]]
-    comments = [own for own in every if _COMMENT.match(own[0])]
-    said = {number: _BEFORE_NAMES.sub("", _COMMENT.sub("", line)) for line, number in comments}
-    headers = [number for number, text in said.items() if _has(text, wanted)]
-    if not headers:
-        widths = [len(it) if len(it) > 1 else 0 for it in _splits(first[0])]
-        before = [*said.items(), *((number, line) for line, number in plain)]
-        likely = [
-            number
-            for number, text in before
-            if number < first[1] and any(map(eq, map(len, _splits(text)), widths))
-        ]
-        headers = [number for number in likely[-1:] if number in said]
+    said = {number: _COMMENT.sub("", line) for line, number in every if _COMMENT.match(line)}
+    headers = _headers_in(said, plain, first, wanted)
+    return _with_headers(every, said, headers) if headers else kept
+
+
+def _headers_in(
+    said: Mapping[int, str], plain: list[tuple[str, int]], first: tuple[str, int], wanted: set[str]
+) -> list[int]:
+    """Return which comments are names: those wanted, or the last before the first row, as wide."""
+    names = {number: _BEFORE_NAMES.sub("", text) for number, text in said.items()}
+    if found := [number for number, text in names.items() if _has(text, wanted)]:
+        return found
+    widths = [len(it) if len(it) > 1 else 0 for it in _splits(first[0])]
+    before = [*names.items(), *((number, line) for line, number in plain)]
+    likely = [
+        number
+        for number, text in before
+        if number < first[1] and any(map(eq, map(len, _splits(text)), widths))
+    ]
+    return [number for number in likely[-1:] if number in said]
+
+
+def _with_headers(
+    every: list[tuple[str, int]], said: Mapping[int, str], headers: list[int]
+) -> list[tuple[str, int]]:
+    """Return rows, and comments that are names, ``key: value`` above them or ``units:`` below."""
     found = list[tuple[str, int]]()
-    for is_comment, group in groupby(every, lambda own: not own[0].strip() or own[1] in said):
-        block = [(_COMMENT.sub("", line).strip(), number) for line, number in group]
+    for in_comments, group in groupby(every, lambda own: not own[0].strip() or own[1] in said):
+        block = [*group]
         at = next((i for i, (_, number) in enumerate(block) if number in headers), None)
-        if not is_comment:
-            found += (every[number - 1] for _, number in block)
+        if not in_comments:
+            found += block
         elif at is not None:
-            found += (own for own in block[:at] if ":" in own[0])
-            found.append((said[block[at][1]], block[at][1]))
-            units = (own for own in block[at + 1 :] if _BEFORE_UNITS.match(own[0]))
+            texts = [(said.get(number, "").strip(), number) for _, number in block]
+            found += (own for own in texts[:at] if ":" in own[0])
+            found.append((_BEFORE_NAMES.sub("", said[block[at][1]]), block[at][1]))
+            units = (own for own in texts[at + 1 :] if _BEFORE_UNITS.match(own[0]))
             found += ((_BEFORE_UNITS.sub("", text), number) for text, number in units)
-    return found if headers else kept
+    return found
 
 
 def _split(line: str, separator: str) -> list[str]:
@@ -308,7 +317,7 @@ def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
     """
     is_step = at >= 2 and str(sheet.cells[at - 2, 0]).lower() == "[step]"
     table = Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1, is_step)
-    names, has_columns = table.names, table.has(columns)
+    names, has_columns = table.names, table.common(columns) == len(columns.named)
     if not has_columns and (_count_numbers(names) or sum(map(bool, names)) < 2):
         return None
     below = [i for i in range(at + 1, min(at + 4, len(sheet.cells))) if any(sheet.cells[i])]
