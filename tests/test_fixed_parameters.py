@@ -10,33 +10,19 @@ from scipy.optimize import curve_fit
 from biogrip.arrays import Array
 from biogrip.library import Sample, set_up, simulate
 from tests.helpers.default import STUDY
-from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
+from tests.helpers.identified import FEW, identify, told, write_trace
 
 SAMPLE = Sample("generalized_maxwell")
 TRUTH = {"k": 20.0, "k_p": 5.0, "c": 400.0, "c_p": 50.0}
 EXPERIMENT = set_up(STUDY.gripper, STUDY.phases, SAMPLE)
-
-
 TIMES = np.arange(401.0)
-
-
-@pytest.fixture(scope="module")
-def trace() -> Array:
-    """A cell's at 1 Hz, with 2 % noise."""
-    response = simulate(EXPERIMENT, TRUTH, TIMES)
-    noise = np.random.default_rng(0).standard_normal(len(TIMES))
-    return response + 0.02 * response.max() * noise
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory, trace: Array) -> Path:
-    return write_trace(tmp_path_factory.mktemp("fixed") / "trace.csv", TIMES, trace)
+# A cell's at 1 Hz, with 2 % noise.
+CLEAN = simulate(EXPERIMENT, TRUTH, TIMES)
+TRACE = CLEAN + 0.02 * CLEAN.max() * np.random.default_rng(0).standard_normal(len(TIMES))
 
 
 @pytest.mark.parametrize("fixed", [{"c_p": 0.0}, {"k_p": 4.9, "c_p": 50.0}])
-def test_the_others_are_scipys(
-    file: Path, tmp_path: Path, trace: Array, fixed: dict[str, float]
-) -> None:
+def test_the_others_are_scipys(fixed: dict[str, float]) -> None:
     free = [name for name in SAMPLE.model.names if name not in fixed]
 
     def response(times: Array, *logs: float) -> Array:
@@ -44,23 +30,21 @@ def test_the_others_are_scipys(
         return 1e6 * simulate(EXPERIMENT, values, times)
 
     start = [np.log(TRUTH[name]) for name in free]
-    best, covariance = curve_fit(response, TIMES, 1e6 * trace, start, xtol=1e-12, ftol=1e-12)
-    options = (f"--fix={name}={value}" for name, value in fixed.items())
-    found = identified(tmp_path, file, *options)
-    own = by_quantity(found)
-    assert set(own) == {*free, "tau"}
-    assert found["assumed"]["fixed"] == fixed
+    best, covariance = curve_fit(response, TIMES, 1e6 * TRACE, start, xtol=1e-12, ftol=1e-12)
+    found = told(TIMES, TRACE, fixed=fixed)
+    own = found.to_frame()
+    assert set(own.index) == {*free, "tau"}
+    assert found.data["assumed"]["fixed"] == fixed
     for name, log, deviation in zip(free, best, np.sqrt(np.diag(covariance)), strict=True):
-        # SciPy stops within a thousandth of the deviation; five digits are written.
-        assert own[name]["value"] == pytest.approx(np.exp(log), rel=1e-3 * deviation + 5e-5)
+        # SciPy stops within a thousandth of the deviation.
+        assert own["value"][name] == pytest.approx(np.exp(log), rel=1e-3 * deviation + 5e-5)
         if deviation < 0.02:
-            width = np.log(own[name]["high"] / own[name]["low"])
+            width = np.log(own["high"][name] / own["low"][name])
             assert width == pytest.approx(2 * 1.966 * deviation, rel=0.02)
 
 
-def test_a_config_fixes_an_option_adds_and_it_is_said_everywhere(
-    file: Path, tmp_path: Path
-) -> None:
+def test_a_config_fixes_an_option_adds_and_it_is_said_everywhere(tmp_path: Path) -> None:
+    file = write_trace(tmp_path / "trace.csv", TIMES, TRACE)
     page, table, config = (tmp_path / name for name in ("page.html", "table.csv", "c.yaml"))
     config.write_text(f"{FEW}fixed: {{k: 20.0, c_p: 1.0}}\n")
     outputs = ("--report", page, "--csv", table, "--output", tmp_path / "f.json")

@@ -1,67 +1,136 @@
-"""The gripper in what `biogrip identify` says: its uncertainty, and samples far stiffer."""
+"""The gripper and its limits: its uncertainty in what is said, and samples far stiffer or softer.
+
+So are ranges, which follow from a trace.
+"""
 
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.identify.trace_case import ranges_of
+from biogrip.library import set_up, simulate
+from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.models import Sample
+from biogrip.physics.protocol import hold
 from tests.helpers.default import STUDY
-from tests.helpers.identified import by_quantity, identified, identify, write_trace
+from tests.helpers.identified import told
 
-FEW = """
-least_squares: {candidates: 200, starts: 6}
-model_selection: {models: [maxwell, burgers]}
-"""
 CASE = STUDY.cases["liquid_drop_2"]
 TIMES = np.linspace(0.0, 400.0, 801)
 
 
-def simulated(
-    folder: Path, parameters: dict[str, float], torque: float = 1.0, length: float = 1.0
-) -> Path:
-    """Write a trace with noise of 1 % of its peak."""
+def simulated(parameters: dict[str, float], torque: float = 1.0, length: float = 1.0) -> Array:
+    """A trace with noise of 1 % of its peak."""
     problem = CASE.problem
     gripper = replace(problem.gripper, arm_length_m=length * problem.gripper.arm_length_m)
-    sample, history = problem.searched.sample(parameters), problem.torque.times(torque)
-    clean = simulated_rotation(gripper, sample, history, TIMES, nonlinear=False)[0]
-    noise = 0.01 * clean.max() * np.random.default_rng(1).standard_normal(len(TIMES))
-    return write_trace(folder / "a.csv", TIMES, clean + noise)
+    phases = tuple(hold(200.0, torque * torque_Nm) for torque_Nm in (1.6e-9, 0.32e-9))
+    clean = simulate(set_up(gripper, phases, problem.sample), parameters, TIMES)
+    return clean + 0.01 * clean.max() * np.random.default_rng(1).standard_normal(len(TIMES))
 
 
 @pytest.mark.nightly
-def test_limits_hold_the_truth_of_a_wrong_gripper_only_with_its_uncertainty(tmp_path: Path) -> None:
+def test_limits_hold_the_truth_of_a_wrong_gripper_only_with_its_uncertainty() -> None:
     """Arms 7 % too long and a torque 8 % too large: some 1.5 standard uncertainties each."""
-    trace = simulated(tmp_path, CASE.parameters, torque=1.08, length=0.93)
-    configs = {
-        "exact": "",
-        "torque": "gripper: {uncertainty: {arm_length_m: 7.5e-5, torque_percent: 5}}\n",
+    trace = simulated(CASE.parameters, torque=1.08, length=0.93)
+    uncertain = {"gripper": {"uncertainty": {"arm_length_m": 7.5e-5, "torque_percent": 5}}}
+    found = {
+        name: told(TIMES, trace, ["maxwell", "burgers"], config=config)
+        for name, config in {"exact": {}, "uncertain": uncertain}.items()
     }
-    told = {name: identified(tmp_path, trace, config=FEW + own) for name, own in configs.items()}
-    assert told["exact"]["limits"].startswith("Limits are statistical only")
-    assert told["torque"]["limits"].endswith("gripper.arm_length_m, torque.")
+    assert found["exact"].data["limits"].startswith("Limits are statistical only")
+    assert found["uncertain"].data["limits"].endswith("gripper.arm_length_m, torque.")
     truth = CASE.parameters["c"] + CASE.parameters["c_p"]
-    for name, found in told.items():
-        held = by_quantity(found)["c + c_p"]
-        assert ((held["low"] or np.inf) < truth < (held["high"] or 0.0)) == (name != "exact")
-        assert found["fit"] == ("rejected" if name == "exact" else "ok")
+    for name, each in found.items():
+        held = each.to_frame().loc["c + c_p"]
+        assert (held["low"] < truth < held["high"]) == (name != "exact")
+        assert each.status == ("rejected" if name == "exact" else "ok")
     # No model is asked for in place of the gripper's error.
-    assert "not adequate" not in told["torque"]["advice"]
+    assert "not adequate" not in found["uncertain"].data["advice"]
 
 
-def test_a_stiff_sample_is_identified_where_the_noise_is_given(tmp_path: Path) -> None:
+def test_a_stiff_sample_is_identified_where_the_noise_is_given() -> None:
     stiff = {"k": 2e4, "k_p": 1e4, "c": 1e6, "c_p": 1.0}
-    trace = simulated(tmp_path, stiff)
-    status, _, complained = identify(trace)
-    assert status != 0
-    assert "or less with a given noise (--noise)" in complained
-    peak = np.loadtxt(trace, delimiter=",", skiprows=1)[:, 1].max()
-    found = identified(tmp_path, trace, "--noise", f"{0.01 * peak:.3g}", config=FEW)
-    assert found["fit"] == "ok"
-    assert any("the sample is very stiff" in note["text"] for note in found["notes"])
+    trace = simulated(stiff)
+    with pytest.raises(BiogripError, match=r"or less with a given noise \(noise\)"):
+        told(TIMES, trace)
+    found = told(TIMES, trace, noise=0.01 * trace.max())
+    assert found.status == "ok"
+    assert "the sample is very stiff" in str(found)
     for name in ("k", "k_p", "c"):
-        quantity = by_quantity(found)[name]
+        quantity = found.to_frame().loc[name]
         assert quantity["verdict"] == "determined"
         # Limits are 1 % apart from the estimate, or less.
         assert quantity["value"] == pytest.approx(stiff[name], rel=0.02)
+
+
+def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met() -> None:
+    """A trace tells stiffnesses times the square of the sine: smaller samples seem stiffer."""
+    trace = simulated(CASE.parameters)
+    unsized, sized = (
+        told(TIMES, trace, config={"sample": own}).to_frame()["value"]
+        for own in ({}, {"size_m": 30e-6})
+    )
+    # From 150 to 30 um each jaw moves by 60 um, on a circle of 1.5 mm.
+    angle = np.arccos(np.cos(np.radians(75)) + 60e-6 / 1.5e-3)
+    ratio = (np.sin(angle) / np.sin(np.radians(75))) ** 2
+    for name in ("k_p", "c + c_p"):
+        assert unsized[name] / sized[name] == pytest.approx(ratio, rel=1e-3)
+
+
+# Creep of polystyrene, in Pa and Pa s, as of a gripper: jaws of l = b at 90 degrees whose arms have
+# 0.25 % of the sample's stiffness.
+K_P, C = 5.26e3, 8.7e7
+LEVER_M, DURATION_S, TORQUE_NM, NOISE_RAD = 1.5e-3, 3e4, 2.7e-5, 1e-5
+ARM = {
+    "inertia_kgm2": 1e-14,
+    "damping_Nms_per_rad": 1e-9,
+    "stiffness_Nm_per_rad": 0.0025 * K_P * 2 * LEVER_M**2,
+}
+POLYSTYRENE = {
+    "gripper": {"arm_length_m": LEVER_M, "reference_angle_deg": 90.0, "left": ARM, "right": ARM},
+    "protocol": {"phases": [{"duration_s": DURATION_S, "torque_Nm": TORQUE_NM}]},
+}
+
+
+@pytest.mark.parametrize("given", [{}, {name: {"exponent": [-4, 5]} for name in ("c", "c_p")}])
+def test_ranges_hold_samples_beyond_those_of_the_paper_and_given_ones_stay(
+    given: dict[str, Any],
+) -> None:
+    gripper = Gripper(LEVER_M, 90.0, Arm(**ARM), Arm(**ARM))
+    problem = set_up(gripper, (hold(DURATION_S, TORQUE_NM),), Sample("generalized_maxwell"))
+    times = np.geomspace(1.0, DURATION_S, 200)
+    clean = simulate(problem, {"k": 1e6, "k_p": K_P, "c": C, "c_p": 1e3}, times)
+    noise = NOISE_RAD * np.random.default_rng(1).standard_normal(len(times))
+    found = told(times, clean + noise, config={**POLYSTYRENE, "search_range": given})
+    ranges = found.problem.ranges
+    assert ranges["k"].exponent != (-3, 8)
+    if given:
+        assert ranges["c"].exponent == ranges["c_p"].exponent == (-4, 5)
+        return
+    assert found.status == "ok"
+    for name, truth in (("k_p", K_P), ("c + c_p", C + 1e3)):
+        own = found.to_frame().loc[name]
+        assert own["verdict"] == "determined"
+        assert own["low"] < truth < own["high"]
+
+
+@pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1", "liquid_drop_2"])
+def test_elements_at_the_ends_of_ranges_do_not_show(case: str) -> None:
+    """A spring or damper beyond either end is as good as absent, or rigid: less than the noise."""
+    chosen = STUDY.cases[case]
+    problem, time_s = chosen.problem, chosen.sampling.over(chosen.problem.torque.end_s)
+
+    def response(**changes: float) -> Array:
+        return simulate(problem, {**chosen.parameters, **changes}, time_s)
+
+    simulated = response()
+    noise_rad = 0.1 * simulated.max()
+    noise = noise_rad * np.random.default_rng(2).standard_normal(len(time_s))
+    for name, genes in ranges_of(problem, time_s, simulated + noise).items():
+        for end, beyond in ((genes.low, 1e-3), (genes.high, 1e3)):
+            change = response(**{name: end}) - response(**{name: end * beyond})
+            assert np.linalg.norm(change) < noise_rad, (name, end)

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 
@@ -13,10 +14,9 @@ from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import hold
 from tests.helpers.default import study_of
-from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
+from tests.helpers.identified import FEW, by_quantity, identify, told, write_trace
 from tests.helpers.places import ROOT
 
-MEASURED = ROOT / "data/measured"
 SOLID = Sample("zener_maxwell")
 TRUTH = {"k": 300.0, "k_p": 200.0, "c": 900.0}
 FOUND = TRUTH | {"tau": 3.0}
@@ -85,30 +85,6 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
         assert not OF_A_GRIPPER.search(said), OF_A_GRIPPER.search(said)
 
 
-def test_what_is_not_held_is_asked_for_and_kinds_do_not_mix(tmp_path: Path) -> None:
-    trace = write_trace(tmp_path / "t.csv", TIMES, response("strain", 1.0), "time_s,strain")
-    held = "protocol: {phases: [{duration_s: 5, stress_Pa: 1}]}\n"
-    (relaxing := tmp_path / "relaxing.yaml").write_text(f"instrument: relaxation\n{held}")
-    (mistyped := tmp_path / "mistyped.yaml").write_text(f"instrument: creeep\n{held}")
-    strain = ("--reading", "strain=strain")
-    refusals = {
-        strain: "--hold: is missing; allowed is the stress in Pa that was",
-        ("--reading", "strian=strain"): "--reading: measurement.strian: unknown key. Did you mean",
-        ("--reading", "modulus=strain", "--set", "measurement.reading_unit=mm"): "--set: "
-        "measurement.reading_unit: found 'mm', allowed are Pa, kPa",
-        ("--reading", "strain=x", "--hold", "1"): "Say which is which by --time and --reading",
-        (*strain, "--hold", "1e99"): "--hold: protocol.phases[0].stress_Pa: found 1e+99, allowed",
-        (*strain, "--config", str(relaxing)): "--reading: measurement.strain: is not what "
-        "relaxation reads where",
-        (*strain, "--config", str(mistyped)): "mistyped.yaml, line 1: instrument: found 'creeep'. "
-        "Did you mean 'creep'?",
-    }
-    for options, message in refusals.items():
-        status, _, error = identify(trace, *options)
-        assert status == 1
-        assert message in error
-
-
 def test_a_study_mixes_instruments() -> None:
     study = study_of(
         "only: [pipette, endothelial_cell]\n"
@@ -124,25 +100,20 @@ def test_a_study_mixes_instruments() -> None:
     assert not study.cases["pipette"].problem.torque.deforms
 
 
-def test_readings_at_the_instant_of_a_step_are_left_out(tmp_path: Path) -> None:
+def test_readings_at_the_instant_of_a_step_are_left_out() -> None:
     """A rheometer's first row is at 0, with the modulus that it jumped to."""
-    times = np.append(0.0, TIMES)
     values = np.append(500.0, noisy(response("stress", 1.0)))
-    trace = write_trace(tmp_path / "g.csv", times, values, "time_s,modulus_Pa")
-    found = identified(tmp_path, trace, "--reading", "modulus=modulus_Pa", "--model", SOLID.name)
-    assert found["fit"] == "ok"
-    assert found["samples"] == len(TIMES)
-    assert any("they were taken: 1 reading, at " in note["text"] for note in found["notes"])
+    found = told(np.append(0.0, TIMES), values, reads="modulus", model=SOLID.name)
+    assert (found.status, found.data["samples"]) == ("ok", len(TIMES))
+    assert "they were taken: 1 reading, at " in str(found)
 
 
-def test_the_power_law_of_a_cell_in_an_optical_stretcher(tmp_path: Path) -> None:
+def test_the_power_law_of_a_cell_in_an_optical_stretcher() -> None:
     """The exponent is that of a published, independent fit."""
     config = yaml.safe_load((ROOT / "config/measured.yaml").read_text())["cases"]["hl60"]
-    trace = MEASURED / "hl60.csv"
-    text = yaml.safe_dump({key: config[key] for key in ("instrument", "protocol")}) + FEW
-    found = identified(
-        tmp_path, trace, "--reading", "strain=strain", "--model", "springpot", config=text
-    )
-    alpha = by_quantity(found)["alpha"]
+    given = {key: config[key] for key in ("instrument", "protocol")}
+    trace = pd.read_csv(ROOT / "data/measured/hl60.csv")
+    found = told(trace["time_s"], trace["strain"], reads="strain", model="springpot", config=given)
+    alpha = found.to_frame().loc["alpha"]
     assert alpha["value"] == pytest.approx(0.701, abs=0.011)
     assert alpha["low"] < 0.701 < alpha["high"]

@@ -20,23 +20,18 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.cli import _parser, main
 from biogrip.errors import BiogripError
-from biogrip.fit.nested_fits import ranked
-from biogrip.fit.problem import History, Identification
 from biogrip.identify import one_trace
-from biogrip.identify.other_fits import FittedModels
 from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.identify.settings import HOLD, Asked, Setting, case_of
-from biogrip.identify.trace_case import read_trace
 from biogrip.identify.words import for_a_paper, side_by_side
-from biogrip.judging.profiles import Profile
-from biogrip.judging.quantities import parameters_and_sum
-from biogrip.judging.verdicts import Finding
-from biogrip.physics.models import CANDIDATES, MODELS
-from biogrip.traces.onset import note_late_onset
-from tests.helpers.identified import FEW, by_quantity, identified, identify, write_trace
+from biogrip.judging.onset import notes_on_start
+from biogrip.physics.models import CANDIDATES
+from biogrip.terminal import QUIET
+from tests.helpers.identified import FEW, identified, identify, told
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
 from tests.helpers.problems import clean
 
+EXPORT = Path(__file__).parent / "traces/files/anton_paar_intervals.utf16.csv"
 TRUTH = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]
 
 
@@ -78,18 +73,14 @@ def test_the_example_gives_its_truth(example: tuple[str, dict[str, Any]]) -> Non
     assert found["by_default"] == ["gripper", "protocol"]
 
 
-def test_a_declared_offset_and_drift_are_fitted_along(tmp_path: Path) -> None:
+def test_a_declared_offset_and_drift_are_fitted_along() -> None:
     times, response = clean("liquid_drop_2")
     values = response + 0.05 * response.max() * np.random.default_rng(0).standard_normal(401)
-    plain = identified(tmp_path, write_trace(tmp_path / "a.csv", times, values))
-    shifted = 1e3 * (values + 5e-4 + 1e-6 * times)
-    file = write_trace(tmp_path / "b.csv", times / 60, shifted, "t,phi_mrad")
-    columns = ("--time", "t", "--set", "measurement.time_unit=min", "--reading", "phi_mrad")
-    found = identified(tmp_path, file, *columns, "--offset", "--drift")
+    found = told(times, values + 5e-4 + 1e-6 * times, offset=True, drift=True)
     # Both are known to some per cent of the rotation.
-    assert found["offset_rad"] == pytest.approx(5e-4, abs=1e-4)
-    assert found["drift_rad_per_s"] == pytest.approx(1e-6, abs=1e-6)
-    total, before = (by_quantity(each)["c + c_p"] for each in (found, plain))
+    assert found.data["offset_rad"] == pytest.approx(5e-4, abs=1e-4)
+    assert found.data["drift_rad_per_s"] == pytest.approx(1e-6, abs=1e-6)
+    total, before = (each.to_frame().loc["c + c_p"] for each in (found, told(times, values)))
     assert total["high"] - total["low"] > before["high"] - before["low"]
     assert total["low"] < before["value"] < total["high"]
 
@@ -119,39 +110,51 @@ def test_options_are_keys_of_the_config_and_the_last_one_counts(
     assert by_options.sample.candidate == "generalized_maxwell_2"
 
 
+def test_an_export_is_read_by_options_or_keys_and_what_is_recognised_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And that is not said with QUIET."""
+    trace = Path(shutil.copy(EXPORT, tmp_path / "gel.csv"))
+    (tmp_path / "few.yaml").write_text(FEW)
+    command: list[str | Path] = [trace, "--model", "maxwell", "--config"]
+    reading = ["--reading", "modulus=Relaxation Modulus", "--set", "measurement.block=3"]
+    options: list[str | Path] = [tmp_path / "few.yaml", "--time", "Time", *reading, "--start", "24"]
+    status, _, said = identify(*command, *options)
+    assert status == 0
+    assert "gel.csv is read as\n  encoding     UTF-16\n  separator    tabs\n" in said
+    assert "\n  modulus      Relaxation Modulus, in kPa\n" in said
+    by_options = json.loads((tmp_path / "gel.identified.json").read_text())
+    assert by_options["read_as"]["block"] == 3
+    monkeypatch.setenv(QUIET, "1")
+    keys = {"time": "Time", "modulus": "Relaxation Modulus", "start_s": 24.0, "block": 3}
+    given = {**yaml.safe_load(FEW), "instrument": "relaxation", "measurement": keys}
+    (tmp_path / "keys.yaml").write_text(yaml.safe_dump(given))
+    status, _, said = identify(*command, tmp_path / "keys.yaml")
+    assert (status, said) == (0, "")
+    assert json.loads((tmp_path / "gel.identified.json").read_text()) == by_options
+
+
 @pytest.mark.parametrize("order", [1, -1])
-@pytest.mark.parametrize("beside", ["--load", "cells.tsv", "held.yaml"])
-def test_what_was_held_is_stated_once(tmp_path: Path, beside: str, order: int) -> None:
-    """By an option, a row of a table or a config, in any order."""
-    phases = [{"duration_s": 100.0, "torque_Nm": 1e-9}, {"duration_s": 300.0, "torque_Nm": 2e-9}]
-    others = {
-        "--load": Setting("--load", ("measurement", "load"), "torque_Nm"),
-        "cells.tsv": Setting("cells.tsv", ("protocol", "phases"), phases, 2),
-    }
-    (config := tmp_path / "held.yaml").write_text(yaml.safe_dump({"protocol": {"phases": phases}}))
-    held = Setting("--hold", HOLD, 3e-9)
-    settings = (held, others[beside]) if beside in others else (held,)
-    given = config if beside == "held.yaml" else None
+@pytest.mark.parametrize("beside", ["measurement.load", "protocol"])
+def test_what_was_held_is_stated_once(beside: str, order: int) -> None:
+    """In any order."""
+    phases = {"phases": [{"duration_s": 400.0, "torque_Nm": 1e-9}]}
+    value = phases if beside == "protocol" else "torque_Nm"
+    settings = Setting("--hold", HOLD, 3e-9), Setting("t.tsv", tuple(beside.split(".")), value)
     with pytest.raises(BiogripError) as error:
-        case_of(Asked(EXAMPLE, given, settings[::order]))
-    assert str(error.value).count("\n") == 0
-    where = "cells.tsv, line 2" if beside == "cells.tsv" else beside
-    for said in ("--hold", where, "allowed is one of them"):
-        assert said in str(error.value)
+        case_of(Asked(EXAMPLE, None, settings[::order], "t.tsv, line 2"))
+    assert str(error.value) == f"t.tsv, line 2: found --hold and {beside}; allowed is one of them."
 
 
-def test_known_deviations_are_weights_of_the_fit(tmp_path: Path) -> None:
-    """By a column in the unit of the readings, or as a share of a smooth course."""
+@pytest.mark.parametrize("floor", [1e-6, 0.0])
+def test_known_deviations_are_weights_of_the_fit(floor: float) -> None:
+    """As a column, or as a share of a smooth course."""
     times, rotation = clean("liquid_drop_2")
-    values = 1e6 * np.c_[rotation, 0.04 * rotation + 1e-6]
-    file = write_trace(tmp_path / "a.csv", times[1:], values[1:], "time_s,rotation_urad,sd")
-    usual = Setting("--reading", ("measurement", "rotation"), "rotation_urad")
-    for name, value in (("sd", "sd"), ("noise_share", 0.04)):
-        asked = Asked(file, settings=(usual, Setting(f"--{name}", ("measurement", name), value)))
-        sd_rad = read_trace(file, case_of(asked), asked.given, print).problem.sd_rad
-        expected = 0.04 * rotation[1:] + (1e-6 if name == "sd" else 0.0)
-        assert sd_rad is not None
-        np.testing.assert_allclose(sd_rad[100:], expected[100:], rtol=0.02)
+    sd = 0.04 * rotation[1:] + floor
+    given: dict[str, Any] = {"config": {"measurement": {"noise_share": 0.04}}}
+    found = told(times[1:], rotation[1:], **({"sd": sd} if floor else given)).problem.sd_rad
+    assert found is not None
+    np.testing.assert_allclose(found[100:], sd[100:], rtol=0.02)
 
 
 # Arguments of `identify`, and what is said of them.
@@ -168,6 +171,12 @@ OPTIONS = {
     "--model maxwel": "--model: sample.model: found 'maxwel'. Did you mean 'maxwell'?",
     "--sd sd": "found no such column, allowed are time_s, rotation_rad.",
     "--reading strian=x": "--reading: measurement.strian: unknown key. Did you mean 'strain'?",
+    "--reading strain=x": "--hold: is missing; allowed is the stress in Pa that was held",
+    "--reading strain=rotation_rad --hold 1e99": "phases[0].stress_Pa: found 1e+99, allowed is",
+    "--reading modulus=x --set measurement.reading_unit=mm": "found 'mm', allowed are Pa, kPa",
+    "--reading strain=x --set instrument=relaxation --set "
+    'protocol.phases=[{"duration_s":5,"strain":1}]': "measurement.strain: is not what relaxation",
+    "--set instrument=creeep": "--set: instrument: found 'creeep'. Did you mean 'creep'?",
     "--time=": "--time: measurement.time: found '' of 0 characters, allowed are at least 1.",
     f"--config {'x' * 300}": "File name too long",
     "--report theirs.html": "biogrip did not write it",
@@ -198,7 +207,7 @@ REFUSED = {
     **{f"identify a.csv --output {name}": said for name, said in WRITTEN.items()},
     **{f"identify a.csv --csv {name}": said for name, said in WRITTEN.items()},
     **dict.fromkeys(PIPES, "no regular file; allowed is one."),
-    "identify .": "TRACE: found the folder '.', allowed is a file.",
+    "identify .": "TRACE: found '.', which is no regular file; allowed is one.",
     "identify tabel.csv": "found 'tabel.csv', allowed is a file that exists in the folder /",
     f"identify {'x/' * 3000}": "allowed is a file that exists in",
     "identify a.csv b.csv --output x.json": "--output: only for one trace",
@@ -276,12 +285,12 @@ def test_a_trace_whose_fit_fails_costs_no_other_its_result(
     bad.write_text("".join(EXAMPLE.read_text().splitlines(keepends=True)[:-1]))
     whole_length = len(pd.read_csv(EXAMPLE))
 
-    def fails(problem: Any, time_s: Array, values: Array, told: Any) -> Any:
+    def fails(problem: Any, time_s: Array, *given: Any, **more: Any) -> Any:
         if len(time_s) < whole_length:
             raise ValueError("min() arg is an empty sequence")
-        return note_late_onset(problem, time_s, values, told)
+        return notes_on_start(problem, time_s, *given, **more)
 
-    monkeypatch.setattr(one_trace, "note_late_onset", fails)
+    monkeypatch.setattr(one_trace, "notes_on_start", fails)
     table, options = tmp_path / "found.csv", ("--config", few, "--model", "liquid_drop")
     status, said, error = identify(bad, good, "--csv", table, *options)
     assert (status, "Traceback" in error) == (1, False)
@@ -322,7 +331,6 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) 
     for text in (said, page.read_text()):
         assert "not identified" in text.lower()
         assert "bad.csv, line" in text
-    assert "5 traces: 2 ok, 0 doubtful, 0 rejected, 3 not identified." in page.read_text()
     # Fit and profiles of each, and a strip of each quantity.
     assert page.read_text().count("<img") == 2 * 2 + 4
     # What biogrip wrote is replaced, be there nothing to draw.
@@ -351,8 +359,7 @@ def test_all_that_is_assumed_repeats_it(
     tmp_path: Path, options: tuple[str, ...], models: str
 ) -> None:
     """Every byte of the answer, without any option but the model's."""
-    config = EVERYTHING + models
-    told = []
+    config, told = EVERYTHING + models, []
     arguments: tuple[str, ...] = ("--model", "liquid_drop", *options)
     for _ in range(2):
         data = identified(tmp_path, EXAMPLE, *arguments, config=config)
@@ -370,7 +377,6 @@ def test_models_that_are_named_are_held_against_the_chosen_one(
     """The example is of a drop with a membrane; its parallel damper does not show."""
     said, found = example
     assert "model is richer than the trace asks for: Maxwell liquid drop" in said
-    assert found["advice"].endswith(" Its values lie within the limits.")
     tried = [row["model"] for row in found["models"]]
     assert tried[-2:] == ["fractional_kelvin_voigt", "fractional_maxwell"]
     assert sum(CANDIDATES[name].model.power_law for name in tried) == 2
@@ -389,54 +395,26 @@ def test_models_that_are_named_are_held_against_the_chosen_one(
         assert advice in str(found["advice"])
 
 
-def test_a_rejected_fit_names_a_better_model_though_it_is_simpler(tmp_path: Path) -> None:
+def test_a_rejected_fit_names_a_better_model_though_it_is_simpler() -> None:
     """The creep of cells, a power law, read at times in a geometric series."""
     times = np.geomspace(1e-3, 1e3, 120)
     noise = 1e-4 * np.random.default_rng(1).standard_normal(len(times))
-    trace = write_trace(tmp_path / "t.csv", times, 0.01 * times**0.3 + noise, "time_s,strain")
-    models = "model_selection: {models: [springpot, maxwell]}"
-    options = ("--reading", "strain", "--hold", "1")
-    found = identified(tmp_path, trace, *options, config=models)
+    models = ["springpot", "maxwell"]
+    found = told(times, 0.01 * times**0.3 + noise, models, reads="strain", hold=1.0).data
     assert found["fit"] == "rejected"
-    assert "(--model springpot) is preferred" in found["advice"]
+    assert "(model springpot) is preferred" in found["advice"]
+    lines = side_by_side([found, found | {"fit": "ok"}], {}).splitlines()
+    assert [line for line in lines if "springpot" in line] == [f"trace.csv: {found['advice']}"]
+    assert f"trace.csv: rejected: {found['reasons'][0]}" in lines
 
 
-def test_values_of_a_simpler_model_are_held_against_limits() -> None:
-    """A drop's c is c + c_p of the richer model, whose c_p it has not."""
-    names = ["generalized_maxwell", "liquid_drop"]
-    answers = {
-        name: Identification(x, 1.0, 1, 1, "converged", History.of([(x, 1.0, 1.0, 1)]))
-        for name, x in zip(
-            names, (np.array([20.0, 5.0, 79.0, 1.0]), np.array([20.0, 5.0, 80.0])), strict=True
-        )
-    }
-    models = FittedModels(names[0], ranked(names, [1.0, 1.0], 400), answers)
-
-    def advised(**limits: tuple[float | None, float | None]) -> str:
-        findings = []
-        for quantity in parameters_and_sum(MODELS[names[0]]):
-            ends = limits.get(quantity.label.replace(" + ", "_and_"), (None, None))
-            low, high = (None if end is None else float(np.log(end)) for end in ends)
-            profile = Profile(np.zeros(1), np.zeros(1), 0.0, low, high, np.zeros(4))
-            findings.append(Finding(quantity, profile, 0.1))
-        return str(models.data(findings)["advice"])
-
-    assert advised(k=(19.0, 21.0), c_p=(None, 3.0)).endswith("Its values lie within the limits.")
-    outside = advised(k=(21.0, None), c=(None, 90.0), c_and_c_p=(70.0, 79.0))
-    assert outside.endswith("Outside the limits lies its k, 20 N/m and its c + c_p, 80 N s/m.")
-    assert "limits" not in advised()
-
-
-def test_colours_are_for_terminals(
+def test_colours_are_not_for_all_terminals(
     example: tuple[str, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = [example[1]]
-    assert "\x1b" not in side_by_side(found, {})
+    assert "\x1b" not in example[0]
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
-    monkeypatch.delenv("NO_COLOR", raising=False)
-    assert "\x1b[32m5.0" in side_by_side(found, {})
     monkeypatch.setenv("NO_COLOR", "1")
-    assert "\x1b" not in side_by_side(found, {})
+    assert "\x1b" not in side_by_side([example[1]], {})
 
 
 def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path, few: str) -> None:

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,29 +9,25 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.fit.fitted_onset import OnsetFits
-from biogrip.identify.notebook import identify_trace
-from biogrip.library import Sample, set_up, simulate
+from biogrip.fit.fitted_onset import OnsetFits, begins_constant, estimate_onset
+from biogrip.judging.onset import is_cut_off
+from biogrip.library import Sample, TraceResult, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import Phase, hold, load
-from biogrip.traces.onset import begins_constant, estimate_onset, is_cut_off
-from tests.helpers import identified as command
 from tests.helpers.default import STUDY
-from tests.helpers.identified import by_quantity, identify, write_trace
+from tests.helpers.identified import told
 
 PHASES = (hold(20.0, 1e-9), hold(20.0, 0.4e-9), hold(20.0, 1.2e-9))
 TRUTH = {"k": 29.0, "k_p": 6.0, "c": 100.0, "c_p": 20.0}
 EXPERIMENT = set_up(STUDY.gripper, PHASES, Sample("generalized_maxwell"))
 NOISE_RAD, ONSET_S = 3e-7, 8.07
-CONFIG = """
-protocol:
-  phases:
-    - {duration_s: 20, torque_Nm: 1.0e-9}
-    - {duration_s: 20, torque_Nm: 0.4e-9}
-    - {duration_s: 20, torque_Nm: 1.2e-9}
-least_squares: {candidates: 100, starts: 4}
-model_selection: {models: []}
-"""
+PROTOCOL = {
+    "phases": [
+        {"duration_s": 20, "torque_Nm": 1.0e-9},
+        {"duration_s": 20, "torque_Nm": 0.4e-9},
+        {"duration_s": 20, "torque_Nm": 1.2e-9},
+    ]
+}
 
 
 def late(seed: int, onset_s: float = ONSET_S, *, flat: bool = False) -> tuple[Array, Array]:
@@ -45,19 +40,15 @@ def late(seed: int, onset_s: float = ONSET_S, *, flat: bool = False) -> tuple[Ar
     return times, response + np.where(flat & before, 0.0, noise)
 
 
-def identified(folder: Path, times: Array, values: Array, *options: str) -> dict[str, Any]:
-    trace = write_trace(folder / "trace.csv", times, values)
-    return command.identified(folder, trace, *options, config=CONFIG)
+def gripped(times: Array, values: Array, **given: Any) -> TraceResult:
+    return told(times, values, config={"protocol": PROTOCOL}, **given)
 
 
-def holding(found: dict[str, Any]) -> list[str]:
+def holding(found: TraceResult) -> list[str]:
     """Name the quantities whose limits hold the truth."""
     truth = TRUTH | {"c + c_p": TRUTH["c"] + TRUTH["c_p"], "tau": TRUTH["c"] / TRUTH["k"]}
-    return [
-        each["quantity"]
-        for each in found["quantities"]
-        if (each["low"] or 0.0) <= truth[each["quantity"]] <= (each["high"] or np.inf)
-    ]
+    limits = found.to_frame().fillna({"low": 0.0, "high": np.inf})
+    return [name for name, own in limits.iterrows() if own["low"] <= truth[name] <= own["high"]]
 
 
 RAMP = (Phase(30.0, load(30.0, 0.0, 1e-9), load(30.0, 0.0, 1e-9)), hold(30.0, 0.3e-9))
@@ -118,101 +109,81 @@ def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
 
 
 @pytest.mark.parametrize("last_s", [1e3, pytest.param(1e4, marks=pytest.mark.nightly)])
-def test_a_trace_over_many_decades_of_time_has_an_answer(tmp_path: Path, last_s: float) -> None:
+def test_a_trace_over_many_decades_of_time_has_an_answer(last_s: float) -> None:
     """A liquid on which no reading of the first decades moves, and exact times."""
     times = np.geomspace(1e-4, last_s, 81)
-    trace = tmp_path / "liquid.csv"
-    trace.write_text("time_s,strain\n" + "".join(f"{t},{1.0 + t}\n" for t in times))
-    given = ("--reading", "strain=strain", "--hold", "1", "--model", "maxwell")
-    found = command.identified(tmp_path, trace, *given, config="model_selection: {models: []}\n")
-    for quantity in found["quantities"]:
-        assert quantity["value"] == pytest.approx(1.0, rel=1e-6)
+    found = told(times, 1.0 + times, reads="strain", hold=1.0, model="maxwell").to_frame()
+    np.testing.assert_allclose(found["value"], 1.0, rtol=1e-6)
 
 
 @pytest.mark.parametrize("noise_model", ["white", "coloured"])
 @pytest.mark.parametrize("onset_s", [0.87, 3.0])
 @pytest.mark.nightly
-def test_a_late_protocol_determines_nothing(
-    tmp_path: Path, onset_s: float, noise_model: str
-) -> None:
+def test_a_late_protocol_determines_nothing(onset_s: float, noise_model: str) -> None:
     """However few readings are before it, and whatever the noise model makes of the misfit."""
-    found = identified(tmp_path, *late(2, onset_s), "--noise-model", noise_model)
-    assert found["fit"] == "rejected"
-    (said,) = [text for text in found["reasons"] if "The trace is constant until" in text]
-    assert "--start fit" in said
-    assert {each["verdict"] for each in found["quantities"]} == {"fit rejected"}
+    found = gripped(*late(2, onset_s), noise_model=noise_model)
+    assert found.status == "rejected"
+    (said,) = [text for text in found.data["reasons"] if "The trace is constant until" in text]
+    assert "start fit" in said
+    assert {*found.to_frame()["verdict"]} == {"fit rejected"}
 
 
 @pytest.mark.nightly
-def test_a_fitted_onset_widens_limits_that_hold_the_truth(tmp_path: Path) -> None:
-    given, fitted = (
-        identified(tmp_path, *late(2), "--start", start) for start in (f"{ONSET_S}", "fit")
-    )
+def test_a_fitted_onset_widens_limits_that_hold_the_truth() -> None:
+    given, fitted = (gripped(*late(2), start=start) for start in (ONSET_S, "fit"))
     for found in (given, fitted):
-        assert (found["fit"], found["samples"], len(holding(found))) == ("ok", 301, 6)
-    assert given["assumed"]["measurement"]["start_s"] == ONSET_S
-    assert fitted["onset_s"] == pytest.approx(ONSET_S, abs=0.1)
-    ratios = {
-        name: (own["high"] - (own["low"] or 0)) / (known["high"] - (known["low"] or 0))
-        for (name, own), known in zip(
-            by_quantity(fitted).items(), by_quantity(given).values(), strict=True
-        )
-    }
-    assert ratios["c_p"] > 1.05
-    assert min(ratios.values()) > 0.99
+        assert (found.status, found.data["samples"], len(holding(found))) == ("ok", 301, 6)
+    assert given.data["assumed"]["measurement"]["start_s"] == ONSET_S
+    assert fitted.data["onset_s"] == pytest.approx(ONSET_S, abs=0.1)
+    limits = (found.to_frame().fillna({"low": 0.0}) for found in (fitted, given))
+    wide, narrow = (own["high"] - own["low"] for own in limits)
+    assert (wide / narrow)["c_p"] > 1.05
+    assert (wide / narrow).min() > 0.99
 
 
-def test_padding_before_the_onset_is_no_measurement(tmp_path: Path) -> None:
+def test_padding_before_the_onset_is_no_measurement() -> None:
     """All but the last zero; with noise-free readings, the noise would seem too small."""
-    found = identified(tmp_path, *late(2, flat=True), "--start", f"{ONSET_S}")
-    assert found["samples"] == 301 - 40
-    (left_out,) = [note for note in found["notes"] if note["text"].startswith("Left out")]
-    assert left_out["text"] == "Left out for want of a number: 40 rows of 301."
-    assert found["fit"] == "ok"
+    found = gripped(*late(2, flat=True), start=ONSET_S)
+    assert (found.status, found.data["samples"]) == ("ok", 301 - 40)
+    assert "Left out for want of a number: 40 rows of 301." in str(found)
 
 
-def test_readings_before_the_onset_tell_the_zero(tmp_path: Path) -> None:
+def test_readings_before_the_onset_tell_the_zero() -> None:
     """On a clock with negative times, too."""
     times, values = late(2)
-    declared = ("--offset", "--start", "0")
-    whole = identified(tmp_path, times - ONSET_S, values + 2e-6, *declared)
-    cut = times >= ONSET_S
-    without = identified(tmp_path, times[cut] - ONSET_S, values[cut] + 2e-6, *declared)
+    whole, without = (
+        gripped(times[cut] - ONSET_S, values[cut] + 2e-6, offset=True, start=0.0)
+        for cut in (times >= 0, times >= ONSET_S)
+    )
     assert len(holding(whole)) == 6
-    assert whole["offset_rad"] == pytest.approx(2e-6, abs=5 * NOISE_RAD / np.sqrt(40))
-    widths = [
-        own["high"] - own["low"]
-        for own in (by_quantity(found)["k_p"] for found in (whole, without))
-    ]
-    assert widths[0] < 0.9 * widths[1]
+    assert whole.data["offset_rad"] == pytest.approx(2e-6, abs=5 * NOISE_RAD / np.sqrt(40))
+    limits = (found.to_frame().loc["k_p"] for found in (whole, without))
+    wide, narrow = (own["high"] - own["low"] for own in limits)
+    assert wide < 0.9 * narrow
 
 
 @pytest.mark.parametrize(
     ("earlier_s", "start", "message"),
     [
         (
-            ONSET_S,
-            (),
+            *(ONSET_S, None),
             "found -8.07 s, allowed is the protocol's time, 0 to 60 s. If the protocol starts at "
-            "another time of the clock than 0, --start says when, or --start fit finds it.",
+            "another time of the clock than 0, start says when, or start fit finds it.",
         ),
-        (0.0, ("--start", "-5"), "found 55.2 s, allowed is the protocol's time, -5 to 55 s."),
+        (0.0, -5.0, "found 55.2 s, allowed is the protocol's time, -5 to 55 s."),
     ],
 )
 def test_a_clock_outside_the_protocol_is_refused(
-    tmp_path: Path, earlier_s: float, start: tuple[str, ...], message: str
+    earlier_s: float, start: float | None, message: str
 ) -> None:
     times, values = late(2)
-    trace = write_trace(tmp_path / "trace.csv", times - earlier_s, values)
-    (tmp_path / "lab.yaml").write_text(CONFIG)
-    status, _, error = identify(trace, "--config", tmp_path / "lab.yaml", *start)
-    assert (status, message in error) == (1, True)
+    with pytest.raises(BiogripError, match=message):
+        gripped(times - earlier_s, values, start=start)
 
 
-def told(times: Array, values: Array, **given: Any) -> tuple[str, str]:
+def notes_on(times: Array, values: Array, **given: Any) -> tuple[str, str]:
     """Return the status of a trace, and all notes on it."""
-    given["config"] = {"model_selection": {"models": []}, **given.get("config", {})}
-    found = identify_trace(times, values, **given)
+    found = told(times, values, **given)
     notes = " ".join(note["text"] for note in found.data["notes"])
     assert "--" not in f"{notes} {found}", "options of the command, which are arguments here"
     return found.status, notes
@@ -246,16 +217,14 @@ def test_a_late_start_is_advised_with_its_limits_and_with_the_tare() -> None:
     values = 42 + (first - second) / 0.3
     values += 0.3 * np.random.default_rng(2).standard_normal(len(times))
     given: dict[str, Any] = {"reads": "strain", "model": "zener_kelvin", "hold": 1.0}
-    status, notes = told(times, values, **given)
+    status, notes = notes_on(times, values, **given)
     assert status == "rejected"
     (limits,) = re.findall(r"constant until \S+ s \((\S+) to (\S+)\) of its clock", notes)
     assert float(limits[0]) < 8.7
     assert float(limits[1]) > 8.4
     assert "readings before the start are constant, but 42 and not 0" in notes
     assert "drifts" not in notes
-    found = identify_trace(
-        times, values, start="fit", offset=True, config={"model_selection": {"models": []}}, **given
-    )
+    found = told(times, values, start="fit", offset=True, **given)
     assert "not 0" not in str(found)
     low, high = found.data["onset_limits_s"]
     assert low < 8.7
@@ -269,9 +238,7 @@ def test_models_are_compared_each_at_its_own_onset() -> None:
     values = np.where(times > 5, np.clip(times - 5, 1e-9, None) ** 0.32, 0.0)
     values += 0.02 * np.random.default_rng(4).standard_normal(len(times))
     models = ["kelvin_voigt", "zener_kelvin", "springpot"]
-    config = {"model_selection": {"models": models}}
-    given: dict[str, Any] = {"reads": "strain", "model": "kelvin_voigt", "hold": 1.0}
-    found = identify_trace(times, values, config=config, start="fit", **given)
+    found = told(times, values, models, start="fit", reads="strain", model=models[0], hold=1.0)
     misfits = {row["model"]: row["misfit_rad"] for row in found.data["models"]}
     assert misfits["springpot"] == pytest.approx(0.02, rel=0.15)
 
@@ -283,22 +250,11 @@ def test_a_fitted_onset_lies_between_its_readings_on_any_clock(unit_s: float) ->
     times = np.r_[-apart[::-3], apart]
     values = np.where(times > 0, 500 + 1000 * np.exp(-np.clip(times, 0, None)), 0.0)
     values += 5.0 * np.random.default_rng(7).standard_normal(len(times))
-    found = identify_trace(
-        unit_s * (times + 200),
-        values,
-        reads="modulus",
-        model="zener_maxwell",
-        start="fit",
-        config={"model_selection": {"models": []}},
-    )
+    given: dict[str, Any] = {"reads": "modulus", "model": "zener_maxwell", "start": "fit"}
+    found = told(unit_s * (times + 200), values, **given)
     ends_s = np.array([found.data["onset_s"], *found.data["onset_limits_s"]])
     assert np.abs(ends_s / unit_s - 200).max() < 1.5e-3
     assert found.to_frame().loc["k", "value"] == pytest.approx(1000, rel=0.02)
-
-
-def test_a_start_that_is_no_number_is_refused() -> None:
-    with pytest.raises(BiogripError, match="start: found 'soon', allowed is a number of seconds"):
-        identify_trace(HOLD, HOLD, reads="strain", start="soon")
 
 
 HOLD = np.arange(0.4, 44, 0.4)
@@ -309,12 +265,11 @@ def test_a_clock_may_count_seconds_since_1970() -> None:
     values = (1 - np.exp(-HOLD / 8)) / 100
     values += 1e-4 * np.random.default_rng(3).standard_normal(len(HOLD))
     given: dict[str, Any] = {"reads": "compliance", "model": "kelvin_voigt"}
-    given["config"] = {"model_selection": {"models": []}}
-    found = identify_trace(HOLD + 1.764e9, values, start=1.764e9, **given).to_frame()
-    expected = identify_trace(HOLD, values, **given).to_frame()
+    found = told(HOLD + 1.764e9, values, start=1.764e9, **given).to_frame()
+    expected = told(HOLD, values, **given).to_frame()
     np.testing.assert_allclose(found["low"], expected["low"], rtol=1e-5)
     with pytest.raises(BiogripError, match="Or say when it started"):
-        identify_trace(HOLD + 1.764e9, values, **given)
+        told(HOLD + 1.764e9, values, **given)
 
 
 @pytest.mark.parametrize(
@@ -324,7 +279,7 @@ def test_a_clock_may_count_seconds_since_1970() -> None:
             "maxwell",
             "force",
             2.0 * np.exp(-HOLD / 8),
-            " relaxation times of the fit. If it starts at 16 s",
+            "after the step of the protocol. If it starts at 16 s",
         ),
         ("maxwell", "strain", 1 / 100 + HOLD / 5000, "k would be 100"),
         ("kelvin_voigt", "strain", (1 - np.exp(-HOLD / 8)) / 100, "If it starts at 16 s of the"),
@@ -336,15 +291,15 @@ def test_a_hold_on_the_clock_of_the_whole_test_is_not_ok(
     """Exponentials look alike from any start; where another is shown, advice is that."""
     values = clean + 2e-3 * clean.max() * np.random.default_rng(3).standard_normal(len(HOLD))
     given = {"reads": reads, "model": model, "hold": 1e-3 if reads == "force" else 1.0}
-    status, notes = told(HOLD + 16, values, **given)
+    status, notes = notes_on(HOLD + 16, values, **given)
     assert status == ("rejected" if model == "kelvin_voigt" else "doubtful")
     assert "The readings begin 16.4 s after the step of the protocol" in notes
     assert said in notes
     assert "drifts" not in notes
-    status, notes = told(HOLD + 16, values, start=16.0, **given)
+    status, notes = notes_on(HOLD + 16, values, start=16.0, **given)
     assert (status, "begin" in notes) == ("ok", False)
     if model == "maxwell":
-        assert told(HOLD + 16, values, start=0.0, **given)[0] == "ok"
+        assert notes_on(HOLD + 16, values, start=0.0, **given)[0] == "ok"
 
 
 @pytest.mark.parametrize("ramp_s", [0.0, 1.0])
@@ -358,9 +313,9 @@ def test_a_ramp_before_the_first_reading_is_said_to_change_values(ramp_s: float)
     values = 100 + 200 * slope * np.exp(-times / 3.0)
     values += 0.5 * np.random.default_rng(0).standard_normal(len(times))
     given = {"reads": "stress", "model": "zener_maxwell"}
-    status, notes = told(times, values, hold=1.0, **given)
+    status, notes = notes_on(times, values, hold=1.0, **given)
     assert (status, "If the load was no step" in notes) == ("ok", bool(ramp_s))
     if said := re.search("k would be (.*) Pa; c", notes):
         assert float(said[1]) == pytest.approx(200.0, rel=0.02)
     protocol = {"instrument": "relaxation", "protocol": {"phases": phases}}
-    assert "If the load was no step" not in told(times, values, config=protocol, **given)[1]
+    assert "If the load was no step" not in notes_on(times, values, config=protocol, **given)[1]

@@ -3,19 +3,22 @@
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from tests.helpers.identified import FEW, identified, identify, write_trace
+from biogrip.errors import BiogripError
+from biogrip.library import TraceResult
+from tests.helpers.identified import told, write_trace
 
 SINCE = np.linspace(0.05, 20, 400)
 NOISY = 500 + 300 * np.exp(-SINCE / 2) + np.random.default_rng(1).normal(0, 5, len(SINCE))
 
 
-def trace(folder: Path, times: Array, values: Array) -> Path:
-    return write_trace(folder / "trace.csv", times, values, "time_s,modulus_Pa")
+def modulus(times: Array, values: Array, model: str, *models: str, **given: Any) -> TraceResult:
+    return told(times, values, models, reads="modulus", model=model, **given)
 
 
 @pytest.mark.parametrize(
@@ -30,13 +33,12 @@ def trace(folder: Path, times: Array, values: Array) -> Path:
     ],
 )
 def test_what_tells_nothing_is_refused_in_one_message(
-    tmp_path: Path, times: Array, values: Array, model: str, said: str
+    times: Array, values: Array, model: str, said: str
 ) -> None:
-    file = trace(tmp_path, times, values)
-    status, _, text = identify(file, "--reading", "modulus=modulus_Pa", "--model", model)
-    assert status == 1
-    assert said in text
-    assert text.count("\n") == 1
+    with pytest.raises(BiogripError) as error:
+        modulus(times, values, model)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -59,16 +61,23 @@ def test_what_tells_nothing_is_refused_in_one_message(
 )
 @pytest.mark.filterwarnings("error")
 def test_strange_readings_are_answered_and_saturated_ones_told(
-    tmp_path: Path, times: Array, values: Array, cut: str | None
+    times: Array, values: Array, cut: str | None
 ) -> None:
-    rich = FEW.replace("damper, maxwell", "zener_maxwell, generalized_maxwell_5")
-    file = trace(tmp_path, times, values)
-    given = ("--reading", "modulus=modulus_Pa", "--model", "zener_maxwell")
-    found = identified(tmp_path, file, *given, config=rich if len(times) == 10 else FEW)
-    told = [text for text in map(str, found["notes"]) if "saturated" in text]
-    assert len(told) == (cut is not None)
-    assert all(f"exactly the {cut}" in text for text in told)
-    assert "generalized_maxwell_5" not in str(found["models"])
+    richer = ["zener_maxwell", "generalized_maxwell_5"] if len(times) == 10 else []
+    found = modulus(times, values, "zener_maxwell", *richer)
+    said = [text for text in map(str, found.data["notes"]) if "saturated" in text]
+    assert len(said) == (cut is not None)
+    assert all(f"exactly the {cut}" in text for text in said)
+    assert "generalized_maxwell_5" not in str(found.data["models"])
+
+
+def test_readings_of_a_rounded_clock_are_averaged_and_counted() -> None:
+    clock = np.floor(SINCE)[20:]
+    config = {"measurement": {"average_repeated": True}}
+    found = modulus(clock, NOISY[20:], "zener_maxwell", config=config)
+    text = f"Averaged at repeated times: {np.sum(clock < 20)} readings."
+    assert {"weight": "harmless", "text": text} in found.data["notes"]
+    assert found.data["samples"] == len(np.unique(clock))
 
 
 @pytest.mark.nightly
@@ -76,7 +85,7 @@ def test_what_lies_in_the_folder_and_a_name_of_marks_change_no_result(tmp_path: 
     told, named = [], "a$x$ \\frac{$ %#&<b>_\x1b[31m\n.csv"
     for folder in (tmp_path / "empty", tmp_path / "theirs"):
         folder.mkdir()
-        trace(folder, SINCE, NOISY).rename(folder / named)
+        write_trace(folder / named, SINCE, NOISY, "time_s,modulus_Pa")
         (folder / "sheet.csv").write_text(f'file,dose <b> &\n"{named}",<b>$\\frac{{$\n')
         if folder.name == "theirs":
             (folder / "matplotlibrc").write_text("text.usetex: True\ntext.color: red\n")

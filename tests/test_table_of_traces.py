@@ -2,7 +2,6 @@
 
 import csv
 import json
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +12,10 @@ import yaml
 from biogrip.errors import BiogripError
 from biogrip.identify import identify as command
 from biogrip.identify.settings import Setting, is_table, read_table
-from biogrip.library import hold
-from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.models import MODELS
-from biogrip.physics.protocol import torque_history
-from tests.helpers.identified import by_quantity, write_trace
+from biogrip.library import Sample, hold, set_up, simulate
+from tests.helpers.default import STUDY
 from tests.helpers.identified import identify as run
-from tests.helpers.problems import GRIPPER, TORQUE
+from tests.helpers.identified import write_trace
 
 SHORT = {"phases": [{"duration_s": 100.0, "torque_Nm": 2e-9}]}
 FEW = {"least_squares": {"candidates": 50, "starts": 2}, "model_selection": {"models": []}}
@@ -30,31 +26,23 @@ TABLE = [
 ]
 
 
-@pytest.fixture(scope="module")
-def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a trace of the usual protocol, one of another, a table and a config."""
-    folder = tmp_path_factory.mktemp("laboratory")
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder, worked in: a trace of the usual protocol, one of another, a table and a config."""
     rng = np.random.default_rng(4)
-    network = MODELS["kelvin_voigt"].network([[10.0, 300.0]])
-    for name, column, torque, end in (
-        ("usual", "time_s", TORQUE, 400),
-        ("other", "t_s", torque_history((hold(100.0, 2e-9),)), 100),
+    for name, column, phases, end in (
+        ("usual", "time_s", STUDY.phases, 400),
+        ("other", "t_s", (hold(100.0, 2e-9),), 100),
     ):
         times = np.linspace(0, end, 81)
-        clean = rotation(step_response(GRIPPER, network), torque, times)[0]
+        experiment = set_up(STUDY.gripper, phases, Sample("kelvin_voigt"))
+        clean = simulate(experiment, {"k_p": 10.0, "c_p": 300.0}, times)
         measured = clean + 0.05 * clean.max() * rng.standard_normal(len(times))
-        write_trace(folder / f"{name}.csv", times, measured, f"{column},rotation_rad")
-    write(folder / "cells.tsv", TABLE)
-    (folder / "few.yaml").write_text(yaml.safe_dump(FEW))
-    return folder
-
-
-@pytest.fixture
-def here(laboratory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the folder, worked in."""
-    shutil.copytree(laboratory, tmp_path / "l")
-    monkeypatch.chdir(tmp_path / "l")
-    return tmp_path / "l"
+        write_trace(tmp_path / f"{name}.csv", times, measured, f"{column},rotation_rad")
+    write(tmp_path / "cells.tsv", TABLE)
+    (tmp_path / "few.yaml").write_text(yaml.safe_dump(FEW))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 def write(path: Path, rows: list[list[str]], separator: str = "\t") -> None:
@@ -120,7 +108,7 @@ def test_a_table_is_told_by_its_column(tmp_path: Path, name: str, separator: str
     text = "\ufefffile|dish||fixed.c_p|'cell, no'\nd1/a.csv|left|||\n\n|||\nb.csv||| 0\nc.csv|NA\n"
     path.write_text(text.replace("|", separator).replace("'", '"'), encoding="utf-8")
     assert is_table(path)
-    setting = Setting(str(path), ("fixed", "c_p"), 0, 5)
+    setting = Setting(f"{path}, line 5", ("fixed", "c_p"), 0)
     assert [(row.place, row.trace, row.settings, row.copied) for row in read_table(path)] == [
         (f"{path}, line {line}", tmp_path / trace, settings, {"dish": dish, "cell, no": ""})
         for line, trace, settings, dish in (
@@ -162,7 +150,7 @@ def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
         ("File,dish\na.csv,1\n", "line 1: found no column 'file' among File, dish; allowed is one"),
         ("file\n", "found no traces, allowed is a row for each."),
         ("file,dish\n,left\n", "line 2, column 'file': found nothing, allowed is a trace."),
-        ("file\na.csv,left\n", "cannot be read as a table: "),
+        ("file\na.csv,left\n", "line 2: found 2 cells in the row, allowed are the header's 1."),
         ("file\n\udcff\n", "cannot be read as a table: "),
     ],
 )
@@ -199,27 +187,24 @@ def test_traces_of_a_command_read_one_quantity(here: Path) -> None:
     (here / "few.yaml").write_text(yaml.safe_dump(lab))
     header = ["file", "measurement.modulus", "measurement.stress"]
     write(here / "cells.tsv", [header, ["usual.csv", "G", ""], ["other.csv", "", "S"]])
-    said = "cells.tsv, line 3: found a reading of stress, but a reading of modulus of usual.csv"
+    said = "cells.tsv, line 3: found a reading of stress, but a reading of modulus before"
     assert said in identify("cells.tsv")[2]
 
 
 def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
     """In its place, with what the table says of it; of a single row, too."""
     rows = [["file", "dish"], ["gone.csv", "lost"], ["usual.csv", "left"]]
-    write(here / "cells.tsv", rows)
-    status, printed, _ = identify("cells.tsv", "--csv", "found.csv", "--report", "page.html")
-    assert status == 1
-    assert "Not identified, 1 of 2:" in printed
-    assert "cells.tsv, line 2: found 'gone.csv', allowed is a file that exists in the" in printed
-    assert [(row["trace"], row["dish"], row["fit"]) for row in listed()] == [
-        ("gone.csv", "lost", "failed"),
-        ("usual.csv", "left", "ok"),
-    ]
-    assert [row["failed"] != "" for row in listed()] == [True, False]
-    assert "<td>lost</td>" in (here / "page.html").read_text()
-    write(here / "cells.tsv", [rows[0], rows[1]])
-    assert identify("cells.tsv", "--csv", "found.csv")[0] == 1
-    assert [row["fit"] for row in listed()] == ["failed"]
+    for few in (3, 2):
+        write(here / "cells.tsv", rows[:few])
+        given = ("--csv", "found.csv", "--report", "page.html")
+        status, printed, _ = identify("cells.tsv", *given)
+        assert status == 1
+        assert f"Not identified, 1 of {few - 1}:" in printed
+        assert "cells.tsv, line 2: found 'gone.csv', allowed is a file that exists in" in printed
+        whole = [("gone.csv", "lost", "failed", True), ("usual.csv", "left", "ok", False)]
+        row = ((it["trace"], it["dish"], it["fit"], it["failed"] != "") for it in listed())
+        assert [*row] == whole[: few - 1]
+        assert "<td>lost</td>" in (here / "page.html").read_text()
 
 
 def test_what_a_row_says_goes_before_options(here: Path) -> None:
@@ -265,17 +250,3 @@ def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None
         write(here / "cells.tsv", [header, row])
         assert identify("cells.tsv")[0] == 0
         assert found(row[0]) == written[row[0]]
-
-
-def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met(here: Path) -> None:
-    """A trace tells stiffnesses times the square of the sine: smaller samples seem stiffer."""
-    shutil.copy(here / "usual.csv", here / "small.csv")
-    rows = [["file", "sample.size_m"], ["usual.csv", ""], ["small.csv", "30e-6"]]
-    write(here / "cells.tsv", rows)
-    assert identify("cells.tsv")[0] == 0
-    unsized, sized = (by_quantity(found(name)) for name in ("usual.csv", "small.csv"))
-    # From 150 to 30 um each jaw moves by 60 um, on a circle of 1.5 mm.
-    angle = np.arccos(np.cos(np.radians(75)) + 60e-6 / 1.5e-3)
-    ratio = (np.sin(angle) / np.sin(np.radians(75))) ** 2
-    for name in ("k_p", "c_p"):
-        assert unsized[name]["value"] / sized[name]["value"] == pytest.approx(ratio, rel=1e-3)

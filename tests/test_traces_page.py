@@ -70,7 +70,8 @@ def dish(example: Outcome) -> Outcome:
 def page(dish: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("dish") / "page.html"
     names = [*(each["trace"] for each in dish.found), *dish.refused]
-    write_page(dish, path, {name: {"cell": name, "dish": "treated"} for name in names})
+    copied = {name: {"cell": name, "dish": "treated"} for name in names}
+    write_page(replace(dish, copied=copied), path)
     return path
 
 

@@ -1,5 +1,6 @@
 """Readings of known standard deviations, against SciPy's weighted least squares."""
 
+from dataclasses import replace
 from math import gamma
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from scipy.optimize import curve_fit
 
 from biogrip.arrays import Array
+from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.problem import Identification, Problem
 from biogrip.fit.trace_fit import trace_fit
@@ -16,7 +18,6 @@ from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import hold
-from biogrip.traces.any_sample import proportional_deviations
 from tests.helpers.problems import run
 
 # The fit of polystyrene at 190 degC that pyRheo publishes, with weights of 5 % of the compliance.
@@ -103,8 +104,5 @@ def test_a_plateau_is_no_noise() -> None:
     smooth = 800 + 700 * np.exp(-times / 20)
     readings = smooth * (1 + 0.01 * np.random.default_rng(0).standard_normal(len(times)))
     relaxation = set_up(INSTRUMENTS["modulus"], (hold(1e3, 1.0),), Sample("zener_maxwell"))
-    none = np.zeros((0, len(times)))
-    found = proportional_deviations(
-        times, readings, relaxation.gripper, relaxation.torque, none, 0.01
-    )
+    found = proportional_deviations(replace(relaxation, noise_share=0.01), times, readings)
     assert found == pytest.approx(0.01 * smooth, rel=0.02)

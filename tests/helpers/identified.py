@@ -1,6 +1,7 @@
 """`biogrip identify` in this process: loading it takes as long as what it does to a bad trace."""
 
 import json
+from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.cli import main
+from biogrip.identify.notebook import TraceResult, identify_trace
 
 FEW = """
 least_squares: {candidates: 100, starts: 4}
@@ -35,6 +37,12 @@ def identified(
     assert status == 0, complained
     found: dict[str, Any] = json.loads((folder / "found.json").read_text())
     return found
+
+
+def told(time_s: Array, values: Array, models: Sequence[str] = (), **given: Any) -> TraceResult:
+    """What a trace tells in a notebook, compared with no other sample models but those named."""
+    given["config"] = {"model_selection": {"models": [*models]}, **given.get("config", {})}
+    return identify_trace(time_s, values, **given)
 
 
 def by_quantity(found: dict[str, Any]) -> dict[str, dict[str, Any]]:

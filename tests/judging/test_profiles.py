@@ -12,7 +12,7 @@ from biogrip.judging.constrained_fits import QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.limits import find_limits
-from biogrip.judging.onset_profiles import profile_over_onset
+from biogrip.judging.onset import profile_over_onset
 from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
 from biogrip.library import set_up, simulate

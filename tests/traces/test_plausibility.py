@@ -1,6 +1,7 @@
 """Traces in a right and a wrong unit, of a right and a wrong sign, and noise."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,26 +9,17 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.physics import instruments
+from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.models import MODELS
 from biogrip.physics.noise import Noise, add_noise
-from biogrip.physics.protocol import (
-    Load,
-    Phase,
-    TorqueHistory,
-    hold,
-    sample_times,
-    torque_history,
-)
-from biogrip.physics.whitening import nuisance_basis
-from biogrip.traces.any_sample import proportional_deviations
+from biogrip.physics.protocol import Load, Phase, hold, sample_times, torque_history
 from biogrip.traces.columns import Columns
 from biogrip.traces.plausibility import check_recording, free_rotation
 from biogrip.traces.reader import Recording
-from tests.helpers.problems import GRIPPER, TORQUE, clean
+from tests.helpers.default import STUDY
+from tests.helpers.problems import GRIPPER
 
 UNEQUAL = Gripper(1.5e-3, 75.0, Arm(1.0e-14, 3.3e-12, 4.4e-7), Arm(1.3e-14, 2.5e-12, 5.5e-7))
 SI = Columns("time_s", "rotation_rad")
@@ -45,11 +37,11 @@ def trace(
     sample: tuple[float, ...],
     time_s: Array = TIMES,
     gripper: Gripper = GRIPPER,
-    torque: TorqueHistory = TORQUE,
+    phases: tuple[Phase, ...] = STUDY.phases,
 ) -> Array:
-    response = step_response(gripper, generalized_maxwell(sample), symmetric=torque.symmetric)
-    values: Array = rotation(response, torque, time_s)[0]
-    return values
+    model = Sample("generalized_maxwell")
+    values = dict(zip(model.model.names, sample, strict=True))
+    return simulate(set_up(gripper, phases, model), values, time_s)
 
 
 def said(
@@ -57,17 +49,18 @@ def said(
     values: Array,
     columns: Columns = SI,
     gripper: Gripper = GRIPPER,
-    torque: TorqueHistory = TORQUE,
+    phases: tuple[Phase, ...] = STUDY.phases,
     *,
     noise_rad: float | None = None,
     offset: bool = False,
 ) -> str:
     """What is said of a trace on lines 2, 3, ...: why it is refused, a note on it, or nothing."""
-    recording = Recording(time_s, values, np.arange(len(time_s)) + 2, 0)
-    basis = nuisance_basis(time_s, offset=offset, drift=False)
-    known = (gripper, torque, Path("trace.csv"), columns, basis, instruments.GRIPPER)
+    units = columns.time.removeprefix("time_"), columns.reading.removeprefix("rotation_")
+    lines, file = np.arange(len(time_s)) + 2, Path("trace.csv")
+    recording = Recording(time_s, values, lines, 0, file, columns, units)
+    problem = replace(set_up(gripper, phases, Sample("maxwell")), offset=offset)
     try:
-        return check_recording(recording, *known, noise_rad, noise_rad) or ""
+        return check_recording(recording, problem, noise_rad) or ""
     except BiogripError as error:
         return str(error)
 
@@ -76,15 +69,19 @@ def said(
 @pytest.mark.parametrize("rate_Hz", [10.0, 0.1])
 @pytest.mark.parametrize("level", [0.0, 0.1, 0.4])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_the_papers_traces_pass_and_not_in_a_wrong_unit(
+def test_the_papers_traces_pass_and_not_in_a_wrong_unit_or_mirrored(
     sample: str, rate_Hz: float, level: float, seed: int
 ) -> None:
     times = sample_times(400.0, rate_Hz)
     clean = trace(SAMPLES[sample], times)
     kind = ("gaussian", "uniform")[seed]
     noisy = add_noise(clean, Noise(kind, level, "peak"), np.random.default_rng([7, seed]))
-    for noise_rad in (None, level * clean.max()):
-        assert said(times, noisy, noise_rad=noise_rad) == ""
+    assert said(times, noisy) == ""
+    assert said(times, -noisy).startswith(
+        f"trace.csv, lines 2 to {len(times) + 1}, column 'rotation_rad': {MIRRORED}, allowed is "
+        "the closing rotation, positive where the arm closes. It would fit if it were -1 times "
+        "(then say scale: -1 under measurement)"
+    )
     found = f"trace.csv, line {np.argmax(np.abs(noisy)) + 2}, column 'rotation_rad': found "
     large, small = (said(times, factor * noisy) for factor in (1e3, 1e-3))
     assert large.startswith(found)
@@ -122,23 +119,20 @@ def test_the_largest_reading_and_the_smoothed_one_are_told() -> None:
 )
 def test_the_unit_that_would_fit_is_named(unit: str, factor: float, hint: str) -> None:
     values = factor * trace(SAMPLES["liquid_drop_1"])
-    for columns in (Columns("time_s", f"phi_{unit}"), Columns("time_s", "phi", None, unit)):
-        found = said(TIMES, values, columns)
-        assert f"column '{columns.reading}'" in found
-        assert found.endswith(f"It would fit if it were {hint}")
+    found = said(TIMES, values, Columns("time_s", f"rotation_{unit}"))
+    assert f"column 'rotation_{unit}'" in found
+    assert found.endswith(f"It would fit if it were {hint}")
 
 
 def test_a_stiff_sample_passes_if_its_rotation_is_far_above_a_given_noise() -> None:
     values = trace((35e3, 12.3e3, 3e5, 1.0))
-    refused = said(TIMES, values)
-    assert "allowed is at least 7.27e-06 rad, or less with a given noise (--noise)" in refused
+    refused = "allowed is at least 7.27e-06 rad, or less with a given noise (--noise)"
+    assert refused in said(TIMES, values)
+    assert refused in said(TIMES, values, noise_rad=values.max() / 5)
     note = said(TIMES, values, noise_rad=values.max() / 20)
     assert note.startswith("The largest rotation is")
     assert "the sample is very stiff, or the unit is not the right one. It would fit if" in note
-    refused = said(TIMES, values, noise_rad=values.max() / 5)
-    assert "allowed is at least" in refused
-    plausible = trace(SAMPLES["liquid_drop_1"])
-    assert said(TIMES, plausible, noise_rad=1e-6) == ""
+    assert said(TIMES, trace(SAMPLES["liquid_drop_1"]), noise_rad=1e-6) == ""
 
 
 @pytest.mark.parametrize("rate_Hz", [10.0, 0.1])
@@ -148,14 +142,7 @@ def test_mere_noise_is_refused(rate_Hz: float, sigma_rad: float) -> None:
     where = f"trace.csv, lines 2 to {len(times) + 1}, column 'rotation_rad': {NO_RESPONSE}"
     for seed in range(20):
         values = sigma_rad * np.random.default_rng([5, seed]).standard_normal(len(times))
-        for noise_rad in (None, sigma_rad, 2 * sigma_rad):
-            assert said(times, values, noise_rad=noise_rad).startswith(where)
-
-
-def test_a_noise_in_another_unit_is_named_beside_the_readings() -> None:
-    text = said(TIMES, trace(SAMPLES["liquid_drop_1"]), noise_rad=0.045)
-    assert NO_RESPONSE in text
-    assert re.search(r"Given were 0.045 rad as noise; the peak is \S+ rad\.", text)
+        assert said(times, values).startswith(where)
 
 
 @pytest.mark.parametrize("value", [0.0, 1e-3, -1e-3, 5.0])
@@ -187,14 +174,14 @@ def test_what_rounding_leaves_of_a_torque_is_no_response(samples: int) -> None:
 
     The sample relaxes within the hold, so that its rotation is no constant.
     """
-    torque, rng = torque_history((hold(60.0, 1e-9),)), np.random.default_rng(samples)
+    phases, rng = (hold(60.0, 1e-9),), np.random.default_rng(samples)
     even = np.linspace(0.0, 60.0, samples + 1)[1:]
     for times in (even, *np.sort(rng.uniform(0.1, 60.0, (10, samples)))):
-        clean = trace((10.0, 0.1, 100.0, 1.0), times, torque=torque)
+        clean = trace((10.0, 0.1, 100.0, 1.0), times, phases=phases)
         noisy = clean + 0.01 * clean.max() * rng.standard_normal(samples)
         for values in (clean, noisy):
-            assert said(times, values + 1e-4, torque=torque, offset=True) == ""
-            assert MIRRORED in said(times, -values, torque=torque)
+            assert said(times, values + 1e-4, phases=phases, offset=True) == ""
+            assert MIRRORED in said(times, -values, phases=phases)
 
 
 def test_the_free_rotation_is_that_of_the_left_arm() -> None:
@@ -283,14 +270,14 @@ PULLING = {
 def test_other_protocols_and_samples_pass_and_not_in_a_wrong_unit(
     gripper: Gripper, phases: tuple[Phase, ...]
 ) -> None:
-    torque, rng = torque_history(phases), np.random.default_rng(8)
-    times = np.sort(rng.uniform(0, torque.end_s, 3000))
+    rng = np.random.default_rng(8)
+    times = np.sort(rng.uniform(0, torque_history(phases).end_s, 3000))
     for _ in range(8):
         sample = tuple(10 ** rng.uniform((-2, -2, -2, -3), (1, 0, 2, 0)))
-        values = trace(sample, times, gripper, torque)
+        values = trace(sample, times, gripper, phases)
         values += 0.1 * np.abs(values).max() * rng.standard_normal(len(times))
-        assert said(times, values, SI, gripper, torque) == ""
-        assert "column 'rotation_rad': found" in said(times, 1e3 * values, SI, gripper, torque)
+        assert said(times, values, SI, gripper, phases) == ""
+        assert "column 'rotation_rad': found" in said(times, 1e3 * values, SI, gripper, phases)
 
 
 @pytest.mark.parametrize("protocol", PULLING)
@@ -312,65 +299,11 @@ def test_the_sign_of_a_trace_is_told(gripper: Gripper, protocol: str) -> None:
         values += rng.choice([0.0, 0.05, 0.3]) * size * rng.standard_normal(len(times))
         offset = bool(trial % 3 == 0)
         values += offset * size * rng.standard_normal()
-        good, bad = (
-            said(times, sign * values, SI, gripper, torque, offset=offset) for sign in (1, -1)
-        )
+        given = (SI, gripper, PULLING[protocol])
+        good, bad = (said(times, sign * values, *given, offset=offset) for sign in (1, -1))
         assert MIRRORED not in good
         mirrored += MIRRORED in bad
         missed += not bad
     assert mirrored >= 20
     # An arm that the other one pushes back differs little from one that opens.
     assert missed <= (12 if protocol == "unequal" else 3)
-
-
-def test_a_mirrored_trace_is_refused_with_its_place_and_a_hint() -> None:
-    values = trace(SAMPLES["liquid_drop_2"])
-    assert said(TIMES, -values).startswith(
-        f"trace.csv, lines 2 to 402, column 'rotation_rad': {MIRRORED}, allowed is the closing "
-        "rotation, positive where the arm closes. It would fit if it were -1 times (then say "
-        "scale: -1 under measurement)"
-    )
-    noise = 0.1 * values.max() * np.random.default_rng(0).standard_normal(len(TIMES))
-    assert MIRRORED in said(TIMES, noise - values, noise_rad=0.1 * values.max())
-
-
-CLEAN_S, CLEAN = clean("endothelial_cell", 2.0)
-NONE = nuisance_basis(CLEAN_S, offset=False, drift=False)
-
-
-def test_deviations_follow_the_rotation_without_its_noise() -> None:
-    """Each reading has noise of 5 %; the smooth rotation is known far better."""
-    rng = np.random.default_rng(0)
-    trace = CLEAN * (1 + 0.05 * rng.standard_normal(len(CLEAN_S)))
-    found = proportional_deviations(CLEAN_S, trace, GRIPPER, TORQUE, NONE, 0.05)
-    large = np.quantile(CLEAN, 0.1) < CLEAN
-    errors = np.abs(found[large] / (0.05 * CLEAN[large]) - 1)
-    assert np.median(errors) < 0.05 / 3
-    assert np.quantile(errors, 0.99) < 0.05
-
-
-def test_no_reading_is_certain() -> None:
-    """Of a trace without noise: the first rotation is zero, and counts as one of the smallest."""
-    assert CLEAN[0] == 0
-    found = proportional_deviations(CLEAN_S, CLEAN, GRIPPER, TORQUE, NONE, 0.05)
-    smallest = np.sort(CLEAN)[: len(CLEAN) // 10]
-    assert found.min() == pytest.approx(0.05 * np.median(smallest), rel=0.01)
-
-
-def test_other_noise_shows_where_the_rotation_is_small() -> None:
-    rng = np.random.default_rng(1)
-    floor = 0.3 * float(CLEAN.max())
-    trace = CLEAN + floor * rng.standard_normal(len(CLEAN_S))
-    found = proportional_deviations(CLEAN_S, trace, GRIPPER, TORQUE, NONE, 1e-3)
-    # Some eighty readings tell the scatter.
-    assert found.min() == pytest.approx(floor, rel=0.3)
-    given = proportional_deviations(CLEAN_S, CLEAN, GRIPPER, TORQUE, NONE, 0.05, floor)
-    np.testing.assert_allclose(given, np.hypot(0.05 * CLEAN, floor), rtol=1e-3)
-
-
-def test_an_offset_is_not_rotation() -> None:
-    offset = nuisance_basis(CLEAN_S, offset=True, drift=False)
-    trace = CLEAN + 3 * CLEAN.max()
-    found = proportional_deviations(CLEAN_S, trace, GRIPPER, TORQUE, offset, 0.05)
-    large = np.quantile(CLEAN, 0.2) < CLEAN
-    np.testing.assert_allclose(found[large], 0.05 * CLEAN[large], rtol=0.1)

@@ -1,34 +1,91 @@
-"""Onset of the protocol in a recorded trace, fitted along with the sample.
+"""Onset of the protocol in a recorded trace: when on its clock it begins to follow the torque.
 
-The fit of the sample is repeated for onsets that a pattern search proposes. Where the rotation
-jumps between two readings, the misfit as a function of the onset has a step at every reading: it
-is smooth only between neighbouring ones, and is minimised there.
+`estimate_onset` needs no sample model: the trace is fitted by any sample's possible responses to
+the delayed torque, and the delay with the least residual sum of squares is found on ever finer
+grids. `OnsetFits` fits the onset along with a sample, by a pattern search. Where the rotation jumps
+between two readings, the misfit as a function of the onset has a step at every reading: it is
+smooth only between neighbouring ones, and is minimised there.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
+from biogrip.fit.any_sample import extreme_responses, fit_responses
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.multi_start import fit_from
-from biogrip.fit.problem import silent
-from biogrip.physics.whitening import estimate_noise
+from biogrip.fit.problem import Problem, silent
+from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
 
+# Longest relaxation time over the protocol's duration, and how many a decade; the shortest is that
+# between the closest readings.
+_LONGEST, _A_DECADE = 10.0, 2
+# Delays on the first grid; finer ones have as many between the neighbours of the best.
+_DELAYS = 65
+# Most readings that an estimate takes of the whole trace, and as many of what the grid spans.
+_MOST_READINGS = 2000
+# Least share of the protocol that has to be after the onset.
+_LEAST_AFTER = 0.02
+# Fewest readings before an onset by which a late one is recognised.
+_FEWEST_BEFORE = 3
+# Standard deviation of readings that are constant, in noise, and in peaks of noise-free traces.
+_CONSTANT, _CONSTANT_OF_PEAK = 2.0, 1e-3
 _BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
 # Steps of the pattern search in sampling intervals: first, and last, and most of them.
 _FIRST_STEP, _LAST_STEP, _MOST_STEPS = 8.0, 0.5, 200
-# Readings on either side of the onset of that search between which the misfit is minimised.
-_NEAR = 3
+# Smooth intervals on either side of the onset of that search in which the misfit is minimised, and
+# how accurately, as a share of them.
+_NEAR, _ACCURATE = 2, 1e-3
 # Instants that differ by less, relative to the latest, are one.
 _ROUNDING = 1e-14
-# Fits in each interval at first, and the share of their spread by which more may lower the misfit:
-# a search has by then come within a tenth of the interval of where the misfit is lowest.
-_FEW, _DROP = 6, 0.5
+
+
+def estimate_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> float:
+    """Estimate from when a trace follows the torque, without a sample model, in s of its clock.
+
+    The trace is (n_samples,), times ascending. One that begins constant may have an offset.
+    """
+    torque, last = problem.torque, len(time_s) - 1
+    offset = problem.offset or begins_constant(time_s, rotation_rad)
+    shortest = float(np.min(np.diff(time_s)))
+    decades = np.log10(_LONGEST * torque.end_s / shortest)
+    shares = np.geomspace(shortest / torque.end_s, _LONGEST, 2 + int(_A_DECADE * decades))
+    responses = extreme_responses(problem, shares.tolist())
+
+    def square_sum(onset_s: float, some: IntArray) -> float:
+        nuisance = nuisance_basis(time_s[some], offset=offset, drift=problem.drift)
+        own = without(nuisance, responses(time_s[some] - onset_s))
+        return fit_responses(without(nuisance, rotation_rad[some]), own)[1]
+
+    low, high = time_s[0], max(time_s[0], time_s[-1] - _LEAST_AFTER * torque.end_s)
+    while True:
+        onsets = np.linspace(low, high, _DELAYS)
+        spanned = np.clip(np.searchsorted(time_s, [low, high]) - [1, 0], 0, last)
+        ends = np.linspace([0, spanned[0]], [last, spanned[1]], _MOST_READINGS)
+        some = np.unique(ends.astype(np.int64))
+        best = int(np.argmin([square_sum(onset, some) for onset in onsets]))
+        low, high = onsets[max(best - 1, 0)], onsets[min(best + 1, _DELAYS - 1)]
+        if high - low < shortest:
+            return float(onsets[best])
+
+
+def begins_constant(time_s: Array, rotation_rad: Array, onset_s: float | None = None) -> bool:
+    """Return True if the readings before an onset are constant within the noise of the trace.
+
+    Without an onset, the first few readings are looked at. The last one before it may be on a ramp.
+    """
+    before = rotation_rad[:_FEWEST_BEFORE]
+    if onset_s is not None:
+        before = rotation_rad[time_s < onset_s][:-1]
+    noise_rad, peak_rad = estimate_noise(rotation_rad), float(np.ptp(rotation_rad))
+    size = max(_CONSTANT * noise_rad, _CONSTANT_OF_PEAK * peak_rad)
+    return len(before) >= _FEWEST_BEFORE and bool(np.std(before) < size)
 
 
 @dataclass(frozen=True)
@@ -53,54 +110,48 @@ def _misfit_rad(fit: OnsetFit) -> float:
     return fit.misfit_rad
 
 
+@dataclass(frozen=True)
 class OnsetFits:
-    """Fits of a trace for given onsets, linear and in white noise.
+    """Fits of a trace for given onsets, linear and in white noise."""
 
-    Parameters
-    ----------
-    case_problem
-        Assumptions of the identification.
-    time_s, rotation_rad : (n_samples,)
-        The trace, times ascending on any clock.
-    """
+    case_problem: CaseProblem
+    """Assumptions of the identification."""
+    time_s: Array
+    """Times, ascending on any clock, (n_samples,)."""
+    rotation_rad: Array
+    """The trace, (n_samples,)."""
 
-    def __init__(self, case_problem: CaseProblem, time_s: Array, rotation_rad: Array) -> None:
-        self._case_problem = case_problem.to_identify()
-        self._time_s, self._rotation_rad = time_s, rotation_rad
-        self._interval_s = float(np.median(np.diff(time_s)))
-        self.noise_rad = estimate_noise(rotation_rad)
+    @cached_property
+    def _identified(self) -> CaseProblem:
+        return self.case_problem.to_identify()
 
-    def best(self, guess_s: float) -> OnsetFit:
-        """Fit the onset along, beginning with a guess in s."""
-        problem = self._case_problem.of(self._time_s - guess_s, self._rotation_rad)
-        (found,) = identify_many([problem], _BUDGET, [np.random.default_rng(0)], silent)
-        start = OnsetFit(guess_s, np.log(found.parameters), found.misfit_rad)
-        return self._between_readings(self._searched(start, _FIRST_STEP))
-
-    def near(self, start: OnsetFit) -> OnsetFit:
-        """Fit the onset along near that of another fit."""
-        best = self._searched(start, 1.0)
-        for ends in self._smooth_intervals(best.onset_s, 1):
-            best = min(self._lowered([best], ends, _FEW), key=_misfit_rad)
-        return best
+    def posed(self, onset_s: float) -> Problem:
+        """Return the problem for an onset."""
+        return self._identified.of(self.time_s - onset_s, self.rotation_rad)
 
     def at(self, onset_s: float, near: Array) -> OnsetFit:
         """Fit the sample for an onset by a local fit from log-parameters, (n_parameters,)."""
-        problem = self._case_problem.of(self._time_s - onset_s, self._rotation_rad)
-        fit = fit_from([problem], near)
+        fit = fit_from([self.posed(onset_s)], near)
         return OnsetFit(onset_s, fit.x[0], float(fit.misfit_rad[0]))
 
-    def _searched(self, best: OnsetFit, first_step: float) -> OnsetFit:
-        """Search the onset in steps, halved where neither direction is better.
+    def best(self, guess_s: float) -> OnsetFit:
+        """Fit the onset along, beginning with a guess in s."""
+        rngs = [np.random.default_rng(0)]
+        (found,) = identify_many([self.posed(guess_s)], _BUDGET, rngs, silent)
+        start = OnsetFit(guess_s, np.log(found.parameters), found.misfit_rad)
+        return self.near(start, _FIRST_STEP)
 
-        The first is some median intervals of the readings.
+    def near(self, best: OnsetFit, first_step: float = 1.0) -> OnsetFit:
+        """Fit the onset along near that of another fit.
 
-        The last steps are half as long as the readings are apart where the onset is, which of
-        times with equal ratios is much less than the median.
+        Steps, of which the first is some median intervals of the readings, are halved where neither
+        direction is better. The last ones are half as long as the readings are apart where the
+        onset is, which of times with equal ratios is much less than the median.
         """
-        step_s = first_step * self._interval_s
+        interval_s = float(np.median(np.diff(self.time_s)))
+        step_s = first_step * interval_s
         for _ in range(_MOST_STEPS):
-            if step_s < _LAST_STEP * min(self._interval_s, spacing_at(self._time_s, best.onset_s)):
+            if step_s < _LAST_STEP * min(interval_s, spacing_at(self.time_s, best.onset_s)):
                 break
             sides = (self.at(best.onset_s + s, best.log_parameters) for s in (-step_s, step_s))
             lower = min(sides, key=_misfit_rad)
@@ -108,50 +159,29 @@ class OnsetFits:
                 best = lower
             else:
                 step_s /= 2
-        return best
-
-    def _between_readings(self, best: OnsetFit) -> OnsetFit:
-        """Minimise the misfit in each neighbouring interval in which it is smooth.
-
-        Those are left early in which the first fits are all far above the best one.
-        """
-        intervals = list(self._smooth_intervals(best.onset_s, _NEAR))
-        tried = [self._lowered([best], ends, _FEW) for ends in intervals]
-        first = min((fit for fits in tried for fit in fits), key=_misfit_rad)
-        for fits, ends in zip(tried, intervals, strict=True):
-            misfits_rad = [fit.misfit_rad for fit in fits[1:]]
-            if min(misfits_rad) - _DROP * np.ptp(misfits_rad) <= first.misfit_rad:
-                best = min(best, *self._lowered(fits, ends, _MOST_STEPS), key=_misfit_rad)
-        return best
-
-    def _lowered(
-        self, fits: list[OnsetFit], bounds: tuple[float, float], most: int
-    ) -> list[OnsetFit]:
-        """Return fits, and those that a search for the lowest misfit adds within bounds."""
-        known = {fit.onset_s: fit for fit in fits}
+        tried = [best]
 
         def misfit_rad(onset_s: float) -> float:
-            if onset_s not in known:
-                nearest = min(known, key=lambda known_s: abs(known_s - onset_s))
-                known[onset_s] = self.at(onset_s, known[nearest].log_parameters)
-            return known[onset_s].misfit_rad
+            tried.append(self.at(float(onset_s), best.log_parameters))
+            return tried[-1].misfit_rad
 
-        minimize_scalar(misfit_rad, bounds=bounds, method="bounded", options={"maxiter": most})
-        return list(known.values())
+        for low, high in self._smooth_intervals(best.onset_s):
+            accurate = {"xatol": _ACCURATE * (high - low)}
+            minimize_scalar(misfit_rad, bounds=(low, high), method="bounded", options=accurate)
+        return min(tried, key=_misfit_rad)
 
-    def _smooth_intervals(self, onset_s: float, near: int) -> Iterator[tuple[float, float]]:
+    def _smooth_intervals(self, onset_s: float) -> Iterator[tuple[float, float]]:
         """Yield intervals of onsets around one, within which no reading passes a change of torque.
 
         An onset before the first reading passes none, however early: the first interval then
         begins some times as far before it.
         """
-        torque = self._case_problem.torque
-        changes_s = torque.changes_s
-        edges = np.unique(np.subtract.outer(self._time_s, changes_s))
-        equal_s = _ROUNDING * max(np.abs(self._time_s).max(), np.abs(changes_s).max())
+        changes_s = self._identified.torque.changes_s
+        edges = np.unique(np.subtract.outer(self.time_s, changes_s))
+        equal_s = _ROUNDING * max(np.abs(self.time_s).max(), np.abs(changes_s).max())
         edges = edges[np.diff(edges, prepend=-np.inf) > equal_s]
         after = int(np.searchsorted(edges, onset_s))
-        if after < near:
+        if after < _NEAR:
             before_s = max(edges[0] - onset_s, spacing_at(edges, onset_s))
             yield float(edges[0] - _NEAR * before_s), float(edges[0])
-        yield from pairwise(edges[max(after - near, 0) : after + near].tolist())
+        yield from pairwise(edges[max(after - _NEAR, 0) : after + _NEAR].tolist())

@@ -74,14 +74,14 @@ def identify(
         outcome = identify_batch(every, None, drawn=drawn)
     if alone and outcome.refused:
         raise BiogripError(outcome.refused[str(files[0])])
-    outcome = replace(outcome, refused=outcome.refused | absent)
     copied = {str(own.trace): own.copied for own in asked}
+    outcome = replace(outcome, refused=outcome.refused | absent, copied=copied)
     if table is not None:
-        write_table(outcome, table, copied)
+        write_table(outcome, table)
     if report is not None:
         from biogrip.identify.page import write_page
 
-        write_page(outcome, report, copied)
+        write_page(outcome, report)
     print(in_words(outcome.found[0]) if alone else side_by_side(outcome.found, outcome.refused))
     pairs = zip(every, outputs, strict=False)
     made = [path for own, path in pairs if str(own.trace) not in outcome.refused]

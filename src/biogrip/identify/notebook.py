@@ -7,12 +7,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.arrays import as_column
 from biogrip.errors import BiogripError
 from biogrip.identify.one_trace import Identified, identify_alike
-from biogrip.identify.settings import HOLD, MODEL, Asked, Setting, case_of
+from biogrip.identify.settings import HOLD, MODEL, Asked, Setting
 from biogrip.identify.trace_case import read_trace
 from biogrip.identify.words import in_words
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS
@@ -22,29 +23,16 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-# Options of the command in what it says, and the arguments and keys that they are here.
-_ARGUMENTS = (
-    ("--start fit", 'start="fit"'),
-    ("--offset --drift", "offset=True, drift=True"),
-    ("--(offset|drift)", r"\1=True"),
-    (r"--model (\w+)", r'model="\1"'),
-    (r"--noise-model (\w+)", r'noise_model="\1"'),
-    (r"--noise-share (\S+)\.", r"measurement.noise_share \1 in config."),
-    ("--(from|until)", r"measurement.\1_s in config"),
-    ("--load", "measurement.load of the command"),
-    ("--(?=[a-z])", ""),
-)
-
 
 def _with_arguments(said: Any) -> Any:
-    """Return what the command says, plain data, with arguments in the place of options."""
+    """Return what the command says, plain data, with names of arguments for its options."""
     if isinstance(said, dict):
         return {key: _with_arguments(value) for key, value in said.items()}
     if isinstance(said, list):
         return [_with_arguments(value) for value in said]
-    for option, argument in _ARGUMENTS if isinstance(said, str) else ():
-        said = re.sub(option, argument, said)
-    return said
+    if not isinstance(said, str):
+        return said
+    return re.sub(r"--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), said)
 
 
 @dataclass(frozen=True, repr=False)
@@ -138,39 +126,36 @@ def identify_trace(
     """
     if reads not in INSTRUMENTS:
         raise BiogripError(f"reads: found '{reads}', allowed are {', '.join(INSTRUMENTS)}.")
-    if hold is not None and "protocol" in (config or {}):
-        raise BiogripError("hold: does not go with config's protocol; allowed is one of them.")
     column = INSTRUMENTS[reads].read.column
     given = {"time_s": time_s, column: readings, **({} if sd is None else {"sd": sd})}
     columns = {name: as_column(values, name) for name, values in given.items()}
     if len({len(values) for values in columns.values()}) > 1:
         found = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
         raise BiogripError(f"found {found}; allowed are as many of each.")
-    if isinstance(start, str) and start != "fit":
-        raise BiogripError(f"start: found '{start}', allowed is a number of seconds, or 'fit'.")
-    late = ("fit_start", True) if start == "fit" else ("start_s", start)
-    measured = (
-        *(("reads", reads, column), ("start", *late), ("sd", "sd", None if sd is None else "sd")),
-        *(("noise", "noise_rad", noise), ("noise_model", "noise_model", noise_model)),
-        *(("offset", "offset", offset), ("drift", "drift", drift)),
-    )
-    settings = [
-        *(Setting("config", (block,), value) for block, value in (config or {}).items()),
-        *(Setting("model", ("sample", "model"), model), Setting("hold", HOLD, hold)),
-        *(Setting(by, ("measurement", key), value) for by, key, value in measured),
-        Setting("fixed", ("fixed",), fixed and {**fixed}),
+    onset = ("fit_start", True) if start == "fit" else ("start_s", start)
+    chosen: list[tuple[str, str, Any]] = [
+        *(("config", block, value) for block, value in (config or {}).items()),
+        ("model", "sample.model", model),
+        ("hold", *HOLD, hold),
+        ("reads", f"measurement.{reads}", column),
+        ("start", f"measurement.{onset[0]}", onset[1]),
+        ("sd", "measurement.sd", None if sd is None else "sd"),
+        ("noise", "measurement.noise_rad", noise),
+        ("noise_model", "measurement.noise_model", noise_model),
+        ("offset", "measurement.offset", offset),
+        ("drift", "measurement.drift", drift),
+        ("fixed", "fixed", fixed and {**fixed}),
     ]
-    # Imported here: loading pandas takes long.
-    import pandas as pd
-
+    settings = [Setting(by, tuple(key.split(".")), it) for by, key, it in chosen if it is not None]
     with TemporaryDirectory() as folder:
         file = Path(folder) / "trace.csv"
-        pd.DataFrame(columns).to_csv(file, index=False)
-        asked = Asked(file, settings=tuple(each for each in settings if each.value is not None))
+        rows, header = np.transpose([*columns.values()]), ",".join(columns)
+        np.savetxt(file, rows, "%.17g", ",", header=header, comments="")
+        asked = Asked(file, None, tuple(settings), file.name)
         try:
-            trace = read_trace(file, case_of(asked), asked.given, lambda text: None)
+            trace = read_trace(asked)
             with Progress("", 5, live=False, quiet=True) as progress:
-                (result,) = identify_alike([Path(file.name)], [trace], None, progress)
+                (result,) = identify_alike([Path(file.name)], [trace], progress)
         except BiogripError as error:
             said = _with_arguments(str(error).replace(str(file), file.name))
             raise BiogripError(said) from None

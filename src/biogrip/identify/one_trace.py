@@ -10,7 +10,8 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -27,32 +28,31 @@ from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.identify.other_fits import (
     FittedModels,
+    fits_of,
     judge_again,
     models_tried,
     note_flow,
     second_opinions,
 )
 from biogrip.identify.outputs import WRITTEN_BY, Outcome, in_own_units
-from biogrip.identify.settings import Asked, case_of
-from biogrip.identify.trace_case import TraceCase, read_trace
+from biogrip.identify.settings import Asked
+from biogrip.identify.trace_case import TraceCase, note_saturated, read_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
-from biogrip.judging.onset_profiles import profile_over_onset
+from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.keys import plain
-from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.physics.whitening import within
 from biogrip.processes import worker_processes
 from biogrip.records.identifications import exact_data
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
-from biogrip.stages.judgement import fits_judged, notes_on_fit
+from biogrip.stages.judgement import notes_on_fit
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
-from biogrip.traces.onset import note_hidden_ramp, note_late_onset, note_tare
-from biogrip.traces.plausibility import note_saturated
+from biogrip.traces.reader import form_in_words, is_usual
 
-# Most traces of a batch, and most readings of traces that are fitted together.
+# Most traces of a batch, and most readings that are fitted together, of short traces.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
 _NOT_COMPARED = (
     "With fixed parameters no other sample models are tried: a value that is known in this model "
@@ -116,13 +116,18 @@ def identify_batch(
                 traces[index] = read
         progress.done()
 
-        def identify(group: Sequence[int]) -> None:
+        alike = defaultdict[Hashable, list[int]](list)
+        for index, trace in traces.items():
+            few = len(trace.readings[0]) * _MOST_IN_BATCH <= _MOST_READINGS
+            alike[trace.budget, None if few else index].append(index)
+        groups = [*alike.values()]
+        # An error is of one of a group: it is then identified one by one.
+        for group in groups:
             found = _tried(
                 asked[group[0]],
                 identify_alike,
                 [asked[index].trace for index in group],
                 [traces[index] for index in group],
-                outputs and [outputs[index] for index in group],
                 progress,
             )
             if not isinstance(found, BiogripError):
@@ -130,12 +135,7 @@ def identify_batch(
             elif len(group) == 1:
                 results[group[0]] = found
             else:
-                # The error is of one of them.
-                for index in group:
-                    identify([index])
-
-        for group in _alike(traces):
-            identify(group)
+                groups += ([index] for index in group)
     outcome = Outcome([], {})
     for index, own in enumerate(asked):
         result = results[index]
@@ -143,6 +143,11 @@ def identify_batch(
             outcome.refused[str(own.trace)] = str(result)
             continue
         outcome.found.append(result.data)
+        if outputs is not None:
+            # Assumptions, which must be repeatable, are not rounded.
+            data = rounded_numbers(result.data) | {"assumed": result.data["assumed"]}
+            data = in_own_units(data, result.problem.instrument.read)
+            write_text(outputs[index], json.dumps(data, indent=1) + "\n")
         if drawn:
             # Imported here: loading Matplotlib takes long.
             from biogrip.identify.page import draw
@@ -154,7 +159,11 @@ def identify_batch(
 
 
 def _read(asked: Asked, progress: Progress) -> TraceCase:
-    return read_trace(asked.trace, case_of(asked), asked.given, progress.note)
+    """Read a trace, and tell what is recognised in an unusual file."""
+    trace = read_trace(asked)
+    if not is_usual(trace.recorded.form, trace.case.columns):
+        progress.note(form_in_words(asked.trace, trace.recorded.form))
+    return trace
 
 
 def _tried(asked: Asked, work: Callable[..., T], *given: Any) -> T | BiogripError:
@@ -175,35 +184,17 @@ def _tried(asked: Asked, work: Callable[..., T], *given: Any) -> T | BiogripErro
         )
 
 
-def _alike(traces: Mapping[int, TraceCase]) -> list[list[int]]:
-    """Group the indices of traces that can be fitted together, none with too many readings."""
-    groups: list[list[int]] = []
-    for index, trace in traces.items():
-        for group in groups:
-            readings = sum(len(traces[other].readings[0]) for other in (*group, index))
-            if readings <= _MOST_READINGS and trace.is_like(traces[group[0]]):
-                group.append(index)
-                break
-        else:
-            groups.append([index])
-    return groups
-
-
 def identify_alike(
-    files: Sequence[Path],
-    traces: Sequence[TraceCase],
-    outputs: Sequence[Path] | None,
-    progress: Progress,
+    files: Sequence[Path], traces: Sequence[TraceCase], progress: Progress
 ) -> list[Identified]:
     """Identify traces of the same model, budget of fits and confidence, each as if it were alone.
 
-    A JSON file of each is written, if `outputs` has any. The counter's last four of five steps are
-    made here. A `BiogripError` says that one of the traces cannot be fitted; nothing is written.
+    The counter's last four of five steps are made here. A `BiogripError` says that one of the
+    traces cannot be fitted.
     """
     first = traces[0]
     progress.doing(f"fitting {counted(sum(len(own.readings[0]) for own in traces), 'sample')}")
-    cases, problems = [own.case for own in traces], [own.problem for own in traces]
-    fits = fits_judged(cases, problems, [own.readings for own in traces], 0, progress.within)
+    fits = fits_of(traces, progress.within)
     progress.done()
     progress.doing("finding confidence limits")
     diagnoses = diagnose_all(
@@ -211,7 +202,7 @@ def identify_alike(
         first.problem.searched,
         [fit.found for fit in fits],
         confidence=first.case.confidence,
-        noise_rad=[problem.noise_rad for problem in problems],
+        noise_rad=[own.problem.noise_rad for own in traces],
     )
     progress.done()
     progress.doing("trying other sample models")
@@ -225,34 +216,23 @@ def identify_alike(
             diagnoses[index], onsets_s[index] = merged
     progress.done()
     progress.doing("trying an offset and a drift")
-    starts = [_about_start(*each) for each in zip(traces, diagnoses, strict=True)]
+    starts = [
+        notes_on_start(own.problem, *own.readings, told, may_be_late=own.case.may_start_late)
+        for own, told in zip(traces, diagnoses, strict=True)
+    ]
     opinions = second_opinions(traces, diagnoses, progress.within, [own.lead for own in models])
     found = []
     for index, own in enumerate(traces):
         # Beside another start, an offset and a drift mean nothing.
         opinions[index] *= not any(note.weight != HARMLESS for note in starts[index])
-        notes = [*again[index][1], *starts[index], *opinions[index], *note_flow(own)]
-        started = own.recorded.time_s > 0
-        notes += note_saturated(own.readings[1][started], own.problem.instrument.read.unit)
+        notes = [*again[index][1], *starts[index], *opinions[index]]
+        notes += [*note_flow(own), *note_saturated(own)]
         data = _data(own, fits[index], diagnoses[index], models[index], notes)
         if index in onsets_s:
             data["onset_limits_s"] = [data["onset_s"] + end_s for end_s in onsets_s[index]]
         data = {WRITTEN_BY: __version__, "trace": str(files[index]), **data}
         found.append(Identified(data, own.problem, own.recorded))
-    for data, output in zip((each.data for each in found), outputs or (), strict=False):
-        # Assumptions, which must be repeatable, are not rounded.
-        rounded = rounded_numbers(data) | {"assumed": data["assumed"]}
-        read = INSTRUMENTS[data["reads"]["quantity"]].read
-        write_text(output, json.dumps(in_own_units(rounded, read), indent=1) + "\n")
     return found
-
-
-def _about_start(trace: TraceCase, diagnosis: Diagnosis) -> list[Note]:
-    """Return notes on when the protocol starts, and on a ramp that no reading shows."""
-    given = trace.problem, *trace.readings, diagnosis
-    late = note_late_onset(*given) if trace.case.may_start_late else []
-    tare = note_tare(trace.problem, trace.readings, diagnosis, late=bool(late))
-    return [*(late or note_hidden_ramp(*given)), *tare]
 
 
 def _data(
@@ -269,22 +249,21 @@ def _data(
     assumptions = [Note(HARMLESS, _NOT_COMPARED)] if problem.fixed else []
     read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
     said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *notes], read)
-    form = recorded.recognised
-    unusual = form and not form.is_usual(case.columns)
+    rejected, usual = said["fit"] == REJECTED, is_usual(recorded.form, case.columns)
     return {
         "model": problem.model.name,
         "model_title": problem.model.title,
         "confidence": case.confidence,
         "instrument": instrument.kind,
         "reads": {"quantity": instrument.read.name, "unit": instrument.read.unit},
-        **({"read_as": form.data()} if form and unusual else {}),
+        **({} if usual else {"read_as": recorded.form}),
         **_fixed(problem),
         "limits": _gripper_in_limits(problem),
         **_fitted_along(problem, recorded, np.exp(best)),
         **said,
         "noise_model": fit.noise_data(),
-        **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
-        "moduli": None if said["fit"] == REJECTED else _moduli(problem, recorded.time_s, best),
+        **models.data(rejected=rejected),
+        "moduli": None if rejected else _moduli(problem, recorded.time_s, best),
         "assumed": _assumed(case, list(models.answers or case.models)),
         "by_default": _by_default(trace.given) if instrument.has_jaws else [],
         "versions": {

@@ -24,7 +24,6 @@ from biogrip.fit.nested_fits import (
     fit_models,
     fits_far_better,
     is_within,
-    preferred_simpler,
     ranked,
     within_range,
 )
@@ -46,7 +45,7 @@ from biogrip.judging.doubts import (
 from biogrip.judging.likelihood import MISSED, compute_fall
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.fractional import LONGEST_S
-from biogrip.physics.models import CANDIDATES, as_richer, contained
+from biogrip.physics.models import CANDIDATES
 from biogrip.physics.noise import stream
 from biogrip.physics.protocol import is_held
 from biogrip.physics.whitening import drift_is_flow, without
@@ -59,6 +58,18 @@ _FAR_BETTER = 10.0
 _TERMS = 2
 # Each of the others would take half a second to five; they are tried where the config names them.
 _POWER_LAWS = ["fractional_kelvin_voigt", "fractional_maxwell"]
+
+
+def fits_of(traces: Sequence[TraceCase], progress: Progress) -> list[TraceFit]:
+    """Return the command's fits of traces with the same model and budget."""
+    cases, problems = [own.case for own in traces], [own.problem for own in traces]
+    return fits_judged(cases, problems, [own.readings for own in traces], 0, progress)
+
+
+def _diagnosed(trace: TraceCase, fit: TraceFit, found: Identification) -> Diagnosis:
+    known = trace.case.confidence, trace.problem.noise_rad
+    searched = trace.problem.searched
+    return diagnose(fit.problem, searched, found, confidence=known[0], noise_rad=known[1])
 
 
 @dataclass(frozen=True)
@@ -79,14 +90,12 @@ class FittedModels:
             (own.delta_bic for own in self.tried if own.candidate == self.chosen), default=0.0
         )
 
-    def data(self, findings: Sequence[Finding] | None) -> dict[str, Any]:
+    def data(self, *, rejected: bool) -> dict[str, Any]:
         """Return one row per model, and advice in words, as plain data.
 
-        Findings are those on the quantities of the chosen model; None if its fit is rejected.
-        Advice is then only another model, simpler or richer, that may suit the trace.
+        If the fit of the chosen model is rejected, advice is only another model, simpler or richer,
+        that may suit the trace.
         """
-        if not self.tried:
-            return {"models": [], "advice": None}
         rows = [
             {
                 "model": each.candidate,
@@ -100,28 +109,8 @@ class FittedModels:
             }
             for each in self.tried
         ]
-        words = advice(self.tried, self.chosen)
-        if findings is not None:
-            return {"models": rows, "advice": f"{words} {self._compared(findings)}".rstrip()}
-        better = fits_far_better(self.tried, self.chosen)
-        return {"models": rows, "advice": words if better else None}
-
-    def _compared(self, findings: Sequence[Finding]) -> str:
-        """Return a sentence on where a preferred simpler model's values are, if it is nested."""
-        simpler = preferred_simpler(self.tried, self.chosen)
-        bounded = [each for each in findings if each.is_bounded]
-        if simpler is None or simpler not in contained(self.chosen) or not bounded:
-            return ""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x = np.log(as_richer(self.chosen, simpler, self.answers[simpler].parameters))
-            outside = [
-                f"{each.quantity.label}, {plain(np.exp(each.quantity.log(x)))} {each.quantity.unit}"
-                for each in bounded
-                if not each.allows(x)
-            ]
-        if not outside:
-            return "Its values lie within the limits."
-        return f"Outside the limits lies its {' and its '.join(outside)}."
+        said = rows and (not rejected or fits_far_better(self.tried, self.chosen))
+        return {"models": rows, "advice": advice(self.tried, self.chosen) if said else None}
 
 
 def _vanished(candidate: str, answer: Identification) -> list[str]:
@@ -134,7 +123,7 @@ def _vanished(candidate: str, answer: Identification) -> list[str]:
 def models_tried(
     traces: Sequence[TraceCase], fits: Sequence[TraceFit], diagnoses: Sequence[Diagnosis]
 ) -> list[FittedModels]:
-    """Fit several sample models to each trace; the traces have the same chosen model and budget.
+    """Fit several sample models to each trace, all of the same chosen model and budget.
 
     Best fits so far are among the starts.
     """
@@ -209,20 +198,17 @@ def _candidates(trace: TraceCase, fit: TraceFit) -> tuple[str, ...]:
     """Return the names of the models to fit to a trace, none if nothing is compared."""
     if trace.problem.fixed:
         return ()
+    residuals, chosen = fit.problem.residuals, trace.case.sample.candidate
+    every = dict.fromkeys(trace.case.models)
     # With very many samples the dozens of modes of a springpot would take gigabytes.
-    few = fit.problem.residuals.samples <= _MOST_SAMPLES
-    valid = trace.problem.torque.end_s <= LONGEST_S
-    others = _POWER_LAWS if few and valid and not trace.names_models else []
+    few = residuals.samples <= _MOST_SAMPLES and trace.problem.torque.end_s <= LONGEST_S
+    if few and not trace.names_models:
+        every |= dict.fromkeys(_POWER_LAWS)
     # A model with as many parameters as readings leaves nothing to tell noise by.
-    most, chosen = (
-        fit.problem.residuals.free - trace.problem.fit_start - 1,
-        trace.case.sample.candidate,
-    )
-    every = dict.fromkeys((*trace.case.models, *others))
-    names = tuple(
-        name for name in every if len(CANDIDATES[name].model.names) <= most or name == chosen
-    )
-    return names if len(names) > 1 else ()
+    most = residuals.free - trace.problem.fit_start - 1
+    names = (it for it in every if len(CANDIDATES[it].model.names) <= most or it == chosen)
+    found = tuple(names)
+    return found if len(found) > 1 else ()
 
 
 def judge_again(
@@ -236,10 +222,7 @@ def judge_again(
     if own is None or (increase := diagnosis.likelihood.increase(own.misfit_rad)) > -MISSED:
         return diagnosis, []
     if is_within(own.parameters, fit.problem):
-        searched, noise_rad = fit.problem.residuals.model, trace.problem.noise_rad
-        confidence = trace.case.confidence
-        again = diagnose(fit.problem, searched, own, confidence=confidence, noise_rad=noise_rad)
-        return again, []
+        return _diagnosed(trace, fit, own), []
     gone = _vanished(models.chosen, own)
     where = f", without {' and '.join(gone)}" if gone else ""
     text = (
@@ -258,11 +241,9 @@ def second_opinions(
     """Fit an offset and a drift along, and warn if chi^2 falls more than by chance (`FALSE_ALARM`).
 
     If an offset alone explains as much, it is that; fits are those that the command would make if
-    it were declared. Traces have the same model, budget and confidence. Each gets at most one note;
-    with a rejected fit, only if the other is not rejected. None are tried if both are declared
-    already, or if the noise model is coloured, which fits both unless they are refused.
-
-    Nor is it said if BIC prefers another model by far more: by its `leads`.
+    it were declared. Each trace gets at most one note; with a rejected fit, only if the other is
+    not rejected. None are tried if both are declared already, or if the noise model is coloured,
+    which fits both. Nor is it said if BIC prefers another model by far more: by its `leads`.
     """
     notes: list[list[Note]] = [[] for _ in traces]
     which = [
@@ -278,13 +259,7 @@ def second_opinions(
         one = offsets.get(index)
         if one and chdtrc(1, max(other.fall - one.fall, 0.0)) >= FALSE_ALARM:
             other = one
-        judged = diagnose(
-            other.fit.problem,
-            other.trace.problem.searched,
-            other.fit.found,
-            confidence=other.trace.case.confidence,
-            noise_rad=other.trace.problem.noise_rad,
-        )
+        judged = _diagnosed(other.trace, other.fit, other.fit.found)
         terms = np.log(len(traces[index].readings[0])) * other.added
         led = leads[index] > other.fall - terms + _FAR_BETTER
         if not (led or diagnoses[index].status == judged.status == REJECTED):
@@ -314,10 +289,8 @@ def _better(
     if not which:
         return {}
     also = [traces[index].with_terms(drift=drift) for index in which]
-    cases, problems = [own.case for own in also], [own.problem for own in also]
-    fits = fits_judged(cases, problems, [own.readings for own in also], 0, progress)
     found = {}
-    for index, own, fit in zip(which, also, fits, strict=True):
+    for index, own, fit in zip(which, also, fits_of(also, progress), strict=True):
         problem, likelihood = traces[index].problem, diagnoses[index].likelihood
         fall = compute_fall(
             fit.problem.residuals.samples,
@@ -346,33 +319,33 @@ def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnos
     many = drifts and not case_problem.offset
     better = f"{'explain' if many else 'explains'} the trace far better (χ² falls by "
     better += f"{plain(other.fall)}; by chance it would {one_in(other.chance)} traces)"
-    controlled, deforms = case_problem.instrument.controlled.name, case_problem.instrument.deforms
-    time_s = trace.recorded.time_s
-    if drifts and drift_is_flow(case_problem.torque, time_s):
+    instrument, torque = case_problem.instrument, case_problem.torque
+    controlled = instrument.controlled.name
+    if drifts and drift_is_flow(torque, trace.recorded.time_s):
         text = (
             f"A constant and a line in time, fitted along, {better}: the "
             f"instrument drifts, or the sample flows. Under this {controlled} both give the same "
             f"line, and the trace cannot tell which it is: a {controlled} that changes would."
         )
-    elif not drifts and is_held(case_problem.torque, time_s):
+    elif not drifts and is_held(torque, trace.recorded.time_s):
+        yields = "holds a load" if instrument.deforms else "yields at once"
         text = (
             f"A constant, fitted along, {better}: the instrument has an offset, or the sample "
-            f"{'holds a load' if deforms else 'yields at once'}. Under this {controlled} both give "
-            "the same constant: readings before the start would tell."
+            f"{yields}. Under this {controlled} both give the same constant: readings before the "
+            "start would tell."
         )
     else:
         terms = "An offset and a drift" if many else "A drift" if drifts else "An offset"
         options = " --offset" * other.trace.problem.offset + " --drift" * other.trace.problem.drift
-        or_flows = ""
-        if drifts and not deforms:
-            or_flows = (
+        text = (
+            f"{terms} of the instrument, fitted along, {better}: {changes or 'no verdict changes'}."
+            f" If the instrument may have that, identify the trace with{options}."
+        )
+        if drifts and not instrument.deforms:
+            text += (
                 f" Or the sample flows: as long as the {controlled} is constant, a drift and a "
                 "damper without a spring give the same line."
             )
-        text = (
-            f"{terms} of the instrument, fitted along, {better}: {changes or 'no verdict changes'}."
-            f" If the instrument may have that, identify the trace with{options}.{or_flows}"
-        )
     weight = DOUBT if changed else HARMLESS
     return Note(REJECTION if rejected else weight, text)
 

@@ -43,6 +43,8 @@ class Outcome:
     """Message of each other trace, which could not be read or whose fit failed, by file."""
     pictures: dict[str, list[str]] = field(default_factory=dict)
     """Drawings of usable traces as data URLs, by file, if there is to be a page."""
+    copied: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """Cells to copy from a table of traces by file, of all in the order of its rows, and column."""
 
 
 def check_output(output: Path) -> None:
@@ -82,13 +84,10 @@ def _in_units(name: str, read: Quantity) -> str:
     return _RADIANS.sub(read.suffix, name)
 
 
-def write_table(
-    outcome: Outcome, table: Path, copied: Mapping[str, Mapping[str, str]] | None = None
-) -> None:
+def write_table(outcome: Outcome, table: Path) -> None:
     """Write one row per trace as CSV: numbers, their units in the header, and why it failed if so.
 
-    What is copied are cells of each trace, by file and column, in the order of rows. By default
-    nothing is, and traces that failed come last.
+    Rows are in the order of what is copied.
     """
     # The same is read in all traces.
     names = {each["reads"]["quantity"] for each in outcome.found} or {ROTATION.name}
@@ -108,8 +107,7 @@ def write_table(
     for trace, why in outcome.refused.items():
         why = visible_lines(why).replace("\n", " ")
         rows[trace] = {"trace": trace, "fit": FAILED, FAILED: why, WRITTEN_BY: __version__}
-    copied = copied or {trace: {} for trace in rows}
-    words = dict.fromkeys(name for own in copied.values() for name in own)
+    words = dict.fromkeys(name for own in outcome.copied.values() for name in own)
     quantities = dict.fromkeys(name for row in rows.values() for name in row if name not in COLUMNS)
     first, *columns = COLUMNS
     header = [first, *words, *columns[:-2], *quantities, *columns[-2:]]
@@ -118,7 +116,7 @@ def write_table(
         [name if name in words else _in_units(name, read) for name in header],
         [
             [{**rows[trace], **own}.get(name, "") for name in header]
-            for trace, own in copied.items()
+            for trace, own in outcome.copied.items()
         ],
     )
 

@@ -100,15 +100,10 @@ def draw_strip(label: str, traces: Sequence[Mapping[str, Any]]) -> Figure:
     return drawn
 
 
-def write_page(
-    outcome: Outcome, page: Path, copied: Mapping[str, Mapping[str, str]] | None = None
-) -> None:
-    """Write results, with pictures as far as there are any, as HTML.
-
-    What is copied are cells of each trace, by file and column.
-    """
+def write_page(outcome: Outcome, page: Path) -> None:
+    """Write results, with pictures as far as there are any, as HTML."""
     here = Path(__file__).parent
-    traces, copied = outcome.found, copied or {}
+    traces, copied = outcome.found, outcome.copied
     columns = words.columns_of(traces)
     several = len(traces) != 1 or bool(outcome.refused)
     with styled():

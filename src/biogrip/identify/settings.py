@@ -9,12 +9,15 @@ of the trace, from ``--hold``, or from a column of the file, ``--load``; where a
 modulus is read, a hold of 1 needs no option.
 """
 
+import csv
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field
+from io import StringIO
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +25,7 @@ import numpy as np
 import yaml
 
 from biogrip.arrays import Array
+from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
 from biogrip.identify.outputs import COLUMNS
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
@@ -36,7 +40,6 @@ from biogrip.study.source import (
     default_config,
     keys_in,
     overlaid,
-    read_config,
     scalar_problem,
 )
 from biogrip.study.study import Case
@@ -56,12 +59,9 @@ HOLD = ("--hold",)
 LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
-_PROTOCOLS = {HOLD: "a hold", LOAD: "a column of the load", ("protocol",): "a protocol"}
-# Of each group, the key that is set last replaces the others.
-_ONE_OF: Sequence[Sequence[tuple[str, ...]]] = (
-    [("measurement", "start_s"), ("measurement", "fit_start")],
-    [("measurement", name) for name in READINGS],
-)
+_PROTOCOLS = (HOLD, LOAD, ("protocol",))
+# Of each group of keys of the measurement, the one that is set last replaces the others.
+_ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
 _SEPARATORS = ",;\t"
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
@@ -73,13 +73,11 @@ class Setting:
     """A key of the config, and the value that an option or a cell of a table gives it."""
 
     by: str
-    """The option or the table, for messages."""
+    """The option, or the line of the table, for messages."""
     path: tuple[str, ...]
     """The key."""
     value: Any
     """Plain value, not yet checked."""
-    line: int | None = None
-    """Line of the table."""
 
 
 @dataclass(frozen=True)
@@ -124,12 +122,10 @@ def value_of(text: str, key: str = "") -> Any:
 def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     """Return the blocks with a setting, and without what it replaces."""
     path, value = setting.path, deepcopy(setting.value)
-    for group in _ONE_OF:
-        if any(path[: len(key)] == key for key in group):
-            for *above, name in (key for key in group if path[: len(key)] != key):
-                block = blocks.get(above[0]) if above else blocks
-                if isinstance(block, dict):
-                    block.pop(name, None)
+    measured = blocks.get("measurement")
+    if path[0] == "measurement" and isinstance(measured, dict):
+        for name in (name for group in _ONE_OF if group & {*path[1:2]} for name in group):
+            measured.pop(name, None)
     # A candidate's name says its branches, too.
     sample = CANDIDATES.get(str(value)) if path == ("sample", "model") else None
     if sample:
@@ -148,7 +144,8 @@ def case_of(asked: Asked) -> Case:
     files = [default_config(), *([asked.config] if asked.config else [])]
     below = read_configs(files)
     given = asked.given
-    _refuse_two_protocols(asked)
+    if len(found := [".".join(key) for key in _PROTOCOLS if key in keys_in(given)]) > 1:
+        raise BiogripError(f"{asked.place}: found {' and '.join(found)}; allowed is one of them.")
     merged = _with_instrument(overlaid(below, given), given, asked.trace)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
@@ -165,22 +162,6 @@ def case_of(asked: Asked) -> Case:
     return study.cases[case]
 
 
-def _refuse_two_protocols(asked: Asked) -> None:
-    """Refuse what was held, a column of it and a protocol beside one another."""
-    sources = [(own.by, own.line, own.path, own.value) for own in asked.settings]
-    if asked.config is not None:
-        sources.insert(0, (visible(asked.config), None, (), read_config(asked.config)))
-    said = {
-        name: f"{by}, line {line}" if line else by
-        for by, line, path, value in sources
-        for key, name in _PROTOCOLS.items()
-        if any(own[: len(key)] == key for own in (path, *keys_in(value, path)))
-    }
-    if len(said) > 1:
-        text = f"found {' and '.join(said)}; allowed is one of them."
-        raise BiogripError(f"{' and '.join(said.values())}: {text}")
-
-
 def _source(
     setting: Setting, below: Mapping[str, Any], merged: Mapping[str, Any], case: str
 ) -> Source:
@@ -192,7 +173,7 @@ def _source(
     own = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
     known = set(keys_in(below))
     above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
-    return setting.by, dict.fromkeys([*above, path, *own], setting.line)
+    return setting.by, dict.fromkeys([*above, path, *own])
 
 
 def _with_instrument(
@@ -272,21 +253,19 @@ def check_settings(traces: Sequence[Asked]) -> None:
     """
     read: dict[str, str] = {}
     problems: dict[str, None] = {}
-    first = None
     for own in traces:
         key = repr([(setting.path, setting.value) for setting in own.settings])
-        if key not in read:
+        if key in read:
+            continue
+        try:
+            read[key] = case_of(own).instrument.read.name
+        except BiogripError as error:
             read[key] = ""
-            try:
-                read[key] = case_of(own).instrument.read.name
-            except BiogripError as error:
-                problems |= dict.fromkeys(str(error).split("\n"))
-                continue
-        first = first or (own, read[key])
-        if read[key] not in ("", first[1]):
-            text = f"{own.place}: found a reading of {read[key]}, but a reading of {first[1]} of "
-            text += f"{visible(first[0].trace)}; allowed is one quantity read for all traces of a "
-            problems[f"{text}command."] = None
+            problems |= dict.fromkeys(str(error).split("\n"))
+        first, *others = dict.fromkeys(filter(None, read.values())) or [""]
+        if read[key] in others:
+            text = f"{own.place}: found a reading of {read[key]}, but a reading of {first} before; "
+            problems[f"{text}allowed is one quantity read for all traces of a command."] = None
     _refuse([*problems])
 
 
@@ -315,7 +294,7 @@ def read_table(
     `BiogripError` has line and column of the first few problems: text that is no table, values that
     are no YAML, a trace twice.
     """
-    header, *rows = _cells(path)
+    (_, header), *rows = _rows(path)
     if FILE not in header:
         raise BiogripError(
             f"{place(path, 1)}: found no column '{FILE}' among {listed(header)}; allowed is one."
@@ -323,10 +302,13 @@ def read_table(
         )
     problems = list(_name_problems(path, header))
     found, lines = [], dict[str, int]()
-    for line, row in enumerate(rows, 2):
+    for line, row in rows:
         if not any(row):
             continue
-        by_name = dict(zip(header, row, strict=True))
+        if any(row[len(header) :]):
+            text = f"found {counted(len(row), 'cell')} in the row, allowed are the header's"
+            problems.append(f"{place(path, line)}: {text} {len(header)}.")
+        by_name = dict(zip_longest(header, row[: len(header)], fillvalue=""))
         trace = path.parent / by_name.pop(FILE)
         # Resolved, so that links to one file are found.
         before = lines.setdefault(os.path.realpath(trace), line)
@@ -339,8 +321,8 @@ def read_table(
         for name, cell in by_name.items():
             if "." in name and cell:
                 try:
-                    value = value_of(cell, name)
-                    settings.append(Setting(visible(path), tuple(name.split(".")), value, line))
+                    key = tuple(name.split("."))
+                    settings.append(Setting(place(path, line), key, value_of(cell, name)))
                 except BiogripError as error:
                     problems.append(f"{place(path, line, name)}: {error}")
         copied = {name: cell for name, cell in by_name.items() if name and "." not in name}
@@ -351,30 +333,18 @@ def read_table(
     return found
 
 
-def _cells(path: Path) -> list[list[str]]:
-    """Return the header and all rows as text, empty where a row is shorter."""
-    # Imported here: loading pandas takes long.
-    import pandas as pd
-
+def _rows(path: Path) -> list[tuple[int, list[str]]]:
+    """Return the cells of every row with its line, the header's first."""
     if problem := trace_file_problem(path):
         raise BiogripError(f"{place(path)}: {problem}")
     try:
-        with path.open(encoding="utf-8-sig") as stream:
-            header = stream.readline()
-        frame = pd.read_csv(
-            path,
-            sep="\t" if path.suffix == ".tsv" else max(_SEPARATORS, key=header.count),
-            header=None,
-            dtype=str,
-            keep_default_na=False,
-            skip_blank_lines=False,
-            skipinitialspace=True,
-            encoding="utf-8-sig",
-        )
-    except (OSError, ValueError) as error:
-        found = " ".join(str(error).split())
-        raise BiogripError(f"{place(path)}: cannot be read as a table: {found}.") from error
-    return [[str(cell).strip() for cell in row] for row in frame.fillna("").to_numpy()]
+        text = path.read_text(encoding="utf-8-sig")
+        header = text.partition("\n")[0]
+        separator = "\t" if path.suffix == ".tsv" else max(_SEPARATORS, key=header.count)
+        reader = csv.reader(StringIO(text), delimiter=separator, skipinitialspace=True, strict=True)
+        return [(reader.line_num, [*map(str.strip, row)]) for row in reader]
+    except (OSError, ValueError, csv.Error) as error:
+        raise BiogripError(f"{place(path)}: cannot be read as a table: {error}.") from error
 
 
 def _name_problems(path: Path, header: Sequence[str]) -> Iterator[str]:

@@ -7,26 +7,31 @@ together resolve. A damper is as stiff as c/t after a time t, which is between t
 interval and the duration; so is a springpot, with a power of t.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.digits import plain
 from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
+from biogrip.identify.settings import Asked, case_of
+from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.protocol import is_held, largest_load
 from biogrip.physics.whitening import drift_is_flow, estimate_noise
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
 from biogrip.study.study import Case
-from biogrip.traces.reader import Recognised
 
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
 _CLEAREST, _MARGIN = 1e5, 10.0
 _LEAST, _MOST = -16, 18
+
+# Share of readings at an end of their scale from which on they are saturated, how many times as
+# often as each of the next values, and fewest values.
+_SATURATED, _MORE_OFTEN, _VALUES = 0.05, 5, 5
 
 _FLOWS = {"damper": "c_p", "maxwell": "c", "burgers": "c_s"}
 
@@ -64,13 +69,10 @@ class TraceCase:
         """True if the user names the sample models to compare."""
         return "models" in (self.given.get("model_selection") or {})
 
-    def is_like(self, other: "TraceCase") -> bool:
-        """Return True if the model, the budget of fits and the confidence are the same."""
-        return (
-            self.problem.searched == other.problem.searched
-            and self.case.confidence == other.case.confidence
-            and self.case.least_squares == other.case.least_squares
-        )
+    @property
+    def budget(self) -> Hashable:
+        """What traces that are fitted together have in common: model, fits and confidence."""
+        return self.problem.searched, self.case.least_squares, self.case.confidence
 
     def with_terms(self, *, drift: bool) -> "TraceCase":
         """Return the trace as if the user had declared an offset, or a drift, too."""
@@ -80,22 +82,37 @@ class TraceCase:
         return _with_ranges(case, self.recorded, self.given)
 
 
-def read_trace(
-    file: Path, case: Case, given: Mapping[str, Any], show: Callable[[str], None]
-) -> TraceCase:
-    """Read a trace as a case; `show` is given a table of what is recognised in an unusual file.
+def note_saturated(trace: TraceCase) -> list[Note]:
+    """Return a doubt if many readings after the start are exactly the largest, or the smallest.
 
-    A `BiogripError` has file, line and column, if the trace cannot be used.
+    Readings that are only rounded have neighbouring values nearly as often.
     """
+    time_s, readings = trace.readings
+    values, counts = np.unique(readings[time_s > 0], return_counts=True)
+    unit, notes = f" {trace.problem.instrument.read.unit}".rstrip(), []
+    for end, at, near in (("largest", -1, slice(-_VALUES, -1)), ("smallest", 0, slice(1, _VALUES))):
+        if len(values) < _VALUES or counts[at] <= _SATURATED * np.sum(counts):
+            continue
+        if counts[at] > _MORE_OFTEN * np.max(counts[near]):
+            text = (
+                f"{counts[at]} of {np.sum(counts)} readings are exactly the {end}, "
+                f"{plain(values[at])}{unit}: the instrument looks saturated, and what it cut off "
+                "is missing."
+            )
+            notes.append(Note(DOUBT, text))
+    return notes
 
-    def show_unusual(form: Recognised) -> None:
-        if not form.is_usual(case.columns):
-            show(form.in_words(file))
 
+def read_trace(asked: Asked) -> TraceCase:
+    """Read a trace as a case.
+
+    A `BiogripError` has file, line and column, or setting, that cannot be used.
+    """
+    case, given = case_of(asked), asked.given
     columns = replace(case.columns, by_options=True)
     declared = case.block.measurement
     problem = replace(case.problem, offset=bool(declared.offset), drift=bool(declared.drift))
-    trace = recording.read_checked(file, case.gripper, problem, columns, show_unusual)
+    trace = recording.read_checked(asked.trace, problem, columns)
     if case.problem.coloured:
         case = _without_likenesses(case, trace.time_s)
     read = _with_ranges(case, trace, given)

@@ -8,7 +8,7 @@ from textwrap import indent
 from typing import Any
 
 from biogrip.digits import instant, plain, with_limits, with_unit, within_limits
-from biogrip.judging.doubts import OK, REJECTED
+from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
 from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
@@ -26,6 +26,9 @@ _COLOURS = {
     NOT_DETERMINED: 31,
     FIT_REJECTED: 90,
 }
+
+# What the notes of a weight do to the fit.
+_SAID = {HARMLESS: "note", DOUBT: DOUBTFUL, REJECTION: REJECTED}
 
 
 def in_words(found: Mapping[str, Any]) -> str:
@@ -145,11 +148,10 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)
         lines += _once(found, fixed_in_words)
-        lines += [
-            f"{visible(each['trace'])}: {note['weight']}: {visible(note['text'])}"
-            for each in found
-            for note in each["notes"]
-        ]
+        for each in found:
+            said = [f"{_SAID[note['weight']]}: {note['text']}" for note in each["notes"]]
+            said += [each["advice"]] if each["fit"] == REJECTED and each["advice"] else []
+            lines += [f"{visible(each['trace'])}: {visible(text)}" for text in said]
         lines += _once(found, lambda it: [taken_for_granted(it)] if it["by_default"] else [])
     if refused:
         lines.append(f"Not identified, {len(refused)} of {len(refused) + len(found)}:")

@@ -1,8 +1,10 @@
 """Files of targets, CSV, and of measurements, npz: traces without and with noise."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +12,6 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import Instrument
 from biogrip.records.rows import read_arrays, write_arrays, write_rows
-from biogrip.traces.reader import Recognised
 
 # More than any instrument gives, and few enough that results on different processors agree.
 _DIGITS = 9
@@ -38,8 +39,8 @@ class Measurements:
     at_steps: tuple[float, ...] = ()
     """Times by the recording's clock of readings that were left out, for they are at the very
     instant of a step of what is controlled."""
-    recognised: Recognised | None = None
-    """What was recognised in the file of a recording."""
+    form: Mapping[str, Any] = field(default_factory=dict)
+    """What was recognised in the file of a recording, see `Recording.form`."""
 
 
 def write_target(

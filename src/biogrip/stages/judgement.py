@@ -21,13 +21,12 @@ from biogrip.fit.trace_fit import TraceFit, fit_traces
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit
 from biogrip.judging.likelihood import MISSED
-from biogrip.judging.onset_profiles import profile_over_onset
+from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.judging.profiles import compute_valley
 from biogrip.physics.noise import rms, standard_deviation, stream
 from biogrip.records.identifications import diagnosis_data
 from biogrip.records.traces import read_measurements, read_target
 from biogrip.study.study import Case
-from biogrip.traces.onset import note_late_onset
 
 TRACE = 0
 """Seed of the trace that is judged."""
@@ -66,7 +65,7 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
         diagnosis, _ = profile_over_onset(diagnosis, recorded.time_s)
     notes = notes_on_fit(fit)
     if case.may_start_late:
-        notes += note_late_onset(case_problem, recorded.time_s, trace, diagnosis)
+        notes += notes_on_start(case_problem, recorded.time_s, trace, diagnosis, may_be_late=True)
     said = diagnosis_data(diagnosis, notes)
     _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": valley})
 

@@ -1,7 +1,6 @@
 """Stage 2 for recorded traces: conversion of the user's file to a measurement."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,26 +9,24 @@ import numpy as np
 from biogrip.arrays import BoolArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
+from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.fitted_onset import OnsetFits
-from biogrip.physics.gripper import Gripper
+from biogrip.fit.fitted_onset import OnsetFits, estimate_onset
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.whitening import MOST_SAMPLES
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.study.study import Case
 from biogrip.terminal import warn
-from biogrip.traces.any_sample import proportional_deviations
 from biogrip.traces.columns import Columns, place
-from biogrip.traces.onset import estimate_onset
 from biogrip.traces.plausibility import check_recording
-from biogrip.traces.reader import Recognised, Recording, read_recording
+from biogrip.traces.reader import Recording, read_recording
 
 
 def record(case: Case, recorded: Path, measurements: Path) -> None:
     """Read, check and convert the user's file; errors name file, line and column."""
     if case.columns.load is not None:
         raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
-    trace = read_checked(recorded, case.gripper, case.problem, case.columns)
+    trace = read_checked(recorded, case.problem, case.columns)
     trace = with_fitted_onset(trace, case.problem)
     for note in notes_on_recording(trace):
         warn(f"{place(recorded)}: {note}")
@@ -38,19 +35,11 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
 
 def read_checked(
     recorded: Path,
-    gripper: Gripper,
     problem: CaseProblem,
     columns: Columns,
-    show: Callable[[Recognised], None] = lambda _: None,
 ) -> Measurements:
-    """Read a recorded trace, and refuse one that is impossible with its gripper and protocol.
-
-    Before it is refused, `show` is called with what was recognised in the file.
-    """
+    """Read a recorded trace, and refuse one that is impossible with its gripper and protocol."""
     trace = read_recording(recorded, columns)
-    if trace.recognised is not None:
-        show(trace.recognised)
-        columns = trace.recognised.stated(columns)
     weighted = columns.sd is not None or problem.noise_share is not None
     if (problem.coloured or weighted) and len(trace.time_s) > MOST_SAMPLES:
         raise BiogripError(
@@ -72,30 +61,11 @@ def read_checked(
             f"{place(recorded)}: found {len(trace.time_s)} readings for {problem.unknowns} unknown "
             "parameters; allowed are more readings than parameters, or a simpler model."
         )
-    nuisance = problem.nuisance(trace.time_s)
-    suspicion = check_recording(
-        trace,
-        gripper,
-        problem.torque,
-        recorded,
-        columns,
-        nuisance,
-        problem.instrument,
-        None if weighted else problem.noise_rad,
-        _typical_noise(trace, problem),
-        onset_s,
-    )
+    noise_rad = _typical_noise(trace, problem)
+    suspicion = check_recording(trace, problem, noise_rad, onset_s)
     sd_rad = trace.sd_rad
     if problem.noise_share is not None:
-        sd_rad = proportional_deviations(
-            trace.time_s,
-            trace.rotation_rad,
-            gripper,
-            problem.torque,
-            nuisance,
-            problem.noise_share,
-            problem.noise_rad,
-        )
+        sd_rad = proportional_deviations(problem, trace.time_s, trace.rotation_rad)
     return Measurements(
         trace.time_s,
         None,
@@ -105,7 +75,7 @@ def read_checked(
         suspicion=suspicion,
         onset_s=onset_s,
         at_steps=at_steps,
-        recognised=trace.recognised,
+        form=trace.form,
     )
 
 
@@ -167,14 +137,15 @@ def notes_on_recording(trace: Measurements) -> list[str]:
     if trace.gaps:
         rows = f"{counted(trace.gaps, 'row')} of {len(trace.time_s) + trace.gaps}"
         notes.append(f"Left out for want of a number: {rows}.")
-    if (form := trace.recognised) is not None and form.averaged:
-        notes.append(f"Averaged at repeated times: {counted(form.averaged, 'reading')}.")
-    if form is not None and form.outside:
-        notes.append(f"Left out by from_s and until_s: {counted(form.outside, 'reading')}.")
-    if form is not None and form.others:
-        notes.append(f"Left out, for rows asks for others: {counted(form.others, 'row')}.")
-    if form is not None and form.load:
-        notes.append(f"The protocol is {form.load}.")
+    form = trace.form
+    if "averaged" in form:
+        notes.append(f"Averaged at repeated times: {counted(form['averaged'], 'reading')}.")
+    if "outside" in form:
+        notes.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
+    if "others" in form:
+        notes.append(f"Left out, for rows asks for others: {counted(form['others'], 'row')}.")
+    if "load" in form:
+        notes.append(f"The protocol is {form['load']}.")
     if trace.at_steps:
         times = ", ".join(f"{time_s:.6g} s" for time_s in trace.at_steps)
         notes.append(

@@ -139,20 +139,10 @@ def unit_of(
     said_by: str,
     below: str = "",
 ) -> str:
-    """Return the unit of a column, a key of `allowed`.
+    """Return the unit of a column, a key of `allowed`; if ``1`` is among them, none need be given.
 
-    Parameters
-    ----------
-    path, column
-        File, for messages, and name of the column, which may end with the unit.
-    given
-        Unit that the user states, or None.
-    allowed
-        Allowed units; if ``1`` is among them, none need be given.
-    said_by
-        What states the unit, for messages.
-    below
-        The column's cell in a row of units, if there is one.
+    It is `given`, at the end of the column's name, or in its cell `below` in a row of units. What
+    states it, `said_by`, is for messages.
 
     Raises
     ------
@@ -202,11 +192,11 @@ def known_unit(written: str, allowed: Collection[str]) -> str | None:
     """Return the allowed unit that is written, as µm, sec or Pa^-1; None if there is none."""
     plain = plain_name(written)
     power = _RECIPROCAL.fullmatch(plain)
-    for name in (plain, f"1/{power[1]}" if power else plain, re.sub(r"[ ·.*⋅]", "", plain)):
-        for unit in allowed:
-            if name in (unit, unit.replace(" ", "")):
-                return unit
-    return next((unit for unit in allowed if plain.lower() in _SPELLED_OUT.get(unit, ())), None)
+    bare = f"1/{power[1]}" if power else re.sub(r"[ ·.*⋅]", "", plain)
+    for unit in allowed:
+        if bare == unit.replace(" ", "") or plain.lower() in _SPELLED_OUT.get(unit, ()):
+            return unit
+    return None
 
 
 def _endings(column: str, *patterns: str) -> list[str]:
@@ -265,8 +255,6 @@ def trace_file_problem(path: str | Path) -> str | None:
     try:
         if file.is_file():
             return None
-        if file.is_dir():
-            return f"found the folder '{shown}', allowed is a file."
         if file.exists():
             return f"found '{shown}', which is no regular file; allowed is one."
         beside = [str(other) for other in file.parent.glob("*") if other.is_file()]

@@ -1,6 +1,7 @@
 """Reader of recorded traces in the user's own files, with gaps, units and line numbers."""
 
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -29,61 +30,24 @@ _SHORTEST_STEP = 1e-18
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
 
 
-@dataclass(frozen=True)
-class Recognised:
-    """What was recognised in a file, for people to check before they believe a fit."""
+def is_usual(form: Mapping[str, Any], columns: Columns) -> bool:
+    """Return True if a file, by its `Recording.form`, is a table as biogrip itself would write."""
+    odd = ("units_line", "block", "preamble", "averaged", "outside", "others", "load")
+    return (
+        (form["encoding"], form["separator"], form["decimal"]) == ("UTF-8", "commas", "point")
+        and not any(key in form for key in odd)
+        and columns.block is None
+        and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
+    )
 
-    encoding: str
-    separator: str
-    """``commas``, ``semicolons``, ``tabs`` or ``blanks``."""
-    decimal: str
-    """``point`` or ``comma``."""
-    header_line: int | None
-    units_line: int | None
-    block: int | None
-    """Number of the table, from 1, and of all tables; None if the file has only one."""
-    blocks: int | None
-    preamble: str | None
-    """Some words above the table."""
-    columns: dict[str, dict[str, str]]
-    """Name, as `column`, and `unit` of each column by its quantity."""
-    rows: int
-    gaps: int
-    """Rows left out as gaps, then readings averaged, outside of the times to use, and left out by
-    `rows`, None for none."""
-    averaged: int | None
-    outside: int | None
-    others: int | None
-    load: str | None
-    """How the column of what was controlled is followed, if it is read."""
-    first_s: float
-    last_s: float
 
-    def is_usual(self, columns: Columns) -> bool:
-        """Return True if the file is a table as biogrip itself would write it."""
-        odd = (self.units_line, self.block, self.preamble, self.averaged, self.outside)
-        return (
-            (self.encoding, self.separator, self.decimal) == ("UTF-8", "commas", "point")
-            and not any((*odd, self.others, self.load, columns.block))
-            and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
-        )
-
-    def stated(self, columns: Columns) -> Columns:
-        """Return columns with the units that the file has."""
-        time_unit, unit, *_ = (each["unit"] for each in self.columns.values())
-        return replace(columns, time_unit=time_unit, reading_unit=unit)
-
-    def data(self) -> dict[str, Any]:
-        """Return the form as plain data, without what there is not."""
-        return {key: value for key, value in asdict(self).items() if value is not None}
-
-    def in_words(self, path: Path) -> str:
-        """Return the form as a small table."""
-        found = self.data()
-        columns = found.pop("columns")
-        named = {key: f"{each['column']}, in {each['unit']}" for key, each in columns.items()}
-        rows = (f"\n  {key:<13}{visible(value)}" for key, value in (found | named).items())
-        return f"{visible(path)} is read as{''.join(rows)}"
+def form_in_words(path: Path, form: Mapping[str, Any]) -> str:
+    """Return a `Recording.form` as a small table."""
+    columns = form["columns"].items()
+    named = {key: f"{each['column']}, in {each['unit']}" for key, each in columns}
+    found = {key: value for key, value in form.items() if key != "columns"} | named
+    rows = (f"\n  {key:<13}{visible(value)}" for key, value in found.items())
+    return f"{visible(path)} is read as{''.join(rows)}"
 
 
 @dataclass(frozen=True)
@@ -98,17 +62,24 @@ class Recording:
     """Line number of each sample, from 1, (n_samples,)."""
     without_number: int
     """Number of rows left out as gaps."""
+    path: Path
+    """The file."""
+    read: Columns
+    """What was read of it."""
+    units: tuple[str, str]
+    """Units of the times and of the readings in the file."""
     sd_rad: Array | None = None
     """Standard deviations of the rotations, (n_samples,), where the file has them."""
-    recognised: Recognised | None = None
-    """What was recognised in the file."""
+    form: Mapping[str, Any] = field(default_factory=dict)
+    """What was recognised in the file, for people to check before they believe a fit; `read_as` of
+    the JSON file."""
     load: Array | None = None
     """Times and loads, or deformations, in SI units, linear between them, (n, 2), where they are
     read: of all rows, used or not. See `ramps`."""
 
 
 def read_recording(path: Path, columns: Columns) -> Recording:
-    """Read a recorded trace.
+    """Read the columns of a recorded trace from a file.
 
     The file is text in UTF-8, UTF-16 or Windows-1252. Empty lines and lines that start with ``#``
     are ignored. The header is the line that has the columns, or has a row of units below it; of
@@ -119,16 +90,6 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
     row is left out and counted; nothing is interpolated. Other spreadsheet errors, as ``#REF!``,
     are refused.
-
-    Parameters
-    ----------
-    path, columns
-        The file, and its columns to read; units as `unit_of` finds them.
-
-    Returns
-    -------
-    Recording
-        Trace in SI units.
 
     Raises
     ------
@@ -161,37 +122,49 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         kept, lines, averaged = _averaged(kept, lines)
     _check_order(path, columns, kept[:, 0], lines)
     time_s = kept[:, 0] * TIME_UNITS[units[0]]
-    first = -np.inf if columns.from_s is None else columns.from_s
-    last = np.inf if columns.until_s is None else columns.until_s
-    used = (time_s >= first) & (time_s <= last)
+    used = np.ones(len(time_s), bool)
+    if columns.from_s is not None:
+        used &= time_s >= columns.from_s
+    if columns.until_s is not None:
+        used &= time_s <= columns.until_s
     kept, lines, time_s = kept[used], lines[used], time_s[used]
     _check_count(path, columns, len(kept), without_number, "usable time")
     names_and_units = (
         {"column": table.names[i], "unit": unit} for i, unit in zip(indices, units, strict=True)
     )
-    recognised = Recognised(
-        encoding=sheet.encoding,
-        separator=_SEPARATORS[sheet.separator],
-        decimal=decimal,
-        header_line=header_line,
-        units_line=None if table.units is None else int(sheet.numbers[table.first - 1]),
-        block=index + 1 if len(tables) > 1 else None,
-        blocks=len(tables) if len(tables) > 1 else None,
-        preamble=table.title or None,
-        columns=dict(zip(columns.named, names_and_units, strict=True)),
-        rows=len(values),
-        gaps=without_number,
-        averaged=averaged or None,
-        outside=int(np.count_nonzero(~used)) or None,
-        others=int(np.count_nonzero(~chosen)) or None,
-        load=followed,
-        first_s=float(time_s[0]),
-        last_s=float(time_s[-1]),
-    )
+    several = len(tables) > 1
+    form = {
+        "encoding": sheet.encoding,
+        "separator": _SEPARATORS[sheet.separator],
+        "decimal": decimal,
+        "header_line": header_line,
+        "units_line": None if table.units is None else int(sheet.numbers[table.first - 1]),
+        "block": index + 1 if several else None,
+        "blocks": len(tables) if several else None,
+        "preamble": table.title or None,
+        "columns": dict(zip(columns.named, names_and_units, strict=True)),
+        "rows": len(values),
+        "gaps": without_number,
+        "averaged": averaged or None,
+        "outside": int(np.count_nonzero(~used)) or None,
+        "others": int(np.count_nonzero(~chosen)) or None,
+        "load": followed,
+        "first_s": float(time_s[0]),
+        "last_s": float(time_s[-1]),
+    }
     unit = columns.quantity.units[units[1]]
-    sd_rad = None if columns.sd is None else kept[:, 2] * (unit * abs(columns.scale))
-    rotation_rad = kept[:, 1] * (unit * columns.scale)
-    return Recording(time_s, rotation_rad, lines, without_number, sd_rad, recognised, load)
+    return Recording(
+        time_s,
+        kept[:, 1] * (unit * columns.scale),
+        lines,
+        without_number,
+        path,
+        columns,
+        (units[0], units[1]),
+        sd_rad=None if columns.sd is None else kept[:, 2] * (unit * abs(columns.scale)),
+        form={key: value for key, value in form.items() if value is not None},
+        load=load,
+    )
 
 
 def _columns_of(

@@ -7,12 +7,12 @@ NumPy and AFM programs write the names in a comment above the rows, and blanks b
 table without names has numbers of columns.
 """
 
+import csv
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from io import BytesIO
-from itertools import pairwise
+from itertools import groupby, pairwise
 from math import inf, isfinite, nan
 from operator import eq
 from pathlib import Path
@@ -40,14 +40,6 @@ BLANKS = " "
 SEPARATORS = (",", ";", "\t")
 """What parts cells, but for `BLANKS`."""
 
-# Guesses among all encodings take µ for Chinese.
-_ENCODINGS = {
-    "utf_8": "UTF-8",
-    "utf_16": "UTF-16",
-    "utf_16_le": "UTF-16",
-    "utf_16_be": "UTF-16",
-    "cp1252": "Windows-1252",
-}
 _LINE_END = re.compile(r"\r\n|\r|\n")
 # Empty lines and comments; #REF!, #DIV/0! or #NAME? followed by a separator are cells.
 _LEFT_OUT = re.compile(r" *(?:$|#(?!(?:[A-Z0-9/_]+[!?]|N/A|NV)\s*[,;\t]))")
@@ -110,10 +102,6 @@ class Table:
         """Count the columns to read that it has."""
         return sum(bool(self.indices(name)) for name in columns.named.values())
 
-    def has(self, columns: Columns) -> bool:
-        """Return True if it has all columns to read."""
-        return self.common(columns) == len(columns.named)
-
 
 def read_sheet(path: Path, columns: Columns) -> Sheet:
     """Read the cells of a text file.
@@ -123,9 +111,6 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
     BiogripError
         If it is no file, or no text in UTF-8, UTF-16 or Windows-1252, or a quote has no end.
     """
-    # Imported here: loading pandas takes long.
-    import pandas as pd
-
     encoding, lines = _read_lines(path)
     numbered = _with_names(lines, {*map(plain_name, columns.named.values())})
     if not numbered:
@@ -137,69 +122,54 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
         named, width = "\t", len(_CELL.findall(lines[-1]))
         parted = [(_WIDE_GAP.split(line.strip()), _CELL.findall(line)) for line in lines]
         lines = ["\t".join(wide if len(wide) == width else cells) for wide, cells in parted]
-    widths = np.array([line.count(named) for line in lines]) + 1
+    rows: list[list[str]] = []
+    reader = csv.reader(lines, delimiter=named, skipinitialspace=True)
     try:
-        frame = pd.read_csv(
-            BytesIO("\n".join(lines).encode()),
-            sep=named,
-            header=None,
-            names=range(widths.max()),
-            index_col=False,
-            dtype=object,
-            na_filter=False,
-            skip_blank_lines=False,
-            skipinitialspace=True,
-        )
-    except ValueError:
-        # A quote is open to the end.
-        frame = pd.DataFrame()
-    if len(frame) != len(lines):
-        is_open = re.compile(rf'(?:^|{named}) *"(?:[^"]|"")*$')
-        row = next((i for i, line in enumerate(lines) if is_open.search(line)), 0)
-        raise BiogripError(
-            f"{place(path, kept[row])}: found a quote without its end, allowed are quoted "
-            "cells that end on their line."
-        )
-    cells = np.vectorize(str.strip, otypes=[object])(frame.to_numpy())
-    return Sheet(encoding, separator, cells, widths, kept, headers)
+        for cells in reader:
+            if reader.line_num > len(rows) + 1:
+                raise BiogripError(
+                    f"{place(path, kept[len(rows)])}: found a quote without its end, allowed are "
+                    "quoted cells that end on their line."
+                )
+            rows.append([*map(str.strip, cells)])
+    except csv.Error as error:
+        raise BiogripError(f"{place(path, kept[len(rows)])}: found a {error}.") from error
+    widths = np.array([*map(len, rows)])
+    padded = [cells + [""] * (widths.max() - len(cells)) for cells in rows]
+    return Sheet(encoding, separator, np.array(padded, dtype=object), widths, kept, headers)
 
 
 def _read_lines(path: Path) -> tuple[str, list[str]]:
-    """Return the encoding that a file seems to have, and its lines."""
-    from charset_normalizer import from_bytes
-
+    """Return the encoding of a file, and its lines."""
     if problem := trace_file_problem(path):
         raise BiogripError(f"{place(path)}: {problem}")
     try:
         content = path.read_bytes()
     except OSError as error:
         raise BiogripError(f"{place(path)}: cannot be read: {error.strerror}.") from error
-    matches = from_bytes(content, cp_isolation=[*_ENCODINGS])
-    # What can be UTF-8 is.
-    best = next((match for match in matches if match.encoding == "utf_8"), matches.best())
-    if best is not None:
-        return _ENCODINGS[best.encoding], _LINE_END.split(str(best))
-    codec = "utf-16" if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8"
-    line, found = None, "binary data"
-    try:
-        content.decode(codec)
-    except UnicodeDecodeError as error:
-        line = len(_LINE_END.split(content[: error.start].decode(codec)))
-        found = f"the byte 0x{content[error.start]:02x}"
+    encodings = {"utf-8-sig": "UTF-8", "cp1252": "Windows-1252"}
+    if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        encodings = {"utf-16": "UTF-16"}
+    for codec, encoding in encodings.items():
+        try:
+            return encoding, _LINE_END.split(content.decode(codec))
+        except UnicodeDecodeError as error:
+            start = error.start
+    line = len(_LINE_END.split(content[:start].decode(codec)))
     raise BiogripError(
-        f"{place(path, line)}: found {found}, allowed is text in UTF-8, UTF-16 or Windows-1252."
+        f"{place(path, line)}: found the byte 0x{content[start]:02x}, allowed is text in UTF-8, "
+        "UTF-16 or Windows-1252."
     )
 
 
 def _with_names(lines: Sequence[str], wanted: set[str]) -> list[tuple[str, int]]:
     """Return lines with numbers from 1, without comments and empty ones, but with those of names.
 
-    Where no other line has the wanted names, comments may have them, also behind ``columns:``, or
-    the last before the first row is as long as that; then comments like ``key: value`` above are
-    a preamble, and one with ``units:`` below is kept. Numbers of columns are names above the first
-    row.
+    Numbers of columns are names above the first row. Where no other line has the wanted names,
+    comments may have them.
     """
-    kept = [(line, number) for number, line in enumerate(lines, 1) if not _LEFT_OUT.match(line)]
+    every = [(line, number) for number, line in enumerate(lines, 1)]
+    kept = [own for own in every if not _LEFT_OUT.match(own[0])]
     plain = [own for own in kept if not _COMMENT.match(own[0])]
     first = next((own for own in plain if _ROW.match(own[0] + " ")), None)
     if any(_has(line, wanted) for line, _ in plain if not _ROW.match(line)) or first is None:
@@ -209,32 +179,45 @@ def _with_names(lines: Sequence[str], wanted: set[str]) -> list[tuple[str, int]]
         widest = range(1, len(_split(first[0], separator)) + 1)
         names = (separator.join(map(str, widest)), 0)
         return [*(own for own in plain if own[1] < first[1]), names, *plain[plain.index(first) :]]
-    found, above = list[tuple[str, int]](), list[tuple[str, int]]()
-    named, widths = False, [len(it) if len(it) > 1 else 0 for it in _splits(first[0])]
-    said = [
-        (_BEFORE_NAMES.sub("", line[mark.end() :]), number)
-        for number, line in enumerate(lines, 1)
-        if (mark := _COMMENT.match(line))
+    said = {number: _COMMENT.sub("", line) for line, number in every if _COMMENT.match(line)}
+    headers = _headers_in(said, plain, first, wanted)
+    return _with_headers(every, said, headers) if headers else kept
+
+
+def _headers_in(
+    said: Mapping[int, str], plain: list[tuple[str, int]], first: tuple[str, int], wanted: set[str]
+) -> list[int]:
+    """Return which comments are names: those wanted, or the last before the first row, as wide."""
+    names = {number: _BEFORE_NAMES.sub("", text) for number, text in said.items()}
+    if found := [number for number, text in names.items() if _has(text, wanted)]:
+        return found
+    widths = [len(it) if len(it) > 1 else 0 for it in _splits(first[0])]
+    before = [*names.items(), *((number, line) for line, number in plain)]
+    likely = [
+        number
+        for number, text in before
+        if number < first[1] and any(map(eq, map(len, _splits(text)), widths))
     ]
-    texts = {number: text for text, number in said if _has(text, wanted)}
-    before = [own for own in (*said, *plain) if own[1] < first[1]]
-    likely = [own for own in before if any(map(eq, map(len, _splits(own[0])), widths))]
-    if not texts and likely and likely[-1] in said:
-        texts = {likely[-1][1]: likely[-1][0]}
-    for number, line in enumerate(lines, 1):
-        mark = _COMMENT.match(line)
-        text = line[mark.end() :].strip() if mark else line
-        if number in texts:
-            found += [*above, (texts[number], number)]
-            above, named = [], True
-        elif mark and named and _BEFORE_UNITS.match(text):
-            found.append((_BEFORE_UNITS.sub("", text), number))
-        elif mark and not named and ":" in text:
-            above.append((text, number))
-        elif not mark and text.strip():
-            found.append((line, number))
-            named = False
-    return found if texts else kept
+    return [number for number in likely[-1:] if number in said]
+
+
+def _with_headers(
+    every: list[tuple[str, int]], said: Mapping[int, str], headers: list[int]
+) -> list[tuple[str, int]]:
+    """Return rows, and comments that are names, ``key: value`` above them or ``units:`` below."""
+    found = list[tuple[str, int]]()
+    for in_comments, group in groupby(every, lambda own: not own[0].strip() or own[1] in said):
+        block = [*group]
+        at = next((i for i, (_, number) in enumerate(block) if number in headers), None)
+        if not in_comments:
+            found += block
+        elif at is not None:
+            texts = [(said.get(number, "").strip(), number) for _, number in block]
+            found += (own for own in texts[:at] if ":" in own[0])
+            found.append((_BEFORE_NAMES.sub("", said[block[at][1]]), block[at][1]))
+            units = (own for own in texts[at + 1 :] if _BEFORE_UNITS.match(own[0]))
+            found += ((_BEFORE_UNITS.sub("", text), number) for text, number in units)
+    return found
 
 
 def _split(line: str, separator: str) -> list[str]:
@@ -334,7 +317,7 @@ def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
     """
     is_step = at >= 2 and str(sheet.cells[at - 2, 0]).lower() == "[step]"
     table = Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1, is_step)
-    names, has_columns = table.names, table.has(columns)
+    names, has_columns = table.names, table.common(columns) == len(columns.named)
     if not has_columns and (_count_numbers(names) or sum(map(bool, names)) < 2):
         return None
     below = [i for i in range(at + 1, min(at + 4, len(sheet.cells))) if any(sheet.cells[i])]
@@ -354,12 +337,8 @@ def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
 def _likely_table(sheet: Sheet) -> Table:
     """Return what may be the table of a file without the columns: names above numbers."""
     numbers = [*map(_count_numbers, sheet.cells[:_LINES_SEARCHED])]
-    likely = [
-        at
-        for at, (here, below) in enumerate(pairwise(numbers))
-        if below > here == 0 and sum(map(bool, sheet.cells[at])) > 1
-    ]
-    at = likely[0] if likely else 0
+    pairs = enumerate(pairwise(numbers))
+    at = next((at for at, (here, below) in pairs if below > here == 0), 0)
     return Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1, end=at + 1)
 
 

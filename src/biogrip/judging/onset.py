@@ -1,0 +1,298 @@
+"""When the protocol of a recorded trace starts: what is said of it, and limits that allow for it.
+
+`notes_on_start` tests a trace of which nothing says when its protocol starts: if it begins before
+that, or so long after it that the clock may be another's. It says what a tare would change, and a
+ramp that ends before the first reading.
+
+`profile_over_onset` widens limits for an onset that is fitted along. A quantity's profile is the
+lowest of those for single onsets, each in its increase over the best fit with the best onset. So a
+limit is the outermost of the limits for single onsets, with the threshold less the increase that
+the onset itself costs. Onsets are taken all over their own confidence interval, closer at its ends,
+as on a circle: with nine the limits of an elliptic region are short by at most five per cent. Where
+a rotation jumps between two readings, sums of squares have kinks as a function of the onset, on
+which a linear approximation fails.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import chdtri, stdtrit
+
+from biogrip.arrays import Array
+from biogrip.digits import instant, plain
+from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.fitted_onset import (
+    OnsetFit,
+    OnsetFits,
+    begins_constant,
+    estimate_onset,
+    spacing_at,
+)
+from biogrip.fit.multi_start import fit_from
+from biogrip.judging.diagnosis import Diagnosis
+from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
+from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
+from biogrip.judging.profiles import Profile, compute_profiles
+from biogrip.judging.verdicts import Finding
+from biogrip.physics.protocol import Load, Phase
+from biogrip.physics.whitening import estimate_noise
+
+# So that correlated noise does not look like a late onset; and level of other tests.
+_FALSE_ALARM, _AS_GOOD = 1e-9, 1e-3
+# Intervals from a change to the first reading of a trace that is cut off, fewest readings by which
+# their growth is known, and its powers of the time if readings were spaced from the change on.
+_DELAYED, _FEWEST_APART, _PLANNED = 10.0, 3, (0.5, 1.5)
+# Misfit over the scatter of neighbours that a right fit does not exceed.
+_WHITE = 1.5
+_SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
+# First change of the onset over how far readings are apart there, and most of it as a share of the
+# trace.
+_FIRST_STEP, _MOST = 1 / 64, 0.25
+# Accuracy of an end of the onset's interval, as a share of its distance.
+_ACCURACY = 0.01
+
+
+def notes_on_start(
+    case_problem: CaseProblem,
+    time_s: Array,
+    rotation_rad: Array,
+    diagnosis: Diagnosis,
+    *,
+    may_be_late: bool,
+) -> list[Note]:
+    """Return notes on another start of the protocol than at 0, on a tare, and on a hidden ramp.
+
+    A trace that begins constant, and fits far better with a later start, tells nothing of the
+    sample under the protocol as given, whatever noise model absorbs the misfit: the test is a
+    likelihood ratio. One that begins long after its first step, as if cut off there, may have been
+    recorded on another clock: then it is fitted with that step just before it.
+
+    Parameters
+    ----------
+    case_problem
+        Assumptions of the identification, with a protocol that starts at 0.
+    time_s, rotation_rad : (n_samples,)
+        The trace, times ascending.
+    diagnosis
+        That of the best fit with that protocol.
+    may_be_late
+        True if the user says nothing of the start.
+    """
+    fits, ramp = OnsetFits(case_problem, time_s, rotation_rad), _with_ramp(case_problem, time_s)
+    notes: list[Note] = []
+    if may_be_late and ramp and is_cut_off(time_s):
+        notes += _about_clock(fits, diagnosis)
+    elif begins_constant(time_s, rotation_rad):
+        # A constant that is not zero is an offset, with which the onset would be biased.
+        free, onset_s = replace(case_problem, offset=True), 0.0
+        if may_be_late or case_problem.fit_start:
+            onset_s = estimate_onset(free, time_s, rotation_rad)
+        if begins_constant(time_s, rotation_rad, onset_s):
+            if may_be_late:
+                notes += _about_late_onset(replace(fits, case_problem=free), diagnosis, onset_s)
+            if not case_problem.offset and (notes or not may_be_late):
+                notes += _about_tare(fits, diagnosis, onset_s)
+    if diagnosis.status != REJECTED and ramp and not notes:
+        notes += _about_ramp(fits, diagnosis, ramp)
+    return notes
+
+
+def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> Iterator[Note]:
+    """Yield a note if a trace is constant up to an onset, with which it fits far better."""
+    trace, noise_rad = (fits.time_s, fits.rotation_rad), fits.case_problem.noise_rad
+    found, given = fits.best(guess_s), fits.at(0.0, diagnosis.likelihood.best)
+    fall = compute_fall(len(trace[0]), given.misfit_rad, found.misfit_rad, noise_rad)
+    if fall < chdtri(1, _FALSE_ALARM) or not begins_constant(*trace, found.onset_s):
+        return
+    fit = fits.posed(found.onset_s), found.log_parameters, found.misfit_rad
+    likelihood = make_likelihood(*fit, confidence=diagnosis.likelihood.confidence)
+    limits = onset_limits(likelihood, fits.time_s - found.onset_s)
+    when = instant(found.onset_s, *(found.onset_s + end_s for end_s in limits))
+    yield Note(
+        REJECTION,
+        f"The trace is constant until {when} of its clock, and fits far better if the protocol "
+        f"starts there (χ² falls by {plain(fall)}). If it does, say --start fit "
+        "(measurement.fit_start), which allows for its uncertainty, or when it was, if that is "
+        "known (--start, measurement.start_s).",
+    )
+
+
+def _about_tare(fits: OnsetFits, diagnosis: Diagnosis, onset_s: float) -> Iterator[Note]:
+    """Yield a note if the readings before an onset are not zero, by a t test."""
+    before = fits.rotation_rad[fits.time_s < onset_s][:-1]
+    mean, error = float(np.mean(before)), float(np.std(before, ddof=1)) / np.sqrt(len(before))
+    if abs(mean) > error * stdtrit(len(before) - 1, 1 - _AS_GOOD / 2):
+        unit = f" {fits.case_problem.instrument.read.unit}".rstrip()
+        yield Note(
+            REJECTION if diagnosis.status == REJECTED else DOUBT,
+            f"The {len(before)} readings before the start are constant, but {plain(mean)}{unit} "
+            "and not 0: if that is the zero of the instrument, say --offset (measurement.offset).",
+        )
+
+
+def is_cut_off(time_s: Array) -> bool:
+    """Return True if readings begin long after 0, (n_samples,), as if there had been earlier ones.
+
+    They begin more than ten of their first intervals after it, and these do not grow in proportion
+    to the time, as of readings that someone spaced from 0 on.
+    """
+    few = max(_FEWEST_APART, len(time_s) // 10)
+    first_s, last_s = (
+        float(np.ptp(ends)) / few for ends in (time_s[: few + 1], time_s[-few - 1 :])
+    )
+    if time_s[0] <= _DELAYED * first_s:
+        return False
+    growth = np.log(last_s / first_s) / np.log(time_s[-1 - few] / time_s[0])
+    return not _PLANNED[0] < growth < _PLANNED[1]
+
+
+def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
+    """Yield a note if a trace may be on another clock, with its step just before it."""
+    time_s, noise_rad = fits.time_s, estimate_noise(fits.rotation_rad)
+    later_s, best = 2 * time_s[0] - time_s[1], diagnosis.likelihood.best
+    given, rejected = fits.at(0.0, best), diagnosis.status == REJECTED
+    other = fits.best(later_s) if rejected else fits.at(later_s, best)
+    fall = compute_fall(len(time_s), given.misfit_rad, other.misfit_rad, None)
+    found = ""
+    if rejected and 0 < other.onset_s < time_s[0] and other.misfit_rad < _WHITE * noise_rad:
+        far = fall > chdtri(1, _FALSE_ALARM)
+        found = f"the fit is far better (χ² falls by {plain(fall)})" if far else ""
+    elif not rejected and fall > -chdtri(1, _AS_GOOD):
+        moved = _moved(diagnosis, given, other, 0.5)
+        found = f"the trace fits as well: {moved}" if moved else ""
+    if found:
+        yield Note(
+            REJECTION if rejected else DOUBT,
+            f"The readings begin {plain(time_s[0])} s after the step of the protocol. If it starts "
+            f"at {other.onset_s:.4g} s of the clock, {found}. Say when the protocol started "
+            "(--start, measurement.start_s), be it at 0, or what came before (--config, protocol).",
+        )
+
+
+def _moved(diagnosis: Diagnosis, given: OnsetFit, other: OnsetFit, widths: float) -> str:
+    """Name what another fit moves beyond its limits, by more than so many of their widths."""
+    x = diagnosis.likelihood.best
+    moved = x + other.log_parameters - given.log_parameters
+    said = []
+    for each in diagnosis.findings:
+        before, after = each.quantity.log(x), each.quantity.log(moved)
+        width = np.log(each.high / each.low) if each.high and each.low else 0.0
+        if not each.allows(moved) and abs(after - before) > widths * width:
+            unit = f" {each.quantity.unit}".rstrip()
+            said.append(f"{each.quantity.label} would be {plain(np.exp(after))}{unit}")
+    return "; ".join(said)
+
+
+def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramp: tuple[Phase, ...]) -> Iterator[Note]:
+    """Yield a note if a ramp up to the first reading moves a value by the width of its limits."""
+    ramped_fits = replace(fits, case_problem=replace(fits.case_problem, phases=ramp))
+    given, ramped = (own.at(0.0, diagnosis.likelihood.best) for own in (fits, ramped_fits))
+    if moved := _moved(diagnosis, given, ramped, 1.0):
+        yield Note(
+            HARMLESS,
+            "If the load was no step but a ramp that ends with the first reading, at "
+            f"{plain(fits.time_s[0])} s: {moved}. A ramp is given by a protocol (--config), or as "
+            "recorded (--load).",
+        )
+
+
+def _with_ramp(case_problem: CaseProblem, time_s: Array) -> tuple[Phase, ...]:
+    """Return phases with a ramp up to the first reading, none but for a hold until after that."""
+    first, *rest = case_problem.phases
+    loads, delay_s = (first.left, first.right), float(time_s[0])
+    if not 0 < delay_s < first.duration_s or any(own != Load(own.value_Nm) for own in loads):
+        return ()
+    ramp = Phase(delay_s, *(Load(0.0, own.value_Nm / delay_s) for own in loads))
+    return ramp, replace(first, duration_s=first.duration_s - delay_s), *rest
+
+
+def onset_limits(best: Likelihood, time_s: Array) -> tuple[float, float]:
+    """Return the limits of an onset, in s from it, for times from it, (n_samples,)."""
+    step_s = _FIRST_STEP * spacing_at(time_s, 0.0)
+    return _end(best, -step_s), _end(best, step_s)
+
+
+def profile_over_onset(
+    diagnosis: Diagnosis, time_s: Array
+) -> tuple[Diagnosis, tuple[float, float]]:
+    """Return a diagnosis whose limits allow for the uncertainty of a fitted onset, and its limits.
+
+    Parameters
+    ----------
+    diagnosis
+        Diagnosis for the best onset.
+    time_s : (n_samples,)
+        Times from that onset, ascending.
+    """
+    best = diagnosis.likelihood
+    ends = onset_limits(best, time_s)
+    others = [_at(best, float(change_s)) for end in ends for change_s in end * _SHARES]
+    others = [each for each in others if each.threshold > 0]
+    if not others:
+        return diagnosis, ends
+    found = [*diagnosis.findings, *(trade.finding for trade in diagnosis.trades)]
+    every = compute_profiles(others, [finding.quantity for finding in found], smooth=False)
+    costs = [best.threshold - each.threshold for each in others]
+    by_quantity = zip(*every, strict=True)
+    merged = [_merged(*each, costs) for each in zip(found, by_quantity, strict=True)]
+    kept = len(diagnosis.findings)
+    pairs = zip(diagnosis.trades, merged[kept:], strict=True)
+    trades = [replace(trade, finding=finding) for trade, finding in pairs]
+    return replace(diagnosis, findings=merged[:kept], trades=trades), ends
+
+
+def _at(best: Likelihood, change_s: float) -> Likelihood:
+    """Return the likelihood of an onset that is later by some s, relative to that of the best."""
+    problem = best.problem.later(change_s)
+    fit = fit_from([problem], best.best)
+    misfit_rad = float(fit.misfit_rad[0])
+    cost = best.increase(misfit_rad)
+    return replace(
+        best,
+        problem=problem,
+        best=fit.x[0],
+        misfit_rad=misfit_rad,
+        threshold=best.threshold - cost,
+        certainty=best.certainty - cost,
+    )
+
+
+def _end(best: Likelihood, step_s: float) -> float:
+    """Return the end of the onset's confidence interval on the side of a first step."""
+    inside, outside = 0.0, step_s
+    most_s = _MOST * best.problem.residuals.duration_s
+    while _at(best, outside).threshold > 0:
+        if abs(outside) > most_s:
+            return outside
+        inside, outside = outside, 2 * outside
+    accuracy = _ACCURACY * abs(outside)
+    return float(brentq(lambda s: _at(best, s).threshold, inside, outside, xtol=accuracy))
+
+
+def _merged(finding: Finding, profiles: Sequence[Profile], costs: list[float]) -> Finding:
+    """Return a finding with the lowest of its profile and of those of other onsets.
+
+    It has no gaps: between two of the onsets nothing is known to be excluded.
+    """
+    own = finding.profile
+    values: Array = np.unique(np.concatenate([p.log_values for p in (own, *profiles)]))
+    rows = [
+        np.interp(values, profile.log_values, profile.increases + cost)
+        for profile, cost in zip((own, *profiles), (0.0, *costs), strict=True)
+    ]
+    increases: Array = np.min(rows, axis=0)
+    ends = [(profile.low, profile.high) for profile in (own, *profiles)]
+    lows, highs = ([end for end in side if end is not None] for side in zip(*ends, strict=True))
+    return replace(
+        finding,
+        profile=replace(
+            own,
+            log_values=values,
+            increases=increases,
+            low=min(lows) if len(lows) == len(ends) else None,
+            high=max(highs) if len(highs) == len(ends) else None,
+            gaps=(),
+        ),
+    )

@@ -1,0 +1,52 @@
+"""Deviations in proportion to what is read, of a trace whose sample has no model yet."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.fit.any_sample import proportional_deviations
+from tests.helpers.default import STUDY
+from tests.helpers.problems import clean
+
+CLEAN_S, CLEAN = clean("endothelial_cell", 2.0)
+
+
+def deviations(trace: Array, share: float = 0.05, **given: Any) -> Array:
+    problem = replace(STUDY.cases["endothelial_cell"].problem, noise_share=share, **given)
+    return proportional_deviations(problem, CLEAN_S, trace)
+
+
+def test_deviations_follow_the_rotation_without_its_noise() -> None:
+    """Each reading has noise of 5 %; the smooth rotation is known far better."""
+    rng = np.random.default_rng(0)
+    found = deviations(CLEAN * (1 + 0.05 * rng.standard_normal(len(CLEAN_S))))
+    large = np.quantile(CLEAN, 0.1) < CLEAN
+    errors = np.abs(found[large] / (0.05 * CLEAN[large]) - 1)
+    assert np.median(errors) < 0.05 / 3
+    assert np.quantile(errors, 0.99) < 0.05
+
+
+def test_no_reading_is_certain() -> None:
+    """Of a trace without noise: the first rotation is zero, and counts as one of the smallest."""
+    assert CLEAN[0] == 0
+    smallest = np.sort(CLEAN)[: len(CLEAN) // 10]
+    assert deviations(CLEAN).min() == pytest.approx(0.05 * np.median(smallest), rel=0.01)
+
+
+def test_other_noise_shows_where_the_rotation_is_small() -> None:
+    rng = np.random.default_rng(1)
+    floor = 0.3 * float(CLEAN.max())
+    found = deviations(CLEAN + floor * rng.standard_normal(len(CLEAN_S)), 1e-3)
+    # Some eighty readings tell the scatter.
+    assert found.min() == pytest.approx(floor, rel=0.3)
+    given = deviations(CLEAN, noise_rad=floor)
+    np.testing.assert_allclose(given, np.hypot(0.05 * CLEAN, floor), rtol=1e-3)
+
+
+def test_an_offset_is_not_rotation() -> None:
+    found = deviations(CLEAN + 3 * CLEAN.max(), offset=True)
+    large = np.quantile(CLEAN, 0.2) < CLEAN
+    np.testing.assert_allclose(found[large], 0.05 * CLEAN[large], rtol=0.1)
