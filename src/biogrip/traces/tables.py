@@ -135,7 +135,8 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
     except csv.Error as error:
         raise BiogripError(f"{place(path, kept[len(rows)])}: found a {error}.") from error
     widths = np.array([*map(len, rows)])
-    padded = [cells + [""] * (widths.max() - len(cells)) for cells in rows]
+    widest = int(widths.max())
+    padded = [cells + [""] * (widest - len(cells)) for cells in rows]
     return Sheet(encoding, separator, np.array(padded, dtype=object), widths, kept, headers)
 
 
