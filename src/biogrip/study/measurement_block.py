@@ -56,7 +56,7 @@ class MeasurementBlock(Block):
     """Sampling times, ascending, instead of a uniform rate; more of them need rate_Hz or bursts."""
     bursts: Annotated[tuple[Burst, ...], Field(min_length=1, max_length=20_000)] = ()
     """Successive bursts of samples instead of a uniform rate, as of a camera that is fast after
-    every step. See docs/design.md."""
+    every step."""
     file: _Name = None
     """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. See
     "Your own measurement"."""
