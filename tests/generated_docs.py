@@ -276,7 +276,10 @@ def slow_branch() -> str:
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
     free, held = (
         np.array([best_fit(it, case.least_squares, rng, silent).misfit_rad for it, rng in each])
-        for each in (zip(problem.of_each(time_s, traces), rngs, strict=True) for problem in posed)
+        for each in (
+            zip([problem.of(time_s, trace) for trace in traces], rngs, strict=True)
+            for problem in posed
+        )
     )
     limit = chi2.ppf(case.confidence, 1)
     fits = int(np.sum(len(time_s) * ((held / free) ** 2 - 1) < limit))

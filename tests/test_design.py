@@ -10,7 +10,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.design import NO_BOUND, Limits, Specimen, decode, rated, search, set_up
-from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.problem import CaseProblem
 from biogrip.library import simulate
 from biogrip.physics.protocol import Sampling
 from biogrip.physics.simulation import compute_grip

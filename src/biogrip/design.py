@@ -22,7 +22,6 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs, write_text
 from biogrip.identify.outputs import WRITTEN_BY, check_output
-from biogrip.judging.likelihood import covariance
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.protocol import Phase, Sampling, hold, largest_load, torque_history
@@ -126,8 +125,18 @@ class Specimen:
 
 
 def relative_bounds(slopes: Array, noise: float) -> Array:
-    """Return standard deviations of log-parameters from derivatives of what is read by these."""
-    return np.minimum(np.sqrt(np.diag(covariance(slopes, noise))), NO_BOUND)
+    """Return standard deviations of log-parameters from derivatives of what is read by these.
+
+    A parameter that is not told to a factor of e with all others known is taken as known for the
+    others, as in `biogrip.judging.likelihood`, and has `NO_BOUND`.
+    """
+    sizes, found = np.linalg.norm(slopes, axis=1) / noise, np.full(len(slopes), NO_BOUND)
+    informed = sizes >= 1
+    rows = slopes[informed] / (noise * sizes[informed, None])
+    # Parameters that stand for one another leave a matrix that can hardly be inverted.
+    inverse = np.linalg.inv(rows @ rows.T + 1e-12 * np.eye(len(rows)))
+    found[informed] = np.sqrt(np.diag(inverse)) / sizes[informed]
+    return np.minimum(found, NO_BOUND)
 
 
 @dataclass(frozen=True, eq=False)

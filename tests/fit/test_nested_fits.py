@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.nested_fits import advice, fit_models, is_within, ranked
-from biogrip.fit.problem import Identification, Problem
+from biogrip.fit.problem import CaseProblem, Identification, Problem
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.misfit import SeriesMisfit
 from biogrip.physics.models import CANDIDATES, MODELS, contained

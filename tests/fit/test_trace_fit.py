@@ -8,10 +8,9 @@ from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.multi_start import identify_from
 from biogrip.fit.noise_model_fit import FAR
-from biogrip.fit.problem import Identification, Problem
+from biogrip.fit.problem import CaseProblem, Identification, Problem
 from biogrip.fit.trace_fit import trace_fit
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, Outliers, add_noise

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.problem import CaseProblem
 from biogrip.fit.trace_fit import gripper_functions
 from biogrip.physics.simulation import simulated_rotation
 from tests.helpers.default import STUDY

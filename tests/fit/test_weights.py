@@ -7,8 +7,7 @@ import pytest
 from scipy.optimize import curve_fit
 
 from biogrip.arrays import Array
-from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.problem import Identification, Problem
+from biogrip.fit.problem import CaseProblem, Identification, Problem
 from biogrip.fit.trace_fit import trace_fit
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.library import set_up

@@ -16,7 +16,7 @@ from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS
 from biogrip.physics.noise import Noise, add_noise
 from biogrip.physics.protocol import TorqueHistory, sample_times, torque_history
-from biogrip.physics.residuals import Residuals
+from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel
 from biogrip.physics.whitening import nuisance_basis
 from tests.helpers.default import STUDY
@@ -78,17 +78,9 @@ def problem_alone(
 
     Assumed is as `condensed_of`'s.
     """
-    return make_problem(
-        gripper,
-        model,
-        torque,
-        time_s,
-        rotation_rad,
-        STUDY.ranges,
-        condensed or condensed_of(torque, time_s, **assumed),
-        noise_rad=noise_rad,
-        instrument=INSTRUMENTS["rotation"],
-    )
+    rows = condensed or condensed_of(torque, time_s, **assumed)
+    given = gripper, model, torque, Trace(time_s, rotation_rad, rows, noise_rad)
+    return make_problem(Residuals(*given, instrument=INSTRUMENTS["rotation"]), STUDY.ranges)
 
 
 def condensed_rows(residuals: Residuals, x: Array) -> tuple[Array, Array]:

@@ -13,10 +13,9 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from biogrip.arrays import Array
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.multi_start import fit_from
-from biogrip.fit.problem import silent
+from biogrip.fit.problem import CaseProblem, silent
 from biogrip.physics.whitening import estimate_noise
 
 _BUDGET = LeastSquaresSettings(candidates=1000, starts=16)

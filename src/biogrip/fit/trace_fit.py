@@ -5,7 +5,7 @@ Then the best fit, the autocorrelation of its residuals and the effect of the gr
 are computed in turn, until none of them changes.
 """
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,11 +13,9 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
 from biogrip.errors import BiogripError
-from biogrip.fit.case_problem import NOT_FITTED, CaseProblem
 from biogrip.fit.multi_start import fit_from
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
-from biogrip.fit.problem import Identification, Problem
-from biogrip.physics.condensed import Condensed
+from biogrip.fit.problem import CaseProblem, Identification, Problem
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.simulation import simulated_rotation
@@ -66,15 +64,12 @@ _Instrument = tuple[Gripper, TorqueHistory]
 def _pairs(case_problem: CaseProblem) -> Iterator[tuple[_Instrument, ...]]:
     """Yield two instruments for each uncertain property, one above and one below its value."""
     gripper, torque = case_problem.gripper, case_problem.torque
-    for name, known in case_problem.uncertainty.items():
-        for key, uncertainty in known.items():
-            if not uncertainty or key == NOT_FITTED:
-                continue
-            errors = (uncertainty, -uncertainty)
-            if name == "torque":
-                yield tuple((gripper, torque.times(1 + error)) for error in errors)
-            else:
-                yield tuple((_changed(gripper, name, key, error), torque) for error in errors)
+    for part, key, uncertainty in case_problem.uncertain:
+        errors = (uncertainty, -uncertainty)
+        if part == "torque":
+            yield tuple((gripper, torque.times(1 + error)) for error in errors)
+        else:
+            yield tuple((_changed(gripper, part, key, error), torque) for error in errors)
 
 
 def _changed(gripper: Gripper, name: str, key: str, error: float) -> Gripper:
@@ -158,15 +153,7 @@ def fit_traces(
     rotations, and has assumptions of its own.
     """
     plain = [trace for trace, case_problem in enumerate(case_problems) if case_problem.plain]
-    # Traces with the same rows are fitted together.
-    rows: dict[Hashable, Condensed] = {}
-    problems = []
-    for trace in plain:
-        case_problem, (time_s, rotation_rad) = case_problems[trace], traces[trace]
-        key = case_problem.sets_condensed(time_s)
-        if key not in rows:
-            rows[key] = case_problem.condensed(time_s)
-        problems.append(case_problem.of(time_s, rotation_rad, condensed=rows[key]))
+    problems = [case_problems[trace].of(*traces[trace]) for trace in plain]
     optima = find(problems, plain) if plain else []
     found = {
         trace: TraceFit(problem, optimum, None, np.zeros(len(traces[trace][0]), dtype=bool))

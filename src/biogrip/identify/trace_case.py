@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
+from biogrip.fit.problem import CaseProblem
 from biogrip.physics.protocol import is_held, largest_load
 from biogrip.physics.whitening import drift_is_flow, estimate_noise
 from biogrip.records.traces import Measurements

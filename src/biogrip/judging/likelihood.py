@@ -27,8 +27,7 @@ from statistics import NormalDist
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import CaseProblem, Problem
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import Noise, standard_deviation
@@ -162,8 +161,6 @@ def compute_fall(
 
 # Members with a smaller share in a sum are neglected, whatever their uncertainty.
 _NEGLIGIBLE = 1e-2
-# Information that every direction has at least, as a share: just above rounding.
-_HARDLY = 1e-14
 
 
 def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
@@ -204,10 +201,9 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
     # Rows of length one, for parameters may differ by decades in their information.
     length = np.sqrt(np.sum(j**2, axis=1))
     j = j / length[:, None]
-    # Parameters that stand for one another leave a matrix without an inverse.
-    prior = _HARDLY * np.eye(len(j))
-    inverse, scattered = np.linalg.inv(j @ j.T + prior), j * (sigma / scale)
-    within = inverse @ (scattered @ scattered.T + prior) @ inverse / np.outer(length, length)
+    inverse = np.linalg.pinv(j @ j.T, hermitian=True, rcond=1e-12)
+    scattered = j * (sigma / scale)
+    within = inverse @ (scattered @ scattered.T) @ inverse / np.outer(length, length)
     found[np.ix_(informed, informed)] = within
     return found
 

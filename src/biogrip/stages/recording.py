@@ -10,8 +10,8 @@ import numpy as np
 from biogrip.arrays import BoolArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFits
+from biogrip.fit.problem import CaseProblem
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.whitening import MOST_SAMPLES

@@ -349,7 +349,7 @@ def _medians(
     nuisance = problem.offset + problem.drift
     if len(time_s) <= len(searched.names) + nuisance + 1:
         return []
-    problems = problem.of_each(time_s, traces)
+    problems = [problem.of(time_s, trace) for trace in traces]
     rngs = [stream(study_seed, name, seed, "contact_loss") for seed in range(len(traces))]
     found = identify_many(problems, case.least_squares, rngs)
     values = [

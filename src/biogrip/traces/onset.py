@@ -17,8 +17,8 @@ from scipy.special import chdtri, stdtrit
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import instant, plain
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFit, OnsetFits
+from biogrip.fit.problem import CaseProblem
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import compute_fall, make_likelihood
