@@ -9,7 +9,8 @@ import pytest
 
 from biogrip import library
 from biogrip.arrays import Array
-from biogrip.fit import least_squares, multi_start
+from biogrip.fit import least_squares
+from biogrip.fit.least_squares import best_of_starts, fit_from, refine_optima
 from biogrip.fit.levenberg_marquardt import Normal, bounded_step
 from biogrip.fit.local_fits import PRIOR_WIDTH, ROUGH, LocalFits, alike
 from biogrip.fit.methods import (
@@ -20,7 +21,6 @@ from biogrip.fit.methods import (
     near_noise,
     near_noise_words,
 )
-from biogrip.fit.multi_start import best_of_starts, fit_from, refine_optima
 from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
@@ -96,7 +96,7 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
         return of_many(residuals, x, slopes=slopes)
 
     of_one, of_many = Residuals.__call__, Residuals.condensed_responses
-    monkeypatch.setattr(multi_start, "refine_optima", settled_silently)
+    monkeypatch.setattr(least_squares, "refine_optima", settled_silently)
     monkeypatch.setattr(Residuals, "__call__", at_one)
     monkeypatch.setattr(Residuals, "condensed_responses", at_many)
     assert run(method, replace(posed, misfit=misfit)).evaluations == counted[0]

@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.fit.multi_start import identify_from
+from biogrip.fit.least_squares import identify_from
 from biogrip.fit.noise_model_fit import FAR
 from biogrip.fit.problem import CaseProblem, Identification, Problem
 from biogrip.fit.trace_fit import trace_fit

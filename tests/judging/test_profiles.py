@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm, t
 
 from biogrip.arrays import Array
-from biogrip.fit.multi_start import fit_from
+from biogrip.fit.least_squares import fit_from
 from biogrip.judging.constrained_fits import QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood

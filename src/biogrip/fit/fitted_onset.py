@@ -13,8 +13,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from biogrip.arrays import Array
-from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
-from biogrip.fit.multi_start import fit_from
+from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import CaseProblem, silent
 from biogrip.physics.whitening import estimate_noise
 

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.fit.genetic import Evolution, GeneticSettings, evolve
-from biogrip.fit.multi_start import best_of_starts
+from biogrip.fit.least_squares import best_of_starts
 from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
 from biogrip.keys import Block
 

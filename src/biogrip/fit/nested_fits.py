@@ -25,8 +25,7 @@ from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import plain
-from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
-from biogrip.fit.multi_start import descend_from, fit_from
+from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.physics.models import CANDIDATES, as_richer, contained, contained_in, different_in
 from biogrip.physics.sample_model import SampleModel
@@ -145,7 +144,8 @@ def _add_branches(name: str, problems: Sequence[Problem], found: dict[str, Answe
         if not pairs:
             continue
         traces = [trace for trace, _ in pairs]
-        ends = descend_from([problems[t] for t in traces], np.array([x for _, x in pairs]))
+        starts = np.array([x for _, x in pairs])
+        ends = fit_from([problems[t] for t in traces], starts, roughly=True)
         for trace, x, misfit_rad in zip(traces, ends.x, ends.misfit_rad.tolist(), strict=True):
             if _is_noticeably_lower(misfit_rad, found[name][trace].misfit_rad, problems[trace]):
                 found[name][trace] = _better_from(found[name][trace], problems[trace], x)

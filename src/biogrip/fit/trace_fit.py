@@ -13,7 +13,7 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
 from biogrip.errors import BiogripError
-from biogrip.fit.multi_start import fit_from
+from biogrip.fit.least_squares import fit_from
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
 from biogrip.fit.problem import CaseProblem, Identification, Problem
 from biogrip.physics.gripper import Gripper

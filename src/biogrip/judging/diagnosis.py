@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biogrip.digits import plain
-from biogrip.fit.multi_start import descend_from, fit_from
+from biogrip.fit.least_squares import fit_from
 from biogrip.fit.problem import Identification, Problem
 from biogrip.judging.doubts import (
     DOUBT,
@@ -195,7 +195,7 @@ def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
             start, low, high = x.copy(), problem.low.copy(), problem.high.copy()
             start[index] += outward * _BEYOND
             (low if outward < 0 else high)[index] += outward * _WIDER
-            wider = descend_from([replace(problem, low=low, high=high)], start)
+            wider = fit_from([replace(problem, low=low, high=high)], start, roughly=True)
             if likelihood.increase(float(wider.misfit_rad[0])) < -_NOTICEABLE:
                 unit = f" {parameter.unit}" if parameter.unit else ""
                 yield Note(

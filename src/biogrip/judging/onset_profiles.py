@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from biogrip.arrays import Array
 from biogrip.fit.fitted_onset import spacing_at
-from biogrip.fit.multi_start import fit_from
+from biogrip.fit.least_squares import fit_from
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.profiles import Profile, compute_profiles

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
+from biogrip.fit.least_squares import fit_from
 from biogrip.fit.methods import best_fit, identifier
-from biogrip.fit.multi_start import fit_from
 from biogrip.fit.problem import CaseProblem, Identification, Problem, silent
 from biogrip.fit.trace_fit import trace_fit
 from biogrip.judging.likelihood import MISSED, Likelihood, covariance, make_likelihood
