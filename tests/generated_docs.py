@@ -23,7 +23,7 @@ import biogrip.records
 from biogrip.cli import main
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
-from biogrip.fit.methods import best_fit, share_in_words, share_with_limits
+from biogrip.fit.methods import identifier, share_in_words, share_with_limits
 from biogrip.fit.problem import silent
 from biogrip.page.answers import (
     compared_rows,
@@ -274,12 +274,12 @@ def slow_branch() -> str:
     seeds = range(case.seeds)
     rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in seeds]
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
+    identify = identifier("least_squares", case.least_squares)
     free, held = (
-        np.array([best_fit(it, case.least_squares, rng, silent).misfit_rad for it, rng in each])
-        for each in (
-            zip([problem.of(time_s, trace) for trace in traces], rngs, strict=True)
-            for problem in posed
+        np.array(
+            [each.misfit_rad for each in identify([it.of(time_s, t) for t in traces], rngs, silent)]
         )
+        for it in posed
     )
     limit = chi2.ppf(case.confidence, 1)
     fits = int(np.sum(len(time_s) * ((held / free) ** 2 - 1) < limit))

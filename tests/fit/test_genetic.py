@@ -156,9 +156,7 @@ def test_populations_are_what_they_are_alone_and_gene_by_gene(name: str) -> None
 
 
 def test_polished_populations_are_as_if_alone() -> None:
-    settings = genetic_refined.RefinedSettings(
-        replace(SMALL, max_generations=8), genetic_refined.Polishing(2, 1)
-    )
+    settings = replace(SMALL, max_generations=8), genetic_refined.Polishing(2, 1)
     problems, polished = posed(2), genetic_refined.identify_many
     alone = [polished([p], settings, [rng_of(s)])[0] for s, p in enumerate(problems)]
     found = polished(problems, settings, [rng_of(0), rng_of(1)])

@@ -5,7 +5,7 @@ Then the best fit, the autocorrelation of its residuals and the effect of the gr
 are computed in turn, until none of them changes.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +16,6 @@ from biogrip.errors import BiogripError
 from biogrip.fit.least_squares import fit_from
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
 from biogrip.fit.problem import CaseProblem, Identification, Problem
-from biogrip.physics.gripper import Gripper
-from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, drift_is_flow
 
@@ -47,37 +45,26 @@ def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Arra
     """
     network = case_problem.searched.network(parameters)
 
-    def simulated(gripper: Gripper, torque: TorqueHistory) -> Array:
+    def rotation(part: str = "", key: str = "", error: float = 0.0) -> Array:
+        gripper, torque = case_problem.gripper, case_problem.torque
+        if part == "torque":
+            torque = torque.times(1 + error)
+        elif part == "gripper":
+            gripper = replace(gripper, **{key: getattr(gripper, key) + error})
+        elif part:
+            arm = getattr(gripper, part)
+            arm = replace(arm, **{key: getattr(arm, key) + error})
+            gripper = replace(gripper, **{part: arm})
         return simulated_rotation(gripper, network, torque, time_s, nonlinear=False)[0]
 
-    pairs = [(simulated(*above), simulated(*below)) for above, below in _pairs(case_problem)]
-    if not pairs:
+    if not case_problem.uncertain:
         return np.zeros((0, len(time_s)))
-    above, below = np.stack(pairs, axis=1)
-    second = 0.5 * (above + below) - simulated(case_problem.gripper, case_problem.torque)
+    above, below = (
+        np.array([rotation(part, key, sign * error) for part, key, error in case_problem.uncertain])
+        for sign in (1, -1)
+    )
+    second = 0.5 * (above + below) - rotation()
     return np.vstack((0.5 * (above - below), _SECOND_ORDER * second))
-
-
-_Instrument = tuple[Gripper, TorqueHistory]
-
-
-def _pairs(case_problem: CaseProblem) -> Iterator[tuple[_Instrument, ...]]:
-    """Yield two instruments for each uncertain property, one above and one below its value."""
-    gripper, torque = case_problem.gripper, case_problem.torque
-    for part, key, uncertainty in case_problem.uncertain:
-        errors = (uncertainty, -uncertainty)
-        if part == "torque":
-            yield tuple((gripper, torque.times(1 + error)) for error in errors)
-        else:
-            yield tuple((_changed(gripper, part, key, error), torque) for error in errors)
-
-
-def _changed(gripper: Gripper, name: str, key: str, error: float) -> Gripper:
-    """Return a gripper with a property of its own or of an arm changed."""
-    if name == "gripper":
-        return replace(gripper, **{key: getattr(gripper, key) + error})
-    arm = getattr(gripper, name)
-    return replace(gripper, **{name: replace(arm, **{key: getattr(arm, key) + error})})
 
 
 _ROUNDS = 5
@@ -123,15 +110,13 @@ class TraceFit:
             return []
         read = self.problem.residuals.instrument.read.name
         noise_model, left_out = self.noise_model, int(np.count_nonzero(self.outliers))
-        parts = [f"{_percent(noise_model.white)} white"]
-        if noise_model.ar1 >= _WORTH_SAYING:
-            parts.append(
-                f"{_percent(noise_model.ar1)} correlated over some {noise_model.time_s:.2g} s"
-            )
-        if noise_model.flicker >= _WORTH_SAYING:
-            parts.append(f"{_percent(noise_model.flicker)} 1/f")
-        if noise_model.proportional >= _WORTH_SAYING:
-            parts.append(f"{_percent(noise_model.proportional)} that grows with the {read}")
+        others = {
+            f"correlated over some {noise_model.time_s:.2g} s": noise_model.ar1,
+            "1/f": noise_model.flicker,
+            f"that grows with the {read}": noise_model.proportional,
+        }
+        parts = [f"{100 * noise_model.white:.0f} % white"]
+        parts += [f"{100 * n:.0f} % {what}" for what, n in others.items() if n >= _WORTH_SAYING]
         said = [
             f"Noise model: of the variance {', '.join(parts)};{self.fitted_along} "
             "the intervals allow for all of it."
@@ -291,7 +276,3 @@ def _alike(one: NoiseModel | None, other: NoiseModel | None) -> bool:
     shares = sum(abs(getattr(one, name) - getattr(other, name)) for name in names)
     times = min(one.ar1, other.ar1) * abs(np.log(one.time_s / other.time_s))
     return bool(shares + times < _CONVERGED)
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %"

@@ -14,9 +14,9 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.fit.least_squares import fit_from
-from biogrip.fit.methods import best_fit, identifier
+from biogrip.fit.methods import identifier
 from biogrip.fit.problem import CaseProblem, Identification, Problem, silent
-from biogrip.fit.trace_fit import trace_fit
+from biogrip.fit.trace_fit import fit_traces
 from biogrip.judging.likelihood import MISSED, Likelihood, covariance, make_likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.profiles import compute_profiles
@@ -133,21 +133,17 @@ def _optima(
     group: Sequence[int],
     time_s: Array,
     traces: list[Array],
-) -> Iterator[tuple[Problem, Identification]]:
-    """Yield problems and fits of traces, fitted together if their noise is white."""
+) -> list[tuple[Problem, Identification]]:
+    """Return problems and fits of traces, fitted together if their noise is white."""
     rngs = [stream(case.study.study_seed, case.name, seed, "coverage") for seed in group]
-    if case_problem.plain:
-        problems = [case_problem.of(time_s, trace) for trace in traces]
-        identify = identifier("least_squares", case.least_squares)
-        yield from zip(problems, identify(problems, rngs, silent), strict=True)
-        return
-    for trace, rng in zip(traces, rngs, strict=True):
+    identify = identifier("least_squares", case.least_squares)
 
-        def find(problem: Problem, rng: np.random.Generator = rng) -> Identification:
-            return best_fit(problem, case.least_squares, rng, silent)
+    def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
+        return identify(problems, [rngs[index] for index in which], silent)
 
-        fit = trace_fit(case_problem, time_s, trace, find)
-        yield fit.problem, fit.found
+    posed = [case_problem] * len(traces)
+    fits = fit_traces(posed, [(time_s, trace) for trace in traces], find)
+    return [(fit.problem, fit.found) for fit in fits]
 
 
 def refitted(likelihood: Likelihood, missed: Array, confidence: float) -> Likelihood | None:
