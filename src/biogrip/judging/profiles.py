@@ -37,8 +37,8 @@ HIGHEST = 16.0
 # Largest difference between neighbours of the square root of the increase, which is nearly linear.
 _STEP = 0.3
 _MOST_ROUNDS = 8
-NEWS = 1e-3
-"""Improvement of a fit, relative to 1 + increase of chi^2, that has its neighbours fitted again."""
+# Improvement of a fit, relative to 1 + increase of chi^2, that has its neighbours fitted again.
+_NEWS = 1e-3
 
 
 class Points:
@@ -88,16 +88,8 @@ class Points:
     def _try(self, point: IntArray, start: IntArray, tolerance: float) -> BoolArray:
         """Fit points from other points' fits; return a mask of those that have improved much."""
         profile, targets = self.profile[point], self.values[point]
-        increases, x = self.fits.at(profile, targets, self.x[start], tolerance)
-        news = np.zeros(len(self.values), dtype=bool)
-        # A point may be fitted from both sides, so one side after the other.
-        for side in (point <= start, point > start):
-            before, after = self.increases[point[side]], increases[side]
-            news[point[side]] |= after < before - NEWS * (1 + np.abs(after))
-            better = after < before
-            at = point[side][better]
-            self.increases[at], self.x[at] = after[better], x[side][better]
-        return news
+        found = self.fits.at(profile, targets, self.x[start], tolerance)
+        return _keep_lower(self.increases, self.x, point, *found)
 
     def ends(self) -> IntArray:
         """Return the indices of the first and last point of every profile, (2, n_profiles)."""
@@ -157,6 +149,22 @@ class Points:
         self._optimum = np.insert(self._optimum, right, False)
         self.increases = np.insert(self.increases, right, np.min(increases, axis=0))
         self.x = np.insert(self.x, right, x, axis=0)
+
+
+def _keep_lower(
+    increases: Array, x: Array, point: IntArray, found: Array, fitted: Array
+) -> BoolArray:
+    """Keep, in place, fits of points that are lower; return a mask of points that improved much.
+
+    Several fits may be of one point.
+    """
+    news = np.zeros(len(increases), dtype=bool)
+    for at, increase, parameters in zip(point.tolist(), found.tolist(), fitted, strict=True):
+        before = increases[at]
+        if increase < before:
+            news[at] |= increase < before - _NEWS * (1 + abs(increase))
+            increases[at], x[at] = increase, parameters
+    return news
 
 
 # Points near the best fit, in standard deviations, that every profile has.
@@ -360,12 +368,8 @@ def _increases(
     neighbours = np.stack([beside[i : i + rows, j : j + columns].ravel() for i, j in shifts])
     tolerance = FAIR
     while len(points):
-        found, fitted = fits.with_fixed(start, fixed, tolerance)
-        news = np.zeros(len(x), dtype=bool)
-        for point, increase, parameters in zip(points, found, fitted, strict=True):
-            if increase < increases[point]:
-                news[point] |= increase < increases[point] - NEWS * (1 + abs(increase))
-                increases[point], x[point] = increase, parameters
+        found = fits.with_fixed(start, fixed, tolerance)
+        news = _keep_lower(increases, x, points, *found)
         origin = np.repeat(np.flatnonzero(news), 4)
         points = neighbours[:, news].T.ravel()
         origin, points = origin[points >= 0], points[points >= 0]
