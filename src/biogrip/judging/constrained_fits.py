@@ -239,10 +239,6 @@ class ConstrainedFits:
         self.missed: dict[int, tuple[float, Array]] = {}
         self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
-        # Fewer readings than twice the parameters leave long valleys, whose last bit is no matter:
-        # steps end that lower chi^2 by less than 0.1 % of its few degrees of freedom.
-        few = self._residuals.samples < 2 * self.best.shape[1]
-        self._coarser = 1e4 if few else 1.0
         scale_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
         # Ratio of chi^2 to the fits' sums of squares.
         self._ratio = (scale_rad / self._noise_rad) ** 2
@@ -273,7 +269,7 @@ class ConstrainedFits:
         low, high = self._fits.low[trace], self._fits.high[trace]
         last_s = self._residuals.duration_s
         constraint = QuantityConstraint(self.quantities, which, targets, low, high, last_s)
-        found = self._fits.fitted(near, trace, self._coarser * tolerance, constraint=constraint)
+        found = self._fits.fitted(near, trace, tolerance, constraint=constraint)
         price = constraint.price(found.x) * self._ratio[trace]
         return self._increases(found, trace) + price, found.x
 
