@@ -128,15 +128,8 @@ def evolve_many(
 ) -> list[Evolution]:
     """Run the genetic algorithm with one population for each random generator.
 
-    Parameters
-    ----------
-    misfits
-        Function of parameters, (n_populations, n, n_parameters), and of the indices of
-        those populations, (n_populations,), that returns misfits.
-    genome
-        Encoding of the parameters.
-    settings, rngs, progress
-        As in `identify_many`, with a generator for each population.
+    Misfits are a function of parameters, (n_populations, n, n_parameters), and of the indices of
+    those populations, (n_populations,).
     """
 
     def ranked(chromosomes: Chromosomes, populations: IntArray) -> Ranking:
@@ -203,22 +196,10 @@ def _identification(course: list[Row], has_stalled: bool) -> Identification:
 def select(
     chromosomes: Chromosomes, ranking: Ranking, genome: Genome, count: int
 ) -> tuple[Chromosomes, Ranking]:
-    """Select the best individuals of each population, best first.
+    """Select the best individuals of each population by their misfits, best first.
 
-    Parameters
-    ----------
-    chromosomes : (n_populations, n, n_genes)
-    ranking : (n_populations, n)
-        Their misfits; NaN is ranked last. Of equals the one with the lowest genes is first.
-    genome
-        Encoding of the parameters.
-    count
-        Number of individuals to select.
-
-    Returns
-    -------
-    chromosomes : (n_populations, count, n_genes)
-    ranking : (n_populations, count)
+    Chromosomes are (n_populations, n, n_genes), misfits (n_populations, n). NaN is ranked last. Of
+    equals the one with the lowest genes is first.
     """
     # As by `numpy.lexsort((*keys, ranking))`, in a third of its time.
     keys: list[NDArray[Any]] = [*genome.keys(chromosomes), ranking]
@@ -241,18 +222,7 @@ def cross(
 ) -> Chromosomes:
     """Produce children by single-point crossover; both children of a pair are kept.
 
-    Parameters
-    ----------
-    parents : (n_populations, n_parents, n_genes)
-        Best first.
-    settings
-        Settings of mating.
-    rngs
-        A generator for each population.
-
-    Returns
-    -------
-    (n_populations, n_children, n_genes)
+    Parents and children are (n_populations, n, n_genes), parents best first.
     """
     populations, count, genes = parents.shape
     n_children = settings.population - settings.survivors
@@ -290,18 +260,7 @@ def mutate(
     settings: GeneticSettings,
     rngs: Sequence[np.random.Generator],
 ) -> None:
-    """Mutate individuals in place: redraw random genes of a random share of them.
-
-    Parameters
-    ----------
-    chromosomes : (n_populations, n, n_genes)
-    genome
-        Encoding of the parameters.
-    settings
-        Settings of mutation.
-    rngs
-        A generator for each population.
-    """
+    """Mutate individuals, (n_populations, n, n_genes), in place: redraw genes of some of them."""
     for own, rng in zip(chromosomes, rngs, strict=True):
         mutating = np.flatnonzero(rng.random(len(own)) < settings.mutation_probability)
         for _ in range(settings.mutated_genes):

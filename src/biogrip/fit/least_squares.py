@@ -47,17 +47,8 @@ def identify_many(
 ) -> list[Identification]:
     """Identify samples by local fits from the best of many random points.
 
-    Parameters
-    ----------
-    problems, settings, rngs, progress
-        As in `biogrip.fit.methods`; `progress` is called after every trace.
-    further
-        Additional starts of each trace, log-parameters (n_further, n_parameters).
-
-    Raises
-    ------
-    BiogripError
-        If the model has no response at any of the points.
+    Further starts of each trace are log-parameters, (n_further, n_parameters). `progress` is called
+    after every trace. If the model has no response at any of the points, it is a `BiogripError`.
     """
     pairs = zip(problems, rngs, strict=True)
     points = [_screened(problem, settings, rng) for problem, rng in pairs]
@@ -96,17 +87,8 @@ def best_of_starts(
     """Fit every trace from each of its starts and return the optima of lowest misfit.
 
     Misfits are compared in single precision and the first of equals wins, so that the
-    last bits, which differ between processors, decide nothing.
-
-    Parameters
-    ----------
-    problems, starts
-        One problem per trace, and its starts, log-parameters (n_starts, n_parameters).
-    before
-        First row of the history of each trace: parameters, lowest and median misfit, and
-        evaluations before the first fit.
-    progress
-        Called after every trace.
+    last bits, which differ between processors, decide nothing. Starts of each trace are
+    log-parameters, (n_starts, n_parameters); the first row of its history is what was before.
     """
     answers: dict[int, Identification] = {}
     for group in alike(problems):
@@ -238,21 +220,10 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     the steps are Newton's. The first are damped, and compared on condensed rows. Each of the last
     is compared, on all readings, with the point before it, and kept only if it fits no worse.
 
-    Parameters
-    ----------
-    fits
-        The traces.
-    found
-        Optima, fitted with the finest tolerance.
-    trace : (n,)
-        Index of the trace that each was fitted to.
-
-    Returns
-    -------
-    Minima
-        Optima with their misfits on all readings, none above that of `found`, and the
-        evaluations of the refinement; branches sorted by relaxation time. An optimum has
-        converged if its next step would not change chi^2 noticeably.
+    Found are optima, fitted with the finest tolerance, each to the trace of an index, (n,).
+    Returned are optima with their misfits on all readings, none above that of `found`, and the
+    evaluations of the refinement; branches sorted by relaxation time. An optimum has converged if
+    its next step would not change chi^2 noticeably.
     """
 
     def convex(x: Array, fit: IntArray) -> Normal:

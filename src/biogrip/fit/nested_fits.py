@@ -53,26 +53,12 @@ def fit_models(
     done: Callable[[], None],
     near: Mapping[str, Array] | None = None,
 ) -> dict[str, Answers]:
-    """Fit nested models to traces by least squares.
+    """Fit nested models to traces by least squares, and return the best fit to each trace.
 
-    Parameters
-    ----------
-    problems
-        By candidate, the problems of the same traces.
-    settings
-        The budget of each fit.
-    rngs
-        By candidate, a random generator for each trace.
-    done
-        Called after every model.
-    near
-        By candidate, additional starts, log-parameters (n_traces, n_parameters).
-
-    Returns
-    -------
-    dict of list of Identification
-        By candidate, in the given order, the best fit to each trace. Parameters may be zero or
-        infinite. A fit worse than a nested model's within its own range has not converged.
+    By candidate, the problems of the same traces are given, a random generator for each of these,
+    and additional starts, log-parameters (n_traces, n_parameters); `done` is called after every
+    model. Parameters found may be zero or infinite. A fit worse than a nested model's within its
+    own range has not converged.
     """
     found: dict[str, Answers] = {}
     for name in sorted(problems, key=lambda each: len(CANDIDATES[each].model.names)):

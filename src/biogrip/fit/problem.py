@@ -240,10 +240,7 @@ class CaseProblem:
     def calibrated(self, files: Sequence[Path]) -> "CaseProblem":
         """Take the arms of the first calibration file (YAML), if there is one.
 
-        Raises
-        ------
-        BiogripError
-            If the calibration cannot be read.
+        If it cannot be read, it is a `BiogripError`.
         """
         if not files:
             return self
@@ -299,16 +296,9 @@ class CaseProblem:
     ) -> Condensed:
         """Condense the readings for autocorrelated noise or an uncertain gripper.
 
-        Parameters
-        ----------
-        time_s : (n_samples,)
-            Ascending sampling times.
-        noise_model
-            Autocorrelation model of the noise; None if it is white.
-        uncertain : (n_functions, n_samples)
-            Functions added with a random amplitude, see `with_uncertain`.
-        growing : (n_samples,), optional
-            Rotation that noise grows with, see `Whitening`.
+        Noise without a model is white. Uncertain are functions added with a random amplitude, see
+        `with_uncertain`; noise may grow with a rotation, see `Whitening`: (n_functions, n_samples)
+        and (n_samples,).
         """
         nuisance, whitening = self.nuisance(time_s), None
         if noise_model is None and self.sd_rad is not None:

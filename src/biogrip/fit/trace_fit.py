@@ -32,11 +32,8 @@ def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Arra
     and has the amplitude of an error of three standard uncertainties. Without it limits would be
     too narrow where the noise is far below the square.
 
-    Returns
-    -------
-    (2 n_properties, n_times)
-        Changes in rad of first order, a row for each uncertain property, then those of second, at
-        ascending times and with the searched parameters (n_parameters,).
+    Rows are changes in rad at ascending times, (2 n_properties, n_times), those of first order of
+    each uncertain property, then those of second.
 
     References
     ----------
@@ -162,21 +159,8 @@ def trace_fit(
     With a coloured noise model, outliers are removed, and the noise is a sum of white,
     Ornstein-Uhlenbeck and 1/f noise. If it grows with the rotation, so does a part of the white
     noise: the parts whose readings depend on each other are of the instrument's zero. The
-    effect of the gripper's uncertainty on the rotation is one more component of the noise.
-
-    Parameters
-    ----------
-    case_problem
-        Assumptions of the identification.
-    time_s, rotation_rad : (n_samples,)
-        The trace, times ascending.
-    find
-        Function that finds the global optimum.
-
-    Raises
-    ------
-    BiogripError
-        If the trace has too many readings for a coloured noise model.
+    effect of the gripper's uncertainty on the rotation is one more component of the noise. `find`
+    finds a global optimum. Too many readings for a coloured noise model are a `BiogripError`.
     """
     kept = np.ones(len(time_s), dtype=bool)
     if not case_problem.coloured:
