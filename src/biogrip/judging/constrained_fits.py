@@ -33,15 +33,9 @@ _SMALLEST = 1e-200
 class QuantityConstraint:
     """A constraint on each of n fits, which holds one quantity at a given value.
 
-    Parameters
-    ----------
-    quantities, which, targets
-        Quantities that may be held; index of the one that each fit holds, (n,), and the logarithm
-        of its value, within the quantity's range, (n,).
-    low, high : (n, n_parameters)
-        Bounds of the log-parameters of each fit.
-    longest_s
-        Time within which branches must relax for quantities that require it.
+    Of the quantities that may be held, each fit has the index of its own, (n,), and the logarithm
+    of its value, within the quantity's range. Bounds of the log-parameters are (n, n_parameters).
+    Branches must relax within a time for quantities that require it.
     """
 
     def __init__(
@@ -199,14 +193,8 @@ Along a valley, a fit to the last digit takes three times as many steps.
 class ConstrainedFits:
     """Fits of several traces with one of several quantities held at given values.
 
-    Each profile belongs to a trace and a quantity; those of the first trace come first.
-
-    Parameters
-    ----------
-    likelihoods
-        One per trace; their problems have to be `alike`.
-    quantities
-        Quantities that may be held.
+    Each profile belongs to a trace and a quantity; those of the first trace come first. The
+    problems of the traces have to be `alike`.
 
     Attributes
     ----------
@@ -248,22 +236,10 @@ class ConstrainedFits:
     ) -> tuple[Array, Array]:
         """Minimize chi^2 over all parameters with one quantity held at a value.
 
-        Parameters
-        ----------
-        profile, targets : (n,)
-            Index of the profile: the trace that is fitted and the quantity that is held; and the
-            logarithm at which it is held, within its range.
-        near : (n, n_parameters)
-            Starts, log-parameters; moved onto the constraint.
-        tolerance
-            Of the fits, see `biogrip.fit.local_fits`.
-
-        Returns
-        -------
-        increases : (n,)
-            Increase of chi^2 over each trace's optimum.
-        log_parameters : (n, n_parameters)
-            Fitted log-parameters, on the constraint up to rounding.
+        A profile has the trace that is fitted and the quantity that is held, the target is the
+        logarithm at which it is held, within its range; both (n,). Starts near the fit are
+        log-parameters, (n, n_parameters), moved onto the constraint. Returns the increases of chi^2
+        over each trace's optimum, (n,), and the fitted log-parameters.
         """
         trace, which = np.divmod(profile, len(self.quantities))
         low, high = self._fits.low[trace], self._fits.high[trace]

@@ -91,18 +91,9 @@ def diagnose_all(
 ) -> list[Diagnosis]:
     """Judge the identification of each of several traces by profile likelihoods.
 
-    No diagnosis depends on the other traces.
-
-    Parameters
-    ----------
-    problems, model
-        The traces, and the model whose parameters were searched.
-    found
-        Global optimum of each, as far as is known.
-    confidence
-        Of the limits, e.g. 0.95.
-    noise_rad
-        Standard deviation of the noise of each, if it is known; else that of the residual.
+    No diagnosis depends on the other traces. Found are their global optima, as far as is known; the
+    noise of each, if its standard deviation is not known, is that of the residual. Limits have a
+    confidence, e.g. 0.95.
     """
     best, done = list(found), dict[int, Diagnosis]()
     while left := [trace for trace in range(len(problems)) if trace not in done]:

@@ -315,16 +315,11 @@ def compute_valley(
 ) -> tuple[dict[str, Any] | None, Array | None]:
     """Compute the increase of chi^2 over two exchangeable parameters, with the others fitted.
 
-    Returns
-    -------
-    dict or None
-        ``x`` and ``y``, names and units; ``best``; and under ``grids``, one along the
-        valley of constant sum and one along its arm of constant second parameter,
-        ``x_values``, ``y_values`` and ``increases``, nested lists.
-        None unless exactly two exchangeable parameters were searched, among others.
-    (n_parameters,) or None
-        Log-parameters whose chi^2 is clearly below that of the optimum, which is not the
-        global one.
+    The first returned has ``x`` and ``y``, names and units; ``best``; and under ``grids``, one
+    along the valley of constant sum and one along its arm of constant second parameter,
+    ``x_values``, ``y_values`` and ``increases``, nested lists. It is None unless exactly two
+    exchangeable parameters were searched, among others. The second are log-parameters whose chi^2
+    is clearly below that of the optimum, which is then not the global one, or None.
     """
     pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
     if len(pair) != 2 or len(model.parameters) == 2:
