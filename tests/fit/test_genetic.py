@@ -15,10 +15,9 @@ from biogrip.fit.genome import GeneRange, lowest_encodable, make_genome, nearest
 from biogrip.fit.problem import Identification, Problem
 from biogrip.physics.misfit import Misfit, combine_misfits
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.noise import rms
 from biogrip.physics.sample_model import with_fixed
 from tests.helpers.plain_genetic import identified
-from tests.helpers.problems import SAMPLES, case_problem, clean, problem
+from tests.helpers.problems import case_problem, clean
 
 PAPER = GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 20, 40, 200)
 SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)
@@ -92,25 +91,6 @@ def test_survivors_that_mutate_are_evaluated_again_and_the_best_is_kept() -> Non
     children_only = run(replace(settings, mutants="children"))
     assert np.array_equal(answer.history.best_misfit[:5], children_only.history.best_misfit[:5])
     assert not np.array_equal(answer.history.best_misfit, children_only.history.best_misfit)
-
-
-def test_about_four_runs_in_ten_find_the_basin_of_table_5() -> None:
-    """What the algorithm as printed is worth: neither nothing nor certainty.
-
-    60 runs at a true share of 0.42 give 25, with a standard deviation of 3.8.
-    """
-    posed = problem("endothelial_cell", 6, rate_Hz=10.0)
-    truth = np.log([SAMPLES["endothelial_cell"][name] for name in MAXWELL.names])
-    floor = 1.02 * rms(posed.residuals.left(truth))
-    rngs = [np.random.default_rng([8, seed]) for seed in range(60)]
-    answers = genetic.identify_many([posed] * 60, PAPER, rngs)
-    good = [answer for answer in answers if answer.misfit_rad <= floor]
-    assert 25 - 4 * 3.8 < len(good) < 25 + 4 * 3.8
-    k, k_p, c, c_p = np.array([answer.parameters for answer in good]).T
-    # The true basin: within what two digits and the Cramer-Rao bounds allow.
-    assert np.all(np.abs(k_p / 12.3 - 1) < 0.05)
-    assert np.all(np.abs((c + c_p) / 299.9 - 1) < 0.15)
-    assert np.median(np.abs(k / 35 - 1)) < 0.2
 
 
 def posed(count: int, model: Any = MAXWELL, **assumed: Any) -> list[Problem]:

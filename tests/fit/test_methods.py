@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from biogrip import library
 from biogrip.arrays import Array
 from biogrip.fit import least_squares
 from biogrip.fit.least_squares import best_of_starts, fit_from, refine_optima
@@ -38,7 +37,6 @@ from tests.helpers.problems import (
     of_case,
     posed_for,
     problem,
-    problem_alone,
     run,
 )
 from tests.helpers.responses import LOG_RANGES, MODEL_PARAMETERS
@@ -129,7 +127,7 @@ def test_offset_and_drift_are_fitted_along() -> None:
     times, response = clean("liquid_drop_2")
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     trace = response + 2e-3 - 4e-6 * times + noise
-    case_problem = problem_alone(GRIPPER, MODEL, TORQUE, times, trace, offset=True, drift=True)
+    case_problem = posed_for(MODEL, times, trace, offset=True, drift=True)
     without = run("least_squares", posed_for(MODEL, times, trace)).misfit_rad
     assert without > 10 * rms(noise)
     for method in EXACT:
@@ -228,11 +226,12 @@ def same(one: Identification, other: Identification) -> bool:
 def mixed() -> list[Problem]:
     """Traces of which some differ in more than the noise, in no order."""
     times, response = clean("liquid_drop_2")
-    linear, other = of_case("liquid_drop_2", 3), of_case("liquid_drop_2", 1)
+    linear = of_case("liquid_drop_2", 3)
+    other = case_problem(times, response, 1, offset=True)
     trace = response + 1e-5 * np.random.default_rng(9).standard_normal(len(times))
     half = times[::2], trace[::2]
     drop = MODELS["liquid_drop"]
-    sparse = problem_alone(GRIPPER, MODEL, TORQUE, *half)
+    sparse = posed_for(MODEL, *half)
     narrow = replace(linear[2], low=linear[2].low + 1)
     of_drop = linear[2].residuals.of_model(drop)
     simple = replace(
@@ -282,42 +281,6 @@ def noisy(model: SampleModel, count: int) -> list[tuple[Problem, Array]]:
         trace = trace + noise_rad * rng.normal(size=len(TIMES))
         problems.append((posed_for(model, TIMES, trace), sample))
     return problems
-
-
-# What `biogrip.identify_sample` was asked when its parameters were not those of the misfit told:
-# an element that a trace does not show, a spring in series with what made it.
-STEPS = (3.306849408e-10, 6.104421476e-10, 1.5714262386e-09, 3.807791792e-10)
-STEP_S, NOISE_RAD = 2.3289703032772175, 7e-8
-
-
-def test_parameters_are_those_of_the_misfit_told() -> None:
-    """A Zener model on the trace of a Kelvin-Voigt sample; and it is the same from all starts.
-
-    With every other spring in series, arms would ring at another frequency: there are minima by
-    the dozen. In this draw of the noise the deepest are equals to 0.1 in chi^2; in others some
-    are deeper by more, and not found from so few starts.
-    """
-    arm = library.Arm(1e-14, 3.3e-12, 4.4e-7)
-    gripper = library.Gripper(1.5e-3, 75.0, arm, arm)
-    protocol = tuple(library.hold(STEP_S, torque) for torque in STEPS)
-    made_by, fitted = (
-        library.set_up(gripper, protocol, library.Sample(name))
-        for name in ("kelvin_voigt", "zener_kelvin")
-    )
-    time_s = np.linspace(0.0, 4 * STEP_S, 2001)
-    noise = NOISE_RAD * np.random.default_rng(0).standard_normal(len(time_s))
-    trace = library.simulate(made_by, {"k_p": 11.6, "c_p": 0.0125}, time_s) + noise
-    chi2 = []
-    for seed in range(2):
-        found = library.identify_sample(fitted, time_s, trace, seed=seed)
-        parameters = dict(zip(fitted.searched.names, found.parameters.tolist(), strict=True))
-        residual = library.simulate(fitted, parameters, time_s) - trace
-        misfit_rad = np.sqrt(np.mean(residual**2))
-        assert found.misfit_rad == pytest.approx(misfit_rad, rel=1e-9)
-        chi2.append(len(time_s) * (misfit_rad / NOISE_RAD) ** 2)
-    assert np.ptp(chi2) < 0.1
-    # The model that made the trace is a special case of the one that is fitted.
-    assert max(chi2) < np.sum(noise**2) / NOISE_RAD**2
 
 
 @pytest.mark.parametrize("name", MODELS_SETTLED)

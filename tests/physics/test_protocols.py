@@ -2,19 +2,21 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from mpmath import mp, mpf
 
 from biogrip.arrays import Array
+from biogrip.library import set_up
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.gripper import torque as torque_of_voltage
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.linear import phi_function, rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.misfit import SeriesMisfit
-from biogrip.physics.models import MODELS
+from biogrip.physics.models import Sample
 from biogrip.physics.protocol import (
     Harmonic,
     Load,
@@ -28,7 +30,6 @@ from biogrip.physics.protocol import (
 from biogrip.physics.roots import SMALLEST_GAP, separate
 from biogrip.physics.simulation import jaw_force
 from biogrip.study.experiment_blocks import PhaseBlock, ProtocolBlock
-from tests.helpers.problems import problem_alone
 from tests.helpers.radau import equal_arms
 from tests.helpers.responses import exact_50_digits, random_samples
 from tests.physics.test_contact import TABLE_2
@@ -106,8 +107,8 @@ EVENLY = np.arange(0, 41, 2.0)
 def test_no_response_is_needed_of_steps_that_are_sampled_evenly(
     gripper: Gripper, load: Load, time_s: Array, offset: bool, by_series: bool
 ) -> None:
-    torque, trace = torque_history((Phase(40.0, load, load),)), np.zeros_like(time_s)
-    problem = problem_alone(gripper, MODELS["maxwell"], torque, time_s, trace, offset=offset)
+    experiment = set_up(gripper, (Phase(40.0, load, load),), Sample("maxwell"))
+    problem = replace(experiment, offset=offset).of(time_s, np.zeros_like(time_s))
     assert isinstance(problem.misfit, SeriesMisfit) == by_series
     assert by_series or problem.misfit == problem.residuals.condensed_misfit
 
