@@ -194,21 +194,11 @@ class ConstrainedFits:
     """Fits of several traces with one of several quantities held at given values.
 
     Each profile belongs to a trace and a quantity; those of the first trace come first. The
-    problems of the traces have to be `alike`.
-
-    Attributes
-    ----------
-    trace : (n_profiles,)
-        Index of the trace of each profile.
-    best : (n_profiles, n_parameters)
-        Log-parameters of the trace's optimum.
-    at_best : (n_profiles,)
-        Logarithm of the quantity there.
-    threshold, certainty : (n_profiles,)
-        As in `Likelihood`; certainty is no less than the threshold.
-    missed
-        By trace, the lowest increase of chi^2 and its log-parameters, if it is so far
-        below zero that the trace's global optimum was missed.
+    problems of the traces have to be `alike`. Of each profile there are the index of its `trace`,
+    the trace's optimum `best`, (n_profiles, n_parameters), the logarithm of the quantity `at_best`,
+    and `threshold` and `certainty` as in `Likelihood`, the latter no less than the former.
+    `missed` has, by trace, the lowest increase of chi^2 and its log-parameters, if it is so far
+    below zero that the trace's global optimum was missed.
     """
 
     def __init__(self, likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> None:

@@ -162,7 +162,7 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
     With the same Gaussian noise everywhere, it is the inverse of the Fisher
     information J J^T / sigma^2: the Cramér-Rao bound, which no unbiased
     estimator undercuts. With noise that changes along the trace, it is the
-    covariance of unweighted least squares [3]_, A J diag(sigma^2) J^T A with
+    covariance of unweighted least squares [4]_, A J diag(sigma^2) J^T A with
     A = (J J^T)^-1, and no longer a bound.
 
     A parameter whose standard deviation exceeds one e-fold even with all others known

@@ -44,21 +44,9 @@ _NEWS = 1e-3
 class Points:
     """Points of several profiles, one profile after the other, with their best fits so far.
 
-    Parameters
-    ----------
-    fits
-        The profiles.
-    grids
-        Of each, ascending logarithms of the quantity, that of the optimum among them.
-
-    Attributes
-    ----------
-    profile : (n_points,)
-        Index of the profile of each point.
-    values, increases : (n_points,)
-        Logarithms of the quantity, and increases of chi^2.
-    x : (n_points, n_parameters)
-        Log-parameters fitted there.
+    Grids are of each profile, ascending logarithms of the quantity, that of the optimum among them.
+    Each point has the index of its `profile`, its value of `values`, and of its best fit
+    `increases` of chi^2, (n_points,), and log-parameters `x`, (n_points, n_parameters).
     """
 
     def __init__(self, fits: ConstrainedFits, grids: Sequence[Array]) -> None:
