@@ -1,6 +1,8 @@
-"""Identification with what an instrument does to a trace, against least squares with all of it."""
+"""What an instrument does to a trace, against least squares with all of it and by symmetries."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from biogrip.errors import BiogripError
 from biogrip.fit.least_squares import identify_from
 from biogrip.fit.noise_model_fit import FAR
 from biogrip.fit.problem import CaseProblem, Identification, Problem
-from biogrip.fit.trace_fit import trace_fit
+from biogrip.fit.trace_fit import gripper_functions, trace_fit
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, Outliers, add_noise
 from biogrip.physics.simulation import simulated_rotation
@@ -135,3 +137,39 @@ def test_too_many_samples_for_a_colour_are_refused() -> None:
     times = np.linspace(0, 400, MOST_SAMPLES + 1)
     with pytest.raises(BiogripError, match="allowed are at most 50000 with a coloured"):
         trace_fit(case_problem, times, times, find)
+
+
+def functions(uncertainty: Mapping[str, Mapping[str, float]], **changes: Any) -> Array:
+    gripper = replace(POSED.gripper, **changes)
+    case_problem = replace(POSED, gripper=gripper, uncertainty=uncertainty)
+    return gripper_functions(case_problem, TIMES, np.exp(TRUTH))
+
+
+def test_the_torque_is_a_factor_of_the_rotation() -> None:
+    odd, even = functions({"torque": {"share": 0.03}})
+    np.testing.assert_allclose(odd, 0.03 * CLEAN, rtol=1e-9)
+    np.testing.assert_allclose(even, 0.0, atol=1e-12 * odd.max())
+
+
+def test_an_uncertain_length_is_that_of_all_elements() -> None:
+    """A length enters as its square, by which every element of the sample is multiplied."""
+    share, length = 0.05, POSED.gripper.arm_length_m
+    odd, even = functions({"gripper": {"arm_length_m": share * length}})
+    above, nominal, below = (
+        simulated(POSED.gripper, TRUTH + 2 * np.log1p(error)) for error in (share, 0, -share)
+    )
+    np.testing.assert_allclose(odd, 0.5 * (above - below), rtol=1e-9, atol=1e-12)
+    bent = 0.5 * (above + below) - nominal
+    assert even @ bent / np.linalg.norm(even) / np.linalg.norm(bent) == pytest.approx(1.0)
+
+
+def test_only_the_sine_of_the_angle_counts() -> None:
+    """Its change by an angle has a slope of cos/sin; at a right angle it has none."""
+    degree = {"gripper": {"reference_angle_deg": 1.0}}
+    odd, _ = functions(degree)
+    length = POSED.gripper.arm_length_m / np.tan(np.radians(75.0)) * np.radians(1.0)
+    same, _ = functions({"gripper": {"arm_length_m": length}})
+    # To the third order in an angle of a degree.
+    np.testing.assert_allclose(odd, same, atol=1e-3 * np.abs(odd).max())
+    right, _ = functions(degree, reference_angle_deg=90.0)
+    np.testing.assert_allclose(right, 0.0, atol=1e-12)
