@@ -16,8 +16,8 @@ from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding
 from biogrip.physics.models import MODELS
 from biogrip.stages.intervals import refitted, shown_of
-from tests.helpers.definition import FitConstraint, rise_at
 from tests.helpers.problems import MODEL, clean, posed_for, problem, run
+from tests.helpers.scipy_fits import lowest_rise, rise_with_held
 
 QUANTITIES = parameters_and_sum(MODEL)
 
@@ -43,11 +43,11 @@ def test_the_rise_at_a_limit_is_the_threshold(case: str, seed: int) -> None:
     (fast,) = find_limits([likelihood], QUANTITIES)[0]
     for quantity, found, near in zip(QUANTITIES, profiles, fast, strict=True):
         for limit in (each for each in (found.low, found.high) if each is not None):
-            lowest = rise_at(likelihood, quantity, limit, rng, 20)
+            lowest = lowest_rise(likelihood, quantity, limit, rng, 20)
             assert lowest == pytest.approx(likelihood.threshold, rel=0.01), quantity.label
         for limit in near[np.isfinite(near)]:
-            held = FitConstraint(likelihood, quantity, limit)
-            rises = held.fitted(likelihood.best)[0], rise_at(likelihood, quantity, limit, rng, 20)
+            held = likelihood, quantity, limit
+            rises = rise_with_held(*held, likelihood.best)[0], lowest_rise(*held, rng, 20)
             assert likelihood.threshold in [pytest.approx(rise, rel=0.01) for rise in rises]
 
 
@@ -77,7 +77,7 @@ def test_a_held_fit_is_scipys(label: str) -> None:
         target = quantity.log(likelihood.best) + away
         (increase,), (x,) = fits.at(one, np.array([target]), likelihood.best[None], FINE)
         assert quantity.log(x) == pytest.approx(target, abs=1e-11)
-        scipys, _ = FitConstraint(likelihood, quantity, target).fitted(likelihood.best)
+        scipys, _ = rise_with_held(likelihood, quantity, target, likelihood.best)
         assert increase == pytest.approx(scipys, abs=0.02)
 
 
