@@ -80,11 +80,10 @@ class Identification:
     converged: bool = True
     """False if the final Newton refinement of the optimum did not converge."""
 
-    def at(self, fit: Minima, which: int = 0) -> "Identification":
-        """Return a copy with the optimum of one of the local fits `fit`, that of this trace."""
-        return self.replaced(
-            np.exp(fit.x[which]), float(fit.misfit_rad[which]), converged=bool(fit.converged[which])
-        )
+    def at(self, fit: Minima) -> "Identification":
+        """Return a copy with the optimum of a local fit of this trace alone."""
+        misfit_rad, converged = float(fit.misfit_rad[0]), bool(fit.converged[0])
+        return self.replaced(np.exp(fit.x[0]), misfit_rad, converged=converged)
 
     def replaced(
         self, parameters: Array, misfit_rad: float, *, converged: bool
