@@ -10,10 +10,10 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit import genetic, genetic_refined
-from biogrip.fit.genetic import GeneticSettings, evolve_many, select
+from biogrip.fit.genetic import GeneticSettings, select
 from biogrip.fit.genome import GeneRange, lowest_encodable, make_genome, nearest_encodable
 from biogrip.fit.problem import Identification, Problem
-from biogrip.physics.misfit import Misfit, combine_misfits
+from biogrip.physics.misfit import Misfit
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.sample_model import with_fixed
 from tests.helpers.plain_genetic import identified
@@ -54,8 +54,9 @@ def bowl(parameters: Array) -> Array:
 
 
 def run(settings: GeneticSettings = PAPER, seed: int = 0, misfit: Misfit = bowl) -> Identification:
-    rngs = [np.random.default_rng(seed)]
-    return evolve_many(combine_misfits([misfit]), GENOME, settings, rngs)[0].identification
+    # Only misfit and genome are asked for.
+    posed = Problem(misfit, None, GENOME, np.zeros(4), np.zeros(4))  # type: ignore[arg-type]
+    return genetic.identify_many([posed], settings, [np.random.default_rng(seed)])[0]
 
 
 @pytest.mark.parametrize("digits", [2, 6])

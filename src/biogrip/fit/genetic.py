@@ -26,7 +26,7 @@ from biogrip.fit.genome import Chromosomes, Genome
 from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
 from biogrip.keys import Block
 from biogrip.keys import Problem as Complaint
-from biogrip.physics.misfit import Misfits, combine_misfits
+from biogrip.physics.misfit import combine_misfits
 
 _MOST = 1_000_000
 
@@ -115,22 +115,7 @@ def evolve(
     progress: Progress = silent,
 ) -> list[Evolution]:
     """Identify samples as `identify_many` does, and return the survivors as well."""
-    misfits = combine_misfits([problem.misfit for problem in problems])
-    return evolve_many(misfits, problems[0].genome, settings, rngs, progress)
-
-
-def evolve_many(
-    misfits: Misfits,
-    genome: Genome,
-    settings: GeneticSettings,
-    rngs: Sequence[np.random.Generator],
-    progress: Progress = silent,
-) -> list[Evolution]:
-    """Run the genetic algorithm with one population for each random generator.
-
-    Misfits are a function of parameters, (n_populations, n, n_parameters), and of the indices of
-    those populations, (n_populations,).
-    """
+    misfits, genome = combine_misfits([problem.misfit for problem in problems]), problems[0].genome
 
     def ranked(chromosomes: Chromosomes, populations: IntArray) -> Ranking:
         misfit = misfits(genome.decode(chromosomes), populations).astype(np.float32)
