@@ -27,6 +27,9 @@ from biogrip.fit.local_fits import FAIR, FINE, ROUGH, LocalFits, alike
 from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
 from biogrip.keys import Block
 
+FINISHED = 4
+"""Number of a trace's best rough fits that are continued to the optimum."""
+
 
 @dataclass(frozen=True)
 class LeastSquaresSettings(Block):
@@ -51,14 +54,14 @@ def identify_many(
     after every trace. If the model has no response at any of the points, it is a `BiogripError`.
     """
     pairs = zip(problems, rngs, strict=True)
-    points = [_screened(problem, settings, rng) for problem, rng in pairs]
+    points = [screened(problem, settings, rng) for problem, rng in pairs]
     starts, before = zip(*points, strict=True)
     if further is not None:
         starts = tuple(map(np.concatenate, zip(starts, further, strict=True)))
     return best_of_starts(problems, starts, before, progress)
 
 
-def _screened(
+def screened(
     problem: Problem, settings: LeastSquaresSettings, rng: np.random.Generator
 ) -> tuple[Array, Row]:
     """Return the best random points as starts, and the first row of the history."""
@@ -131,7 +134,7 @@ def _finished(
     trace = np.repeat(np.arange(len(starts)), [len(own_starts) for own_starts in starts])
     rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
     # Rough fits show which basins are deepest; only the best are continued to the optimum.
-    best = [_best(rough, trace == own, _FINISHED) for own in range(len(starts))]
+    best = [_best(rough, trace == own, FINISHED) for own in range(len(starts))]
     finalists = np.concatenate(best)
     return rough, trace, fits.fitted(rough.x[finalists], trace[finalists]), trace[finalists]
 
@@ -188,8 +191,6 @@ def fit_from(problems: Sequence[Problem], starts: Array, *, roughly: bool = Fals
     return Minima.joined(found)[np.argsort(np.concatenate(groups))]
 
 
-# Best rough fits of a trace that are continued to the optimum.
-_FINISHED = 4
 # Tolerance and initial damping of the steps that approach a minimum along a curved valley.
 _CLOSE, _DAMPING = 1e-10, 1e-6
 _MOST_STEPS = 60
