@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.fit import least_squares
 from biogrip.fit.methods import identifier
 from biogrip.fit.problem import Identification, Problem, silent
+from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS
@@ -66,9 +66,10 @@ def run(method: str, case_problem: Problem, seed: int = 0) -> Identification:
     return answer
 
 
-def identified(problems: list[Problem], seeds: list[int]) -> list[Identification]:
-    rngs = [np.random.default_rng(seed) for seed in seeds]
-    return least_squares.identify_many(problems, STUDY.config.least_squares, rngs)
+def likelihood_of(posed: Problem, seed: int = 0) -> Likelihood:
+    """What is judged of a trace: its best fit by least squares."""
+    found = run("least_squares", posed, seed)
+    return make_likelihood(posed, np.log(found.parameters), found.misfit_rad, confidence=0.95)
 
 
 def condensed_of(

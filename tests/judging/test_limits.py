@@ -9,14 +9,14 @@ from biogrip.arrays import Array
 from biogrip.fit.local_fits import FINE
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.diagnosis import diagnose
-from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.profiles import Profile, compute_profiles, find_gaps
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding
 from biogrip.physics.models import MODELS
 from biogrip.stages.intervals import refitted, shown_of
-from tests.helpers.problems import MODEL, clean, posed_for, problem, run
+from tests.helpers.problems import MODEL, clean, likelihood_of, posed_for, problem, run
 from tests.helpers.scipy_fits import lowest_rise, rise_with_held
 
 QUANTITIES = parameters_and_sum(MODEL)
@@ -24,9 +24,7 @@ QUANTITIES = parameters_and_sum(MODEL)
 
 def likelihood_for(case: str, seed: int) -> Likelihood:
     """What the limits of a simulated trace are measured against."""
-    posed = problem(case, seed, rate_Hz=10.0)
-    found = run("least_squares", posed, seed)
-    return make_likelihood(posed, np.log(found.parameters), found.misfit_rad, confidence=0.95)
+    return likelihood_of(problem(case, seed, rate_Hz=10.0), seed)
 
 
 @pytest.mark.parametrize(

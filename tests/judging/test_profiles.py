@@ -1,6 +1,7 @@
 """Quantities held exactly in many fits at once, against SciPy's fits of all samples."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,8 +27,7 @@ from tests.helpers.problems import (
     TORQUE,
     case_problem,
     clean,
-    identified,
-    of_case,
+    likelihood_of,
     posed_for,
     run,
 )
@@ -36,12 +36,8 @@ from tests.helpers.scipy_fits import scipy_fit
 PARAMETERS = parameters_and_sum(MODEL)
 
 
-def likelihoods(case: str, count: int) -> list[Likelihood]:
-    problems = of_case(case, count)
-    return [
-        make_likelihood(problem, np.log(found.parameters), found.misfit_rad, confidence=0.95)
-        for problem, found in zip(problems, identified(problems, [0] * count), strict=True)
-    ]
+def likelihoods(case: str, count: int, **assumed: Any) -> list[Likelihood]:
+    return [likelihood_of(each) for each in case_problem(*clean(case), count, **assumed)]
 
 
 def labelled(*labels: str) -> list[Quantity]:
@@ -99,7 +95,7 @@ def test_points_are_moved_to_where_quantities_are_held(form: str) -> None:
 
 def test_limits_do_not_depend_on_the_batch() -> None:
     """Byte for byte, in any order, of one or several experiments."""
-    each = [*likelihoods("endothelial_cell", 2), *likelihoods("liquid_drop_2", 1)]
+    each = [*likelihoods("endothelial_cell", 2), *likelihoods("liquid_drop_2", 1, offset=True)]
     quantities = labelled("k", "c + c_p")
     together, profiles = find_limits(each, quantities)[0], compute_profiles(each, quantities)
     for chosen in ([2], [1, 0], [1, 2]):
