@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import curve_fit
 
 from biogrip.arrays import Array
-from biogrip.fit.problem import CaseProblem, Identification, Problem
-from biogrip.fit.trace_fit import trace_fit
+from biogrip.fit.problem import CaseProblem
+from biogrip.fit.trace_fit import TraceFit, fit_traces
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.library import set_up
 from biogrip.physics.gripper import Arm, Gripper
@@ -45,12 +45,15 @@ def noisy(share: float, seed: int = 3) -> Array:
     return trace
 
 
-def find(problem: Problem) -> Identification:
-    return run("least_squares", problem)
+def fitted(problem: CaseProblem, trace: Array) -> TraceFit:
+    (fit,) = fit_traces(
+        [problem], [(TIMES, trace)], lambda some, _: [run("least_squares", each) for each in some]
+    )
+    return fit
 
 
 def identified(problem: CaseProblem, trace: Array) -> Diagnosis:
-    fit = trace_fit(problem, TIMES, trace, find)
+    fit = fitted(problem, trace)
     return diagnose(
         fit.problem, problem.searched, fit.found, confidence=0.95, noise_rad=problem.noise_rad
     )
@@ -70,7 +73,7 @@ def test_the_noise_is_the_root_mean_square_of_known_deviations() -> None:
 
 def test_the_published_fit_comes_out_to_five_digits() -> None:
     trace = noisy(0.0)
-    fit = trace_fit(POLYSTYRENE.weighted(0.05 * trace), TIMES, trace, find)
+    fit = fitted(POLYSTYRENE.weighted(0.05 * trace), trace)
     assert fit.found.parameters == pytest.approx([V, BETA, ETA], rel=5e-6)
 
 

@@ -179,7 +179,7 @@ class CaseProblem:
     sd_rad: Array | None = field(default=None, compare=False)
     """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
     coloured: bool = False
-    """True if the noise of a trace may be autocorrelated, see `trace_fit`."""
+    """True if the noise of a trace may be autocorrelated, see `fit_traces`."""
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
     ``gripper`` itself; and ``share`` of the ``torque``."""

@@ -129,10 +129,17 @@ def fit_traces(
     traces: Sequence[tuple[Array, Array]],
     find: Callable[[Sequence[Problem], Sequence[int]], list[Identification]],
 ) -> list[TraceFit]:
-    """Fit each of several traces as `trace_fit` does, and those with plain noise together.
+    """Fit each of several traces and, if wanted, estimate the model of its noise.
 
-    `find` finds the global optima of the problems of given traces. A trace is its times and
-    rotations, and has assumptions of its own.
+    Traces of plain noise are fitted together. With a coloured noise model, outliers are removed,
+    and the noise is a sum of white, Ornstein-Uhlenbeck and 1/f noise. If it grows with the
+    rotation, so does a part of the white noise: the parts whose readings depend on each other are
+    of the instrument's zero. The effect of the gripper's uncertainty on the rotation is one more
+    component of the noise.
+
+    `find` finds the global optima of the problems of given traces. A trace is its ascending times
+    and rotations, (n_samples,), and has assumptions of its own. Too many readings for a coloured
+    noise model are a `BiogripError`.
     """
     plain = [trace for trace, case_problem in enumerate(case_problems) if case_problem.plain]
     problems = [case_problems[trace].of(*traces[trace]) for trace in plain]
@@ -141,33 +148,23 @@ def fit_traces(
         trace: TraceFit(problem, optimum, None, np.zeros(len(traces[trace][0]), dtype=bool))
         for trace, problem, optimum in zip(plain, problems, optima, strict=True)
     }
-
-    def find_alone(trace: int) -> Find:
-        return lambda problem: find([problem], [trace])[0]
-
     for trace, case_problem in enumerate(case_problems):
         if trace not in found:
-            found[trace] = trace_fit(case_problem, *traces[trace], find_alone(trace))
+
+            def find_alone(problem: Problem, trace: int = trace) -> Identification:
+                return find([problem], [trace])[0]
+
+            found[trace] = _fit_in_noise(case_problem, *traces[trace], find_alone)
     return [found[trace] for trace in range(len(traces))]
 
 
-def trace_fit(
+def _fit_in_noise(
     case_problem: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
 ) -> TraceFit:
-    """Fit a trace and, if wanted, estimate the model of its noise.
-
-    With a coloured noise model, outliers are removed, and the noise is a sum of white,
-    Ornstein-Uhlenbeck and 1/f noise. If it grows with the rotation, so does a part of the white
-    noise: the parts whose readings depend on each other are of the instrument's zero. The
-    effect of the gripper's uncertainty on the rotation is one more component of the noise. `find`
-    finds a global optimum. Too many readings for a coloured noise model are a `BiogripError`.
-    """
     kept = np.ones(len(time_s), dtype=bool)
     if not case_problem.coloured:
         plain = case_problem.of(time_s, rotation_rad)
         found = find(plain)
-        if case_problem.plain:
-            return TraceFit(plain, found, None, ~kept)
     else:
         if len(time_s) > MOST_SAMPLES:
             raise BiogripError(
