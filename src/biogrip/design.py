@@ -9,8 +9,6 @@ worst Cramér-Rao bound.
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from itertools import groupby
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -83,13 +81,11 @@ class Train:
 
     @property
     def phases(self) -> tuple[Phase, ...]:
-        """Phases of a protocol; steps of the same level are one."""
+        """Phases of a protocol, one a step."""
         durations_s = np.diff(self.starts, append=2 * self.limits.intervals)
-        pairs = zip(self.levels, durations_s / (2 * self.limits.rate_Hz), strict=True)
-        return tuple(
-            hold(_rounded(sum(lasts for _, lasts in same)), _rounded(level))
-            for level, same in groupby(pairs, key=itemgetter(0))
-        )
+        durations_s = durations_s / (2 * self.limits.rate_Hz)
+        pairs = zip(durations_s.tolist(), self.levels.tolist(), strict=True)
+        return tuple(hold(_rounded(lasts_s), _rounded(level)) for lasts_s, level in pairs)
 
 
 @dataclass(frozen=True, eq=False)
