@@ -10,8 +10,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
+from biogrip.fit.least_squares import FINISHED
 from biogrip.fit.local_fits import FINE, PRIOR_WIDTH, ROUGH
-from biogrip.fit.multi_start import FINISHED
 from biogrip.fit.problem import Problem
 
 

@@ -11,8 +11,7 @@ from benchmarks.noisy_traces import BATCH, OURS, SIDE_BY_SIDE, NoisyTrace, noisy
 from benchmarks.report import Row, Section, number, times_ours
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array
-from biogrip.fit.genetic import GeneticSettings, evolve_many
-from biogrip.physics.misfit import combine_misfits
+from biogrip.fit.genetic import GeneticSettings, identify_many
 
 _GENERATIONS, _SEEDS = 80, 15
 # Misfits up to this share above the noise count as at its floor, as in the study.
@@ -42,13 +41,8 @@ def by_biogrip(
     traces: Sequence[NoisyTrace], settings: GeneticSettings, seeds: Sequence[int]
 ) -> list[tuple[float, int]]:
     """Identify traces side by side; misfit and evaluations of each."""
-    found = evolve_many(
-        combine_misfits([trace.misfit() for trace in traces]),
-        traces[0].genome,
-        settings,
-        [np.random.default_rng(seed) for seed in seeds],
-    )
-    answers = [evolution.identification for evolution in found]
+    rngs = [np.random.default_rng(seed) for seed in seeds]
+    answers = identify_many([trace.problem() for trace in traces], settings, rngs)
     return [(answer.misfit_rad, answer.evaluations) for answer in answers]
 
 

@@ -13,7 +13,7 @@ from benchmarks.report import Row as ReportRow
 from benchmarks.report import Section, number, times_ours
 from benchmarks.timing import Timed, alternate
 from biogrip.arrays import Array
-from biogrip.fit.multi_start import FINISHED, best_of_starts, screened
+from biogrip.fit.least_squares import FINISHED, best_of_starts, screened
 from biogrip.fit.problem import Problem, Row, silent
 
 _ROUNDS, _FEW = 5, 3
@@ -38,12 +38,8 @@ class Started:
 
 def started(seed: int) -> Started:
     """Choose starting points as the study's least squares does, from the best of random ones."""
-    problem, settings = noisy_trace(seed).problem(), _settings()
-    rng = np.random.default_rng(seed)
-    drawn = rng.uniform(problem.low, problem.high, (settings.candidates, len(problem.low)))
-    points, misfit = screened(problem.misfit, drawn)
-    before = np.exp(points[0]), float(misfit[0]), float(np.median(misfit)), len(points)
-    return Started(problem, points[: settings.starts], before)
+    problem = noisy_trace(seed).problem()
+    return Started(problem, *screened(problem, _settings(), np.random.default_rng(seed)))
 
 
 def _settings() -> Any:
@@ -100,7 +96,7 @@ def _chi2_above_best(traces: Sequence[Started], found: Mapping[str, Array]) -> d
     """By library and trace; each entry of what was found is (n_traces, n_parameters)."""
     misfits = np.array(
         [
-            trace.problem.misfit(np.exp([each[index] for each in found.values()]))
+            trace.problem.residuals.misfit(np.exp([each[index] for each in found.values()]))
             for index, trace in enumerate(traces)
         ]
     ).T

@@ -10,7 +10,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import Genome, make_genome
-from biogrip.fit.problem import Problem, make_problem
+from biogrip.fit.problem import Problem
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
@@ -74,16 +74,7 @@ class NoisyTrace:
 
     def problem(self) -> Problem:
         """Pose the identification as the study does."""
-        return make_problem(
-            self.gripper,
-            self.model,
-            self.steps,
-            self.time_s,
-            self.trace_rad,
-            case().ranges,
-            _condensed(),
-            instrument=GRIPPER,
-        )
+        return case().problem.to_identify().of(self.time_s, self.trace_rad)
 
 
 def noisy_trace(seed: int = 0) -> NoisyTrace:

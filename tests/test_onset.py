@@ -69,7 +69,7 @@ def test_before_the_protocol_nothing_responds(
     one, other = own.of(times, values), padded.of(times + 8.0, values)
     for got, expected in zip(one.residuals(x), other.residuals(x), strict=True):
         assert got == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
-    misfits = [problem.misfit(np.exp(x)[None]) for problem in (one, other)]
+    misfits = [problem.residuals.misfit(np.exp(x)[None]) for problem in (one, other)]
     assert misfits[0] == pytest.approx(misfits[1], rel=1e-9)
 
 

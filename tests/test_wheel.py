@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 import sysconfig
@@ -14,7 +13,6 @@ import yaml
 import biogrip
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.runs import TINY
-from tests.test_design import CREEP
 
 pytestmark = pytest.mark.nightly
 
@@ -83,16 +81,6 @@ def test_the_wheel_identifies_the_example(commands: Path, tmp_path: Path) -> Non
     printed = [line.strip() for line in said.splitlines()]
     assert [line for line in shown if line.strip() not in printed] == []
     assert (tmp_path / "trace.identified.json").is_file()
-
-
-def test_the_wheel_compares_groups_and_designs(commands: Path, tmp_path: Path) -> None:
-    biogrip = commands / "biogrip"
-    shutil.copytree(ROOT / "data" / "dishes", tmp_path, dirs_exist_ok=True)
-    called(biogrip, "identify", "cells.tsv", "--csv", "found.csv", folder=tmp_path)
-    assert "treated" in called(biogrip, "groups", "found.csv", "--by", "treatment", folder=tmp_path)
-    (tmp_path / "my.yaml").write_text(CREEP.replace("HELD", "stress_Pa"))
-    called(biogrip, "design", "my.yaml", folder=tmp_path)
-    assert (tmp_path / "my_designed.yaml").is_file()
 
 
 def test_the_wheel_runs_a_study(commands: Path, tmp_path: Path) -> None:

@@ -22,8 +22,7 @@ import numpy as np
 from benchmarks.report import Row, Section, number
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array, BoolArray
-from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.problem import Identification
+from biogrip.fit.problem import CaseProblem, Identification
 from biogrip.identify.trace_case import ranges_of
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.library import Phase, Sample, hold, identify_sample, judge, simulate

@@ -10,25 +10,13 @@
 __version__ = "1.0.0"
 
 
-_LIBRARY = frozenset(
-    (
-        *("BiogripError", "INSTRUMENTS", "Arm", "CaseProblem", "Diagnosis", "GeneRange", "Gripper"),
-        *("Identification", "Noise", "TraceResult", "identify_trace"),
-        *("Phase", "Sample", "add_noise", "hold", "identify_sample", "judge", "plot", "set_up"),
-        "simulate",
-    )
-)
-
-
 def __getattr__(name: str) -> object:
-    # Imported lazily: jobs import this package hundreds of times without the library.
-    if name in _LIBRARY:
-        # Imported here, after the handlers of signals are installed.
+    # Imported lazily, for jobs import this package hundreds of times without the library, and after
+    # the handlers of signals are installed.
+    if not name.startswith("_"):
         from importlib import import_module
 
-        return getattr(import_module("biogrip.library"), name)
+        library = import_module("biogrip.library")
+        if name in library.__all__:
+            return getattr(library, name)
     raise AttributeError(f"module 'biogrip' has no attribute '{name}'")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *_LIBRARY})

@@ -257,7 +257,7 @@ def _design_parser(stages: Any) -> None:
     design.examples = _examples(
         "design my.yaml",
         "design my.yaml --output designed.yaml",
-        cost="The search takes some ten seconds.",
+        cost="The search takes less than a minute.",
     )
     text = "YAML file with your samples, laid over the default study"
     design.add_argument("config", type=Path, help=text)

@@ -14,10 +14,7 @@ from biogrip.terminal import visible
 def atomic_write(path: Path) -> Iterator[Path]:
     """Yield a scratch path beside `path`, and move it into place if no error occurs.
 
-    Raises
-    ------
-    BiogripError
-        If the file cannot be written.
+    If the file cannot be written, it is a `BiogripError`.
     """
     scratch = scratch_path(path)
     unfinished.add(str(scratch))
@@ -48,13 +45,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Refuse outputs that are also inputs, under any name.
-
-    Raises
-    ------
-    BiogripError
-        Names the first such output.
-    """
+    """Refuse outputs that are also inputs, under any name: a `BiogripError` names the first."""
     # Path.exists raises for invalid paths; os.path.exists returns False.
     read = [path for path in inputs if os.path.exists(path)]
     for output in outputs:

@@ -131,19 +131,9 @@ def compare(cells: Sequence[Cell], groups: Sequence[str], confidence: float) -> 
 def groups(found: Path, by: str, table: Path | None) -> None:
     """Compare groups of cells, print the comparison, and write it as CSV if asked.
 
-    Parameters
-    ----------
-    found
-        CSV file of ``biogrip identify --csv``.
-    by
-        Column that makes the groups. Traces of a cell, as a column `cell` says, are averaged.
-    table
-        CSV file to write, if any.
-
-    Raises
-    ------
-    BiogripError
-        If the file is no such table, or has no such column.
+    Found is the CSV file of ``biogrip identify --csv``, a column of it makes the groups, and traces
+    of a cell, as a column `cell` says, are averaged. Another file, or a column that is not there,
+    is a `BiogripError`.
     """
     if problem := trace_file_problem(found):
         raise BiogripError(f"FOUND: {problem}")

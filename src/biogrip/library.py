@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array, as_column
 from biogrip.errors import BiogripError
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
-from biogrip.fit.problem import Identification, silent
+from biogrip.fit.problem import CaseProblem, Identification, silent
 from biogrip.identify.notebook import TraceResult, identify_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose, with_times
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper

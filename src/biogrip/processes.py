@@ -16,7 +16,7 @@ from contextlib import suppress
 from multiprocessing import get_context
 from types import FrameType
 
-from biogrip.terminal import CLEARED, visible
+from biogrip.terminal import CLEARED
 
 _SAID = {signal.SIGINT: "stopped", signal.SIGTERM: "ended by SIGTERM"}
 
@@ -33,11 +33,8 @@ def end_when_stopped() -> None:
             signal.signal(number, _end)
 
 
-def end_at_once(number: int, line: str) -> None:
-    """Exit with a message after the command's name, as if ended by a signal.
-
-    The exit status is 128 plus the signal's number, as in a shell.
-    """
+def _end(number: int, _: FrameType | None) -> None:
+    """Exit with a message after the command's name; the status is 128 plus the signal's number."""
     # Ignore further signals.
     for other in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(other, signal.SIG_IGN)
@@ -47,7 +44,8 @@ def end_at_once(number: int, line: str) -> None:
         sys.stdout.flush()
     with suppress(OSError):
         cleared = CLEARED if os.isatty(2) else ""
-        os.write(2, f"{cleared}biogrip: {visible(line)}\n".encode())
+        said = f"{_SAID[signal.Signals(number)]}; no file was left half-written."
+        os.write(2, f"{cleared}biogrip: {said}\n".encode())
     os._exit(128 + number)
 
 
@@ -55,10 +53,6 @@ def _remove_unfinished() -> None:
     for path in unfinished:
         with suppress(OSError):
             os.unlink(path)
-
-
-def _end(number: int, _: FrameType | None) -> None:
-    end_at_once(number, f"{_SAID[signal.Signals(number)]}; no file was left half-written.")
 
 
 def worker_processes(count: int, begin: Callable[[], None] | None = None) -> ProcessPoolExecutor:

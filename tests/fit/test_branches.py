@@ -1,7 +1,5 @@
 """Branches are exchangeable; everywhere they are counted from the one that relaxes fastest."""
 
-import functools
-
 import numpy as np
 import pytest
 
@@ -10,13 +8,12 @@ from biogrip.fit.local_fits import FINE
 from biogrip.fit.methods import METHODS, identifier
 from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.judging.constrained_fits import ConstrainedFits
-from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import Sample
 from biogrip.physics.sample_model import with_fixed
 from tests.helpers.default import STUDY, study_of
-from tests.helpers.problems import GRIPPER, TORQUE, case_problem, clean
+from tests.helpers.problems import GRIPPER, TORQUE, case_problem, clean, likelihood_of
 
 TIMES = clean("endothelial_cell")[0]
 TWO = Sample("generalized_maxwell", 2).model
@@ -59,7 +56,8 @@ def test_names_change_nothing_else() -> None:
     assert_in_order(ordered)
     changed = np.any(drawn != ordered, axis=1)
     assert 50 < np.sum(changed) < 150
-    np.testing.assert_allclose(problem.misfit(ordered), problem.misfit(drawn), rtol=1e-9)
+    misfit = problem.residuals.misfit
+    np.testing.assert_allclose(misfit(ordered), misfit(drawn), rtol=1e-9)
 
 
 def test_a_branch_that_is_partly_known_keeps_its_name() -> None:
@@ -69,16 +67,10 @@ def test_a_branch_that_is_partly_known_keeps_its_name() -> None:
     np.testing.assert_array_equal(model.in_order(slow_first), np.arange(5)[None])
 
 
-@functools.cache
-def likelihood() -> Likelihood:
-    (problem,) = problems(1, 3e-3)
-    (answer,) = identified("least_squares", [problem])
-    return make_likelihood(problem, np.log(answer.parameters), answer.misfit_rad, confidence=0.95)
-
-
 def test_another_name_of_the_optimum_is_none_of_its_neighbours() -> None:
     """With names free, the fit with a branch at the value of the other is as good as the best."""
-    fits = ConstrainedFits([likelihood()], parameters_and_sum(TWO))
+    (problem,) = problems(1, 3e-3)
+    fits = ConstrainedFits([likelihood_of(problem)], parameters_and_sum(TWO))
     swapped = fits.best[:1, [1, 0, 2, 4, 3, 5]]
     for which in (0, 1, 3, 4):
         increases, _ = fits.at(np.array([which]), swapped[:, which], swapped, FINE)

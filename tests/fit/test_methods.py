@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from biogrip import library
 from biogrip.arrays import Array
-from biogrip.fit import least_squares, multi_start
+from biogrip.fit import genetic, least_squares
+from biogrip.fit.least_squares import best_of_starts, fit_from, refine_optima
 from biogrip.fit.levenberg_marquardt import Normal, bounded_step
 from biogrip.fit.local_fits import PRIOR_WIDTH, ROUGH, LocalFits, alike
 from biogrip.fit.methods import (
@@ -20,8 +20,7 @@ from biogrip.fit.methods import (
     near_noise,
     near_noise_words,
 )
-from biogrip.fit.multi_start import best_of_starts, fit_from, refine_optima
-from biogrip.fit.problem import Identification, Problem, silent
+from biogrip.fit.problem import Problem, silent
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.noise import rms
@@ -38,7 +37,6 @@ from tests.helpers.problems import (
     of_case,
     posed_for,
     problem,
-    problem_alone,
     run,
 )
 from tests.helpers.responses import LOG_RANGES, MODEL_PARAMETERS
@@ -56,7 +54,7 @@ def test_an_answer_is_what_it_says(method: str) -> None:
     rng = np.random.default_rng(0)
     (answer,) = identify([case_problem], [rng], lambda n, misfit: told.append((n, misfit)))
     history = answer.history
-    assert case_problem.misfit(answer.parameters[None])[0] == pytest.approx(
+    assert case_problem.residuals.misfit(answer.parameters[None])[0] == pytest.approx(
         answer.misfit_rad, rel=1e-6
     )
     assert len(history.best_misfit) == answer.generations + 1
@@ -83,10 +81,6 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
         counted[0] = before
         return found
 
-    def misfit(parameters: Array) -> Array:
-        counted[0] += len(parameters)
-        return posed.misfit(parameters)
-
     def at_one(residuals: Residuals, x: Array) -> tuple[Array, Array]:
         counted[0] += 1
         return of_one(residuals, x)
@@ -96,10 +90,11 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
         return of_many(residuals, x, slopes=slopes)
 
     of_one, of_many = Residuals.__call__, Residuals.condensed_responses
-    monkeypatch.setattr(multi_start, "refine_optima", settled_silently)
+    monkeypatch.setattr(least_squares, "refine_optima", settled_silently)
+    monkeypatch.setattr(genetic, "make_misfit", lambda residuals: residuals.misfit)
     monkeypatch.setattr(Residuals, "__call__", at_one)
     monkeypatch.setattr(Residuals, "condensed_responses", at_many)
-    assert run(method, replace(posed, misfit=misfit)).evaluations == counted[0]
+    assert run(method, posed).evaluations == counted[0]
 
 
 @pytest.mark.parametrize("case", SAMPLES)
@@ -129,7 +124,7 @@ def test_offset_and_drift_are_fitted_along() -> None:
     times, response = clean("liquid_drop_2")
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     trace = response + 2e-3 - 4e-6 * times + noise
-    case_problem = problem_alone(GRIPPER, MODEL, TORQUE, times, trace, offset=True, drift=True)
+    case_problem = posed_for(MODEL, times, trace, offset=True, drift=True)
     without = run("least_squares", posed_for(MODEL, times, trace)).misfit_rad
     assert without > 10 * rms(noise)
     for method in EXACT:
@@ -219,35 +214,15 @@ def test_a_trace_without_noise_gives_every_model_back(name: str) -> None:
         np.testing.assert_allclose(best, np.log(truth), rtol=0, atol=1e-3)
 
 
-def same(one: Identification, other: Identification) -> bool:
-    """Whether parameters, misfit, evaluations and history are the same byte for byte."""
-    histories = zip(vars(one.history).values(), vars(other.history).values(), strict=True)
-    return all(np.array_equal(a, b) for a, b in histories)
-
-
-def mixed() -> list[Problem]:
-    """Traces of which some differ in more than the noise, in no order."""
-    times, response = clean("liquid_drop_2")
-    linear, other = of_case("liquid_drop_2", 3), of_case("liquid_drop_2", 1)
-    trace = response + 1e-5 * np.random.default_rng(9).standard_normal(len(times))
-    half = times[::2], trace[::2]
-    drop = MODELS["liquid_drop"]
-    sparse = problem_alone(GRIPPER, MODEL, TORQUE, *half)
-    narrow = replace(linear[2], low=linear[2].low + 1)
-    of_drop = linear[2].residuals.of_model(drop)
-    simple = replace(
-        linear[2],
-        residuals=of_drop,
-        misfit=of_drop.condensed_misfit,
-        low=linear[2].low[:3],
-        high=linear[2].high[:3],
-    )
-    return [linear[0], linear[1], sparse, *other, narrow, linear[2], simple]
-
-
 def test_answers_do_not_depend_on_the_batch_byte_for_byte() -> None:
     """Fits share responses: of one model, at the same times; search ranges may differ."""
-    problems = mixed()
+    times, response = clean("liquid_drop_2")
+    linear = of_case("liquid_drop_2", 4)
+    (offset,) = case_problem(times, response, 1, offset=True)
+    (sparse,) = case_problem(times[::2], response[::2], 1)
+    narrow = replace(linear[2], low=linear[2].low + 1)
+    simple = posed_for(MODELS["liquid_drop"], times, response)
+    problems = [linear[0], linear[1], sparse, offset, narrow, linear[3], simple]
     groups = alike(problems)
     assert [group.tolist() for group in groups] == [[0, 1, 4, 5], [2], [3], [6]]
     assert alike([]) == []
@@ -258,7 +233,9 @@ def test_answers_do_not_depend_on_the_batch_byte_for_byte() -> None:
 
     together = least_squares.identify_many(problems, few, rngs())
     for each, rng, answer in zip(problems, rngs(), together, strict=True):
-        assert same(answer, *least_squares.identify_many([each], few, [rng]))
+        (alone,) = least_squares.identify_many([each], few, [rng])
+        histories = zip(vars(answer.history).values(), vars(alone.history).values(), strict=True)
+        assert all(np.array_equal(one, other) for one, other in histories)
 
 
 MODELS_SETTLED = {
@@ -284,40 +261,11 @@ def noisy(model: SampleModel, count: int) -> list[tuple[Problem, Array]]:
     return problems
 
 
-# What `biogrip.identify_sample` was asked when its parameters were not those of the misfit told:
-# an element that a trace does not show, a spring in series with what made it.
-STEPS = (3.306849408e-10, 6.104421476e-10, 1.5714262386e-09, 3.807791792e-10)
-STEP_S, NOISE_RAD = 2.3289703032772175, 7e-8
-
-
-def test_parameters_are_those_of_the_misfit_told() -> None:
-    """A Zener model on the trace of a Kelvin-Voigt sample; and it is the same from all starts.
-
-    With every other spring in series, arms would ring at another frequency: there are minima by
-    the dozen. In this draw of the noise the deepest are equals to 0.1 in chi^2; in others some
-    are deeper by more, and not found from so few starts.
-    """
-    arm = library.Arm(1e-14, 3.3e-12, 4.4e-7)
-    gripper = library.Gripper(1.5e-3, 75.0, arm, arm)
-    protocol = tuple(library.hold(STEP_S, torque) for torque in STEPS)
-    made_by, fitted = (
-        library.set_up(gripper, protocol, library.Sample(name))
-        for name in ("kelvin_voigt", "zener_kelvin")
-    )
-    time_s = np.linspace(0.0, 4 * STEP_S, 2001)
-    noise = NOISE_RAD * np.random.default_rng(0).standard_normal(len(time_s))
-    trace = library.simulate(made_by, {"k_p": 11.6, "c_p": 0.0125}, time_s) + noise
-    chi2 = []
-    for seed in range(2):
-        found = library.identify_sample(fitted, time_s, trace, seed=seed)
-        parameters = dict(zip(fitted.searched.names, found.parameters.tolist(), strict=True))
-        residual = library.simulate(fitted, parameters, time_s) - trace
-        misfit_rad = np.sqrt(np.mean(residual**2))
-        assert found.misfit_rad == pytest.approx(misfit_rad, rel=1e-9)
-        chi2.append(len(time_s) * (misfit_rad / NOISE_RAD) ** 2)
-    assert np.ptp(chi2) < 0.1
-    # The model that made the trace is a special case of the one that is fitted.
-    assert max(chi2) < np.sum(noise**2) / NOISE_RAD**2
+def gradient(posed: Problem, x: Array) -> Array:
+    """Half of that of what is minimized, on all samples."""
+    residual, slopes = posed.residuals(x)
+    away = (x - 0.5 * (posed.low + posed.high)) / PRIOR_WIDTH**2
+    return slopes @ residual / posed.residuals.noise_scale_rad**2 + away
 
 
 @pytest.mark.parametrize("name", MODELS_SETTLED)
@@ -328,15 +276,14 @@ def test_curvatures_are_those_of_what_is_minimized(name: str) -> None:
         found = fits.curved(x[None], trace)
         unit = np.eye(len(x))
 
-        def gradient(at: Array, posed: Problem = posed) -> Array:
-            residual, slopes = posed.residuals(at)
-            away = (at - 0.5 * (posed.low + posed.high)) / PRIOR_WIDTH**2
-            return slopes @ residual / posed.residuals.noise_scale_rad**2 + away
-
         np.testing.assert_allclose(
-            found.gradient[0], gradient(x), rtol=1e-6, atol=1e-8 * np.abs(found.gradient).max()
+            found.gradient[0],
+            gradient(posed, x),
+            rtol=1e-6,
+            atol=1e-8 * np.abs(found.gradient).max(),
         )
-        second = [(gradient(x + 1e-4 * u) - gradient(x - 1e-4 * u)) / 2e-4 for u in unit]
+        ends = ((gradient(posed, x + 1e-4 * u), gradient(posed, x - 1e-4 * u)) for u in unit)
+        second = [(after - before) / 2e-4 for after, before in ends]
         # Of what the trace says nothing of, nearly all is rounding.
         allowed = 1e-6 * np.abs(second).max() + 1e-8
         np.testing.assert_allclose(found.information[0], second, rtol=0, atol=allowed)
@@ -349,7 +296,4 @@ def test_the_optimum_is_settled_to_the_last_digits() -> None:
     rng = np.random.default_rng(0)
     ends = [fit_from([case_problem], best + 0.01 * rng.standard_normal(4)).x[0] for _ in range(4)]
     assert np.max(np.ptp(ends, axis=0)) < 1e-9
-    residual, sensitivity = case_problem.residuals(ends[0])
-    prior = (ends[0] - 0.5 * (case_problem.low + case_problem.high)) / PRIOR_WIDTH**2
-    gradient = sensitivity @ residual / case_problem.residuals.noise_scale_rad**2 + prior
-    assert np.max(np.abs(gradient)) < 1e-6
+    assert np.max(np.abs(gradient(case_problem, ends[0]))) < 1e-6

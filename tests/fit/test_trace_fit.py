@@ -1,6 +1,8 @@
-"""Identification with what an instrument does to a trace, against least squares with all of it."""
+"""What an instrument does to a trace, against least squares with all of it and by symmetries."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,11 +10,10 @@ from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.multi_start import identify_from
+from biogrip.fit.least_squares import identify_from
 from biogrip.fit.noise_model_fit import FAR
-from biogrip.fit.problem import Identification, Problem
-from biogrip.fit.trace_fit import trace_fit
+from biogrip.fit.problem import CaseProblem, Identification, Problem
+from biogrip.fit.trace_fit import TraceFit, fit_traces, gripper_functions
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, Outliers, add_noise
 from biogrip.physics.simulation import simulated_rotation
@@ -37,13 +38,18 @@ def find(problem: Problem) -> Identification:
     return identify_from(problem, TRUTH)
 
 
+def fitted(case_problem: CaseProblem, trace: Array, times: Array = TIMES) -> TraceFit:
+    (fit,) = fit_traces([case_problem], [(times, trace)], lambda some, _: list(map(find, some)))
+    return fit
+
+
 def noisy(noise: Noise, seed: int = 0) -> Array:
     return add_noise(CLEAN, noise, np.random.default_rng([seed, 3]), TIMES)
 
 
 def test_white_noise_and_a_known_gripper_leave_the_fit_as_it_is() -> None:
     trace = noisy(Noise("gaussian", 0.02, "peak"))
-    fit = trace_fit(POSED, TIMES, trace, find)
+    fit = fitted(POSED, trace)
     expected = find(POSED.of(TIMES, trace))
     np.testing.assert_array_equal(fit.found.parameters, expected.parameters)
     assert fit.noise_model is None
@@ -66,7 +72,7 @@ def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
     }
     case_problem = replace(POSED, uncertainty=uncertainty, noise_rad=float(level))
     trace = noisy(Noise("gaussian", 0.02, "peak"))
-    fit = trace_fit(case_problem, TIMES, trace, find)
+    fit = fitted(case_problem, trace)
     _, slopes = fit.problem.residuals(np.log(fit.found.parameters))
     told = [0, 2]  # k and c: nothing is told of c_p, and next to nothing of k_p.
 
@@ -100,7 +106,7 @@ def test_noise_is_found_and_said() -> None:
     noise = Noise("gaussian", 0.02, "peak", ar1=AR1(0.5, 5.0), drift=Drift(2.0))
     noise = replace(noise, outliers=Outliers(0.01, 30.0))
     case_problem = replace(POSED, coloured=True, offset=True, drift=True)
-    fit = trace_fit(case_problem, TIMES, noisy(noise), find)
+    fit = fitted(case_problem, noisy(noise))
     assert fit.noise_model is not None
     assert fit.noise_model.ar1 + fit.noise_model.flicker == pytest.approx(0.5, abs=0.25)
     away = np.abs(noisy(noise) - noisy(replace(noise, outliers=None))) / (0.02 * CLEAN.max())
@@ -122,8 +128,8 @@ def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
     spikes = [200, 500, 700]
     spiked = trace.copy()
     spiked[spikes] += 15 * 0.05 * CLEAN[spikes]
-    assert not trace_fit(case_problem, TIMES, trace, find).outliers.any()
-    fit = trace_fit(case_problem, TIMES, spiked, find)
+    assert not fitted(case_problem, trace).outliers.any()
+    fit = fitted(case_problem, spiked)
     np.testing.assert_array_equal(np.flatnonzero(fit.outliers), spikes)
     assert fit.noise_model is not None
     assert fit.noise_model.proportional > 0.9
@@ -135,4 +141,40 @@ def test_too_many_samples_for_a_colour_are_refused() -> None:
     case_problem: CaseProblem = replace(POSED, coloured=True, offset=True, drift=True)
     times = np.linspace(0, 400, MOST_SAMPLES + 1)
     with pytest.raises(BiogripError, match="allowed are at most 50000 with a coloured"):
-        trace_fit(case_problem, times, times, find)
+        fitted(case_problem, times, times)
+
+
+def functions(uncertainty: Mapping[str, Mapping[str, float]], **changes: Any) -> Array:
+    gripper = replace(POSED.gripper, **changes)
+    case_problem = replace(POSED, gripper=gripper, uncertainty=uncertainty)
+    return gripper_functions(case_problem, TIMES, np.exp(TRUTH))
+
+
+def test_the_torque_is_a_factor_of_the_rotation() -> None:
+    odd, even = functions({"torque": {"share": 0.03}})
+    np.testing.assert_allclose(odd, 0.03 * CLEAN, rtol=1e-9)
+    np.testing.assert_allclose(even, 0.0, atol=1e-12 * odd.max())
+
+
+def test_an_uncertain_length_is_that_of_all_elements() -> None:
+    """A length enters as its square, by which every element of the sample is multiplied."""
+    share, length = 0.05, POSED.gripper.arm_length_m
+    odd, even = functions({"gripper": {"arm_length_m": share * length}})
+    above, nominal, below = (
+        simulated(POSED.gripper, TRUTH + 2 * np.log1p(error)) for error in (share, 0, -share)
+    )
+    np.testing.assert_allclose(odd, 0.5 * (above - below), rtol=1e-9, atol=1e-12)
+    bent = 0.5 * (above + below) - nominal
+    assert even @ bent / np.linalg.norm(even) / np.linalg.norm(bent) == pytest.approx(1.0)
+
+
+def test_only_the_sine_of_the_angle_counts() -> None:
+    """Its change by an angle has a slope of cos/sin; at a right angle it has none."""
+    degree = {"gripper": {"reference_angle_deg": 1.0}}
+    odd, _ = functions(degree)
+    length = POSED.gripper.arm_length_m / np.tan(np.radians(75.0)) * np.radians(1.0)
+    same, _ = functions({"gripper": {"arm_length_m": length}})
+    # To the third order in an angle of a degree.
+    np.testing.assert_allclose(odd, same, atol=1e-3 * np.abs(odd).max())
+    right, _ = functions(degree, reference_angle_deg=90.0)
+    np.testing.assert_allclose(right, 0.0, atol=1e-12)

@@ -9,9 +9,8 @@ from scipy.optimize import curve_fit
 
 from biogrip.arrays import Array
 from biogrip.fit.any_sample import proportional_deviations
-from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.problem import Identification, Problem
-from biogrip.fit.trace_fit import trace_fit
+from biogrip.fit.problem import CaseProblem
+from biogrip.fit.trace_fit import TraceFit, fit_traces
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.library import set_up
 from biogrip.physics.gripper import Arm, Gripper
@@ -47,12 +46,15 @@ def noisy(share: float, seed: int = 3) -> Array:
     return trace
 
 
-def find(problem: Problem) -> Identification:
-    return run("least_squares", problem)
+def fitted(problem: CaseProblem, trace: Array) -> TraceFit:
+    (fit,) = fit_traces(
+        [problem], [(TIMES, trace)], lambda some, _: [run("least_squares", each) for each in some]
+    )
+    return fit
 
 
 def identified(problem: CaseProblem, trace: Array) -> Diagnosis:
-    fit = trace_fit(problem, TIMES, trace, find)
+    fit = fitted(problem, trace)
     return diagnose(
         fit.problem, problem.searched, fit.found, confidence=0.95, noise_rad=problem.noise_rad
     )
@@ -63,7 +65,7 @@ def test_the_noise_is_the_root_mean_square_of_known_deviations() -> None:
     trace, deviations = noisy(0.05), 0.05 * noisy(0.0)
     weighted = POLYSTYRENE.weighted(deviations)
     parameters = np.array([1.2 * V, 0.9 * BETA, 1.1 * ETA])
-    misfit = weighted.of(TIMES, trace).misfit(parameters[None])[0]
+    misfit = weighted.of(TIMES, trace).residuals.misfit(parameters[None])[0]
     left = rotation(TIMES, np.log(parameters[0]), parameters[1], np.log(parameters[2])) - trace
     assert weighted.noise_rad is not None
     chi_squared = np.sum((left / deviations) ** 2)
@@ -72,7 +74,7 @@ def test_the_noise_is_the_root_mean_square_of_known_deviations() -> None:
 
 def test_the_published_fit_comes_out_to_five_digits() -> None:
     trace = noisy(0.0)
-    fit = trace_fit(POLYSTYRENE.weighted(0.05 * trace), TIMES, trace, find)
+    fit = fitted(POLYSTYRENE.weighted(0.05 * trace), trace)
     assert fit.found.parameters == pytest.approx([V, BETA, ETA], rel=5e-6)
 
 

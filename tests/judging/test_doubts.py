@@ -17,11 +17,10 @@ from biogrip.judging.doubts import (
     examine_residuals,
     find_slow_misfit,
 )
-from biogrip.judging.likelihood import make_likelihood
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.noise import AR1, Noise, Outliers, add_noise, draw_ornstein_uhlenbeck
 from biogrip.physics.whitening import NoiseModel
-from tests.helpers.problems import MODEL, clean, posed_for, run
+from tests.helpers.problems import MODEL, clean, likelihood_of, posed_for, run
 
 
 def examined(parts: dict[str, Any], place: int | None = None) -> str:
@@ -31,11 +30,7 @@ def examined(parts: dict[str, Any], place: int | None = None) -> str:
     trace = add_noise(response, noise, np.random.default_rng(0), times)
     if place is not None:
         trace[place] += response.max()
-    problem = posed_for(MODEL, times, trace)
-    found = run("least_squares", problem)
-    likelihood = make_likelihood(
-        problem, np.log(found.parameters), found.misfit_rad, confidence=0.95
-    )
+    likelihood = likelihood_of(posed_for(MODEL, times, trace))
     notes = examine_residuals(likelihood).notes
     return " ".join(note.text for note in notes if note.weight == DOUBT)
 

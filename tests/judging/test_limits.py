@@ -9,24 +9,22 @@ from biogrip.arrays import Array
 from biogrip.fit.local_fits import FINE
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.diagnosis import diagnose
-from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.profiles import Profile, compute_profiles, find_gaps
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding
 from biogrip.physics.models import MODELS
 from biogrip.stages.intervals import refitted, shown_of
-from tests.helpers.definition import FitConstraint, rise_at
-from tests.helpers.problems import MODEL, clean, posed_for, problem, run
+from tests.helpers.problems import MODEL, clean, likelihood_of, posed_for, problem, run
+from tests.helpers.scipy_fits import lowest_rise, rise_with_held
 
 QUANTITIES = parameters_and_sum(MODEL)
 
 
 def likelihood_for(case: str, seed: int) -> Likelihood:
     """What the limits of a simulated trace are measured against."""
-    posed = problem(case, seed, rate_Hz=10.0)
-    found = run("least_squares", posed, seed)
-    return make_likelihood(posed, np.log(found.parameters), found.misfit_rad, confidence=0.95)
+    return likelihood_of(problem(case, seed, rate_Hz=10.0), seed)
 
 
 @pytest.mark.parametrize(
@@ -43,11 +41,11 @@ def test_the_rise_at_a_limit_is_the_threshold(case: str, seed: int) -> None:
     (fast,) = find_limits([likelihood], QUANTITIES)[0]
     for quantity, found, near in zip(QUANTITIES, profiles, fast, strict=True):
         for limit in (each for each in (found.low, found.high) if each is not None):
-            lowest = rise_at(likelihood, quantity, limit, rng, 20)
+            lowest = lowest_rise(likelihood, quantity, limit, rng, 20)
             assert lowest == pytest.approx(likelihood.threshold, rel=0.01), quantity.label
         for limit in near[np.isfinite(near)]:
-            held = FitConstraint(likelihood, quantity, limit)
-            rises = held.fitted(likelihood.best)[0], rise_at(likelihood, quantity, limit, rng, 20)
+            held = likelihood, quantity, limit
+            rises = rise_with_held(*held, likelihood.best)[0], lowest_rise(*held, rng, 20)
             assert likelihood.threshold in [pytest.approx(rise, rel=0.01) for rise in rises]
 
 
@@ -58,7 +56,7 @@ def test_an_optimum_that_was_missed_is_judged_again() -> None:
     case_problem = posed_for(maxwell, times, response + noise)
     found = run("least_squares", case_problem)
     elsewhere = found.parameters * np.array([1.1, 1.02])
-    misfit_rad = float(case_problem.misfit(elsewhere[None])[0])
+    misfit_rad = float(case_problem.residuals.misfit(elsewhere[None])[0])
     missed = replace(found, parameters=elsewhere, misfit_rad=misfit_rad)
     right, again = (diagnose(case_problem, maxwell, f, confidence=0.95) for f in (found, missed))
     assert again.likelihood.misfit_rad == pytest.approx(right.likelihood.misfit_rad, rel=1e-9)
@@ -77,7 +75,7 @@ def test_a_held_fit_is_scipys(label: str) -> None:
         target = quantity.log(likelihood.best) + away
         (increase,), (x,) = fits.at(one, np.array([target]), likelihood.best[None], FINE)
         assert quantity.log(x) == pytest.approx(target, abs=1e-11)
-        scipys, _ = FitConstraint(likelihood, quantity, target).fitted(likelihood.best)
+        scipys, _ = rise_with_held(likelihood, quantity, target, likelihood.best)
         assert increase == pytest.approx(scipys, abs=0.02)
 
 
@@ -122,7 +120,7 @@ def test_no_limit_is_said_only_of_what_has_none() -> None:
 def test_limits_tell_of_an_optimum_that_was_missed() -> None:
     right = likelihood_for("liquid_drop_2", 0)
     away = right.best + np.array([0.1, 0.0, 0.02, 0.0])
-    misfit_rad = float(right.problem.misfit(np.exp(away)[None])[0])
+    misfit_rad = float(right.problem.residuals.misfit(np.exp(away)[None])[0])
     missed = replace(right, best=away, misfit_rad=misfit_rad)
     quantities = [QUANTITIES[0], QUANTITIES[4]]
     assert find_limits([right], quantities)[1] == {}

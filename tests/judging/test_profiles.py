@@ -1,13 +1,14 @@
 """Quantities held exactly in many fits at once, against SciPy's fits of all samples."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import norm, t
 
 from biogrip.arrays import Array
-from biogrip.fit.multi_start import fit_from
+from biogrip.fit.least_squares import fit_from
 from biogrip.judging.constrained_fits import QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
@@ -26,8 +27,7 @@ from tests.helpers.problems import (
     TORQUE,
     case_problem,
     clean,
-    identified,
-    of_case,
+    likelihood_of,
     posed_for,
     run,
 )
@@ -36,12 +36,8 @@ from tests.helpers.scipy_fits import scipy_fit
 PARAMETERS = parameters_and_sum(MODEL)
 
 
-def likelihoods(case: str, count: int) -> list[Likelihood]:
-    problems = of_case(case, count)
-    return [
-        make_likelihood(problem, np.log(found.parameters), found.misfit_rad, confidence=0.95)
-        for problem, found in zip(problems, identified(problems, [0] * count), strict=True)
-    ]
+def likelihoods(case: str, count: int, **assumed: Any) -> list[Likelihood]:
+    return [likelihood_of(each) for each in case_problem(*clean(case), count, **assumed)]
 
 
 def labelled(*labels: str) -> list[Quantity]:
@@ -99,7 +95,7 @@ def test_points_are_moved_to_where_quantities_are_held(form: str) -> None:
 
 def test_limits_do_not_depend_on_the_batch() -> None:
     """Byte for byte, in any order, of one or several experiments."""
-    each = [*likelihoods("endothelial_cell", 2), *likelihoods("liquid_drop_2", 1)]
+    each = [*likelihoods("endothelial_cell", 2), *likelihoods("liquid_drop_2", 1, offset=True)]
     quantities = labelled("k", "c + c_p")
     together, profiles = find_limits(each, quantities)[0], compute_profiles(each, quantities)
     for chosen in ([2], [1, 0], [1, 2]):
@@ -142,7 +138,7 @@ def test_the_search_range_determines_no_combination() -> None:
     problem = posed_for(MODEL, times, clean_rad + noise)
     found, k_and_k_p = run("least_squares", problem), find_combinations(MODEL, [0, 1])
     told = diagnose(problem, MODEL, found, confidence=0.95, noise_rad=1e-4)
-    series = next(q for q in k_and_k_p if q.form == "series")
+    series = next(q for q in k_and_k_p if q.sense < 0)
     # To first order it is known well enough to be looked at.
     assert told.likelihood.deviation(series) < 0.5
     ((one,),) = compute_profiles([told.likelihood], [series])

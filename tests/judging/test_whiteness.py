@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 from scipy.signal import lfilter
 from scipy.stats import kstest
 from scipy.stats import t as student
@@ -55,28 +54,6 @@ def test_of_white_noise_each_test_fails_as_many_as_its_level_says(
     assert np.all(shares < LEVEL + margin)
     exact = [0] if readings < 20 else [0, 1]
     assert np.all(shares[exact] > LEVEL - margin)
-
-
-def test_the_chance_of_a_correlation_is_that_of_the_quadratic_form() -> None:
-    """By Imhof's integral of the characteristic function, Biometrika 48 (1961), 419-426."""
-    basis = absorbed(directions(np.geomspace(1e-3, 1, 15)))
-    maker = np.eye(15) - basis.T @ basis
-    residual = maker @ np.cumsum(np.random.default_rng(3).standard_normal(15))
-    found, chance = correlated(residual, basis)
-    differences = np.diff(np.eye(15), axis=0)
-    observed = np.sum(np.diff(residual) ** 2) / np.sum(residual**2)
-    weights = np.linalg.eigvalsh(
-        maker @ (differences.T @ differences - observed * np.eye(15)) @ maker
-    )
-
-    def integrand(u: float) -> float:
-        angle = 0.5 * np.sum(np.arctan(weights * u))
-        return float(np.sin(angle) / (u * np.prod((1 + (weights * u) ** 2) ** 0.25)))
-
-    expected = 0.5 - quad(integrand, 0, np.inf, limit=500)[0] / np.pi
-    assert 1e-4 < expected < 0.1
-    assert chance == pytest.approx(expected, rel=0.2)
-    assert found > 0.3
 
 
 def test_the_cumulative_periodogram_is_kolmogorovs() -> None:

@@ -115,7 +115,7 @@ def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
     # Exponents stay below one.
     moved = [parameter.kind != "exponent" for parameter in model.parameters]
     logs = np.log([model.example]) + np.linspace(-0.3, 0.4, 5)[:, None] * moved
-    found = residuals.condensed_misfit(np.exp(logs))
+    found = residuals.misfit(np.exp(logs))
     expected = [np.sqrt(np.mean(residuals(at)[0] ** 2)) for at in logs]
     assert found == pytest.approx(expected, rel=1e-10)
     responses = residuals.condensed_responses(logs)

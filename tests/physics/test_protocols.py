@@ -2,19 +2,21 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from mpmath import mp, mpf
 
 from biogrip.arrays import Array
+from biogrip.library import set_up
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.gripper import torque as torque_of_voltage
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.linear import phi_function, rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
-from biogrip.physics.misfit import SeriesMisfit
-from biogrip.physics.models import MODELS
+from biogrip.physics.misfit import SeriesMisfit, make_misfit
+from biogrip.physics.models import Sample
 from biogrip.physics.protocol import (
     Load,
     Phase,
@@ -27,7 +29,6 @@ from biogrip.physics.protocol import (
 from biogrip.physics.roots import SMALLEST_GAP, separate
 from biogrip.physics.simulation import jaw_force
 from biogrip.study.experiment_blocks import PhaseBlock, ProtocolBlock
-from tests.helpers.problems import problem_alone
 from tests.helpers.radau import equal_arms
 from tests.helpers.responses import exact_50_digits, random_samples
 from tests.physics.test_contact import TABLE_2
@@ -112,10 +113,11 @@ def test_no_response_is_needed_of_steps_that_are_sampled_evenly(
     offset: bool,
     by_series: bool,
 ) -> None:
-    torque, trace = torque_history(phases), np.zeros_like(time_s)
-    problem = problem_alone(gripper, MODELS[name], torque, time_s, trace, offset=offset)
-    assert isinstance(problem.misfit, SeriesMisfit) == by_series
-    assert by_series or problem.misfit == problem.residuals.condensed_misfit
+    experiment = set_up(gripper, phases, Sample(name))
+    problem = replace(experiment, offset=offset).of(time_s, np.zeros_like(time_s))
+    misfit = make_misfit(problem.residuals)
+    assert isinstance(misfit, SeriesMisfit) == by_series
+    assert by_series or misfit == problem.residuals.misfit
 
 
 def test_rounding_does_not_lose_the_last_sample() -> None:

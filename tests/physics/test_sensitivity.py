@@ -130,6 +130,6 @@ def test_a_later_protocol_is_one_of_earlier_readings(
     )
     moved, parameters = here.later(3.0), np.exp(AT)[None]
     np.testing.assert_array_equal(moved(AT)[0], there(AT)[0])
-    expected = there.condensed_misfit(parameters)
-    assert moved.condensed_misfit(parameters) == pytest.approx(expected, rel=1e-12)
+    expected = there.misfit(parameters)
+    assert moved.misfit(parameters) == pytest.approx(expected, rel=1e-12)
     assert moved.noise_scale_rad == here.noise_scale_rad

@@ -9,8 +9,8 @@ import pandas as pd
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.methods import ALL, basins
+from biogrip.fit.problem import CaseProblem
 from biogrip.physics.instruments import ROTATION, Quantity
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.physics.whitening import within

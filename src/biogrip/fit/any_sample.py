@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from biogrip.arrays import Array
-from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.problem import CaseProblem
 from biogrip.physics.modes import lagged_torques
 
 # Retardation times a decade; shortest over the sampling interval, longest over the protocol, and

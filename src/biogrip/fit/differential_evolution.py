@@ -63,7 +63,7 @@ def _identified(
     def ranking(columns: Array) -> Array:
         nonlocal evaluations
         evaluations += columns.shape[1]
-        return problem.misfit(np.exp(columns.T)).astype(np.float32).astype(float)
+        return problem.residuals.misfit(np.exp(columns.T)).astype(np.float32).astype(float)
 
     def row_of(result: "OptimizeResult") -> Row:
         median = float(np.median(result.population_energies))

@@ -17,10 +17,8 @@ from scipy.optimize import minimize_scalar
 
 from biogrip.arrays import Array, IntArray
 from biogrip.fit.any_sample import extreme_responses, fit_responses
-from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
-from biogrip.fit.multi_start import fit_from
-from biogrip.fit.problem import Problem, silent
+from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
+from biogrip.fit.problem import CaseProblem, Problem, silent
 from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
 
 # Longest relaxation time over the protocol's duration, and how many a decade; the shortest is that

@@ -26,7 +26,7 @@ from biogrip.fit.genome import Chromosomes, Genome
 from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
 from biogrip.keys import Block
 from biogrip.keys import Problem as Complaint
-from biogrip.physics.misfit import Misfits, combine_misfits
+from biogrip.physics.misfit import combine_misfits, make_misfit
 
 _MOST = 1_000_000
 
@@ -115,29 +115,8 @@ def evolve(
     progress: Progress = silent,
 ) -> list[Evolution]:
     """Identify samples as `identify_many` does, and return the survivors as well."""
-    misfits = combine_misfits([problem.misfit for problem in problems])
-    return evolve_many(misfits, problems[0].genome, settings, rngs, progress)
-
-
-def evolve_many(
-    misfits: Misfits,
-    genome: Genome,
-    settings: GeneticSettings,
-    rngs: Sequence[np.random.Generator],
-    progress: Progress = silent,
-) -> list[Evolution]:
-    """Run the genetic algorithm with one population for each random generator.
-
-    Parameters
-    ----------
-    misfits
-        Function of parameters, (n_populations, n, n_parameters), and of the indices of
-        those populations, (n_populations,), that returns misfits.
-    genome
-        Encoding of the parameters.
-    settings, rngs, progress
-        As in `identify_many`, with a generator for each population.
-    """
+    misfits = combine_misfits([make_misfit(problem.residuals) for problem in problems])
+    genome = problems[0].genome
 
     def ranked(chromosomes: Chromosomes, populations: IntArray) -> Ranking:
         misfit = misfits(genome.decode(chromosomes), populations).astype(np.float32)
@@ -203,22 +182,10 @@ def _identification(course: list[Row], has_stalled: bool) -> Identification:
 def select(
     chromosomes: Chromosomes, ranking: Ranking, genome: Genome, count: int
 ) -> tuple[Chromosomes, Ranking]:
-    """Select the best individuals of each population, best first.
+    """Select the best individuals of each population by their misfits, best first.
 
-    Parameters
-    ----------
-    chromosomes : (n_populations, n, n_genes)
-    ranking : (n_populations, n)
-        Their misfits; NaN is ranked last. Of equals the one with the lowest genes is first.
-    genome
-        Encoding of the parameters.
-    count
-        Number of individuals to select.
-
-    Returns
-    -------
-    chromosomes : (n_populations, count, n_genes)
-    ranking : (n_populations, count)
+    Chromosomes are (n_populations, n, n_genes), misfits (n_populations, n). NaN is ranked last. Of
+    equals the one with the lowest genes is first.
     """
     # As by `numpy.lexsort((*keys, ranking))`, in a third of its time.
     keys: list[NDArray[Any]] = [*genome.keys(chromosomes), ranking]
@@ -241,18 +208,7 @@ def cross(
 ) -> Chromosomes:
     """Produce children by single-point crossover; both children of a pair are kept.
 
-    Parameters
-    ----------
-    parents : (n_populations, n_parents, n_genes)
-        Best first.
-    settings
-        Settings of mating.
-    rngs
-        A generator for each population.
-
-    Returns
-    -------
-    (n_populations, n_children, n_genes)
+    Parents and children are (n_populations, n, n_genes), parents best first.
     """
     populations, count, genes = parents.shape
     n_children = settings.population - settings.survivors
@@ -290,18 +246,7 @@ def mutate(
     settings: GeneticSettings,
     rngs: Sequence[np.random.Generator],
 ) -> None:
-    """Mutate individuals in place: redraw random genes of a random share of them.
-
-    Parameters
-    ----------
-    chromosomes : (n_populations, n, n_genes)
-    genome
-        Encoding of the parameters.
-    settings
-        Settings of mutation.
-    rngs
-        A generator for each population.
-    """
+    """Mutate individuals, (n_populations, n, n_genes), in place: redraw genes of some of them."""
     for own, rng in zip(chromosomes, rngs, strict=True):
         mutating = np.flatnonzero(rng.random(len(own)) < settings.mutation_probability)
         for _ in range(settings.mutated_genes):

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.fit.genetic import Evolution, GeneticSettings, evolve
-from biogrip.fit.multi_start import best_of_starts
+from biogrip.fit.least_squares import best_of_starts
 from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
 from biogrip.keys import Block
 
@@ -28,17 +28,9 @@ class Polishing(Block):
     """The same for the last population."""
 
 
-@dataclass(frozen=True)
-class RefinedSettings:
-    """Settings of the genetic algorithm and of the local fits that follow."""
-
-    genetic: GeneticSettings
-    polishing: Polishing
-
-
 def identify_many(
     problems: Sequence[Problem],
-    settings: RefinedSettings,
+    settings: tuple[GeneticSettings, Polishing],
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Identification]:
@@ -46,8 +38,9 @@ def identify_many(
 
     `progress` is called after every generation, for all problems together, and finally for each.
     """
-    evolutions = evolve(problems, settings.genetic, rngs, progress)
-    starts, before = zip(*(_survivors(e, settings.polishing) for e in evolutions), strict=True)
+    genetic, polishing = settings
+    evolutions = evolve(problems, genetic, rngs, progress)
+    starts, before = zip(*(_survivors(each, polishing) for each in evolutions), strict=True)
     fine = best_of_starts(problems, starts, before, progress)
     coarse = [evolution.identification for evolution in evolutions]
     return [_polished(*both) for both in zip(coarse, fine, strict=True)]

@@ -121,15 +121,9 @@ class Genome:
     def decode(self, chromosomes: Chromosomes) -> Array:
         """Decode chromosomes into parameters, 10^g_1 (0.1 g_2 + 0.01 g_3 + ...) (eq. 10).
 
-        Parameters
-        ----------
-        chromosomes : (..., n_genes)
-
-        Returns
-        -------
-        (..., n_parameters)
-            Each is the double nearest to the encoded decimal number: the digits form an integer,
-            and powers of ten up to 10^22 are exact, so that only one operation rounds.
+        Of (..., n_genes) they are (..., n_parameters). Each is the double nearest to the encoded
+        decimal number: the digits form an integer, and powers of ten up to 10^22 are exact, so that
+        only one operation rounds.
         """
         digits = np.array(self.sizes) - 1
         powers = chromosomes[..., self._exponents] - digits + _LARGEST_POWER
@@ -181,15 +175,7 @@ _OVER = np.array([10.0 ** max(-power, 0) for power in _POWERS])
 
 
 def make_genome(model: SampleModel, ranges: Mapping[str, GeneRange]) -> Genome:
-    """Return the genome of a sample model.
-
-    Parameters
-    ----------
-    model
-        Gives the order of the parameters.
-    ranges
-        Gene ranges by the name of the range, see `Parameter.range_name`.
-    """
+    """Return the genome of a sample model, from gene ranges by `Parameter.range_name`."""
     chosen = [ranges[parameter.range_name] for parameter in model.parameters]
     low = np.concatenate([genes.least for genes in chosen])
     high = np.concatenate([genes.most for genes in chosen])

@@ -1,5 +1,18 @@
-"""Bounded multi-start least squares on log-parameters."""
+"""Bounded multi-start least squares on log-parameters, for many traces at once [1]_.
 
+Local fits start from the best of many random points. All are rough; the best few are continued to
+their optima, and the best of these is refined by Newton steps to its last digits (`refine_optima`).
+The result of a trace does not depend, to the last bit, on the other traces.
+
+References
+----------
+.. [1] A. Raue et al., Lessons learned from quantitative dynamical modeling in systems biology,
+   PLoS ONE 8 (2013), e74335: local fits from many starts.
+.. [2] J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., Springer, 2006, section
+   3.4: Newton's method with the moduli of the curvatures.
+"""
+
+from bisect import insort
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
@@ -7,11 +20,15 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.errors import BiogripError
-from biogrip.fit.multi_start import best_of_starts, screened
-from biogrip.fit.problem import Identification, Problem, Progress, Row, silent
+from biogrip.fit.levenberg_marquardt import Minima, Normal, bounded_step, minimize
+from biogrip.fit.local_fits import FAIR, FINE, ROUGH, LocalFits, alike
+from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
 from biogrip.keys import Block
+
+FINISHED = 4
+"""Number of a trace's best rough fits that are continued to the optimum."""
 
 
 @dataclass(frozen=True)
@@ -33,32 +50,28 @@ def identify_many(
 ) -> list[Identification]:
     """Identify samples by local fits from the best of many random points.
 
-    Parameters
-    ----------
-    problems, settings, rngs, progress
-        As in `biogrip.fit.methods`; `progress` is called after every trace.
-    further
-        Additional starts of each trace, log-parameters (n_further, n_parameters).
-
-    Raises
-    ------
-    BiogripError
-        If the model has no response at any of the points.
+    Further starts of each trace are log-parameters, (n_further, n_parameters). `progress` is called
+    after every trace. If the model has no response at any of the points, it is a `BiogripError`.
     """
     pairs = zip(problems, rngs, strict=True)
-    points = [_screened(problem, settings, rng) for problem, rng in pairs]
+    points = [screened(problem, settings, rng) for problem, rng in pairs]
     starts, before = zip(*points, strict=True)
     if further is not None:
         starts = tuple(map(np.concatenate, zip(starts, further, strict=True)))
     return best_of_starts(problems, starts, before, progress)
 
 
-def _screened(
+def screened(
     problem: Problem, settings: LeastSquaresSettings, rng: np.random.Generator
 ) -> tuple[Array, Row]:
     """Return the best random points as starts, and the first row of the history."""
     shape = (settings.candidates, len(problem.low))
-    points, misfit = screened(problem.misfit, rng.uniform(problem.low, problem.high, shape))
+    points = rng.uniform(problem.low, problem.high, shape)
+    misfit = problem.residuals.misfit(np.exp(points))
+    # Equals, in single precision, keep their order.
+    order = np.argsort(misfit.astype(np.float32), kind="stable")
+    order = order[np.isfinite(misfit[order])]
+    points, misfit = points[order], misfit[order]
     if not len(points):
         raise BiogripError(
             "least_squares: the model has no answer anywhere in the search range; "
@@ -66,3 +79,249 @@ def _screened(
         )
     before = np.exp(points[0]), float(misfit[0]), float(np.median(misfit)), settings.candidates
     return points[: settings.starts], before
+
+
+def best_of_starts(
+    problems: Sequence[Problem],
+    starts: Sequence[Array],
+    before: Sequence[Row],
+    progress: Progress,
+) -> list[Identification]:
+    """Fit every trace from each of its starts and return the optima of lowest misfit.
+
+    Misfits are compared in single precision and the first of equals wins, so that the
+    last bits, which differ between processors, decide nothing. Starts of each trace are
+    log-parameters, (n_starts, n_parameters); the first row of its history is what was before.
+    """
+    answers: dict[int, Identification] = {}
+    for group in alike(problems):
+        found = _best_of_alike(
+            [problems[index] for index in group],
+            [starts[index] for index in group],
+            [before[index] for index in group],
+            progress,
+        )
+        answers.update(zip(group.tolist(), found, strict=True))
+    return [answers[index] for index in range(len(problems))]
+
+
+def _best_of_alike(
+    problems: Sequence[Problem],
+    starts: Sequence[Array],
+    before: Sequence[Row],
+    progress: Progress,
+) -> list[Identification]:
+    fits, traces = LocalFits(problems), np.arange(len(problems))
+    rough, trace, fine, trace_of_fine = _finished(fits, starts)
+    winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
+    best = refine_optima(fits, fine[winners], traces)
+    answers = []
+    for own, first_row in enumerate(before):
+        rows = _descents(rough[trace == own], first_row)
+        # Newton's steps are not counted: the last bits of a processor decide their number.
+        finished = fine.evaluations[trace_of_fine == own].sum()
+        misfit_rad, evaluations = float(best.misfit_rad[own]), rows[-1][3] + int(finished)
+        rows[-1] = np.exp(best.x[own]), misfit_rad, misfit_rad, evaluations
+        progress(evaluations, misfit_rad)
+        answers.append(_answer_of(rows, converged=bool(best.converged[own])))
+    return answers
+
+
+def _finished(
+    fits: LocalFits, starts: Sequence[Array]
+) -> tuple[Minima, IntArray, Minima, IntArray]:
+    """Fit roughly from all starts, then finely from the best; return both with their traces."""
+    trace = np.repeat(np.arange(len(starts)), [len(own_starts) for own_starts in starts])
+    rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
+    # Rough fits show which basins are deepest; only the best are continued to the optimum.
+    best = [_best(rough, trace == own, FINISHED) for own in range(len(starts))]
+    finalists = np.concatenate(best)
+    return rough, trace, fits.fitted(rough.x[finalists], trace[finalists]), trace[finalists]
+
+
+def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
+    """Return the indices of the best fits among those that `which` marks."""
+    chosen = np.flatnonzero(which)
+    order = np.argsort(found.misfit_rad[chosen].astype(np.float32), kind="stable")
+    best: IntArray = chosen[order[:count]]
+    return best
+
+
+def _descents(found: Minima, before: Row) -> list[Row]:
+    """Return the rows of a history: the given first one, and one for each fit."""
+    rows, evaluations, best, sorted_rad = [before], before[3], 0, list[float]()
+    ranks = found.misfit_rad.astype(np.float32)
+    for fit, misfit_rad in enumerate(found.misfit_rad.tolist()):
+        evaluations += int(found.evaluations[fit])
+        best = fit if ranks[fit] < ranks[best] else best
+        insort(sorted_rad, misfit_rad)
+        median = 0.5 * (sorted_rad[fit // 2] + sorted_rad[(fit + 1) // 2])
+        rows.append((np.exp(found.x[best]), float(found.misfit_rad[best]), median, evaluations))
+    return rows
+
+
+def _answer_of(rows: list[Row], *, converged: bool) -> Identification:
+    """Return an identification with a history, whose last row is its result."""
+    parameters, misfit_rad, _, evaluations = rows[-1]
+    steps, why = len(rows) - 1, "all starts fitted"
+    return Identification(
+        parameters, misfit_rad, steps, evaluations, why, History.of(rows), converged
+    )
+
+
+def identify_from(problem: Problem, start: Array) -> Identification:
+    """Fit a trace from a single start, (n_parameters,) log-parameters."""
+    misfit = float(problem.residuals.misfit(np.exp(start)[None])[0])
+    row = np.exp(start), misfit, misfit, 1
+    return best_of_starts([problem], [start[None]], [row], silent)[0]
+
+
+def fit_from(problems: Sequence[Problem], starts: Array, *, roughly: bool = False) -> Minima:
+    """Fit every trace from one starting point, and refine the optima by Newton steps.
+
+    Starts are log-parameters, (n_parameters,) or (n_traces, n_parameters). Rough fits, to compare
+    basins, are less fine and without Newton steps.
+    """
+    starts = np.broadcast_to(starts, (len(problems), len(problems[0].low)))
+    groups, found = alike(problems), list[Minima]()
+    for group in groups:
+        fits, traces = LocalFits([problems[index] for index in group]), np.arange(len(group))
+        minima = fits.fitted(starts[group], traces, FAIR if roughly else FINE)
+        found.append(minima if roughly else refine_optima(fits, minima, traces))
+    return Minima.joined(found)[np.argsort(np.concatenate(groups))]
+
+
+# Tolerance and initial damping of the steps that approach a minimum along a curved valley.
+_CLOSE, _DAMPING = 1e-10, 1e-6
+_MOST_STEPS = 60
+# Least damping after a rejected step, and the factor by which damping then changes.
+_LITTLE, _MORE = 1e-9, 10.0
+# E-folds; shorter steps are rounding, and every machine decides alike whether a step is shorter.
+_STILL = 1e-9
+# Steps longer than the first, in e-folds, end on a grid of the second.
+_FAR, _SPACING = 1e-5, 2.0**-24
+# A step with a smaller predicted decrease of chi^2 changes no digit that is written.
+_NOTHING = 1e-8
+# One that ends with less has converged as far as data can tell: limits are at about 4.
+_UNTOLD = 1e-3
+# E-folds; a converged fit is nearer to its optimum.
+_LONGEST_STEP = 1.0
+# Least curvature of a direction, relative to single parameters; and of a single parameter.
+_FLAT, _SMALLEST = 1e-12, 1e-150
+# Accuracy of a misfit, relative to the largest rotation.
+_ROUNDING = 1e-15
+
+
+def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
+    """Refine optima by Newton steps until they are stationary to the last digits [2]_.
+
+    Descents compare sums of squares, and so find an optimum to half the digits. Its vanishing
+    gradient locates it to all of them. Gauss-Newton steps need not converge there: for an element
+    too weak to be seen, second derivatives of the residuals decide how the gradient changes. So
+    the steps are Newton's. The first are damped, and compared on condensed rows. Each of the last
+    is compared, on all readings, with the point before it, and kept only if it fits no worse.
+
+    Found are optima, fitted with the finest tolerance, each to the trace of an index, (n,).
+    Returned are optima with their misfits on all readings, none above that of `found`, and the
+    evaluations of the refinement; branches sorted by relaxation time. An optimum has converged if
+    its next step would not change chi^2 noticeably.
+    """
+
+    def convex(x: Array, fit: IntArray) -> Normal:
+        return _convex(fits, x, trace[fit])
+
+    low, high = fits.low[trace], fits.high[trace]
+    closer = minimize(convex, found.x, low, high, _CLOSE, None, _DAMPING, _MOST_STEPS)
+    evaluations = closer.evaluations * (1 + 2 * found.x.shape[1])
+    here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
+    rounding = _rounding(fits, here.misfit_rad, trace)
+    state = _State(fits, trace, rounding, found.x.copy(), here)
+    state.move(moving, closer.x)
+    left, damping = np.full(len(moving), np.inf), np.zeros(len(moving))
+    for _ in range(_MOST_STEPS):
+        if not len(moving):
+            break
+        x = state.x[moving]
+        normal = _convex(fits, x, trace[moving])
+        normal.gradient = state.here.gradient[moving]
+        bounds = low[moving], high[moving]
+        plain = _newton_step(*bounds, normal, x, np.zeros(len(x)))
+        left[moving] = -np.sum(plain * normal.gradient, axis=1)
+        converged = left <= np.maximum(_NOTHING, rounding)
+        step = _newton_step(*bounds, normal, x, damping[moving])
+        step = np.where(damping[moving, None] > 0, np.log1p(np.maximum(step, -0.9)), step)
+        on = np.max(np.abs(plain), axis=1) >= _STILL
+        moving, step = moving[on], step[on]
+        if not len(moving):
+            break
+        evaluations[moving] += 2 + 2 * x.shape[1]
+        ahead = np.clip(_on_grid(state.x[moving] + step, step), low[moving], high[moving])
+        kept = state.move(moving, ahead)
+        more, less = _MORE * damping[moving], damping[moving] / _MORE
+        less[less < _LITTLE] = 0.0
+        damping[moving] = np.where(kept, less, np.maximum(more, _LITTLE))
+        # A converged fit whose step is rejected differs from its optimum by rounding only.
+        moving = moving[kept | ~converged[moving]]
+    order = fits.problems[0].residuals.model.in_order(np.exp(state.x))
+    x = np.take_along_axis(state.x, order, axis=1)
+    return Minima(x, state.here.misfit_rad, evaluations, left <= np.maximum(_UNTOLD, rounding))
+
+
+def _on_grid(x: Array, step: Array) -> Array:
+    """Round the ends of long steps to a grid, for the reason given in `levenberg_marquardt`."""
+    far = np.max(np.abs(step), axis=1, keepdims=True) > _FAR
+    return np.where(far, np.rint(x / _SPACING) * _SPACING, x)
+
+
+@dataclass
+class _State:
+    """Points of the fits, with their sums of squares and gradients from all readings."""
+
+    fits: LocalFits
+    trace: IntArray
+    rounding: Array
+    x: Array
+    here: Normal
+
+    def move(self, which: IntArray, x: Array) -> BoolArray:
+        """Move fits to those points that are no worse on all readings; return their mask."""
+        there = self.fits.on_all_samples(x, self.trace[which])
+        kept = there.square_sum <= self.here.square_sum[which] + self.rounding[which]
+        moved = which[kept]
+        self.x[moved] = x[kept]
+        for part, new in zip(self.here.parts, there.parts, strict=True):
+            part[moved] = new[kept]
+        return kept
+
+
+def _rounding(fits: LocalFits, misfit_rad: Array, trace: IntArray) -> Array:
+    """Estimate the rounding errors of sums of squares, (n,)."""
+    residuals = [fits.problems[own].residuals for own in trace.tolist()]
+    samples = np.array([each.samples for each in residuals])
+    noise_rad = np.array([each.noise_scale_rad for each in residuals])
+    more_rad = _ROUNDING * np.array([each.peak_rad for each in residuals])
+    found: Array = samples * more_rad * (2 * misfit_rad + more_rad) / noise_rad**2
+    return found
+
+
+def _newton_step(low: Array, high: Array, normal: Normal, x: Array, damping: Array) -> Array:
+    below = np.maximum(low - x, -_LONGEST_STEP)
+    above = np.minimum(high - x, _LONGEST_STEP)
+    return bounded_step(normal, damping, below, above)
+
+
+def _convex(fits: LocalFits, x: Array, trace: IntArray) -> Normal:
+    """Return normal equations with the moduli of the Hessian's eigenvalues."""
+    normal = fits.curved(x, trace)
+    # A parameter pushed against a bound does not move, whatever the curvature there.
+    at_low, at_high = x <= fits.low[trace], x >= fits.high[trace]
+    fixed = at_low & (normal.gradient > 0) | at_high & (normal.gradient < 0)
+    free = (~fixed[:, :, None]) & (~fixed[:, None, :])
+    second = np.where(free, normal.information, np.eye(x.shape[1]))
+    scale = np.sqrt(np.abs(np.diagonal(second, axis1=1, axis2=2))) + _SMALLEST
+    both = scale[:, :, None] * scale[:, None, :]
+    curvatures, directions = np.linalg.eigh(second / both)
+    moduli = np.maximum(np.abs(curvatures), _FLAT)
+    convex = directions * moduli[:, None] @ directions.swapaxes(1, 2)
+    normal.information = np.where(curvatures[:, :1, None] > _FLAT, second, convex * both)
+    return normal

@@ -82,6 +82,12 @@ Objective = Callable[[Array, IntArray], Normal]
 class Constraint(Protocol):
     """A constraint on the parameters of each problem, kept exactly by eliminating one of them."""
 
+    def started(self, x: Array) -> Array:
+        """Return points near the given ones, one a problem, that fulfil the constraint."""
+
+    def added(self, normal: Normal, x: Array, problem: IntArray) -> Normal:
+        """Return the normal equations with the residuals of the constraint, if it has any."""
+
     def eliminated(self, normal: Normal, x: Array, problem: IntArray) -> tuple[Normal, BoolArray]:
         """Eliminate one parameter; return reduced equations and its mask, (n, n_parameters)."""
 
@@ -101,13 +107,6 @@ class Minima(Rows):
     """Number of linearisations of each problem, (n,)."""
     converged: BoolArray
     """True if the minimization ended before the limit of steps, (n,)."""
-
-    @classmethod
-    def none_yet(cls, starts: Array, evaluations: int) -> "Minima":
-        """Return starts as results that have not converged and whose misfit is infinite."""
-        count = len(starts)
-        misfit_rad, converged = np.full(count, np.inf), np.zeros(count, dtype=bool)
-        return cls(starts.copy(), misfit_rad, np.full(count, evaluations), converged)
 
 
 @dataclass
@@ -133,26 +132,16 @@ def minimize(
 ) -> Minima:
     """Minimize the sum of squares of every problem from its start.
 
-    Parameters
-    ----------
-    objective
-        Function that returns the normal equations.
-    starts, low, high : (n, n_parameters)
-        Logarithms, on the constraint and within bounds; equal bounds fix a parameter. Steps are
-        limited in e-folds.
-    tolerance
-        Stop when the actual and the predicted relative decrease of the sum are below this.
-    constraint
-        Constraint on the parameters, if any.
-    damping
-        Initial damping, relative to the diagonal of the information.
-    most_steps
-        Limit of steps.
+    Starts and bounds are logarithms, (n, n_parameters), on the constraint if there is one; equal
+    bounds fix a parameter. A problem has converged when the actual and the predicted relative
+    decrease of its sum are below the tolerance. The initial damping is relative to the diagonal of
+    the information.
     """
-    everyone, minima = np.arange(len(starts)), Minima.none_yet(starts, evaluations=1)
-    normal, growth = objective(starts, everyone), np.full(len(starts), 2.0)
-    dampings = np.full(len(starts), damping)
-    state = _State(everyone, starts, low, high, normal, dampings, growth)
+    everyone, count = np.arange(len(starts)), len(starts)
+    never = np.full(count, np.inf), np.ones(count, dtype=np.int64), np.zeros(count, dtype=bool)
+    minima = Minima(starts.copy(), *never)
+    normal, growth = objective(starts, everyone), np.full(count, 2.0)
+    state = _State(everyone, starts, low, high, normal, np.full(count, damping), growth)
     for _ in range(most_steps):
         minima.evaluations[state.problem] += 1
         done = _advance(state, objective, constraint, tolerance)
@@ -210,20 +199,11 @@ def _on_grid(x: Array, state: _State) -> Array:
 
 
 def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> Array:
-    """Compute damped Gauss-Newton steps within a box.
+    """Compute damped Gauss-Newton steps within a box, (n, n_parameters).
 
-    Parameters
-    ----------
-    normal
-        Normal equations of n problems.
-    damping : (n,)
-        Relative to the diagonal of the information; 0 for plain Gauss-Newton.
-    below, above : (n, n_parameters)
-        Smallest and largest change of each parameter; zero is between them.
-
-    Returns
-    -------
-    (n, n_parameters)
+    The damping, (n,), is relative to the diagonal of the information, 0 for plain Gauss-Newton.
+    The box has the smallest and largest change of each parameter, (n, n_parameters), with zero
+    between them.
     """
     gradient, information = normal.gradient, normal.information
     fixed = ((below >= 0) & (gradient > 0)) | ((above <= 0) & (gradient < 0))

@@ -6,7 +6,6 @@ fits.
 """
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -35,16 +34,6 @@ _APART = 1e-4
 _AT_ONCE = 1_000_000
 
 
-class FitConstraint(Constraint, Protocol):
-    """A constraint between parameters that fits keep, with residuals of its own if it has any."""
-
-    def started(self, x: Array) -> Array:
-        """Return points near the given ones, one a fit, that fulfil the constraint."""
-
-    def added(self, normal: Normal, x: Array, fit: IntArray) -> Normal:
-        """Return the normal equations with the residuals of the constraint included."""
-
-
 def alike(problems: Sequence[Problem]) -> list[IntArray]:
     """Group the indices of problems that one `LocalFits` can fit together."""
     groups: list[list[int]] = []
@@ -59,17 +48,10 @@ def alike(problems: Sequence[Problem]) -> list[IntArray]:
 
 
 class LocalFits:
-    """Local fits to several traces that are modelled by the same responses.
+    """Local fits to several traces, whose problems have to be `alike`.
 
-    Parameters
-    ----------
-    problems
-        One a trace; all have to be `alike`.
-
-    Attributes
-    ----------
-    low, high : (n_traces, n_parameters)
-        Logarithms of the ends of the search range of each trace.
+    The logarithms of the ends of the search range of each are `low` and `high`, (n_traces,
+    n_parameters).
     """
 
     def __init__(self, problems: Sequence[Problem]) -> None:
@@ -84,21 +66,14 @@ class LocalFits:
     def normal(self, x: Array, trace: IntArray) -> Normal:
         """Return the normal equations of the residuals, in units of the noise, and the prior.
 
-        Parameters
-        ----------
-        x : (n, n_parameters)
-            Log-parameters.
-        trace : (n,)
-            Index of the trace that each point is compared with.
+        They are at log-parameters, (n, n_parameters), each compared with a trace by index, (n,).
         """
         size = max(1, _AT_ONCE // (self._traces.shape[1] * (1 + x.shape[1])))
-        if len(x) <= size:
-            return self._normal_of(self._residuals.condensed_responses(x), x, trace)
         normals = []
-        for some in parts(len(x), size):
+        for some in parts(max(len(x), 1), size):
             rows = self._residuals.condensed_responses(x[some])
             normals.append(self._normal_of(rows, x[some], trace[some]))
-        return Normal.joined(normals)
+        return Normal.joined(normals) if len(normals) > 1 else normals[0]
 
     def curved(self, x: Array, trace: IntArray) -> Normal:
         """Return normal equations with the full Hessian in place of its Gauss-Newton part.
@@ -167,24 +142,15 @@ class LocalFits:
         trace: IntArray,
         tolerance: float = FINE,
         *,
-        constraint: FitConstraint | None = None,
+        constraint: Constraint | None = None,
         low: Array | None = None,
         high: Array | None = None,
     ) -> Minima:
-        """Minimize the sum of squares from given starts.
+        """Minimize the sum of squares from log-parameters, (n, n_parameters).
 
-        Parameters
-        ----------
-        starts : (n, n_parameters)
-            Log-parameters; moved into the bounds and onto the constraint if need be.
-        trace : (n,)
-            Index of the trace that each is fitted to.
-        tolerance
-            `ROUGH`, `FAIR` or `FINE`.
-        constraint
-            Constraint that the fits keep.
-        low, high : (n, n_parameters) or (n_parameters,)
-            Bounds instead of the search range; equal bounds fix a parameter.
+        These are moved into the bounds and onto the constraint if need be. Each is fitted to the
+        trace of an index, (n,). Other bounds than the search range are (n, n_parameters) or
+        (n_parameters,); equal bounds fix a parameter.
         """
         low = np.broadcast_to(self.low[trace] if low is None else low, starts.shape)
         high = np.broadcast_to(self.high[trace] if high is None else high, starts.shape)

@@ -4,10 +4,11 @@ Each method is a module of this package, named like the method. It has the class
 whose fields are the keys of its config block (`biogrip.keys`), and a function
 ``identify_many(problems, settings, rngs, progress)``, which returns an `Identification` of each
 trace, to the bit as if it were alone. Ranges and traces are the problems', the budget of each is
-in the settings, its generator is its only source of randomness, and progress is told of all.
+in the settings, its generator is its only source of randomness, and progress is told of all. A
+method with several blocks is given a tuple of their settings.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
@@ -27,8 +28,8 @@ class Method:
     """Name in the config and in files."""
     title: str
     """Name in print."""
-    blocks: Mapping[str, str]
-    """Names of its config blocks, and of the settings class of each in its module."""
+    blocks: tuple[str, ...]
+    """Names of its config blocks."""
     step: str
     """Name of a step of the method, after each of which its history has a row."""
     color: str
@@ -36,73 +37,54 @@ class Method:
     `biogrip.figures.style.COLORS`."""
     dashes: str
     """Their dashes, as Matplotlib has them."""
-    settings: str = ""
-    """Class in its module that puts several blocks together, in their order."""
     exact: bool = False
     """True if the method ends at an optimum to all digits; tests hold it to that."""
     sure: bool = False
     """True if the method finds the global optimum of (nearly) every trace; likewise."""
-
-    @property
-    def module(self) -> str:
-        """Name of its module."""
-        return f"biogrip.fit.{self.name}"
-
-    def named(self, name: str) -> type:
-        """Import a class of its module by its name."""
-        found: type = getattr(import_module(self.module), name)
-        return found
 
 
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
         Method(
-            "genetic",
-            "genetic algorithm",
-            {"genetic_algorithm": "GeneticSettings"},
-            "generation",
-            "grey",
-            "-",
+            name="genetic",
+            title="genetic algorithm",
+            blocks=("genetic_algorithm",),
+            step="generation",
+            color="grey",
+            dashes="-",
         ),
         Method(
-            "genetic_refined",
-            "genetic, polished",
-            {"genetic_algorithm": "GeneticSettings", "genetic_refined": "Polishing"},
-            "generation, then local fit",
-            "vermilion",
-            "-",
-            "RefinedSettings",
+            name="genetic_refined",
+            title="genetic, polished",
+            blocks=("genetic_algorithm", "genetic_refined"),
+            step="generation, then local fit",
+            color="vermilion",
+            dashes="-",
             exact=True,
             sure=True,
         ),
         Method(
-            "least_squares",
-            "multi-start least squares",
-            {"least_squares": "LeastSquaresSettings"},
-            "local fit",
-            "blue",
-            "--",
+            name="least_squares",
+            title="multi-start least squares",
+            blocks=("least_squares",),
+            step="local fit",
+            color="blue",
+            dashes="--",
             exact=True,
             sure=True,
         ),
         Method(
-            "differential_evolution",
-            "differential evolution",
-            {"differential_evolution": "DifferentialEvolutionSettings"},
-            "generation",
-            "purple",
-            "-.",
+            name="differential_evolution",
+            title="differential evolution",
+            blocks=("differential_evolution",),
+            step="generation",
+            color="purple",
+            dashes="-.",
             exact=True,
         ),
     )
 }
-
-
-def block_class(block: str) -> type:
-    """Import the settings class of a config block of any method."""
-    method = next(method for method in METHODS.values() if block in method.blocks)
-    return method.named(method.blocks[block])
 
 
 Identify = Callable[
@@ -112,7 +94,7 @@ Identify = Callable[
 
 
 def identifier(name: str, settings: object) -> Identify:
-    """Load a method of `METHODS` with its settings: its block, or what puts several together."""
+    """Load a method of `METHODS` with its settings, those of several blocks as a tuple."""
     module = import_module(f"{__package__}.{name}")
 
     def identify(
@@ -123,14 +105,6 @@ def identifier(name: str, settings: object) -> Identify:
         return [answer.in_order(problem.residuals.model) for problem, answer in pairs]
 
     return identify
-
-
-def best_fit(
-    problem: Problem, least_squares: object, rng: np.random.Generator, progress: Progress
-) -> Identification:
-    """Identify one trace by multi-start least squares, the method of every judgement."""
-    (found,) = identifier("least_squares", least_squares)([problem], [rng], progress)
-    return found
 
 
 ALL = "all"

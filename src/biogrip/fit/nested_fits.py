@@ -25,8 +25,7 @@ from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import plain
-from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
-from biogrip.fit.multi_start import descend_from, fit_from
+from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.physics.models import CANDIDATES, as_richer, contained, contained_in, different_in
 from biogrip.physics.sample_model import SampleModel
@@ -54,26 +53,12 @@ def fit_models(
     done: Callable[[], None],
     near: Mapping[str, Array] | None = None,
 ) -> dict[str, Answers]:
-    """Fit nested models to traces by least squares.
+    """Fit nested models to traces by least squares, and return the best fit to each trace.
 
-    Parameters
-    ----------
-    problems
-        By candidate, the problems of the same traces.
-    settings
-        The budget of each fit.
-    rngs
-        By candidate, a random generator for each trace.
-    done
-        Called after every model.
-    near
-        By candidate, additional starts, log-parameters (n_traces, n_parameters).
-
-    Returns
-    -------
-    dict of list of Identification
-        By candidate, in the given order, the best fit to each trace. Parameters may be zero or
-        infinite. A fit worse than a nested model's within its own range has not converged.
+    By candidate, the problems of the same traces are given, a random generator for each of these,
+    and additional starts, log-parameters (n_traces, n_parameters); `done` is called after every
+    model. Parameters found may be zero or infinite. A fit worse than a nested model's within its
+    own range has not converged.
     """
     found: dict[str, Answers] = {}
     for name in sorted(problems, key=lambda each: len(CANDIDATES[each].model.names)):
@@ -145,7 +130,8 @@ def _add_branches(name: str, problems: Sequence[Problem], found: dict[str, Answe
         if not pairs:
             continue
         traces = [trace for trace, _ in pairs]
-        ends = descend_from([problems[t] for t in traces], np.array([x for _, x in pairs]))
+        starts = np.array([x for _, x in pairs])
+        ends = fit_from([problems[t] for t in traces], starts, roughly=True)
         for trace, x, misfit_rad in zip(traces, ends.x, ends.misfit_rad.tolist(), strict=True):
             if _is_noticeably_lower(misfit_rad, found[name][trace].misfit_rad, problems[trace]):
                 found[name][trace] = _better_from(found[name][trace], problems[trace], x)

@@ -50,14 +50,8 @@ def outliers_of(residual: Array, rounding_rad: float = 0.0) -> BoolArray:
     """Find outliers among residuals by a Hampel filter [5]_, (n_samples,).
 
     They are further than `FAR` from the median of the eleven residuals around, in standard
-    deviations estimated from the median of all such distances.
-
-    Parameters
-    ----------
-    residual : (n_samples,)
-        Residuals of a fit, over the noise's standard deviation where that is not the same.
-    rounding_rad
-        Step of the readings: a reading on the next step is no outlier.
+    deviations estimated from the median of all such distances. Where noise is not the same,
+    residuals are over its standard deviation. A reading on the next step of rounding is no outlier.
     """
     apart = measure_distances(residual)
     # One residual in eleven is that median itself.
@@ -145,18 +139,10 @@ _KNOWN = 3.0
 
 
 class NoiseModelLikelihood:
-    """Restricted likelihood of noise models, given the residuals of a fit.
+    """Restricted likelihood of noise models, given the residuals of a fit, (n_samples,).
 
-    Parameters
-    ----------
-    time_s : (n_samples,)
-        Ascending sampling times.
-    residual : (n_samples,)
-        Residuals of the fit.
-    directions : (n_directions, n_samples)
-        Directions that the fit absorbs: derivatives by the parameters, and nuisance functions.
-    growing : (n_samples,), optional
-        Rotation that a part of the white noise grows with; by default none does.
+    Directions, (n_directions, n_samples), are what the fit absorbs: derivatives by the parameters,
+    and nuisance functions. A part of the white noise may grow with a rotation, (n_samples,).
     """
 
     def __init__(
@@ -189,17 +175,10 @@ class NoiseModelLikelihood:
     def freedom(self, noise_model: NoiseModel, sensitivity: Array, nuisance: Array) -> float:
         """Compute the degrees of freedom of the least known variance of a parameter.
 
-        They are those of a chi-squared variable whose relative spread is that of the
-        variance, given the uncertainty of the noise model (Satterthwaite [6]_).
-
-        Parameters
-        ----------
-        noise_model
-            Noise model of highest likelihood.
-        sensitivity : (n_parameters, n_samples)
-            Derivatives by the log-parameters, over the noise's standard deviation.
-        nuisance : (n_functions, n_samples)
-            Nuisance functions of the instrument.
+        They are those of a chi-squared variable whose relative spread is that of the variance,
+        given the uncertainty of the noise model of highest likelihood (Satterthwaite [6]_).
+        Derivatives by the log-parameters, (n_parameters, n_samples), are over the noise's standard
+        deviation; nuisance functions of the instrument are (n_functions, n_samples).
         """
 
         def variances(x: Array) -> Array:

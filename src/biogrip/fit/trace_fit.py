@@ -5,7 +5,7 @@ Then the best fit, the autocorrelation of its residuals and the effect of the gr
 are computed in turn, until none of them changes.
 """
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,13 +13,9 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
 from biogrip.errors import BiogripError
-from biogrip.fit.case_problem import NOT_FITTED, CaseProblem
-from biogrip.fit.multi_start import fit_from
+from biogrip.fit.least_squares import fit_from
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
-from biogrip.fit.problem import Identification, Problem
-from biogrip.physics.condensed import Condensed
-from biogrip.physics.gripper import Gripper
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.fit.problem import CaseProblem, Identification, Problem
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, drift_is_flow
 
@@ -36,11 +32,8 @@ def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Arra
     and has the amplitude of an error of three standard uncertainties. Without it limits would be
     too narrow where the noise is far below the square.
 
-    Returns
-    -------
-    (2 n_properties, n_times)
-        Changes in rad of first order, a row for each uncertain property, then those of second, at
-        ascending times and with the searched parameters (n_parameters,).
+    Rows are changes in rad at ascending times, (2 n_properties, n_times), those of first order of
+    each uncertain property, then those of second.
 
     References
     ----------
@@ -49,40 +42,26 @@ def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Arra
     """
     network = case_problem.searched.network(parameters)
 
-    def simulated(gripper: Gripper, torque: TorqueHistory) -> Array:
+    def rotation(part: str = "", key: str = "", error: float = 0.0) -> Array:
+        gripper, torque = case_problem.gripper, case_problem.torque
+        if part == "torque":
+            torque = torque.times(1 + error)
+        elif part == "gripper":
+            gripper = replace(gripper, **{key: getattr(gripper, key) + error})
+        elif part:
+            arm = getattr(gripper, part)
+            arm = replace(arm, **{key: getattr(arm, key) + error})
+            gripper = replace(gripper, **{part: arm})
         return simulated_rotation(gripper, network, torque, time_s, nonlinear=False)[0]
 
-    pairs = [(simulated(*above), simulated(*below)) for above, below in _pairs(case_problem)]
-    if not pairs:
+    if not case_problem.uncertain:
         return np.zeros((0, len(time_s)))
-    above, below = np.stack(pairs, axis=1)
-    second = 0.5 * (above + below) - simulated(case_problem.gripper, case_problem.torque)
+    above, below = (
+        np.array([rotation(part, key, sign * error) for part, key, error in case_problem.uncertain])
+        for sign in (1, -1)
+    )
+    second = 0.5 * (above + below) - rotation()
     return np.vstack((0.5 * (above - below), _SECOND_ORDER * second))
-
-
-_Instrument = tuple[Gripper, TorqueHistory]
-
-
-def _pairs(case_problem: CaseProblem) -> Iterator[tuple[_Instrument, ...]]:
-    """Yield two instruments for each uncertain property, one above and one below its value."""
-    gripper, torque = case_problem.gripper, case_problem.torque
-    for name, known in case_problem.uncertainty.items():
-        for key, uncertainty in known.items():
-            if not uncertainty or key == NOT_FITTED:
-                continue
-            errors = (uncertainty, -uncertainty)
-            if name == "torque":
-                yield tuple((gripper, torque.times(1 + error)) for error in errors)
-            else:
-                yield tuple((_changed(gripper, name, key, error), torque) for error in errors)
-
-
-def _changed(gripper: Gripper, name: str, key: str, error: float) -> Gripper:
-    """Return a gripper with a property of its own or of an arm changed."""
-    if name == "gripper":
-        return replace(gripper, **{key: getattr(gripper, key) + error})
-    arm = getattr(gripper, name)
-    return replace(gripper, **{name: replace(arm, **{key: getattr(arm, key) + error})})
 
 
 _ROUNDS = 5
@@ -128,15 +107,13 @@ class TraceFit:
             return []
         read = self.problem.residuals.instrument.read.name
         noise_model, left_out = self.noise_model, int(np.count_nonzero(self.outliers))
-        parts = [f"{_percent(noise_model.white)} white"]
-        if noise_model.ar1 >= _WORTH_SAYING:
-            parts.append(
-                f"{_percent(noise_model.ar1)} correlated over some {noise_model.time_s:.2g} s"
-            )
-        if noise_model.flicker >= _WORTH_SAYING:
-            parts.append(f"{_percent(noise_model.flicker)} 1/f")
-        if noise_model.proportional >= _WORTH_SAYING:
-            parts.append(f"{_percent(noise_model.proportional)} that grows with the {read}")
+        others = {
+            f"correlated over some {noise_model.time_s:.2g} s": noise_model.ar1,
+            "1/f": noise_model.flicker,
+            f"that grows with the {read}": noise_model.proportional,
+        }
+        parts = [f"{100 * noise_model.white:.0f} % white"]
+        parts += [f"{100 * n:.0f} % {what}" for what, n in others.items() if n >= _WORTH_SAYING]
         said = [
             f"Noise model: of the variance {', '.join(parts)};{self.fitted_along} "
             "the intervals allow for all of it."
@@ -152,66 +129,42 @@ def fit_traces(
     traces: Sequence[tuple[Array, Array]],
     find: Callable[[Sequence[Problem], Sequence[int]], list[Identification]],
 ) -> list[TraceFit]:
-    """Fit each of several traces as `trace_fit` does, and those with plain noise together.
+    """Fit each of several traces and, if wanted, estimate the model of its noise.
 
-    `find` finds the global optima of the problems of given traces. A trace is its times and
-    rotations, and has assumptions of its own.
+    Traces of plain noise are fitted together. With a coloured noise model, outliers are removed,
+    and the noise is a sum of white, Ornstein-Uhlenbeck and 1/f noise. If it grows with the
+    rotation, so does a part of the white noise: the parts whose readings depend on each other are
+    of the instrument's zero. The effect of the gripper's uncertainty on the rotation is one more
+    component of the noise.
+
+    `find` finds the global optima of the problems of given traces. A trace is its ascending times
+    and rotations, (n_samples,), and has assumptions of its own. Too many readings for a coloured
+    noise model are a `BiogripError`.
     """
     plain = [trace for trace, case_problem in enumerate(case_problems) if case_problem.plain]
-    # Traces with the same rows are fitted together.
-    rows: dict[Hashable, Condensed] = {}
-    problems = []
-    for trace in plain:
-        case_problem, (time_s, rotation_rad) = case_problems[trace], traces[trace]
-        key = case_problem.sets_condensed(time_s)
-        if key not in rows:
-            rows[key] = case_problem.condensed(time_s)
-        problems.append(case_problem.of(time_s, rotation_rad, condensed=rows[key]))
+    problems = [case_problems[trace].of(*traces[trace]) for trace in plain]
     optima = find(problems, plain) if plain else []
     found = {
         trace: TraceFit(problem, optimum, None, np.zeros(len(traces[trace][0]), dtype=bool))
         for trace, problem, optimum in zip(plain, problems, optima, strict=True)
     }
-
-    def find_alone(trace: int) -> Find:
-        return lambda problem: find([problem], [trace])[0]
-
     for trace, case_problem in enumerate(case_problems):
         if trace not in found:
-            found[trace] = trace_fit(case_problem, *traces[trace], find_alone(trace))
+
+            def find_alone(problem: Problem, trace: int = trace) -> Identification:
+                return find([problem], [trace])[0]
+
+            found[trace] = _fit_in_noise(case_problem, *traces[trace], find_alone)
     return [found[trace] for trace in range(len(traces))]
 
 
-def trace_fit(
+def _fit_in_noise(
     case_problem: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
 ) -> TraceFit:
-    """Fit a trace and, if wanted, estimate the model of its noise.
-
-    With a coloured noise model, outliers are removed, and the noise is a sum of white,
-    Ornstein-Uhlenbeck and 1/f noise. If it grows with the rotation, so does a part of the white
-    noise: the parts whose readings depend on each other are of the instrument's zero. The
-    effect of the gripper's uncertainty on the rotation is one more component of the noise.
-
-    Parameters
-    ----------
-    case_problem
-        Assumptions of the identification.
-    time_s, rotation_rad : (n_samples,)
-        The trace, times ascending.
-    find
-        Function that finds the global optimum.
-
-    Raises
-    ------
-    BiogripError
-        If the trace has too many readings for a coloured noise model.
-    """
     kept = np.ones(len(time_s), dtype=bool)
     if not case_problem.coloured:
         plain = case_problem.of(time_s, rotation_rad)
         found = find(plain)
-        if case_problem.plain:
-            return TraceFit(plain, found, None, ~kept)
     else:
         if len(time_s) > MOST_SAMPLES:
             raise BiogripError(
@@ -304,7 +257,3 @@ def _alike(one: NoiseModel | None, other: NoiseModel | None) -> bool:
     shares = sum(abs(getattr(one, name) - getattr(other, name)) for name in names)
     times = min(one.ar1, other.ar1) * abs(np.log(one.time_s / other.time_s))
     return bool(shares + times < _CONVERGED)
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %"

@@ -24,7 +24,7 @@ from biogrip.arrays import Array
 from biogrip.digits import counted, rounded_numbers
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
-from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.problem import CaseProblem
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.identify.other_fits import (
     FittedModels,
@@ -292,9 +292,9 @@ def _fixed(problem: CaseProblem) -> dict[str, list[str]]:
 def _gripper_in_limits(problem: CaseProblem) -> str:
     """Return a sentence on the part that the gripper's uncertainty has in the limits."""
     exact = "gripper" if problem.instrument.has_jaws else problem.instrument.controlled.name
-    if not problem.uncertain_keys or not problem.instrument.has_jaws:
+    if not problem.uncertain or not problem.instrument.has_jaws:
         return f"Limits are statistical only: the {exact} is taken as exact."
-    keys = ", ".join(key.removesuffix(".share") for key in problem.uncertain_keys)
+    keys = ", ".join(f"{part}.{key}".removesuffix(".share") for part, key, _ in problem.uncertain)
     return f"Limits include uncertainties of the gripper: {keys}."
 
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import plain
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
+from biogrip.fit.problem import CaseProblem
 from biogrip.identify.settings import Asked, case_of
 from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.protocol import is_held, largest_load

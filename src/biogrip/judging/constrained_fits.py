@@ -33,15 +33,9 @@ _SMALLEST = 1e-200
 class QuantityConstraint:
     """A constraint on each of n fits, which holds one quantity at a given value.
 
-    Parameters
-    ----------
-    quantities, which, targets
-        Quantities that may be held; index of the one that each fit holds, (n,), and the logarithm
-        of its value, within the quantity's range, (n,).
-    low, high : (n, n_parameters)
-        Bounds of the log-parameters of each fit.
-    longest_s
-        Time within which branches must relax for quantities that require it.
+    Of the quantities that may be held, each fit has the index of its own, (n,), and the logarithm
+    of its value, within the quantity's range. Bounds of the log-parameters are (n, n_parameters).
+    Branches must relax within a time for quantities that require it.
     """
 
     def __init__(
@@ -199,28 +193,12 @@ Along a valley, a fit to the last digit takes three times as many steps.
 class ConstrainedFits:
     """Fits of several traces with one of several quantities held at given values.
 
-    Each profile belongs to a trace and a quantity; those of the first trace come first.
-
-    Parameters
-    ----------
-    likelihoods
-        One per trace; their problems have to be `alike`.
-    quantities
-        Quantities that may be held.
-
-    Attributes
-    ----------
-    trace : (n_profiles,)
-        Index of the trace of each profile.
-    best : (n_profiles, n_parameters)
-        Log-parameters of the trace's optimum.
-    at_best : (n_profiles,)
-        Logarithm of the quantity there.
-    threshold, certainty : (n_profiles,)
-        As in `Likelihood`; certainty is no less than the threshold.
-    missed
-        By trace, the lowest increase of chi^2 and its log-parameters, if it is so far
-        below zero that the trace's global optimum was missed.
+    Each profile belongs to a trace and a quantity; those of the first trace come first. The
+    problems of the traces have to be `alike`. Of each profile there are the index of its `trace`,
+    the trace's optimum `best`, (n_profiles, n_parameters), the logarithm of the quantity `at_best`,
+    and `threshold` and `certainty` as in `Likelihood`, the latter no less than the former.
+    `missed` has, by trace, the lowest increase of chi^2 and its log-parameters, if it is so far
+    below zero that the trace's global optimum was missed.
     """
 
     def __init__(self, likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> None:
@@ -239,10 +217,6 @@ class ConstrainedFits:
         self.missed: dict[int, tuple[float, Array]] = {}
         self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
-        # Fewer readings than twice the parameters leave long valleys, whose last bit is no matter:
-        # steps end that lower chi^2 by less than 0.1 % of its few degrees of freedom.
-        few = self._residuals.samples < 2 * self.best.shape[1]
-        self._coarser = 1e4 if few else 1.0
         scale_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
         # Ratio of chi^2 to the fits' sums of squares.
         self._ratio = (scale_rad / self._noise_rad) ** 2
@@ -252,28 +226,16 @@ class ConstrainedFits:
     ) -> tuple[Array, Array]:
         """Minimize chi^2 over all parameters with one quantity held at a value.
 
-        Parameters
-        ----------
-        profile, targets : (n,)
-            Index of the profile: the trace that is fitted and the quantity that is held; and the
-            logarithm at which it is held, within its range.
-        near : (n, n_parameters)
-            Starts, log-parameters; moved onto the constraint.
-        tolerance
-            Of the fits, see `biogrip.fit.local_fits`.
-
-        Returns
-        -------
-        increases : (n,)
-            Increase of chi^2 over each trace's optimum.
-        log_parameters : (n, n_parameters)
-            Fitted log-parameters, on the constraint up to rounding.
+        A profile has the trace that is fitted and the quantity that is held, the target is the
+        logarithm at which it is held, within its range; both (n,). Starts near the fit are
+        log-parameters, (n, n_parameters), moved onto the constraint. Returns the increases of chi^2
+        over each trace's optimum, (n,), and the fitted log-parameters.
         """
         trace, which = np.divmod(profile, len(self.quantities))
         low, high = self._fits.low[trace], self._fits.high[trace]
         last_s = self._residuals.duration_s
         constraint = QuantityConstraint(self.quantities, which, targets, low, high, last_s)
-        found = self._fits.fitted(near, trace, self._coarser * tolerance, constraint=constraint)
+        found = self._fits.fitted(near, trace, tolerance, constraint=constraint)
         price = constraint.price(found.x) * self._ratio[trace]
         return self._increases(found, trace) + price, found.x
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biogrip.digits import plain
-from biogrip.fit.multi_start import descend_from, fit_from
+from biogrip.fit.least_squares import fit_from
 from biogrip.fit.problem import Identification, Problem
 from biogrip.judging.doubts import (
     DOUBT,
@@ -91,18 +91,9 @@ def diagnose_all(
 ) -> list[Diagnosis]:
     """Judge the identification of each of several traces by profile likelihoods.
 
-    No diagnosis depends on the other traces.
-
-    Parameters
-    ----------
-    problems, model
-        The traces, and the model whose parameters were searched.
-    found
-        Global optimum of each, as far as is known.
-    confidence
-        Of the limits, e.g. 0.95.
-    noise_rad
-        Standard deviation of the noise of each, if it is known; else that of the residual.
+    No diagnosis depends on the other traces. Found are their global optima, as far as is known; the
+    noise of each, if its standard deviation is not known, is that of the residual. Limits have a
+    confidence, e.g. 0.95.
     """
     best, done = list(found), dict[int, Diagnosis]()
     while left := [trace for trace in range(len(problems)) if trace not in done]:
@@ -195,7 +186,7 @@ def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
             start, low, high = x.copy(), problem.low.copy(), problem.high.copy()
             start[index] += outward * _BEYOND
             (low if outward < 0 else high)[index] += outward * _WIDER
-            wider = descend_from([replace(problem, low=low, high=high)], start)
+            wider = fit_from([replace(problem, low=low, high=high)], start, roughly=True)
             if likelihood.increase(float(wider.misfit_rad[0])) < -_NOTICEABLE:
                 unit = f" {parameter.unit}" if parameter.unit else ""
                 yield Note(

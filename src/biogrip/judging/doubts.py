@@ -203,37 +203,35 @@ def _misfit(
             "standard deviations (--sd)."
         )
         return Remainder([Note(DOUBT, text)])
-    misfit = as_correlated(*bulk)
-    count = f"{plain(misfit[0], 2)} independent ones" if misfit[0] > 1 else "less than one"
-    allowed = f"The limits count the {len(bulk[0])} residuals as {count}."
-    more = plain(times, 2)
-    read = residuals.trace.rotation_rad
-    if not residuals.rounding_rad and np.mean(read[1:] == read[:-1]) > _REPEATED:
-        text = (
-            "Most readings repeat the one before, as of a sensor that is read less often than it "
-            f"is logged: keep one of each. {allowed}"
-        )
-        return Remainder([Note(DOUBT, text)], misfit)
-    if has_fast_noise(residuals, *left):
-        text = (
-            f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
-            f"correlated for a short time. {allowed}"
-        )
-        return Remainder([Note(DOUBT, text)], misfit)
+    more, read = plain(times, 2), residuals.trace.rotation_rad
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak_rad
     of_peak = f"{plain(100 * share, 2)} % of the peak"
     suspects = residuals.instrument.suspects(unit=True)
-    if share < _FAR_OFF:
+    if not residuals.rounding_rad and np.mean(read[1:] == read[:-1]) > _REPEATED:
+        text = (
+            "Most readings repeat the one before, as of a sensor that is read less often than it "
+            "is logged: keep one of each."
+        )
+    elif has_fast_noise(residuals, *left):
+        text = (
+            f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
+            "correlated for a short time."
+        )
+    elif share < _FAR_OFF:
         text = (
             f"The fit is good to {of_peak}; the rest, {more} times the noise of the trace, is not "
-            f"noise: {suspects} is not quite the right one. {allowed}"
+            f"noise: {suspects} is not quite the right one."
         )
-        return Remainder([Note(DOUBT, text)], misfit)
-    text = (
-        f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects} is not the "
-        "right one."
-    )
-    return Remainder([Note(REJECTION, text)])
+    else:
+        text = (
+            f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects} is not "
+            "the right one."
+        )
+        return Remainder([Note(REJECTION, text)])
+    misfit = as_correlated(*bulk)
+    count = f"{plain(misfit[0], 2)} independent ones" if misfit[0] > 1 else "less than one"
+    allowed = f"The limits count the {len(bulk[0])} residuals as {count}."
+    return Remainder([Note(DOUBT, f"{text} {allowed}")], misfit)
 
 
 def _about_growth(

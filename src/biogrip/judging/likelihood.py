@@ -27,8 +27,7 @@ from statistics import NormalDist
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import CaseProblem, Problem
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import Noise, standard_deviation
@@ -116,14 +115,7 @@ def make_likelihood(
 ) -> Likelihood:
     """Compute the noise and the thresholds for the profile likelihoods of a trace.
 
-    Parameters
-    ----------
-    problem, best, misfit_rad
-        As in `Likelihood`.
-    confidence
-        Confidence level of the limits, e.g. 0.95.
-    noise_rad
-        Standard deviation of the noise if it is known.
+    Without the standard deviation of the noise, it is estimated from the misfit.
     """
     freedom = inf
     if noise_rad is None:
@@ -170,24 +162,16 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
     With the same Gaussian noise everywhere, it is the inverse of the Fisher
     information J J^T / sigma^2: the Cramér-Rao bound, which no unbiased
     estimator undercuts. With noise that changes along the trace, it is the
-    covariance of unweighted least squares [3]_, A J diag(sigma^2) J^T A with
+    covariance of unweighted least squares [4]_, A J diag(sigma^2) J^T A with
     A = (J J^T)^-1, and no longer a bound.
 
     A parameter whose standard deviation exceeds one e-fold even with all others known
     carries no information. It is fixed for the others' covariance: near zero on a
     logarithmic scale, the linear approximation of its effect fails.
 
-    Parameters
-    ----------
-    sensitivity : (n_parameters, n_samples)
-        J, d rotation / d log parameter in rad.
-    noise_rad : float or (n_samples,)
-        Standard deviation of the noise.
-
-    Returns
-    -------
-    (n_parameters, n_parameters)
-        Infinite on the diagonal for parameters without information; zeros without noise.
+    J is d rotation / d log parameter in rad, (n_parameters, n_samples), sigma a number or
+    (n_samples,). The covariance, (n_parameters, n_parameters), is infinite on the diagonal for
+    parameters without information, and zero without noise.
     """
     sigma = np.broadcast_to(noise_rad, sensitivity.shape[1])
     scale = float(np.sqrt(np.mean(sigma**2)))
@@ -232,20 +216,9 @@ def bounds_percent(
 ) -> list[tuple[Quantity, float]]:
     """Compute the Cramér-Rao bounds of all identified quantities of a case with its noise.
 
-    Parameters
-    ----------
-    problem, noise
-        Assumptions of the identification, and noise that is added to the rotation.
-    parameters
-        Parameters at which the bounds are computed, SI units. A parameter of zero comes
-        out as undetermined, for its logarithm has no effect on the trace.
-    time_s : (n_samples,)
-        Sampling times.
-
-    Returns
-    -------
-    list of (Quantity, float)
-        Each with 100 times the standard deviation of its logarithm; NaN without noise.
+    They are 100 times the standard deviation of a quantity's logarithm, NaN without noise, at
+    parameters in SI units and sampling times, (n_samples,). A parameter of zero comes out as
+    undetermined, for its logarithm has no effect on the trace.
     """
     model = problem.searched
     quantities = parameters_and_sum(model)

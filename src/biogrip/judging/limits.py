@@ -50,23 +50,11 @@ class Brackets:
 def crossings(
     fits: ConstrainedFits, brackets: Brackets, tolerance: float, accuracy: float
 ) -> Array:
-    """Find the values of quantities at which the increase of chi^2 equals the threshold.
+    """Find the logarithms of quantities at which the increase of chi^2 equals the threshold, (n,).
 
-    Parameters
-    ----------
-    fits
-        The traces and quantities.
-    brackets
-        Intervals to search; lower fits that are found at outer ends replace theirs, in place.
-    tolerance, accuracy
-        Tolerance of the fits, see `biogrip.fit.local_fits`; and accuracy of the square root of
-        the increase of chi^2.
-
-    Returns
-    -------
-    (n,)
-        Logarithms of the quantities; NaN where a deeper basin turns out to be below the
-        threshold at the outer end, so that the crossing lies further out.
+    The accuracy is that of the square root of the increase. Lower fits that are found at outer ends
+    of brackets replace theirs, in place. NaN is where a deeper basin turns out to be below the
+    threshold at the outer end, so that the crossing lies further out.
     """
     profile, threshold = brackets.profile, fits.threshold[brackets.profile]
     root_threshold = np.sqrt(threshold)
@@ -128,13 +116,9 @@ def find_limits(
 ) -> tuple[Array, dict[int, Array]]:
     """Find the confidence limits of quantities by profile likelihood, and optima that were missed.
 
-    Returns
-    -------
-    limits : (n_traces, n_quantities, 2)
-        Logarithms of the lower and upper limits; NaN where the profile stays below the threshold.
-    missed
-        By trace, log-parameters whose chi^2 is clearly below that of its optimum, which is
-        not the global one.
+    Limits are logarithms, the lower and the upper, (n_traces, n_quantities, 2); NaN where the
+    profile stays below the threshold. By trace, log-parameters are returned whose chi^2 is clearly
+    below that of its optimum, which is not the global one.
     """
     limits = np.empty((len(likelihoods), len(quantities), 2))
     missed: dict[int, Array] = {}

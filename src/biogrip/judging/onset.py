@@ -22,7 +22,6 @@ from scipy.special import chdtri, stdtrit
 
 from biogrip.arrays import Array
 from biogrip.digits import instant, plain
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import (
     OnsetFit,
     OnsetFits,
@@ -30,7 +29,8 @@ from biogrip.fit.fitted_onset import (
     estimate_onset,
     spacing_at,
 )
-from biogrip.fit.multi_start import fit_from
+from biogrip.fit.least_squares import fit_from
+from biogrip.fit.problem import CaseProblem
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood

@@ -37,28 +37,16 @@ HIGHEST = 16.0
 # Largest difference between neighbours of the square root of the increase, which is nearly linear.
 _STEP = 0.3
 _MOST_ROUNDS = 8
-NEWS = 1e-3
-"""Improvement of a fit, relative to 1 + increase of chi^2, that has its neighbours fitted again."""
+# Improvement of a fit, relative to 1 + increase of chi^2, that has its neighbours fitted again.
+_NEWS = 1e-3
 
 
 class Points:
     """Points of several profiles, one profile after the other, with their best fits so far.
 
-    Parameters
-    ----------
-    fits
-        The profiles.
-    grids
-        Of each, ascending logarithms of the quantity, that of the optimum among them.
-
-    Attributes
-    ----------
-    profile : (n_points,)
-        Index of the profile of each point.
-    values, increases : (n_points,)
-        Logarithms of the quantity, and increases of chi^2.
-    x : (n_points, n_parameters)
-        Log-parameters fitted there.
+    Grids are of each profile, ascending logarithms of the quantity, that of the optimum among them.
+    Each point has the index of its `profile`, its value of `values`, and of its best fit
+    `increases` of chi^2, (n_points,), and log-parameters `x`, (n_points, n_parameters).
     """
 
     def __init__(self, fits: ConstrainedFits, grids: Sequence[Array]) -> None:
@@ -88,16 +76,8 @@ class Points:
     def _try(self, point: IntArray, start: IntArray, tolerance: float) -> BoolArray:
         """Fit points from other points' fits; return a mask of those that have improved much."""
         profile, targets = self.profile[point], self.values[point]
-        increases, x = self.fits.at(profile, targets, self.x[start], tolerance)
-        news = np.zeros(len(self.values), dtype=bool)
-        # A point may be fitted from both sides, so one side after the other.
-        for side in (point <= start, point > start):
-            before, after = self.increases[point[side]], increases[side]
-            news[point[side]] |= after < before - NEWS * (1 + np.abs(after))
-            better = after < before
-            at = point[side][better]
-            self.increases[at], self.x[at] = after[better], x[side][better]
-        return news
+        found = self.fits.at(profile, targets, self.x[start], tolerance)
+        return _keep_lower(self.increases, self.x, point, *found)
 
     def ends(self) -> IntArray:
         """Return the indices of the first and last point of every profile, (2, n_profiles)."""
@@ -157,6 +137,22 @@ class Points:
         self._optimum = np.insert(self._optimum, right, False)
         self.increases = np.insert(self.increases, right, np.min(increases, axis=0))
         self.x = np.insert(self.x, right, x, axis=0)
+
+
+def _keep_lower(
+    increases: Array, x: Array, point: IntArray, found: Array, fitted: Array
+) -> BoolArray:
+    """Keep, in place, fits of points that are lower; return a mask of points that improved much.
+
+    Several fits may be of one point.
+    """
+    news = np.zeros(len(increases), dtype=bool)
+    for at, increase, parameters in zip(point.tolist(), found.tolist(), fitted, strict=True):
+        before = increases[at]
+        if increase < before:
+            news[at] |= increase < before - _NEWS * (1 + abs(increase))
+            increases[at], x[at] = increase, parameters
+    return news
 
 
 # Points near the best fit, in standard deviations, that every profile has.
@@ -307,16 +303,11 @@ def compute_valley(
 ) -> tuple[dict[str, Any] | None, Array | None]:
     """Compute the increase of chi^2 over two exchangeable parameters, with the others fitted.
 
-    Returns
-    -------
-    dict or None
-        ``x`` and ``y``, names and units; ``best``; and under ``grids``, one along the
-        valley of constant sum and one along its arm of constant second parameter,
-        ``x_values``, ``y_values`` and ``increases``, nested lists.
-        None unless exactly two exchangeable parameters were searched, among others.
-    (n_parameters,) or None
-        Log-parameters whose chi^2 is clearly below that of the optimum, which is not the
-        global one.
+    The first returned has ``x`` and ``y``, names and units; ``best``; and under ``grids``, one
+    along the valley of constant sum and one along its arm of constant second parameter,
+    ``x_values``, ``y_values`` and ``increases``, nested lists. It is None unless exactly two
+    exchangeable parameters were searched, among others. The second are log-parameters whose chi^2
+    is clearly below that of the optimum, which is then not the global one, or None.
     """
     pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
     if len(pair) != 2 or len(model.parameters) == 2:
@@ -360,12 +351,8 @@ def _increases(
     neighbours = np.stack([beside[i : i + rows, j : j + columns].ravel() for i, j in shifts])
     tolerance = FAIR
     while len(points):
-        found, fitted = fits.with_fixed(start, fixed, tolerance)
-        news = np.zeros(len(x), dtype=bool)
-        for point, increase, parameters in zip(points, found, fitted, strict=True):
-            if increase < increases[point]:
-                news[point] |= increase < increases[point] - NEWS * (1 + abs(increase))
-                increases[point], x[point] = increase, parameters
+        found = fits.with_fixed(start, fixed, tolerance)
+        news = _keep_lower(increases, x, points, *found)
         origin = np.repeat(np.flatnonzero(news), 4)
         points = neighbours[:, news].T.ravel()
         origin, points = origin[points >= 0], points[points >= 0]

@@ -64,8 +64,9 @@ class Quantity:
     """SI unit."""
     members: tuple[int, ...]
     """Indices of the parameters in it."""
-    form: str = "product"
-    """``"product"`` of powers; ``"sum"``; ``"series"``, one over the sum of reciprocals."""
+    sense: int = 0
+    """Power of the members in a sum: 1; -1 in series, one over the sum of reciprocals. 0 in a
+    product of powers."""
     sign: tuple[int, ...] = (1,)
     """Powers in a product (relaxation times are quotients), (n_members,)."""
     penalties: tuple[BranchPenalty, ...] = ()
@@ -84,14 +85,14 @@ class Quantity:
     def log(self, log_parameters: Array) -> float:
         """Return its logarithm, from log-parameters of shape (n_parameters,)."""
         x = log_parameters[list(self.members)]
-        if self.form == "product":
+        if not self.sense:
             return float(np.sum(x * np.array(self.sign)))
         return float(self.sense * np.logaddexp.reduce(self.sense * x))
 
     def gradient(self, log_parameters: Array) -> Array:
         """Return the derivatives of its logarithm by the log-parameters, (n_parameters,)."""
         slope = np.zeros_like(log_parameters)
-        if self.form == "product":
+        if not self.sense:
             slope[list(self.members)] = self.sign
         else:
             of_sum = self.sense * log_parameters[list(self.members)]
@@ -106,17 +107,12 @@ class Quantity:
         ranges, and these ends, not the trace, would bound the quantity.
         """
         members = list(self.members)
-        if self.form == "product":
+        if not self.sense:
             ends = np.multiply(self.sign, (low[members], high[members]))
             return float(np.sum(np.min(ends, axis=0))), float(np.sum(np.max(ends, axis=0)))
-        if self.form == "sum":
+        if self.sense > 0:
             return self.log(low), float(np.max(high[members]))
         return float(np.min(low[members])), self.log(high)
-
-    @property
-    def sense(self) -> int:
-        """Power of the members in the sum: 1 in a sum, -1 in a series; 0 in a product."""
-        return {"product": 0, "sum": 1, "series": -1}[self.form]
 
 
 def parameters_and_sum(model: SampleModel) -> list[Quantity]:
@@ -182,13 +178,13 @@ def _ordered(model: SampleModel) -> tuple[BranchPenalty, ...]:
 
 def _sum(model: SampleModel, members: tuple[int, ...]) -> Quantity:
     names, symbols, unit = _named(model, members)
-    return Quantity(" + ".join(names), " + ".join(symbols), unit, members, "sum")
+    return Quantity(" + ".join(names), " + ".join(symbols), unit, members, 1)
 
 
 def _series(model: SampleModel, members: tuple[int, ...]) -> Quantity:
     names, symbols, unit = _named(model, members)
     label, symbol = (" + ".join(f"1/{each}" for each in texts) for texts in (names, symbols))
-    return Quantity(f"1/({label})", f"$1/($ {symbol} $)$", unit, members, "series")
+    return Quantity(f"1/({label})", f"$1/($ {symbol} $)$", unit, members, -1)
 
 
 def _named(model: SampleModel, members: tuple[int, ...]) -> tuple[list[str], list[str], str]:

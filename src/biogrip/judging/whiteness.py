@@ -7,6 +7,10 @@ variance, whatever the number of readings, their times and the standard deviatio
 [1]_. That of successive differences tests for correlation, that of means over stretches for what
 is slow.
 
+Residuals, (n_samples,), are over the noise's standard deviation where that is not the same. The
+basis of what the fit absorbs has orthonormal rows, (n_directions, n_samples), as
+`biogrip.fit.noise_model_fit.absorbed` returns them.
+
 References
 ----------
 .. [1] J. Durbin and G. S. Watson, Testing for serial correlation in least squares regression II,
@@ -46,13 +50,6 @@ def correlated(residual: Array, basis: Array) -> tuple[float, float]:
 
     The statistic is that of Durbin and Watson, d = sum (r_i+1 - r_i)^2 / sum r_i^2 [1]_, the
     correlation 1 - d/2 relative to the mean of d; the chance is that of a smaller d.
-
-    Parameters
-    ----------
-    residual : (n_samples,)
-        Residuals of a fit, over the noise's standard deviation where that is not the same.
-    basis : (n_directions, n_samples)
-        What the fit absorbs, orthonormal rows; see `biogrip.fit.noise_model_fit.absorbed`.
     """
     n = len(residual)
     observed = float(np.sum(np.diff(residual) ** 2) / np.sum(residual**2))
@@ -149,13 +146,6 @@ def far_out(residual: Array, struck: BoolArray, basis: Array) -> float:
     They are held against the fit to the others, to first order: their distances are in standard
     deviations of these, with Student's distribution [3]_. That of the nearest of them, and their
     number, have Poisson's distribution, and so has that of the farthest alone.
-
-    Parameters
-    ----------
-    residual, struck : (n_samples,)
-        Residuals of a fit, and True for outliers.
-    basis : (n_directions, n_samples)
-        What the fit absorbs, orthonormal rows.
     """
     from scipy.special import pdtrc, stdtr
 
@@ -189,20 +179,10 @@ def as_correlated(residual: Array, basis: Array) -> tuple[float, float]:
     noise are those of highest restricted likelihood, which allows for what the fit absorbs [4]_. Of
     many residuals sums over stretches are taken, since what is slow matters.
 
-    Parameters
-    ----------
-    residual : (n_samples,)
-        Residuals of a fit, over the noise's standard deviation where that is not the same.
-    basis : (n_directions, n_samples)
-        What the fit absorbs, orthonormal rows; none if that is not known.
-
-    Returns
-    -------
-    independent
-        The n residuals count as this many: n times their mean square over the variance of the
-        misfit in the direction, of those that the fit absorbs, in which it is largest.
-    freedom
-        Of the estimated variance: (tr V)^2 / tr V^2 for the covariance V of what is left [5]_.
+    The n residuals count as this many: n times their mean square over the variance of the misfit in
+    the direction, of those that the fit absorbs, in which it is largest. The freedom is
+    (tr V)^2 / tr V^2 for the covariance V of what is left [5]_. Without a basis, what the fit
+    absorbs is not known.
     """
     n = len(residual)
     sums = min(n, _SUMS)

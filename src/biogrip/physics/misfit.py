@@ -56,7 +56,7 @@ def make_misfit(residuals: Residuals) -> Misfit:
     ):
         given = residuals.gripper, residuals.model, torque, end_s / intervals
         return SeriesMisfit(*given, trace.rotation_rad)
-    return residuals.condensed_misfit
+    return residuals.misfit
 
 
 def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:

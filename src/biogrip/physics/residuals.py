@@ -216,7 +216,7 @@ class Residuals:
         parameters, condensed = np.exp(log_parameters), self.trace.condensed
         return condensed.of_modes(compute_modes(*given, parameters, slopes=slopes))
 
-    def condensed_misfit(self, parameters: Array) -> Array:
+    def misfit(self, parameters: Array) -> Array:
         """Compute RMS misfits of a population, (n,) in rad, each independent of the others.
 
         Parameters

@@ -57,11 +57,10 @@ def identify(
     progress = Progress(f"{case.name}, {method}", len(seeds))
     whose = case.name, method, case_problem.model, case_problem.searched, case_problem.fixed
     records = []
-    condensed = case_problem.condensed(recorded.time_s)
     for group in groups(seeds):
         traces = [recorded.rotation_rad[seed] for seed in group]
         rngs = [stream(case.study.study_seed, case.name, seed, method) for seed in group]
-        problems = case_problem.of_each(recorded.time_s, traces, condensed=condensed)
+        problems = [case_problem.of(recorded.time_s, trace) for trace in traces]
         answers = identified(problems, rngs, progress.within)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
             noise = None if recorded.target_rad is None else rms(trace - recorded.target_rad)
@@ -95,10 +94,10 @@ def join(
     lowest: dict[str, str] = {}
     for file in measurements:
         recorded = read_measurements(file)
-        traces = recorded.rotation_rad
-        posed = problem.weighted(recorded.sd_rad).of_each(recorded.time_s, traces.values())
+        traces, weighted = recorded.rotation_rad, problem.weighted(recorded.sd_rad)
+        posed = [weighted.of(recorded.time_s, trace) for trace in traces.values()]
         for seed, of_trace in zip(map(str, traces), posed, strict=True):
-            misfit = lowest_encodable(of_trace.misfit, ranges, np.array(ends[seed]))
+            misfit = lowest_encodable(of_trace.residuals.misfit, ranges, np.array(ends[seed]))
             lowest[seed] = f"{misfit:.6e}"
     write_rows(parameters, (*header, ENCODABLE), ([*row, lowest.get(row[2], "")] for row in rows))
     write_arrays(history, join_arrays([read_arrays(batch) for batch in history_batches]))
@@ -118,10 +117,8 @@ def fit(
     problem = problem.weighted(recorded.sd_rad)
     progress = Progress(f"{case.name}, models", len(models) * len(seeds))
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
-    condensed = problem.condensed(recorded.time_s)
     for group in groups(seeds):
-        rotations = (recorded.rotation_rad[seed] for seed in group)
-        traces = problem.of_each(recorded.time_s, rotations, condensed=condensed)
+        traces = [problem.of(recorded.time_s, recorded.rotation_rad[seed]) for seed in group]
         found = fit_models(
             {
                 name: [problem.for_model(trace, model) for trace in traces]

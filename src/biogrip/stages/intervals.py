@@ -13,17 +13,15 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.case_problem import CaseProblem
-from biogrip.fit.methods import best_fit, identifier
-from biogrip.fit.multi_start import fit_from
-from biogrip.fit.problem import Identification, Problem, silent
-from biogrip.fit.trace_fit import trace_fit
+from biogrip.fit.least_squares import fit_from
+from biogrip.fit.methods import identifier
+from biogrip.fit.problem import CaseProblem, Identification, Problem, silent
+from biogrip.fit.trace_fit import fit_traces
 from biogrip.judging.likelihood import MISSED, Likelihood, covariance, make_likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding
-from biogrip.physics.condensed import Condensed
 from biogrip.physics.noise import add_noise, standard_deviation, stream
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.records.identifications import INTERVALS, read_verdicts
@@ -69,8 +67,6 @@ def _rows(
     every = parameters_and_sum(case_problem.searched)
     selected = [index for index, quantity in enumerate(every) if quantity.label in determined]
     rest_known, informed, truth = _rest_known(case, case_problem, time_s, rotation)
-    # The same rows for all, so that seeds of different groups are profiled together.
-    condensed = case_problem.condensed(time_s)
     progress = Progress(f"{case.name}, intervals", len(seeds))
     # Combine groups until they hold enough seeds with full verdicts.
     for some in groups(seeds, case.verdicts_every):
@@ -80,11 +76,11 @@ def _rows(
             rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in group]
             traces = [add_noise(rotation, case.noise, rng, time_s) for rng in rngs]
             quantities = [every[index] for index in selected]
-            found = _optima(case, case_problem, group, time_s, traces, condensed)
+            found = _optima(case, case_problem, group, time_s, traces)
             likelihoods, limits = _limited(case, found, quantities)
             known = np.tile(truth, (len(group), 1))
             if len(informed):
-                simpler = case_problem.of_each(time_s, traces, rest_known, condensed)
+                simpler = [case_problem.of(time_s, trace, rest_known) for trace in traces]
                 known[:, informed] = fit_from(simpler, truth[informed]).x
             for index, seed in enumerate(group):
                 with_limits = dict(zip(selected, limits[index], strict=True))
@@ -137,22 +133,17 @@ def _optima(
     group: Sequence[int],
     time_s: Array,
     traces: list[Array],
-    condensed: Condensed,
-) -> Iterator[tuple[Problem, Identification]]:
-    """Yield problems and fits of traces, fitted together if their noise is white."""
+) -> list[tuple[Problem, Identification]]:
+    """Return problems and fits of traces, fitted together if their noise is white."""
     rngs = [stream(case.study.study_seed, case.name, seed, "coverage") for seed in group]
-    if case_problem.plain:
-        problems = case_problem.of_each(time_s, traces, condensed=condensed)
-        identify = identifier("least_squares", case.least_squares)
-        yield from zip(problems, identify(problems, rngs, silent), strict=True)
-        return
-    for trace, rng in zip(traces, rngs, strict=True):
+    identify = identifier("least_squares", case.least_squares)
 
-        def find(problem: Problem, rng: np.random.Generator = rng) -> Identification:
-            return best_fit(problem, case.least_squares, rng, silent)
+    def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
+        return identify(problems, [rngs[index] for index in which], silent)
 
-        fit = trace_fit(case_problem, time_s, trace, find)
-        yield fit.problem, fit.found
+    posed = [case_problem] * len(traces)
+    fits = fit_traces(posed, [(time_s, trace) for trace in traces], find)
+    return [(fit.problem, fit.found) for fit in fits]
 
 
 def refitted(likelihood: Likelihood, missed: Array, confidence: float) -> Likelihood | None:

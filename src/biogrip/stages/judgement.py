@@ -13,10 +13,9 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.files import write_text
-from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.least_squares import fit_from, identify_from
 from biogrip.fit.methods import identifier
-from biogrip.fit.multi_start import fit_from, identify_from
-from biogrip.fit.problem import Identification, Problem, Progress, silent
+from biogrip.fit.problem import CaseProblem, Identification, Problem, Progress, silent
 from biogrip.fit.trace_fit import TraceFit, fit_traces
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit

@@ -16,11 +16,10 @@ import pandas as pd
 
 from biogrip.arrays import Array
 from biogrip.files import write_text
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.methods import share_in_words
-from biogrip.fit.problem import Identification, Problem, silent
+from biogrip.fit.problem import CaseProblem, Identification, Problem, silent
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED, compute_status, examine_residuals
 from biogrip.judging.likelihood import make_likelihood

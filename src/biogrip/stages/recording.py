@@ -10,8 +10,8 @@ from biogrip.arrays import BoolArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.fitted_onset import OnsetFits, estimate_onset
+from biogrip.fit.problem import CaseProblem
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.whitening import MOST_SAMPLES
 from biogrip.records.traces import Measurements, write_measurements

@@ -165,14 +165,13 @@ def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, 
     progress = Progress(f"{case.name}, interpretations", len(case.interpretations) * case.seeds)
     for name, interpretation in case.interpretations.items():
         case_problem = interpretation.problem
-        condensed = case_problem.condensed(time_s)
         for seeds in groups(range(case.seeds)):
             noises, searches = (
                 [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]
                 for purpose in ("noise", "genetic")
             )
             traces = [add_noise(rotation, interpretation.noise, rng, time_s) for rng in noises]
-            problems = case_problem.of_each(time_s, traces, condensed=condensed)
+            problems = [case_problem.of(time_s, trace) for trace in traces]
             answers = identify_many(problems, interpretation.genetic, searches)
             for seed, trace, answer in zip(seeds, traces, answers, strict=True):
                 names = case_problem.searched.names

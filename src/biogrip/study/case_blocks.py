@@ -111,10 +111,9 @@ class Shared(Block):
     differential_evolution: DifferentialEvolutionSettings
 
     def method(self, name: str) -> object:
-        """Return the settings object of a method."""
-        method = METHODS[name]
-        found = [getattr(self, block) for block in method.blocks]
-        return method.named(method.settings)(*found) if method.settings else found[0]
+        """Return the settings of a method, of several blocks as a tuple."""
+        found = tuple(getattr(self, block) for block in METHODS[name].blocks)
+        return found if len(found) > 1 else found[0]
 
 
 OVERRIDABLE = tuple(each.name for each in fields(Shared))

@@ -52,7 +52,7 @@ class MeasurementBlock(Block):
     """Sampling rate; the first sample is at t = 0."""
     bursts: Annotated[tuple[Burst, ...], Field(min_length=1, max_length=20_000)] = ()
     """Successive bursts of samples instead of a uniform rate, as of a camera that is fast after
-    every step; of one sample each they are single times. See docs/design.md."""
+    every step; of one sample each they are single times."""
     file: _Name = None
     """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. See
     "Your own measurement"."""

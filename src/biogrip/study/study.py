@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from biogrip.fit.case_problem import CaseProblem
 from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.methods import METHODS, Method
+from biogrip.fit.problem import CaseProblem
 from biogrip.keys import built, plain
 from biogrip.physics.contact import Contact
 from biogrip.physics.gripper import NO_ARMS, Gripper

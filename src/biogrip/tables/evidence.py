@@ -222,7 +222,7 @@ def _errors_and_bounds(case: Case) -> list[tuple[Any, ...]]:
 def _drop_redundant(bounds: list[tuple[Quantity, float]]) -> list[Quantity]:
     """Leave out sums whose members are determined, and members that only the sum determines."""
     left_out = []
-    for total, percent in [(q, percent) for q, percent in bounds if q.form == "sum"]:
+    for total, percent in [(q, percent) for q, percent in bounds if q.sense > 0]:
         members = [(q, alone) for q, alone in bounds if set(q.members) < set(total.members)]
         if min(alone for _, alone in members) > _TRADING * percent:
             left_out += [q for q, _ in members]

@@ -14,7 +14,7 @@ from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import extreme_responses, fit_responses
-from biogrip.fit.case_problem import CaseProblem
+from biogrip.fit.problem import CaseProblem
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import TorqueHistory, torque_at
 from biogrip.physics.whitening import nuisance_basis, without
