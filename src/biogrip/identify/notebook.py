@@ -23,16 +23,29 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+# Options of the command in what it says, and the arguments and keys that they are here.
+_ARGUMENTS = (
+    ("--start fit", 'start="fit"'),
+    ("--offset --drift", "offset=True, drift=True"),
+    ("--(offset|drift)", r"\1=True"),
+    (r"--model (\w+)", r'model="\1"'),
+    (r"--noise-model (\w+)", r'noise_model="\1"'),
+    (r"--noise-share (\S+)\.", r"measurement.noise_share \1 in config."),
+    ("--(from|until)", r"measurement.\1_s in config"),
+    ("--load", "measurement.load of the command"),
+    ("--(?=[a-z])", ""),
+)
+
 
 def _with_arguments(said: Any) -> Any:
-    """Return what the command says, plain data, with names of arguments for its options."""
+    """Return what the command says, plain data, with arguments in the place of options."""
     if isinstance(said, dict):
         return {key: _with_arguments(value) for key, value in said.items()}
     if isinstance(said, list):
         return [_with_arguments(value) for value in said]
-    if not isinstance(said, str):
-        return said
-    return re.sub(r"--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), said)
+    for option, argument in _ARGUMENTS if isinstance(said, str) else ():
+        said = re.sub(option, argument, said)
+    return said
 
 
 @dataclass(frozen=True, repr=False)
