@@ -48,7 +48,7 @@ def test_what_is_slow_is_seen_where_neighbouring_samples_do_not_show_it() -> Non
 def test_a_drift_that_a_sample_could_have_shown_is_suspected(seed: int) -> None:
     """Most of it is fitted away, as a softer sample."""
     (said,) = suspected(gripped(seed, 0.6 * DRIFT))
-    assert "identify the trace with offset drift" in said
+    assert "identify the trace with offset=True, drift=True" in said
     assert "k_p would be " in said
 
 
@@ -94,7 +94,7 @@ def test_an_offset_alone_is_advised_if_it_explains_as_much() -> None:
     """And the fit that is advised is what is made of the trace if it is declared."""
     (said,) = suspected(gripped(0, OFFSET))
     assert said.startswith("An offset of the instrument, fitted along, explains the trace")
-    assert "with offset." in said
+    assert "with offset=True." in said
     advised = re.findall(r"(\S+|c \+ c_p) would be ([^;]+?)[;:.](?: |$)", said)
     found = gripped(0, OFFSET, offset=True).data["quantities"]
     words = {it["quantity"]: it["in_words"].removeprefix("determined: ") for it in found}

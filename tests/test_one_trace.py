@@ -402,7 +402,7 @@ def test_a_rejected_fit_names_a_better_model_though_it_is_simpler() -> None:
     models = ["springpot", "maxwell"]
     found = told(times, 0.01 * times**0.3 + noise, models, reads="strain", hold=1.0).data
     assert found["fit"] == "rejected"
-    assert "(model springpot) is preferred" in found["advice"]
+    assert '(model="springpot") is preferred' in found["advice"]
     lines = side_by_side([found, found | {"fit": "ok"}], {}).splitlines()
     assert [line for line in lines if "springpot" in line] == [f"trace.csv: {found['advice']}"]
     assert f"trace.csv: rejected: {found['reasons'][0]}" in lines

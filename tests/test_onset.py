@@ -168,7 +168,7 @@ def test_readings_before_the_onset_tell_the_zero() -> None:
         (
             *(ONSET_S, None),
             "found -8.07 s, allowed is the protocol's time, 0 to 60 s. If the protocol starts at "
-            "another time of the clock than 0, start says when, or start fit finds it.",
+            'another time of the clock than 0, start says when, or start="fit" finds it.',
         ),
         (0.0, -5.0, "found 55.2 s, allowed is the protocol's time, -5 to 55 s."),
     ],
