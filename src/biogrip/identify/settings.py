@@ -145,7 +145,8 @@ def case_of(asked: Asked) -> Case:
     below = read_configs(files)
     given = asked.given
     if len(found := [".".join(key) for key in _PROTOCOLS if key in keys_in(given)]) > 1:
-        raise BiogripError(f"{asked.place}: found {' and '.join(found)}; allowed is one of them.")
+        where = asked.config or asked.place
+        raise BiogripError(f"{where}: found {' and '.join(found)}; allowed is one of them.")
     merged = _with_instrument(overlaid(below, given), given, asked.trace)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
