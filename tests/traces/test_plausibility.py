@@ -196,7 +196,7 @@ def test_the_free_rotation_is_that_of_the_left_arm() -> None:
         ((hold(1.0, 1.0e-9, -1.6e-9),), 2.6e-9 / 9.9e-7),
     ):
         found = free_rotation(UNEQUAL, torque_history(phases))
-        assert found == pytest.approx(largest_rad, rel=2e-3)
+        assert found == pytest.approx(largest_rad, rel=1e-12)
 
 
 @pytest.mark.parametrize(

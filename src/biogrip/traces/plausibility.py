@@ -142,8 +142,9 @@ def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
     Statically phi_2 = (1 - x) tau_2/k_2 + x (tau_2 - tau_4)/(k_2 + k_4), where x
     goes from 0 without a sample to 1 with a rigid one.
     """
-    edges = np.append(torque.time_s, torque.end_s)
-    times = np.linspace(edges[:-1], edges[1:], 1000, endpoint=False).ravel()
+    # Within a phase nothing turns round: its start and its end will do.
+    ends_s = np.append(torque.time_s[1:], torque.end_s)
+    times = np.concatenate((torque.time_s, np.nextafter(ends_s, 0)))
     left, right = (torque_at(torque, times, arm) for arm in ("left", "right"))
     k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
     alone, pushed = np.abs(left) / k_2, np.abs(left - right) / (k_2 + k_4)
