@@ -16,7 +16,7 @@ from biogrip.library import set_up, simulate
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import hold
-from tests.helpers.default import STUDY
+from tests.helpers.default import STUDY, study_of
 from tests.helpers.identified import told
 
 CASE = STUDY.cases["liquid_drop_2"]
@@ -30,6 +30,12 @@ def simulated(parameters: dict[str, float], torque: float = 1.0, length: float =
     phases = tuple(hold(200.0, torque * torque_Nm) for torque_Nm in (1.6e-9, 0.32e-9))
     clean = simulate(set_up(gripper, phases, problem.sample), parameters, TIMES)
     return clean + 0.01 * clean.max() * np.random.default_rng(1).standard_normal(len(TIMES))
+
+
+def test_a_torque_is_uncertain_by_percent() -> None:
+    study = study_of("gripper: {uncertainty: {torque_percent: 3.0, left: {inertia_kgm2: 1e-15}}}")
+    expected = {"left": {"inertia_kgm2": 1e-15}, "torque": {"share": 0.03}}
+    assert study.case("liquid_drop_1").problem.uncertainty == expected
 
 
 @pytest.mark.nightly
