@@ -33,7 +33,8 @@ with logged(snakemake):
     for rule in rules.values():
         # Turned: from left to right, as high as a line of text and as wide as the longest name.
         rule.view = VertexViewer(w=14, h=80)
-    edges = [Edge(rules[a], rules[b]) for a, b in nx.transitive_reduction(nx.DiGraph(reads)).edges]
+    shown = sorted(nx.transitive_reduction(nx.DiGraph(reads)).edges)
+    edges = [Edge(rules[a], rules[b]) for a, b in shown]
     for edge in edges:
         edge.view = Bends()
     graph = Graph(list(rules.values()), edges).C[0]

@@ -5,7 +5,8 @@ whose fields are the keys of its config block (`biogrip.keys`), and a function
 ``identify_many(problems, settings, rngs, progress)``, which returns an `Identification` of each
 trace, to the bit as if it were alone. Ranges and traces are the problems', the budget of each is
 in the settings, its generator is its only source of randomness, and progress is told of all. A
-method with several blocks is given a tuple of their settings.
+method with several blocks is given a tuple of their settings. A history has a row for the start
+and one a step, of which there are `Identification.generations`.
 """
 
 from collections.abc import Callable, Sequence

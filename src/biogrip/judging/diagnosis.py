@@ -5,8 +5,8 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 
 1. A confidence set in parts is harmless.
 2. A parameter at an end of its search range, with chi^2 lower beyond it, rejects the fit.
-3. Residuals that are not white noise (`biogrip.judging.doubts`) make it doubtful; a misfit far
-   above the noise rejects it. Limits allow for a small one.
+3. Residuals that are not white noise (`biogrip.judging.doubts`) make it doubtful; a misfit of 2 %
+   of the peak or more rejects it. Limits allow for a smaller one.
 4. Jaws that would have to pull are harmless.
 5. A fit that has not converged is doubtful, and so are arms that ring.
 """

@@ -8,10 +8,10 @@ leaves.
 
 What is correlated beyond chance (`CERTAIN_MISFIT`) and larger than the scatter of neighbouring
 readings may be noise all the same: if it is correlated for a short time (`has_fast_noise`), or if
-the noise differs from one part of the trace to another (`has_uneven_noise`). Else it is misfit. One
-of more than a few per cent of the peak rejects the fit. Of a smaller one limits are given that
-count independent residuals only: the fit is good to so much of the peak, which is doubtful, not
-wrong. A noise model may be misfit, too (`find_slow_misfit`): if it is correlated for too long.
+the noise differs from one part of the trace to another (`has_uneven_noise`). Else it is misfit. A
+misfit of 2 % of the peak or more rejects the fit. With a smaller one limits are given that count
+independent residuals only: the fit is good to so much of the peak, which is doubtful, not wrong. A
+noise model may be misfit, too (`find_slow_misfit`): if it is correlated for too long.
 """
 
 from collections.abc import Iterator, Sequence
@@ -82,7 +82,7 @@ FALSE_ALARM = 0.003
 """Significance level of each test: share of traces with white noise that fail it."""
 
 CERTAIN_MISFIT = 0.001
-"""The same of the test by which a fit is rejected."""
+"""Significance level of the test that tells misfit from noise."""
 
 # A misfit larger than the scatter of neighbouring readings by this factor changes limits.
 _TOO_MUCH = 1.2

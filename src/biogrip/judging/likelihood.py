@@ -129,7 +129,10 @@ def make_likelihood(
 
 
 def _thresholds(confidence: float, freedom: float) -> tuple[float, float]:
-    """Return the increases of chi^2 at limits and at `CERTAIN`, by the freedom of the noise."""
+    """Return the increases of chi^2 at limits and at `CERTAIN`, by the freedom of the noise.
+
+    If the noise is known, chi-squared of one degree of freedom, 3.84 at 95 %; else F(1, freedom).
+    """
     from scipy.special import fdtri
 
     levels = confidence, CERTAIN

@@ -163,6 +163,7 @@ def phi_function(order: int, z: NDArray[Any]) -> NDArray[Any]:
 def sample_polynomials(network: Network) -> tuple[Array, Array]:
     """Return P and Q of the sample's impedance P/Q, ascending powers, shape (terms, n).
 
+    The node between spring and damper of a branch, corrected (3) and (6), is eliminated.
     Each branch enters as c_j s / (1 + T_j s) with its relaxation time T_j = c_j/k_j.
     """
     one = np.ones((1, len(network.k_p)))
