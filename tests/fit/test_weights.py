@@ -60,18 +60,6 @@ def identified(problem: CaseProblem, trace: Array) -> Diagnosis:
     )
 
 
-def test_the_noise_is_the_root_mean_square_of_known_deviations() -> None:
-    """Misfit over noise is the root of chi-squared a reading, for whatever parameters."""
-    trace, deviations = noisy(0.05), 0.05 * noisy(0.0)
-    weighted = POLYSTYRENE.weighted(deviations)
-    parameters = np.array([1.2 * V, 0.9 * BETA, 1.1 * ETA])
-    misfit = weighted.of(TIMES, trace).residuals.misfit(parameters[None])[0]
-    left = rotation(TIMES, np.log(parameters[0]), parameters[1], np.log(parameters[2])) - trace
-    assert weighted.noise_rad is not None
-    chi_squared = np.sum((left / deviations) ** 2)
-    assert len(TIMES) * (misfit / weighted.noise_rad) ** 2 == pytest.approx(chi_squared, rel=1e-5)
-
-
 def test_the_published_fit_comes_out_to_five_digits() -> None:
     trace = noisy(0.0)
     fit = fitted(POLYSTYRENE.weighted(0.05 * trace), trace)

@@ -8,7 +8,6 @@ import pytest
 from scipy.stats import norm, t
 
 from biogrip.arrays import Array
-from biogrip.fit.least_squares import fit_from
 from biogrip.judging.constrained_fits import QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
@@ -149,20 +148,6 @@ def test_the_search_range_determines_no_combination() -> None:
     soft, best = problem.low[0], told.likelihood.best
     assert series.log(np.array([soft, *best[1:]])) < soft + 1e-3
     assert rest_fitted(told.likelihood, [0], [soft], best) < told.likelihood.threshold
-
-
-def test_a_model_with_one_parameter_has_a_profile() -> None:
-    damper = MODELS["damper"]
-    (problem,) = case_problem(*clean("liquid_drop_2"), 1, damper)
-    best = fit_from([problem], np.array([2.0]))
-    misfit_rad = float(best.misfit_rad[0])
-    assert misfit_rad == pytest.approx(scipy_fit(problem, np.array([2.0])).misfit_rad, rel=1e-9)
-    likelihood = make_likelihood(problem, best.x[0], misfit_rad, confidence=0.95)
-    quantities = parameters_and_sum(damper)
-    (limits,) = find_limits([likelihood], quantities)[0]
-    ((alone,),) = compute_profiles([likelihood], quantities)
-    ends = np.array([alone.low, alone.high], dtype=float)
-    np.testing.assert_allclose(limits[0], ends, rtol=0, atol=1e-4)
 
 
 @pytest.mark.parametrize("taken_out", [{}, {"offset": True}, {"offset": True, "drift": True}])

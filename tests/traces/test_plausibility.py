@@ -23,11 +23,7 @@ from tests.helpers.problems import GRIPPER
 
 UNEQUAL = Gripper(1.5e-3, 75.0, Arm(1.0e-14, 3.3e-12, 4.4e-7), Arm(1.3e-14, 2.5e-12, 5.5e-7))
 SI = Columns("time_s", "rotation_rad")
-SAMPLES = {
-    "endothelial_cell": (35.0, 12.3, 299.9, 1.0e-3),
-    "liquid_drop_1": (9.5, 1.0e-4, 10.0, 1.0e-4),
-    "liquid_drop_2": (1.0, 1.0e-4, 10.0, 1.0e-3),
-}
+SAMPLES = {name: tuple(case.parameters.values()) for name, case in STUDY.cases.items()}
 TIMES = sample_times(400.0, 1.0)
 NO_RESPONSE = "found no response to the torque"
 MIRRORED = "found a rotation that goes against the torque"
