@@ -46,6 +46,8 @@ TINY: dict[str, Any] = {
         },
     },
 }
+SMALL = {key: value for key, value in TINY.items() if key != "cases"}
+"""What makes runs of any cases small."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import pytest
 import yaml
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import TINY
+from tests.helpers.runs import SMALL
 
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 # Of each document, what there is when the reader is through.
@@ -62,7 +62,6 @@ TINY_FIT = """
 least_squares: {candidates: 50, starts: 3}
 model_selection: {models: [damper, maxwell]}
 """
-SMALL = {key: value for key, value in TINY.items() if key != "cases"}
 
 
 @pytest.fixture(scope="module")

@@ -10,15 +10,14 @@ import pytest
 import yaml
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import TINY, Run, called
+from tests.helpers.runs import SMALL, Run, called
 
-ONE_CASE = {
+CONFIG = SMALL | {
     "seeds": 1,
     "methods": ["genetic"],
     "identifiability": {"coverage_seeds": 0},
     "only": ["liquid_drop_2"],
 }
-CONFIG = {key: value for key, value in TINY.items() if key != "cases"} | ONE_CASE
 ERRORS = "results/tables/errors_liquid_drop_2.csv"
 MODULE = f"""
 module biogrip:
@@ -73,14 +72,6 @@ rule mine:
     assert (tmp_path / "mine.txt").read_text().strip() == shutil.which(
         "python", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}"
     )
-
-
-def test_a_wrong_value_in_a_module_is_one_message(tmp_path: Path) -> None:
-    text = f"{MODULE}    config: {{'seedz': 2}}\n\nuse rule * from biogrip as biogrip_*\n"
-    wrong = host(tmp_path, text, "-n")
-    assert wrong.status == 1
-    assert "seedz: unknown key. Did you mean 'seeds'?" in wrong.output
-    assert "Traceback" not in wrong.output
 
 
 @pytest.mark.nightly
