@@ -17,8 +17,7 @@ def stop():
     time.sleep(60)
 end_when_stopped()
 """
-# Where an exception would be made another error of, would be printed and forgotten, or would
-# have to be raised through other people's code.
+# Where an exception would be made another error of, or would be printed and forgotten.
 PLACES = {
     "a library that is being loaded": """
 try:
@@ -31,12 +30,6 @@ class Finalized:
     def __del__(self):
         stop()
 Finalized()
-""",
-    "a callback that anything may come out of": """
-try:
-    stop()
-except BaseException:
-    pass
 """,
     "a file being written": """
 from biogrip.files import atomic_write
