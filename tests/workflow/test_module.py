@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import pytest
 import yaml
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import SMALL, Run, called
+from tests.helpers.runs import SMALL, Run, called, ran
 
 CONFIG = SMALL | {
     "seeds": 1,
@@ -79,12 +78,10 @@ def test_it_is_deployed_from_a_clone_and_runs_a_case(tmp_path: Path) -> None:
     """By snakedeploy, as the catalogue of workflows tells its readers to."""
     pytest.importorskip("snakedeploy")
     clone, place = tmp_path / "clone", tmp_path / "place"
-    subprocess.run(["git", "clone", "-q", str(ROOT), str(clone)], check=True)
-    branch = subprocess.run(
-        ["git", "branch", "--show-current"], cwd=clone, capture_output=True, text=True, check=True
-    ).stdout.strip()
-    deploy = [Path(sys.executable).with_name("snakedeploy"), "deploy-workflow", clone, place]
-    subprocess.run([*map(str, deploy), "--branch", branch], check=True)
+    assert ran(tmp_path, "git", "clone", "-q", ROOT, clone).status == 0
+    branch = ran(clone, "git", "branch", "--show-current").output.strip()
+    run = ran(tmp_path, "snakedeploy", "deploy-workflow", clone, place, "--branch", branch)
+    assert run.status == 0, run.output
     (place / "config" / "config.yaml").write_text(yaml.safe_dump(CONFIG))
     # Of a clone it names the Snakefile without the folder; of a server it names the server, too.
     text = (place / "workflow" / "Snakefile").read_text()
