@@ -9,8 +9,6 @@ from tests.helpers.identified import FEW, identify
 from tests.helpers.places import EXAMPLE
 
 FILES = 300
-FAILED: list[int] = []
-"""Seeds that once failed; they are tried with every change."""
 
 NUMBERS = ["", "nan", "inf", "-0", "1e308", "1e-320", "-1e30", "1,5", "0x1F", "٣", "1e400", "$x$"]
 NAMES = ["time_ms", "time [h]", "rotation_deg", "rotation [mrad]", "File", "", "\x1b[31m", "<b>"]
@@ -48,10 +46,8 @@ def damaged(seed: int) -> bytes:
     return bytes(content)
 
 
-@pytest.mark.parametrize(
-    "seed",
-    [*FAILED, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(FILES))],
-)
+@pytest.mark.parametrize("seed", range(FILES))
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("error")
 def test_a_damaged_trace_gives_an_answer_or_one_message(tmp_path: Path, seed: int) -> None:
     (tmp_path / "few.yaml").write_text(FEW)

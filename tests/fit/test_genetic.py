@@ -19,7 +19,6 @@ from biogrip.physics.sample_model import with_fixed
 from tests.helpers.plain_genetic import identified
 from tests.helpers.problems import case_problem, clean
 
-PAPER = GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 20, 40, 200)
 SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)
 READINGS = {
     "as printed": SMALL,
@@ -33,7 +32,7 @@ READINGS = {
     "limit": replace(SMALL, max_generations=5),
     "no generation": replace(SMALL, min_generations=0, max_generations=0),
     "misfits of their own": replace(SMALL, population=10, survivors=5, max_generations=7),
-    "the paper's population": replace(PAPER, min_generations=10, patience=5),
+    "the paper's population": GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 5, 10, 200),
 }
 MAXWELL = MODELS["generalized_maxwell"]
 MODELS_SEARCHED = {

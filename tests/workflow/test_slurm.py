@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.helpers.identified import write_drop
+from tests.helpers.identified import FEW, write_drop
 from tests.helpers.places import ROOT
 from tests.helpers.required import cannot_run
 from tests.helpers.runs import SMALL, snakemake
@@ -69,7 +69,6 @@ FEW_JOBS: dict[str, Any] = SMALL | {
     },
 }
 CELLS = "file\tmeasurement.noise_rad\nfirst.csv\t\nsecond.csv\t1e-6\n"
-FEW = "least_squares: {candidates: 50, starts: 2}\nmodel_selection: {models: []}\n"
 # Of a case, whose jobs are submitted in groups, and one that is submitted alone.
 WANTED = ["errors_liquid_drop_2", "verdicts_liquid_drop_2", "contact_loss", "traces"]
 TABLES = [f"results/tables/{name}.csv" for name in WANTED]
