@@ -13,7 +13,7 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.groups import FEWEST_CELLS, Cell, adjusted, compare, estimate
 from biogrip.identify.outputs import WRITTEN_BY
-from tests.helpers.identified import identify
+from tests.helpers.identified import FEW, identify
 from tests.helpers.places import ROOT
 
 # Log risk ratios of tuberculosis, with and without vaccination, and their variances: Colditz et
@@ -253,9 +253,7 @@ def test_identify_and_groups_say_the_same_of_a_cell(
     arms slipped in b5.
     """
     monkeypatch.chdir(ROOT)
-    (tmp_path / "few.yaml").write_text(
-        "least_squares: {candidates: 100, starts: 4}\nmodel_selection: {models: []}\n"
-    )
+    (tmp_path / "few.yaml").write_text(FEW)
     folder = tmp_path / "dishes"
     shutil.copytree(ROOT / "data" / "dishes", folder)
     options = "--config", tmp_path / "few.yaml", "--csv", tmp_path / "found.csv"

@@ -13,7 +13,6 @@ from biogrip.arrays import Array
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import hold
-from tests.helpers.default import study_of
 from tests.helpers.identified import FEW, by_quantity, identify, told, write_trace
 from tests.helpers.places import ROOT
 
@@ -83,21 +82,6 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
     written = page.read_text() if page.exists() else ""
     for said in (printed, json.dumps(found), NOT_READ.sub("", written), table.read_text()):
         assert not OF_A_GRIPPER.search(said), OF_A_GRIPPER.search(said)
-
-
-def test_a_study_mixes_instruments() -> None:
-    study = study_of(
-        "only: [pipette, endothelial_cell]\n"
-        "cases:\n"
-        "  pipette:\n"
-        "    instrument: creep\n"
-        "    sample: {model: maxwell, k: 0.05, c: 0.2}\n"
-        "    protocol: {phases: [{duration_s: 60, force_N: 1.0e-9}]}\n"
-    )
-    units = {name: case.sample.model.stiffness_unit for name, case in study.cases.items()}
-    assert units == {"pipette": "N/m", "endothelial_cell": "N/m"}
-    assert study.gripped == ["endothelial_cell"]
-    assert not study.cases["pipette"].problem.torque.deforms
 
 
 def test_readings_at_the_instant_of_a_step_are_left_out() -> None:

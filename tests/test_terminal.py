@@ -11,13 +11,9 @@ import pytest
 from biogrip import terminal
 from biogrip.cli import _parser, main
 from biogrip.terminal import visible, visible_lines
-from tests.helpers.identified import identify
+from tests.helpers.identified import FEW, identify
 from tests.helpers.places import EXAMPLE
 
-FEW = """
-least_squares: {candidates: 50, starts: 2}
-model_selection: {models: []}
-"""
 # A colour, the title of a window, a line that is cleared, text that runs from right to left.
 HOSTILE = "\x1b[31m\x9b2J\x1b]0;x\x07\r\u202ea\x7f"
 OBEYED = re.compile("[^\n -~\xa1-\u200d\u2010-\u2027\u2030-\u2065\u2070-\ud7ff]")

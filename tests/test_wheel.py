@@ -2,9 +2,8 @@
 
 import json
 import os
-import subprocess
 import sys
-import sysconfig
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,27 +11,9 @@ import yaml
 
 import biogrip
 from tests.helpers.places import EXAMPLE, ROOT
-from tests.helpers.runs import TINY
+from tests.helpers.runs import TINY, ran
 
 pytestmark = pytest.mark.nightly
-
-PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check")
-
-
-def called(*command: str | Path, folder: Path) -> str:
-    """What a command says in a folder, with nothing of this process' environment."""
-    environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL"))}
-    done = subprocess.run(
-        [*map(str, command)],
-        cwd=folder,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stdout
-    return done.stdout
 
 
 def test_the_version_is_the_same_everywhere() -> None:
@@ -45,36 +26,27 @@ def test_the_version_is_the_same_everywhere() -> None:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
+    """What a command says in a folder, with the wheel before the libraries of this environment."""
     folder = tmp_path_factory.mktemp("wheel")
-    options = ("--quiet", "--no-deps", "--no-index", "--no-build-isolation", "--wheel-dir", ".")
-    called(*PIP, "wheel", *options, ROOT, folder=folder)
-    (built,) = folder.glob("*.whl")
-    return built
+    options = ("--quiet", "--no-deps", "--no-index", "--no-build-isolation")
+
+    def said(place: Path, *command: str | Path) -> str:
+        paths = [str(folder / "there" / "bin"), str(Path(sys.executable).parent)]
+        path = os.pathsep.join([*paths, os.environ["PATH"]])
+        run = ran(place, *command, PATH=path, PYTHONPATH=str(folder / "there"))
+        assert run.status == 0, run.output
+        return run.output
+
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
+    said(folder, *pip, "wheel", *options, "--wheel-dir", ".", ROOT)
+    said(folder, *pip, "install", *options[:3], "--target", "there", *folder.glob("*.whl"))
+    return said
 
 
-@pytest.fixture(scope="module")
-def commands(wheel: Path) -> Path:
-    """The commands of an environment that has the wheel, and borrows the libraries of this one."""
-    folder = wheel.parent / "empty"
-    called(sys.executable, "-m", "venv", "--without-pip", folder, folder=wheel.parent)
-    python = folder / "bin" / "python"
-    called(*PIP, "--python", python, "install", "--no-deps", "--no-index", wheel, folder=folder)
-    own = called(
-        python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", folder=folder
-    )
-    places = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}
-    # Lines of a .pth file come after what is installed, and theirs are not read in turn: so the
-    # biogrip that is being developed is not found.
-    Path(own.strip(), "borrowed.pth").write_text("".join(f"{place}\n" for place in sorted(places)))
-    where = called(python, "-c", "import biogrip; print(biogrip.__file__)", folder=folder)
-    assert Path(where.strip()).is_relative_to(folder)
-    return folder / "bin"
-
-
-def test_the_wheel_identifies_the_example(commands: Path, tmp_path: Path) -> None:
+def test_the_wheel_identifies_the_example(installed: Callable[..., str], tmp_path: Path) -> None:
     (tmp_path / "trace.csv").write_bytes(EXAMPLE.read_bytes())
-    said = called(commands / "biogrip", "identify", "trace.csv", folder=tmp_path)
+    said = installed(tmp_path, "biogrip", "identify", "trace.csv")
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     shown = readme.split("example: begin")[1].split("\n\n")[1].strip().splitlines()
     assert shown
@@ -83,15 +55,15 @@ def test_the_wheel_identifies_the_example(commands: Path, tmp_path: Path) -> Non
     assert (tmp_path / "trace.identified.json").is_file()
 
 
-def test_the_wheel_runs_a_study(commands: Path, tmp_path: Path) -> None:
+def test_the_wheel_runs_a_study(installed: Callable[..., str], tmp_path: Path) -> None:
     """Snakefile, rules, profile and config come with it, and published results for the claims."""
     (tmp_path / "tiny.yaml").write_text(yaml.safe_dump(TINY))
     (tmp_path / "mine.csv").write_bytes(EXAMPLE.read_bytes())
-    python = commands / "python"
-    place = called(python, "-c", "import biogrip; print(biogrip.__file__)", folder=tmp_path)
-    workflow = Path(place.strip()).parent / "workflow" / "Snakefile"
-    options = ("-s", workflow, "-j2", "--directory", tmp_path, "--configfile", "tiny.yaml")
+    place = installed(tmp_path, "python", "-c", "import biogrip; print(biogrip.__file__)")
+    assert not Path(place).is_relative_to(ROOT)
+    workflow = Path(place).parent / "workflow" / "Snakefile"
+    given = ("-m", "snakemake", "-s", workflow, "-j2", "--configfile", "tiny.yaml")
     wanted = ["results/tables/contact_loss.md", "results/targets/liquid_drop_2.csv"]
-    called(python, "-m", "snakemake", *wanted, *options, folder=tmp_path)
+    installed(tmp_path, "python", *given, "--", *wanted)
     assert [name for name in wanted if not (tmp_path / name).is_file()] == []
-    called(python, "-m", "snakemake", "-n", "results/tables/claims.csv", *options, folder=tmp_path)
+    installed(tmp_path, "python", *given, "-n", "--", "results/tables/claims.csv")

@@ -10,7 +10,6 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.fit import genetic, least_squares
 from biogrip.fit.least_squares import best_of_starts, fit_from, refine_optima
-from biogrip.fit.levenberg_marquardt import Normal, bounded_step
 from biogrip.fit.local_fits import PRIOR_WIDTH, ROUGH, LocalFits, alike
 from biogrip.fit.methods import (
     ALL,
@@ -176,22 +175,6 @@ def test_a_history_is_of_the_fits_so_far() -> None:
         assert history.best_misfit[count] == pytest.approx(so_far.min(), rel=1e-7)
         assert history.median_misfit[count] == pytest.approx(np.median(so_far), rel=1e-12)
         assert history.evaluations[count] == 10 + fitted.evaluations[:count].sum()
-
-
-def test_steps_within_a_box_are_the_lowest_points_of_a_quadratic() -> None:
-    """Of one parameter that has bounds, and ends there in some problems and not in others."""
-    rng = np.random.default_rng(0)
-    shapes = rng.normal(size=(50, 3, 5))
-    information, gradient = shapes @ shapes.swapaxes(1, 2), rng.normal(size=(50, 3))
-    none, above = np.zeros(50), np.full((50, 3), np.inf)
-    above[:, 0] = 0.1
-    step = bounded_step(Normal(none, gradient, information, none), none, -above, above)
-    free = np.linalg.solve(information, -gradient[:, :, None])[:, 0, 0]
-    first = np.clip(free, -0.1, 0.1)
-    assert 10 < np.sum(first == free) < 40
-    pull = gradient[:, 1:] + information[:, 1:, 0] * first[:, None]
-    rest = np.linalg.solve(information[:, 1:, 1:], -pull[:, :, None])[:, :, 0]
-    np.testing.assert_allclose(step, np.column_stack((first, rest)), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", [*MODEL_PARAMETERS, "four branches"])

@@ -106,15 +106,6 @@ def test_the_shape_is_that_of_the_noise(floor: float) -> None:
     np.testing.assert_allclose(growth, shape, rtol=0.25)
 
 
-def test_outliers_are_judged_by_the_noise_around_them() -> None:
-    rng = np.random.default_rng(2)
-    residual = ROTATION * rng.standard_normal(400)
-    residual[[40, 350]] = 10 * ROTATION[[40, 350]]
-    assert np.count_nonzero(outliers_of(residual)) > 40
-    growth = compute_growth(residual, ROTATION)
-    np.testing.assert_array_equal(np.flatnonzero(outliers_of(residual / growth)), [40, 350])
-
-
 def test_a_first_reading_without_rotation_does_not_make_its_noise_vanish() -> None:
     """It has a floor of noise, as all have: 1 % of what the largest rotations have."""
     rotation = np.concatenate(([0.0], ROTATION))

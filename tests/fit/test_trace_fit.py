@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -144,10 +143,8 @@ def test_too_many_samples_for_a_colour_are_refused() -> None:
         fitted(case_problem, times, times)
 
 
-def functions(uncertainty: Mapping[str, Mapping[str, float]], **changes: Any) -> Array:
-    gripper = replace(POSED.gripper, **changes)
-    case_problem = replace(POSED, gripper=gripper, uncertainty=uncertainty)
-    return gripper_functions(case_problem, TIMES, np.exp(TRUTH))
+def functions(uncertainty: Mapping[str, Mapping[str, float]]) -> Array:
+    return gripper_functions(replace(POSED, uncertainty=uncertainty), TIMES, np.exp(TRUTH))
 
 
 def test_the_torque_is_a_factor_of_the_rotation() -> None:
@@ -166,15 +163,3 @@ def test_an_uncertain_length_is_that_of_all_elements() -> None:
     np.testing.assert_allclose(odd, 0.5 * (above - below), rtol=1e-9, atol=1e-12)
     bent = 0.5 * (above + below) - nominal
     assert even @ bent / np.linalg.norm(even) / np.linalg.norm(bent) == pytest.approx(1.0)
-
-
-def test_only_the_sine_of_the_angle_counts() -> None:
-    """Its change by an angle has a slope of cos/sin; at a right angle it has none."""
-    degree = {"gripper": {"reference_angle_deg": 1.0}}
-    odd, _ = functions(degree)
-    length = POSED.gripper.arm_length_m / np.tan(np.radians(75.0)) * np.radians(1.0)
-    same, _ = functions({"gripper": {"arm_length_m": length}})
-    # To the third order in an angle of a degree.
-    np.testing.assert_allclose(odd, same, atol=1e-3 * np.abs(odd).max())
-    right, _ = functions(degree, reference_angle_deg=90.0)
-    np.testing.assert_allclose(right, 0.0, atol=1e-12)

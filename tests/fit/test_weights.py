@@ -11,7 +11,7 @@ from biogrip.arrays import Array
 from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.problem import CaseProblem
 from biogrip.fit.trace_fit import TraceFit, fit_traces
-from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.judging.diagnosis import diagnose
 from biogrip.library import set_up
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.instruments import INSTRUMENTS
@@ -53,25 +53,6 @@ def fitted(problem: CaseProblem, trace: Array) -> TraceFit:
     return fit
 
 
-def identified(problem: CaseProblem, trace: Array) -> Diagnosis:
-    fit = fitted(problem, trace)
-    return diagnose(
-        fit.problem, problem.searched, fit.found, confidence=0.95, noise_rad=problem.noise_rad
-    )
-
-
-def test_the_noise_is_the_root_mean_square_of_known_deviations() -> None:
-    """Misfit over noise is the root of chi-squared a reading, for whatever parameters."""
-    trace, deviations = noisy(0.05), 0.05 * noisy(0.0)
-    weighted = POLYSTYRENE.weighted(deviations)
-    parameters = np.array([1.2 * V, 0.9 * BETA, 1.1 * ETA])
-    misfit = weighted.of(TIMES, trace).residuals.misfit(parameters[None])[0]
-    left = rotation(TIMES, np.log(parameters[0]), parameters[1], np.log(parameters[2])) - trace
-    assert weighted.noise_rad is not None
-    chi_squared = np.sum((left / deviations) ** 2)
-    assert len(TIMES) * (misfit / weighted.noise_rad) ** 2 == pytest.approx(chi_squared, rel=1e-5)
-
-
 def test_the_published_fit_comes_out_to_five_digits() -> None:
     trace = noisy(0.0)
     fit = fitted(POLYSTYRENE.weighted(0.05 * trace), trace)
@@ -87,7 +68,9 @@ def test_weighted_fits_are_scipys() -> None:
     expected, covariance = curve_fit(
         rotation, TIMES, trace, start, deviations, absolute_sigma=True, xtol=1e-13, ftol=1e-13
     )
-    diagnosis = identified(POLYSTYRENE.weighted(deviations), trace)
+    problem = POLYSTYRENE.weighted(deviations)
+    fit, known = fitted(problem, trace), {"noise_rad": problem.noise_rad}
+    diagnosis = diagnose(fit.problem, problem.searched, fit.found, confidence=0.95, **known)
     best = diagnosis.likelihood.best
     assert [best[0], np.exp(best[1]), best[2]] == pytest.approx(expected, rel=2e-6)
     errors = np.sqrt(np.diagonal(covariance)) / [1.0, expected[1], 1.0]

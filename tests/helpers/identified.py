@@ -12,6 +12,8 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.identify.notebook import TraceResult, identify_trace
+from biogrip.library import Sample, set_up, simulate
+from tests.helpers.default import STUDY
 
 FEW = """
 least_squares: {candidates: 100, starts: 4}
@@ -56,3 +58,11 @@ def write_trace(
     """Write a trace as CSV, and return its path."""
     np.savetxt(path, np.c_[times, values], "%.9g", ",", header=header, comments="")
     return path
+
+
+def write_drop(path: Path, seed: int) -> None:
+    """Write a trace of a liquid drop in noise, of 120 readings."""
+    times, rng = np.linspace(0, 400, 120), np.random.default_rng(seed)
+    experiment = set_up(STUDY.gripper, STUDY.phases, Sample("liquid_drop"))
+    clean = simulate(experiment, {"k": 20.0 + seed, "k_p": 5.0, "c": 300.0}, times)
+    write_trace(path, times, clean + 1e-6 * rng.standard_normal(len(times)))

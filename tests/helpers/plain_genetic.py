@@ -33,6 +33,7 @@ def identified(
 
     survivors, ranking = ranked(genome.draw(settings.population, rng))
     rows = [(survivors[0], ranking[0], ranking[len(ranking) // 2])]
+    counts = [settings.population]
     generation = improved = 0
     reason = "generation limit"
     while generation < settings.max_generations:
@@ -43,16 +44,19 @@ def identified(
         children = _children(survivors, settings, rng)
         if generation >= settings.mutation_start:
             _mutate(children, genome, settings, rng)
+            if settings.mutants == "all":
+                best, others = np.split(survivors.copy(), [1])
+                _mutate(others, genome, settings, rng)
+                survivors, children = best, np.concatenate((children, others))
+        counts.append(counts[-1] + len(children))
         survivors, new = ranked(np.concatenate((survivors, children)))
         improved = generation if new[0] < ranking[0] else improved
         ranking = new
         rows.append((survivors[0], ranking[0], ranking[len(ranking) // 2]))
-    best, lowest, median = map(np.array, zip(*rows, strict=True))
-    offspring = settings.population - settings.survivors
-    counts = settings.population + offspring * np.arange(len(rows))
-    history = History(lowest, median, decoded(genome, best), counts)
+    fittest, lowest, median = map(np.array, zip(*rows, strict=True))
+    history = History(lowest, median, decoded(genome, fittest), np.array(counts))
     return Identification(
-        history.best_parameters[-1], float(lowest[-1]), generation, int(counts[-1]), reason, history
+        history.best_parameters[-1], float(lowest[-1]), generation, counts[-1], reason, history
     )
 
 

@@ -46,6 +46,8 @@ TINY: dict[str, Any] = {
         },
     },
 }
+SMALL = {key: value for key, value in TINY.items() if key != "cases"}
+"""What makes runs of any cases small."""
 
 
 @dataclass(frozen=True)
@@ -62,19 +64,24 @@ class Run:
         return {rule: jobs for rule, jobs in found.items() if rule not in ("all", "study", "total")}
 
 
-def called(folder: Path, *arguments: str | Path) -> Run:
-    """Call Snakemake in a folder."""
-    paths = [Path(sys.executable).parent, os.environ["PATH"]]
+def ran(folder: Path, *command: str | Path, **environment: str) -> Run:
+    """Run a command in a folder, with the commands of this Python, and more in the environment."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     done = subprocess.run(
-        [sys.executable, "-m", "snakemake", *map(str, arguments)],
+        [*map(str, command)],
         cwd=folder,
-        env={**os.environ, "PATH": os.pathsep.join(map(str, paths))},
+        env={**os.environ, "PATH": path, **environment},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         timeout=_SECONDS,
     )
     return Run(done.returncode, done.stdout)
+
+
+def called(folder: Path, *arguments: str | Path) -> Run:
+    """Call Snakemake in a folder."""
+    return ran(folder, sys.executable, "-m", "snakemake", *arguments)
 
 
 def snakemake(folder: Path, *arguments: str | Path, config: dict[str, Any] | None = None) -> Run:

@@ -7,20 +7,18 @@ import numpy as np
 import pytest
 
 from biogrip.identify.notebook import identify_trace
-from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
     OK,
-    REJECTED,
     REJECTION,
     examine_residuals,
     find_slow_misfit,
 )
 from biogrip.physics.instruments import GRIPPER
-from biogrip.physics.noise import AR1, Noise, Outliers, add_noise, draw_ornstein_uhlenbeck
+from biogrip.physics.noise import AR1, Noise, Outliers, add_noise
 from biogrip.physics.whitening import NoiseModel
-from tests.helpers.problems import MODEL, clean, likelihood_of, posed_for, run
+from tests.helpers.problems import MODEL, clean, likelihood_of, posed_for
 
 
 def examined(parts: dict[str, Any], place: int | None = None) -> str:
@@ -73,25 +71,6 @@ def test_share_and_time_decide(
 ) -> None:
     note = find_slow_misfit(NoiseModel(share, time_s, 0.0), 400.0, of_peak, GRIPPER)
     assert (note and note.weight) == weight
-
-
-@pytest.mark.parametrize(
-    ("time_s", "share_of_peak", "status"),
-    [(3.0, 0.1, DOUBTFUL), (20.0, 0.1, REJECTED), (20.0, 2e-3, DOUBTFUL)],
-)
-def test_slow_misfit_rejects_if_it_is_more_than_two_per_cent_of_the_peak(
-    time_s: float, share_of_peak: float, status: str
-) -> None:
-    """Slow is what is correlated over more than 2 % of the trace."""
-    times, response = clean("endothelial_cell")
-    rng = np.random.default_rng([0, 40])
-    noise = draw_ornstein_uhlenbeck(times, np.ones(1), np.array([1 / time_s]), rng)
-    problem = posed_for(MODEL, times, response + share_of_peak * response.max() * noise)
-    found = run("least_squares", problem)
-    diagnosis = diagnose(problem, MODEL, found, confidence=0.95)
-    assert diagnosis.status == status
-    said = " ".join(note.text for note in diagnosis.notes)
-    assert ("independent ones" in said) == (status == DOUBTFUL)
 
 
 def test_noise_that_grows_over_decades_is_weighed_and_its_share_advised() -> None:

@@ -1,14 +1,11 @@
 """Quantities held exactly in many fits at once, against SciPy's fits of all samples."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import norm, t
 
-from biogrip.arrays import Array
-from biogrip.fit.least_squares import fit_from
 from biogrip.judging.constrained_fits import QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
@@ -20,7 +17,6 @@ from biogrip.library import set_up, simulate
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import hold
-from biogrip.physics.sample_model import with_fixed
 from tests.helpers.problems import (
     GRIPPER,
     MODEL,
@@ -31,7 +27,7 @@ from tests.helpers.problems import (
     posed_for,
     run,
 )
-from tests.helpers.scipy_fits import scipy_fit
+from tests.helpers.scipy_fits import rise_with_held, scipy_fit
 
 PARAMETERS = parameters_and_sum(MODEL)
 
@@ -42,19 +38,6 @@ def likelihoods(case: str, count: int, **assumed: Any) -> list[Likelihood]:
 
 def labelled(*labels: str) -> list[Quantity]:
     return [quantity for quantity in PARAMETERS if quantity.label in labels]
-
-
-def rest_fitted(likelihood: Likelihood, known: list[int], logs: list[float], start: Array) -> float:
-    """Rise of chi^2 of a model in which parameters are known, fitted by SciPy."""
-    given = {MODEL.names[i]: float(np.exp(log)) for i, log in zip(known, logs, strict=True)}
-    problem = likelihood.problem
-    rest = replace(
-        problem,
-        residuals=problem.residuals.of_model(with_fixed(MODEL, given)),
-        low=np.delete(problem.low, known),
-        high=np.delete(problem.high, known),
-    )
-    return likelihood.increase(scipy_fit(rest, np.delete(start, known)).misfit_rad)
 
 
 BURGERS = MODELS["burgers"]
@@ -122,7 +105,7 @@ def test_profiles_are_as_low_as_fits_with_the_parameter_known(case: str) -> None
         shown = np.sqrt(np.clip(found.increases, 0.0, 16.0))
         assert np.max(np.abs(np.diff(shown))) <= 0.3
         for value, increase in zip(found.log_values[::6], found.increases[::6], strict=True):
-            alone = rest_fitted(likelihood, [index], [value], likelihood.best)
+            alone = rise_with_held(likelihood, quantity, value, likelihood.best)[0]
             assert increase < alone + 1e-3 * (1 + alone)
 
 
@@ -148,21 +131,7 @@ def test_the_search_range_determines_no_combination() -> None:
     # With one spring as soft as it may be, and the other any, it is lower than any limit.
     soft, best = problem.low[0], told.likelihood.best
     assert series.log(np.array([soft, *best[1:]])) < soft + 1e-3
-    assert rest_fitted(told.likelihood, [0], [soft], best) < told.likelihood.threshold
-
-
-def test_a_model_with_one_parameter_has_a_profile() -> None:
-    damper = MODELS["damper"]
-    (problem,) = case_problem(*clean("liquid_drop_2"), 1, damper)
-    best = fit_from([problem], np.array([2.0]))
-    misfit_rad = float(best.misfit_rad[0])
-    assert misfit_rad == pytest.approx(scipy_fit(problem, np.array([2.0])).misfit_rad, rel=1e-9)
-    likelihood = make_likelihood(problem, best.x[0], misfit_rad, confidence=0.95)
-    quantities = parameters_and_sum(damper)
-    (limits,) = find_limits([likelihood], quantities)[0]
-    ((alone,),) = compute_profiles([likelihood], quantities)
-    ends = np.array([alone.low, alone.high], dtype=float)
-    np.testing.assert_allclose(limits[0], ends, rtol=0, atol=1e-4)
+    assert rise_with_held(told.likelihood, PARAMETERS[0], soft, best)[0] < told.likelihood.threshold
 
 
 @pytest.mark.parametrize("taken_out", [{}, {"offset": True}, {"offset": True, "drift": True}])

@@ -6,18 +6,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from biogrip.arrays import Array
 from biogrip.judging.likelihood import headlines
-from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.models import MODELS
-from biogrip.physics.protocol import hold, torque_history
 from biogrip.records.identifications import columns
 from biogrip.records.rows import write_rows
 from biogrip.stages import sweeps as stage
 from biogrip.study.study import Study
 from biogrip.tables.sweeps import robustness
 from tests.helpers.default import study_of
+from tests.helpers.problems import GRIPPER, TORQUE
 
 CASE = "endothelial_cell"
 TRUTH = np.array([35.0, 12.3, 299.9, 1e-3])
@@ -71,11 +71,8 @@ def judged(study: Study, identifications: list[Path], tmp_path: Path) -> Path:
     return tmp_path / "judged" / f"{CASE}.csv"
 
 
-def _response(parameters: np.ndarray) -> np.ndarray:
-    arm = Arm(1.0e-14, 3.3e-12, 4.4e-7)
-    steps = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
-    step = step_response(Gripper(1.5e-3, 75.0, arm, arm), generalized_maxwell(parameters))
-    return rotation(step, steps, TIME_S)[0]
+def _response(parameters: Array) -> Array:
+    return rotation(step_response(GRIPPER, generalized_maxwell(parameters)), TORQUE, TIME_S)[0]
 
 
 def _resolution() -> float:
@@ -84,18 +81,12 @@ def _resolution() -> float:
     return float(np.sqrt(np.mean((rounded - _response(TRUTH)) ** 2)))
 
 
-def _by_hand(relative_sigma: np.ndarray) -> np.ndarray:
+def _by_hand(relative_sigma: Array) -> Array:
     """Sandwich covariance of log k, log k_p, log c from central differences."""
-    step = 1e-5
-    slopes = []
-    for index in range(3):
-        up, down = TRUTH.copy(), TRUTH.copy()
-        up[index] *= np.exp(step)
-        down[index] *= np.exp(-step)
-        slopes.append((_response(up) - _response(down)) / (2 * step))
-    jacobian = np.array(slopes)
+    ends = ((_response(TRUTH * np.exp(h)), _response(TRUTH * np.exp(-h))) for h in 1e-5 * np.eye(4))
+    jacobian = np.array([(up - down) / 2e-5 for up, down in ends])[:3]
     inverse = np.linalg.inv(jacobian @ jacobian.T)
-    spread: np.ndarray = (jacobian * relative_sigma) @ (jacobian * relative_sigma).T
+    spread: Array = (jacobian * relative_sigma) @ (jacobian * relative_sigma).T
     return inverse @ spread @ inverse
 
 

@@ -19,17 +19,24 @@ from tests.helpers.default import STUDY, seen, study_of
 
 
 def test_springs_alone_tell_what_statics_says() -> None:
-    """A spring of the gripper's own stiffness halves what rigid jaws would be pressed with."""
+    """A spring of the gripper's own stiffness halves what rigid jaws would be pressed with.
+
+    What creeps under another instrument is in no jaws.
+    """
     own = STUDY.gripper.jaw_stiffness_N_per_m
     study = study_of(
         f"""
-        only: [spring, sized]
+        only: [spring, sized, crept]
         cases:
+          crept:
+            instrument: creep
+            sample: {{model: kelvin_voigt, k_p: {own!r}, c_p: 0}}
+            protocol: {{phases: [{{duration_s: 60, force_N: 1.0e-9}}]}}
           spring: {{sample: {{model: kelvin_voigt, k_p: {own!r}, c_p: 0}}}}
           sized: {{sample: {{model: kelvin_voigt, k_p: 0.05, c_p: 0, size_m: 90e-6}}}}
         """
     )
-    small, large, sized = mechanics(study).rows
+    small, large, sized = mechanics(study.of(study.gripped)).rows
     force = 0.5 * 1.6e-9 / STUDY.gripper.lever_m
     assert small["largest_force_uN"] == pytest.approx(1e6 * force)
     assert small["shortening_um"] == pytest.approx(1e6 * force / own)

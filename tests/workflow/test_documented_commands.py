@@ -6,11 +6,9 @@ not show; runs that make a whole study, by naming what the reader is to look at,
 searched for among fewer candidates and steps.
 """
 
-import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -18,7 +16,7 @@ import pytest
 import yaml
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import TINY
+from tests.helpers.runs import SMALL, ran
 
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 # Of each document, what there is when the reader is through.
@@ -62,7 +60,6 @@ TINY_FIT = """
 least_squares: {candidates: 50, starts: 3}
 model_selection: {models: [damper, maxwell]}
 """
-SMALL = {key: value for key, value in TINY.items() if key != "cases"}
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +98,7 @@ def test_what_is_said_can_be_done(document: str, place: Path) -> None:
     (place / "tiny.yaml").write_text(yaml.safe_dump(tiny))
     (place / "tiny_fit.yaml").write_text(TINY_FIT)
     for language, title, content in BLOCK.findall(text):
+        commands: list[list[str]] = []
         if title:
             of_a_fit = re.search(f"identify .*--config {title}", text)
             (place / title).parent.mkdir(parents=True, exist_ok=True)
@@ -110,10 +108,14 @@ def test_what_is_said_can_be_done(document: str, place: Path) -> None:
                 content = yaml.safe_dump(SMALL | yaml.safe_load(content))
             (place / title).write_text(content + (TINY_FIT if of_a_fit else ""))
         elif language == "sh":
-            for line in content.splitlines():
-                _call(_typed(shlex.split(line, comments=True)), place)
+            lines = content.splitlines()
+            commands = [_typed(shlex.split(line, comments=True)) for line in lines]
         elif language == "python":
-            _call([sys.executable, "-c", content], place)
+            commands = [[sys.executable, "-c", content]]
+        for command in commands:
+            # Python finds the copy.
+            run = ran(place, *command, PYTHONPATH=str(place / "src"))
+            assert run.status == 0, run.output
     assert [name for name in LEFT[document] if not (place / name).is_file()] == []
 
 
@@ -131,18 +133,3 @@ def _typed(command: list[str]) -> list[str]:
         model = [] if "--model" in arguments else ["--model", "maxwell"]
         return [*command, *model, "--config", "tiny_fit.yaml"]
     return command
-
-
-def _call(command: list[str], folder: Path) -> None:
-    paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
-    done = subprocess.run(
-        command,
-        cwd=folder,
-        # Python finds the copy.
-        env={**os.environ, "PATH": os.pathsep.join(paths), "PYTHONPATH": str(folder / "src")},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=600,
-    )
-    assert done.returncode == 0, done.stdout

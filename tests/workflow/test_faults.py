@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import TINY, results_of, snakemake
+from tests.helpers.runs import TINY, ran, results_of, snakemake
 
 pytestmark = pytest.mark.nightly
 
@@ -85,9 +85,7 @@ def test_a_full_disk_leaves_no_part_of_a_file(tmp_path: Path) -> None:
         "from pathlib import Path; from biogrip.files import write_text;"
         "write_text(Path('table.csv'), 'a' * 5000)"
     )
-    run = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert run.returncode == 1
-    assert "table.csv: cannot be written: File too large." in run.stderr
+    run = ran(tmp_path, sys.executable, "-c", code)
+    assert run.status == 1
+    assert "table.csv: cannot be written: File too large." in run.output
     assert list(tmp_path.iterdir()) == []

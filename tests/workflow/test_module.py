@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -10,15 +9,14 @@ import pytest
 import yaml
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import TINY, Run, called
+from tests.helpers.runs import SMALL, Run, called, ran
 
-ONE_CASE = {
+CONFIG = SMALL | {
     "seeds": 1,
     "methods": ["genetic"],
     "identifiability": {"coverage_seeds": 0},
     "only": ["liquid_drop_2"],
 }
-CONFIG = {key: value for key, value in TINY.items() if key != "cases"} | ONE_CASE
 ERRORS = "results/tables/errors_liquid_drop_2.csv"
 MODULE = f"""
 module biogrip:
@@ -75,25 +73,15 @@ rule mine:
     )
 
 
-def test_a_wrong_value_in_a_module_is_one_message(tmp_path: Path) -> None:
-    text = f"{MODULE}    config: {{'seedz': 2}}\n\nuse rule * from biogrip as biogrip_*\n"
-    wrong = host(tmp_path, text, "-n")
-    assert wrong.status == 1
-    assert "seedz: unknown key. Did you mean 'seeds'?" in wrong.output
-    assert "Traceback" not in wrong.output
-
-
 @pytest.mark.nightly
 def test_it_is_deployed_from_a_clone_and_runs_a_case(tmp_path: Path) -> None:
     """By snakedeploy, as the catalogue of workflows tells its readers to."""
     pytest.importorskip("snakedeploy")
     clone, place = tmp_path / "clone", tmp_path / "place"
-    subprocess.run(["git", "clone", "-q", str(ROOT), str(clone)], check=True)
-    branch = subprocess.run(
-        ["git", "branch", "--show-current"], cwd=clone, capture_output=True, text=True, check=True
-    ).stdout.strip()
-    deploy = [Path(sys.executable).with_name("snakedeploy"), "deploy-workflow", clone, place]
-    subprocess.run([*map(str, deploy), "--branch", branch], check=True)
+    assert ran(tmp_path, "git", "clone", "-q", ROOT, clone).status == 0
+    branch = ran(clone, "git", "branch", "--show-current").output.strip()
+    run = ran(tmp_path, "snakedeploy", "deploy-workflow", clone, place, "--branch", branch)
+    assert run.status == 0, run.output
     (place / "config" / "config.yaml").write_text(yaml.safe_dump(CONFIG))
     # Of a clone it names the Snakefile without the folder; of a server it names the server, too.
     text = (place / "workflow" / "Snakefile").read_text()

@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from tests.helpers.drops import write_trace
+from tests.helpers.identified import FEW, write_drop
 from tests.helpers.places import ROOT
 from tests.helpers.required import cannot_run
-from tests.helpers.runs import snakemake
+from tests.helpers.runs import SMALL, snakemake
 from tests.helpers.slurm.cluster import SlurmError, missing_packages, one_node_slurm
 
 pytestmark = pytest.mark.nightly
@@ -55,17 +55,9 @@ def _installed_plugin(folder: Path) -> str:
 
 
 # A Slurm job costs seconds whatever it does: one method, and no more judging than needed.
-FEW_JOBS: dict[str, Any] = {
+FEW_JOBS: dict[str, Any] = SMALL | {
     "seeds": 4,
-    "measurement": {"rate_Hz": 1.0},
     "methods": ["genetic"],
-    "genetic_algorithm": {
-        "population": 60,
-        "survivors": 30,
-        "min_generations": 10,
-        "max_generations": 25,
-    },
-    "least_squares": {"candidates": 100, "starts": 2},
     "identifiability": {"coverage_seeds": 0},
     "model_selection": {"models": []},
     "only": ["liquid_drop_2"],
@@ -77,7 +69,6 @@ FEW_JOBS: dict[str, Any] = {
     },
 }
 CELLS = "file\tmeasurement.noise_rad\nfirst.csv\t\nsecond.csv\t1e-6\n"
-FEW = "least_squares: {candidates: 50, starts: 2}\nmodel_selection: {models: []}\n"
 # Of a case, whose jobs are submitted in groups, and one that is submitted alone.
 WANTED = ["errors_liquid_drop_2", "verdicts_liquid_drop_2", "contact_loss", "traces"]
 TABLES = [f"results/tables/{name}.csv" for name in WANTED]
@@ -93,7 +84,7 @@ def test_slurm_gives_the_same_bytes(
         (folder / "cells.tsv").write_text(CELLS)
         (folder / "few.yaml").write_text(FEW)
         for seed, name in enumerate(("first", "second")):
-            write_trace(folder / f"{name}.csv", seed)
+            write_drop(folder / f"{name}.csv", seed)
     alone = snakemake(here, "--", *TABLES, config=FEW_JOBS)
     assert alone.status == 0, alone.output
     for name, value in slurm.items():

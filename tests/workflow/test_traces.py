@@ -7,7 +7,7 @@ import pytest
 
 from biogrip.cli import main
 from biogrip.study.source import overlaid
-from tests.helpers.drops import write_trace
+from tests.helpers.identified import write_drop
 from tests.helpers.places import CONFIG
 from tests.helpers.runs import planned, snakemake
 
@@ -31,7 +31,7 @@ CELLS = """file\tdish\tfixed.c
 def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Four traces, of which one is not there, and one cannot be read."""
     for number in (0, 2):
-        write_trace(tmp_path / f"{number}.csv", number)
+        write_drop(tmp_path / f"{number}.csv", number)
     (tmp_path / "1.csv").write_text("time_s,rotation_rad\n0,1e-6\nten,2e-6\n")
     (tmp_path / "cells.tsv").write_text(CELLS)
     (tmp_path / "lab.yaml").write_text(LAB)
@@ -67,7 +67,7 @@ def test_what_is_changed_and_only_that_is_identified_again(lab: Path) -> None:
         assert planned(lab, TABLE, config=STUDY) == {"traces_batch": batches, "traces": 1}
     (lab / "cells.tsv").write_text(CELLS)
     # A trace that was not there, and the config of all.
-    write_trace(lab / "3.csv", 7)
+    write_drop(lab / "3.csv", 7)
     assert planned(lab, TABLE, config=STUDY) == {"traces_batch": 1, "traces": 1}
     (lab / "lab.yaml").write_text(LAB.replace("1.0e-6", "2.0e-6"))
     assert planned(lab, TABLE, config=STUDY) == {"traces_batch": 2, "traces": 1}
@@ -77,7 +77,7 @@ def test_what_is_changed_and_only_that_is_identified_again(lab: Path) -> None:
 
 def test_a_table_that_cannot_be_used_stops_with_line_and_key(lab: Path) -> None:
     for number in (2, 3):
-        write_trace(lab / f"{number}.csv", number)
+        write_drop(lab / f"{number}.csv", number)
     table = lab / "cells.tsv"
     table.write_text(CELLS.replace("fixed.c\n", "fixed.x\n"))
     run = snakemake(lab, "-n", "--", TABLE, config=STUDY)
