@@ -28,7 +28,6 @@ from biogrip.page.answers import (
     say_which_method_finds_it,
 )
 from biogrip.physics.noise import add_noise, stream
-from biogrip.physics.protocol import sample_times
 from biogrip.physics.simulation import simulated_rotation
 from biogrip.records.rows import read_table
 from biogrip.tables.claims import count_verdicts
@@ -180,10 +179,9 @@ def slow_branch() -> str:
         for fixed in ("{}", f"{{c: {_SLOW}}}")
     )
     posed = case.problem.to_identify(), slow.problem.to_identify()
-    torque = posed[0].torque
-    time_s = sample_times(torque.end_s, case.study.config.measurement.rate_Hz)
-    network = case.sample.model.sample(case.parameters)
-    (target,) = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)
+    time_s = case.sampling.over(case.torque.end_s)
+    given = case.gripper, case.network, case.torque, time_s
+    (target,) = simulated_rotation(*given, nonlinear=False)
     seeds = range(case.seeds)
     rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in seeds]
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
