@@ -38,12 +38,6 @@ from tests.helpers.problems import (
 DAMPER = MODELS["damper"]
 
 
-def test_bound_is_the_inverse_information() -> None:
-    rng = np.random.default_rng(0)
-    j = rng.standard_normal((3, 200))
-    np.testing.assert_allclose(covariance(j, 0.3), 0.09 * np.linalg.inv(j @ j.T), rtol=1e-10)
-
-
 def test_a_parameter_without_information_is_taken_as_known() -> None:
     t = np.linspace(0.0, 1.0, 100)
     j = np.stack((t, 1e-9 * t**2))

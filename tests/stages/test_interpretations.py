@@ -1,16 +1,13 @@
 """Interpretations of section 4: each found as if the study had said so."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from biogrip.records.identifications import INTERPRETATIONS, read_identifications
 from biogrip.stages.identification import identify
 from biogrip.stages.sweeps import identify_interpreted
 from biogrip.stages.targets import measure, simulate
-from biogrip.study.study import Study
 from biogrip.tables.sweeps import interpretations
 from tests.helpers.default import study_of
 
@@ -31,13 +28,9 @@ interpretations:
 CASE = "liquid_drop_2"
 
 
-@pytest.fixture(scope="module")
-def study() -> Study:
-    return study_of(OVERLAY)
-
-
-def test_one_that_changes_nothing_finds_what_the_study_finds(study: Study, tmp_path: Path) -> None:
+def test_one_that_changes_nothing_finds_what_the_study_finds(tmp_path: Path) -> None:
     target, measured, ours_file = (tmp_path / name for name in ("t.csv", "m.npz", "ours.csv"))
+    study = study_of(OVERLAY)
     case = study.case(CASE)
     simulate(case, target)
     measure(case, range(3), target, measured)
@@ -53,12 +46,3 @@ def test_one_that_changes_nothing_finds_what_the_study_finds(study: Study, tmp_p
         assert set(rows[rows["interpretation"] == name]["misfit"]) != set(same["misfit"]), name
     titles = [row["interpretation"] for row in interpretations(study, [interpreted]).rows]
     assert titles == ["as printed", "patient", "three digits", "uniform noise"]
-
-
-def test_a_reading_changes_only_what_it_says(study: Study) -> None:
-    found = study.case(CASE).interpretations
-    printed, patient = found["printed"], found["patience"]
-    assert patient.problem == printed.problem
-    assert patient.genetic == replace(printed.genetic, min_generations=40)
-    assert found["three"].problem.ranges["k"].digits == 3
-    assert found["uniform"].noise.kind == "uniform"

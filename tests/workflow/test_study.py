@@ -9,10 +9,9 @@ import pytest
 from matplotlib.image import imread
 
 from biogrip.figures.style import COLUMN_IN
-from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.maxwell_models import generalized_maxwell
-from biogrip.physics.protocol import TorqueHistory
+from tests.helpers.problems import GRIPPER, TORQUE
 from tests.helpers.runs import TINY, snakemake
 
 CASE = "liquid_drop_2"
@@ -32,16 +31,14 @@ def test_identifications_have_a_row_for_each_method_and_seed(tiny: Path) -> None
     np.testing.assert_allclose(last.to_numpy(), found["misfit"], rtol=1e-6)
 
 
-def test_the_last_row_is_what_its_own_trace_gives(
-    tiny: Path, gripper: Gripper, steps: TorqueHistory
-) -> None:
+def test_the_last_row_is_what_its_own_trace_gives(tiny: Path) -> None:
     """Misfit and noise in the file, recomputed from the files alone."""
     results = tiny / "results"
     found = pd.read_csv(results / "identifications" / f"{CASE}.csv").iloc[-1]
     measured = np.load(results / "measurements" / CASE / "seeds_0-1.npz")
     target, trace = measured["target"], measured["traces"][1]
-    response = step_response(gripper, generalized_maxwell(found[PARAMETERS].to_numpy(float)))
-    fitted = rotation(response, steps, measured["time_s"])[0]
+    response = step_response(GRIPPER, generalized_maxwell(found[PARAMETERS].to_numpy(float)))
+    fitted = rotation(response, TORQUE, measured["time_s"])[0]
     misfit = np.sqrt(np.mean((fitted - trace) ** 2))
     assert misfit == pytest.approx(found["misfit"], rel=1e-6)
     noise = trace - target
