@@ -10,7 +10,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import Genome, make_genome
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import CaseProblem, Problem
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
@@ -35,6 +35,11 @@ OURS, SIDE_BY_SIDE = "biogrip", f"biogrip, {BATCH} traces side by side"
 def case() -> Case:
     """Return the endothelial cell of the default study."""
     return load_study(yaml.safe_load(CONFIG.read_text()), [CONFIG]).cases["endothelial_cell"]
+
+
+@cache
+def _posed() -> CaseProblem:
+    return case().problem.to_identify()
 
 
 @cache
@@ -74,7 +79,7 @@ class NoisyTrace:
 
     def problem(self) -> Problem:
         """Pose the identification as the study does."""
-        return case().problem.to_identify().of(self.time_s, self.trace_rad)
+        return _posed().of(self.time_s, self.trace_rad, condensed=_condensed())
 
 
 def noisy_trace(seed: int = 0) -> NoisyTrace:
