@@ -146,6 +146,12 @@ def test_what_was_held_is_stated_once(beside: str, order: int) -> None:
     assert str(error.value) == f"t.tsv, line 2: found --hold and {beside}; allowed is one of them."
 
 
+def test_a_second_protocol_is_told_with_the_row_and_the_config(tmp_path: Path) -> None:
+    (config := tmp_path / "ramp.yaml").write_text("protocol: {phases: []}")
+    with pytest.raises(BiogripError, match=f"line 2: found --hold and protocol of {config}; "):
+        case_of(Asked(EXAMPLE, config, (Setting("--hold", HOLD, 3e-9),), "t.tsv, line 2"))
+
+
 @pytest.mark.parametrize("floor", [1e-6, 0.0])
 def test_known_deviations_are_weights_of_the_fit(floor: float) -> None:
     """As a column, or as a share of a smooth course."""

@@ -144,9 +144,10 @@ def case_of(asked: Asked) -> Case:
     files = [default_config(), *([asked.config] if asked.config else [])]
     below = read_configs(files)
     given = asked.given
-    if len(found := [".".join(key) for key in _PROTOCOLS if key in keys_in(given)]) > 1:
-        where = asked.config or asked.place
-        raise BiogripError(f"{where}: found {' and '.join(found)}; allowed is one of them.")
+    if len(found := [key for key in _PROTOCOLS if key in keys_in(given)]) > 1:
+        of_config = [*keys_in(read_configs([asked.config] if asked.config else []))]
+        said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in found]
+        raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
     merged = _with_instrument(overlaid(below, given), given, asked.trace)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):

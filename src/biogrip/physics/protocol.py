@@ -93,7 +93,7 @@ class TorqueHistory:
             if np.any(heights[:, event, order])
         ]
 
-    @property
+    @cached_property
     def changes_s(self) -> Array:
         """Times at which the torque changes, ascending."""
         return np.unique([start for start, *_ in self.jumps])
