@@ -22,7 +22,8 @@ from biogrip.cli import _parser, main
 from biogrip.errors import BiogripError
 from biogrip.identify import one_trace
 from biogrip.identify.outputs import WRITTEN_BY, check_output
-from biogrip.identify.settings import HOLD, Asked, Setting, case_of
+from biogrip.identify.settings import Asked, Setting, case_of
+from biogrip.study.source import HOLD
 from biogrip.identify.words import for_a_paper, side_by_side
 from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES

@@ -22,9 +22,10 @@ _SHOWN = 200
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, and return its exit status."""
-    options = _parser().parse_args(arguments)
-    # Matrices are small: BLAS threads cost more than they bring.
+    # Matrices are small: BLAS threads, which NumPy starts when it is imported, cost more than they
+    # bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    options = _parser().parse_args(arguments)
     try:
         status: int = options.command(options)
         sys.stdout.flush()
@@ -108,7 +109,7 @@ def _start(text: str) -> tuple[tuple[str, ...], Any]:
 
 
 def _hold(text: str) -> tuple[tuple[str, ...], Any]:
-    from biogrip.identify.settings import HOLD
+    from biogrip.study.source import HOLD
 
     with suppress(ValueError):
         if (value := float(text)) and math.isfinite(value):
@@ -125,7 +126,7 @@ def _fix(text: str) -> tuple[tuple[str, ...], Any]:
 
 
 def _any_key(text: str) -> tuple[tuple[str, ...], Any]:
-    from biogrip.identify.settings import value_of
+    from biogrip.study.source import value_of
 
     key, found, value = text.partition("=")
     if not (key and found):

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from threadpoolctl import threadpool_limits
 
 from biogrip.arrays import as_column
 from biogrip.errors import BiogripError
 from biogrip.identify.one_trace import Identified, identify_alike
-from biogrip.identify.settings import HOLD, MODEL, Asked, Setting
+from biogrip.identify.settings import MODEL, Asked, Setting
 from biogrip.identify.trace_case import read_trace
 from biogrip.identify.words import in_words
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS
+from biogrip.study.source import HOLD
 from biogrip.terminal import Progress
 
 if TYPE_CHECKING:
@@ -167,7 +169,11 @@ def identify_trace(
         asked = Asked(file, None, tuple(settings), file.name)
         try:
             trace = read_trace(asked)
-            with Progress("", 5, live=False, quiet=True) as progress:
+            # Matrices are small: BLAS threads cost more than they bring.
+            with (
+                threadpool_limits(1, user_api="blas"),
+                Progress("", 5, live=False, quiet=True) as progress,
+            ):
                 (result,) = identify_alike([Path(file.name)], [trace], progress)
         except BiogripError as error:
             said = _with_arguments(str(error).replace(str(file), file.name))

@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from biogrip.arrays import Array
 from biogrip.digits import counted
@@ -35,12 +34,13 @@ from biogrip.study.load import load_study, read_configs
 from biogrip.study.measurement_block import READINGS, MeasurementBlock
 from biogrip.study.messages import checked, schema_of
 from biogrip.study.source import (
+    HOLD,
     KeyPath,
     Source,
     default_config,
     keys_in,
     overlaid,
-    scalar_problem,
+    value_of,
 )
 from biogrip.study.study import Case
 from biogrip.terminal import visible
@@ -52,9 +52,6 @@ MODEL = "generalized_maxwell"
 
 FILE = "file"
 """The column that every table of traces has."""
-
-HOLD = ("--hold",)
-"""Path of the only setting that is no key: what is controlled from 0 to the end of the trace."""
 
 LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
@@ -102,21 +99,6 @@ class Asked:
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
         return blocks
-
-
-def value_of(text: str, key: str = "") -> Any:
-    """Read the value of a key as YAML, units as text; refuse what is not read as it looks."""
-    if key.endswith("_unit"):
-        return text
-    try:
-        node = yaml.compose(text, yaml.SafeLoader)
-        problem = scalar_problem(node) if isinstance(node, yaml.ScalarNode) else None
-        value = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError) as error:
-        problem = f"not valid YAML: {' '.join(str(error).split())}."
-    if problem:
-        raise BiogripError(problem)
-    return value
 
 
 def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:

@@ -21,6 +21,9 @@ Lines = Mapping[KeyPath, int | None]
 Source = tuple[str, Lines]
 """Name of a file or of another source of keys, and the line (from 1) of each that it has."""
 
+HOLD = ("--hold",)
+"""Path of the only setting that is no key: what is controlled from 0 to the end of the trace."""
+
 LARGEST_BYTES = 1_000_000
 """Bytes of a config file at most."""
 
@@ -114,6 +117,21 @@ def scalar_problem(node: yaml.ScalarNode) -> str | None:
     else:
         return None
     return f"found {text}, which YAML reads {reading}, or text in quotes."
+
+
+def value_of(text: str, key: str = "") -> Any:
+    """Read the value of a key as YAML, units as text; refuse what is not read as it looks."""
+    if key.endswith("_unit"):
+        return text
+    try:
+        node = yaml.compose(text, yaml.SafeLoader)
+        problem = scalar_problem(node) if isinstance(node, yaml.ScalarNode) else None
+        value = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError) as error:
+        problem = f"not valid YAML: {' '.join(str(error).split())}."
+    if problem:
+        raise BiogripError(problem)
+    return value
 
 
 def _read(file: Path) -> tuple[Lines, dict[str, Any]]:

@@ -1,0 +1,59 @@
+"""BLAS threads: the products of small matrices that fits make are slower with several."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+OPTIONS = """
+import sys
+from biogrip.cli import _SETTINGS, _parser
+
+VALUES = {"--hold": "5", "--set": "measurement.block=2", "--fix": "k_p=0", "--start": "1.5"}
+parser = _parser()
+for name, _, metavar, _ in (option for options in _SETTINGS.values() for option in options):
+    given = [name, VALUES.get(name, "a")] if metavar else [name]
+    parser.parse_args(["identify", "trace.csv", *given])
+    assert "numpy" not in sys.modules, name
+parser.parse_args(["groups", "found.csv", "--by", "dish"])
+parser.parse_args(["design", "my.yaml"])
+assert "numpy" not in sys.modules
+"""
+
+NOTEBOOK = """
+import numpy as np
+from threadpoolctl import threadpool_info
+
+import biogrip
+from biogrip.identify import notebook
+
+def threads():
+    return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+def tell(*given):
+    raise biogrip.BiogripError(f"threads: {threads()}")
+
+before, notebook.identify_alike = threads(), tell
+time_s = np.arange(1, 30.0)
+try:
+    biogrip.identify_trace(time_s, 2 - np.exp(-time_s), reads="strain", hold=1.0)
+except biogrip.BiogripError as error:
+    assert str(error) == "threads: {1}", error
+assert threads() == before
+"""
+
+
+def run(code: str, threads: str | None = None) -> None:
+    given = {name: it for name, it in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    given |= {} if threads is None else {"OPENBLAS_NUM_THREADS": threads}
+    root = Path(__file__).parents[1]
+    subprocess.run([sys.executable, "-c", code], env=given, cwd=root, check=True)
+
+
+def test_reading_an_option_loads_no_numpy() -> None:
+    """So that the command limits the threads before NumPy starts them, whatever is typed."""
+    run(OPTIONS)
+
+
+def test_a_notebook_that_has_threads_keeps_them_and_fits_with_one() -> None:
+    run(NOTEBOOK, threads="2")
