@@ -33,7 +33,7 @@ class Objective:
         """Their Jacobian, (n_rows, n_parameters)."""
         return self._at(x)[2]
 
-    def misfit_rad(self, x: Array) -> float:
+    def misfit(self, x: Array) -> float:
         """RMS misfit."""
         return self._at(x)[3]
 
@@ -42,10 +42,10 @@ class Objective:
         if self._last is None or not np.array_equal(self._last[0], x):
             found = self._residuals.condensed_responses(x[None])[0]
             found[0] -= self._residuals.condensed_trace
-            misfit_rad = float(np.linalg.norm(found[0])) / np.sqrt(self._residuals.samples)
-            found /= self._residuals.noise_scale_rad
+            misfit = float(np.linalg.norm(found[0])) / np.sqrt(self._residuals.samples)
+            found /= self._residuals.noise_scale
             rows = np.append(found[0], (x - self._middle) / PRIOR_WIDTH)
-            self._last = x.copy(), rows, np.concatenate((found[1:].T, self._prior)), misfit_rad
+            self._last = x.copy(), rows, np.concatenate((found[1:].T, self._prior)), misfit
         return self._last
 
 
@@ -62,9 +62,9 @@ def by_scipy_in_two_turns(problem: Problem, starts: Array) -> Array:
     """Fit by the same roughly from every start, and only the best of these to the end."""
     objective = Objective(problem)
     rough = [_local_fit(objective, start, ROUGH) for start in starts]
-    rough.sort(key=objective.misfit_rad)
+    rough.sort(key=objective.misfit)
     fine = [_local_fit(objective, x, FINE) for x in rough[:FINISHED]]
-    return min(fine, key=objective.misfit_rad)
+    return min(fine, key=objective.misfit)
 
 
 def _local_fit(objective: Objective, start: Array, tolerance: float) -> Array:

@@ -43,7 +43,7 @@ def by_biogrip(
     """Identify traces side by side; misfit and evaluations of each."""
     rngs = [np.random.default_rng(seed) for seed in seeds]
     answers = identify_many([trace.problem() for trace in traces], settings, rngs)
-    return [(answer.misfit_rad, answer.evaluations) for answer in answers]
+    return [(answer.misfit, answer.evaluations) for answer in answers]
 
 
 def measure() -> list[Row]:

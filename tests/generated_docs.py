@@ -28,7 +28,7 @@ from biogrip.page.answers import (
     say_which_method_finds_it,
 )
 from biogrip.physics.noise import add_noise, stream
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_response
 from biogrip.records.rows import read_table
 from biogrip.tables.claims import count_verdicts
 from biogrip.terminal import QUIET
@@ -181,14 +181,14 @@ def slow_branch() -> str:
     posed = case.problem.to_identify(), slow.problem.to_identify()
     time_s = case.sampling.over(case.torque.end_s)
     given = case.gripper, case.network, case.torque, time_s
-    (target,) = simulated_rotation(*given, nonlinear=False)
+    (target,) = simulated_response(*given, nonlinear=False)
     seeds = range(case.seeds)
     rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in seeds]
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
     identify = identifier("least_squares", case.least_squares)
     free, held = (
         np.array(
-            [each.misfit_rad for each in identify([it.of(time_s, t) for t in traces], rngs, silent)]
+            [each.misfit for each in identify([it.of(time_s, t) for t in traces], rngs, silent)]
         )
         for it in posed
     )

@@ -75,10 +75,10 @@ def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(
     """With the noise that is known, or that with which each residual is likeliest."""
     residual = np.random.default_rng(4).standard_normal(50)
     fits = 2.0 * residual, 1.7 * residual
-    before_rad, after_rad = (float(np.sqrt(np.mean(fit**2))) for fit in fits)
-    before = norm.logpdf(fits[0], scale=known or before_rad).sum()
-    after = norm.logpdf(fits[1], scale=known or after_rad).sum()
-    found = compute_fall(50, before_rad, after_rad, known)
+    before, after = (float(np.sqrt(np.mean(fit**2))) for fit in fits)
+    before = norm.logpdf(fits[0], scale=known or before).sum()
+    after = norm.logpdf(fits[1], scale=known or after).sum()
+    found = compute_fall(50, before, after, known)
     assert found == pytest.approx(2 * (after - before), rel=1e-12)
 
 

@@ -134,9 +134,9 @@ def test_elements_at_the_ends_of_ranges_do_not_show(case: str) -> None:
         return simulate(problem, {**chosen.parameters, **changes}, time_s)
 
     simulated = response()
-    noise_rad = 0.1 * simulated.max()
-    noise = noise_rad * np.random.default_rng(2).standard_normal(len(time_s))
+    noise_sd = 0.1 * simulated.max()
+    noise = noise_sd * np.random.default_rng(2).standard_normal(len(time_s))
     for name, genes in ranges_of(problem, time_s, simulated + noise).items():
         for end, beyond in ((genes.low, 1e-3), (genes.high, 1e3)):
             change = response(**{name: end}) - response(**{name: end * beyond})
-            assert np.linalg.norm(change) < noise_rad, (name, end)
+            assert np.linalg.norm(change) < noise_sd, (name, end)

@@ -23,10 +23,10 @@ from biogrip.errors import BiogripError
 from biogrip.identify import one_trace
 from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.identify.settings import Asked, Setting, case_of
-from biogrip.study.source import HOLD
 from biogrip.identify.words import for_a_paper, side_by_side
 from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES
+from biogrip.study.source import HOLD
 from biogrip.terminal import QUIET
 from tests.helpers.identified import FEW, identified, identify, told
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
@@ -159,7 +159,7 @@ def test_known_deviations_are_weights_of_the_fit(floor: float) -> None:
     times, rotation = clean("liquid_drop_2")
     sd = 0.04 * rotation[1:] + floor
     given: dict[str, Any] = {"config": {"measurement": {"noise_share": 0.04}}}
-    found = told(times[1:], rotation[1:], **({"sd": sd} if floor else given)).problem.sd_rad
+    found = told(times[1:], rotation[1:], **({"sd": sd} if floor else given)).problem.sd
     assert found is not None
     np.testing.assert_allclose(found[100:], sd[100:], rtol=0.02)
 

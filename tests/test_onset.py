@@ -105,7 +105,7 @@ def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
     fits = OnsetFits(creep, times, exact + noise)
     best = fits.best(float(times[0]))
     true = fits.at(0.0, np.log(list(truth.values())))
-    assert best.misfit_rad <= true.misfit_rad * (1 + 1e-9)
+    assert best.misfit <= true.misfit * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("last_s", [1e3, pytest.param(1e4, marks=pytest.mark.nightly)])

@@ -82,13 +82,13 @@ class Task:
     @property
     def data(self) -> Array:
         """Readings in SI units, (n_samples,)."""
-        return np.asarray(_recorded(self.name)[1].rotation_rad[0][self._chosen])
+        return np.asarray(_recorded(self.name)[1].readings[0][self._chosen])
 
     def deviations(self, measure: str) -> Array | None:
         """Return what readings are divided by, (n_samples,), or none if by nothing."""
         if measure == RELATIVE:
             return np.abs(self.data)
-        return _recorded(self.name)[1].sd_rad if measure == KNOWN else None
+        return _recorded(self.name)[1].sd if measure == KNOWN else None
 
     def experiment(self, measure: str) -> CaseProblem:
         """Return what biogrip is told, with the search ranges of `biogrip identify`."""

@@ -27,7 +27,7 @@ from biogrip.physics.simulation import (
     compute_grip,
     jaw_force_response,
     linear_jaw_force,
-    simulated_rotation,
+    simulated_response,
 )
 from biogrip.study.config import DesignBlock
 from biogrip.study.load import load_study, read_configs
@@ -216,7 +216,7 @@ def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
     required = np.array([name in (block.parameters or model.names) for name in model.names])
     # The noise of an instrument: that of its own sample under its own protocol.
     times_s = case.sampling.over(problem.torque.end_s)
-    read = simulated_rotation(case.gripper, network, problem.torque, times_s, nonlinear=False)
+    read = simulated_response(case.gripper, network, problem.torque, times_s, nonlinear=False)
     noise = float(standard_deviation(read[0], case.noise)[0])
     elapsed_s = limits.elapsed_s
     step = torque_history((hold(elapsed_s[-1], 1.0),), deforms=case.instrument.deforms)
@@ -296,9 +296,9 @@ def rated(specimen: Specimen, phases: tuple[Phase, ...], sampling: Sampling) -> 
     bounds = relative_bounds(np.array(slopes), specimen.noise)
     if not case.instrument.has_jaws:
         return Experiment(phases, times_s, bounds, None)
-    if read.max() > case.stroke_rad:
+    if read.max() > case.stroke:
         text = f"found a torque that turns the arms by {1e3 * read.max():.4g} mrad, allowed is "
-        text += f"what the stroke leaves, {1e3 * case.stroke_rad:.4g} mrad: a lower `largest`."
+        text += f"what the stroke leaves, {1e3 * case.stroke:.4g} mrad: a lower `largest`."
         raise BiogripError(f"design: {case.name}: {text}")
     network = model.network(specimen.parameters[None])
     grip = compute_grip(case.gripper, network, problem.torque, nonlinear=False)

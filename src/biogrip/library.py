@@ -22,7 +22,7 @@ from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import Sample
 from biogrip.physics.noise import Noise, add_noise
 from biogrip.physics.protocol import Phase, hold
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_response
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -100,7 +100,7 @@ def simulate(
     """
     network, torque = experiment.model.sample(parameters), experiment.torque
     times = as_column(time_s, "time_s")
-    return simulated_rotation(experiment.gripper, network, torque, times, nonlinear=nonlinear)[0]
+    return simulated_response(experiment.gripper, network, torque, times, nonlinear=nonlinear)[0]
 
 
 def identify_sample(

@@ -95,9 +95,9 @@ class Progress:
             cleared = CLEARED if self._live else ""
             print(f"{cleared}{visible_lines(text)}", file=sys.stderr, flush=True)
 
-    def within(self, evaluations: int, misfit_rad: float) -> None:
+    def within(self, evaluations: int, misfit: float) -> None:
         """Print the progress of an identification within a piece."""
-        self._say(f", {evaluations} responses, misfit {misfit_rad:.4g}")
+        self._say(f", {evaluations} responses, misfit {misfit:.4g}")
 
     def _say(self, more: str) -> None:
         now = time.monotonic()

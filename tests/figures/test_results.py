@@ -19,7 +19,7 @@ from biogrip.figures.style import ALL_SEEDS, RUNS, figure, styled
 from biogrip.fit.methods import METHODS
 from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import columns
 from biogrip.records.rows import write_arrays
 from biogrip.records.traces import Measurements, write_measurements
@@ -35,7 +35,7 @@ def response(values: list[float]) -> Array:
     problem = STUDY.cases[CASE].problem
     network = problem.model.network(np.array([values]))
     device = problem.gripper, network, problem.torque
-    found: Array = simulated_rotation(*device, TIME_S, nonlinear=False)[0]
+    found: Array = simulated_response(*device, TIME_S, nonlinear=False)[0]
     return found
 
 

@@ -42,7 +42,7 @@ def test_other_noise_shows_where_the_rotation_is_small() -> None:
     found = deviations(CLEAN + floor * rng.standard_normal(len(CLEAN_S)), 1e-3)
     # Some eighty readings tell the scatter.
     assert found.min() == pytest.approx(floor, rel=0.3)
-    given = deviations(CLEAN, noise_rad=floor)
+    given = deviations(CLEAN, noise_sd=floor)
     np.testing.assert_allclose(given, np.hypot(0.05 * CLEAN, floor), rtol=1e-3)
 
 

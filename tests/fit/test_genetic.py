@@ -75,7 +75,7 @@ def content(answer: Identification) -> tuple[bytes | float | str, ...]:
     history = answer.history
     return (
         answer.parameters.tobytes(),
-        answer.misfit_rad,
+        answer.misfit,
         answer.generations,
         answer.evaluations,
         answer.stop_reason,

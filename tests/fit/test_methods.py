@@ -54,11 +54,11 @@ def test_an_answer_is_what_it_says(method: str) -> None:
     (answer,) = identify([case_problem], [rng], lambda n, misfit: told.append((n, misfit)))
     history = answer.history
     assert case_problem.residuals.misfit(answer.parameters[None])[0] == pytest.approx(
-        answer.misfit_rad, rel=1e-6
+        answer.misfit, rel=1e-6
     )
     assert len(history.best_misfit) == answer.generations + 1
     np.testing.assert_array_equal(history.best_parameters[-1], answer.parameters)
-    assert np.all(np.diff(history.best_misfit) <= 1e-7 * answer.misfit_rad)
+    assert np.all(np.diff(history.best_misfit) <= 1e-7 * answer.misfit)
     assert np.all(np.diff(history.evaluations) >= 0)
     assert history.evaluations[-1] == answer.evaluations
     assert np.all(np.log(answer.parameters) >= case_problem.low - 1e-9)
@@ -105,8 +105,8 @@ def test_what_is_sure_of_it_reaches_the_global_optimum(case: str) -> None:
     for seed in range(4):
         case_problem = problem(case, seed, rate_Hz=10.0)
         truth = np.log([SAMPLES[case][name] for name in MODEL.names])
-        found = [run(method, case_problem, seed).misfit_rad for method in SURE]
-        best = min(*found, scipy_fit(case_problem, truth).misfit_rad)
+        found = [run(method, case_problem, seed).misfit for method in SURE]
+        best = min(*found, scipy_fit(case_problem, truth).misfit)
         increases = case_problem.residuals.samples * ((np.array(found) / best) ** 2 - 1)
         assert np.all(increases < 1)
 
@@ -124,11 +124,11 @@ def test_offset_and_drift_are_fitted_along() -> None:
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     trace = response + 2e-3 - 4e-6 * times + noise
     case_problem = posed_for(MODEL, times, trace, offset=True, drift=True)
-    without = run("least_squares", posed_for(MODEL, times, trace)).misfit_rad
+    without = run("least_squares", posed_for(MODEL, times, trace)).misfit
     assert without > 10 * rms(noise)
     for method in EXACT:
         answer = run(method, case_problem)
-        assert answer.misfit_rad < 1.1 * rms(noise)
+        assert answer.misfit < 1.1 * rms(noise)
         k, _, c, c_p = answer.parameters
         assert k == pytest.approx(1.0, rel=0.05)
         assert c + c_p == pytest.approx(10.0, rel=0.03)
@@ -170,7 +170,7 @@ def test_a_history_is_of_the_fits_so_far() -> None:
     row = np.exp(starts[0]), 1.0, 1.0, 10
     history = best_of_starts([problem], [starts], [row], silent)[0].history
     for count in range(1, 6):
-        so_far = fitted.misfit_rad[:count]
+        so_far = fitted.misfit[:count]
         # In single precision, in which fits are compared.
         assert history.best_misfit[count] == pytest.approx(so_far.min(), rel=1e-7)
         assert history.median_misfit[count] == pytest.approx(np.median(so_far), rel=1e-12)
@@ -191,9 +191,9 @@ def test_a_trace_without_noise_gives_every_model_back(name: str) -> None:
     (problem,) = case_problem(times, response[0], 1, model, level=0.0)
     near = np.log(truth) + 0.1 * np.random.default_rng(1).normal(size=(5, len(truth)))
     found = LocalFits([problem]).fitted(near, np.zeros(5, dtype=np.int64))
-    assert np.min(found.misfit_rad) < 1e-6 * np.abs(response).max()
+    assert np.min(found.misfit) < 1e-6 * np.abs(response).max()
     if name in MODELS and model is not MODEL:
-        best = found.x[np.argmin(found.misfit_rad)]
+        best = found.x[np.argmin(found.misfit)]
         np.testing.assert_allclose(best, np.log(truth), rtol=0, atol=1e-3)
 
 
@@ -238,8 +238,8 @@ def noisy(model: SampleModel, count: int) -> list[tuple[Problem, Array]]:
         sample = 0.5 * (low + high) + 0.25 * rng.uniform(-1, 1, len(low)) * (high - low)
         response = step_response(GRIPPER, model.network(np.exp(sample)[None]), inertia=False)
         trace = rotation(response, TORQUE, TIMES)[0]
-        noise_rad = 10 ** rng.uniform(-3, -1) * np.abs(trace).max()
-        trace = trace + noise_rad * rng.normal(size=len(TIMES))
+        noise_sd = 10 ** rng.uniform(-3, -1) * np.abs(trace).max()
+        trace = trace + noise_sd * rng.normal(size=len(TIMES))
         problems.append((posed_for(model, TIMES, trace), sample))
     return problems
 
@@ -248,7 +248,7 @@ def gradient(posed: Problem, x: Array) -> Array:
     """Half of that of what is minimized, on all samples."""
     residual, slopes = posed.residuals(x)
     away = (x - 0.5 * (posed.low + posed.high)) / PRIOR_WIDTH**2
-    return slopes @ residual / posed.residuals.noise_scale_rad**2 + away
+    return slopes @ residual / posed.residuals.noise_scale**2 + away
 
 
 @pytest.mark.parametrize("name", MODELS_SETTLED)

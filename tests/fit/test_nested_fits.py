@@ -34,7 +34,7 @@ def worse(
 ) -> list[tuple[str, str, float]]:
     """Pairs the wrong way round, and by how much in chi^2."""
     increases = [
-        (richer, simpler, problem.residuals.samples * (2 * np.log(a.misfit_rad / b.misfit_rad)))
+        (richer, simpler, problem.residuals.samples * (2 * np.log(a.misfit / b.misfit)))
         for richer in found
         for simpler in contained(richer)
         if simpler in found
@@ -63,8 +63,8 @@ def test_a_model_fits_no_worse_than_one_in_it(
         network = CANDIDATES[name].model.network([answer.parameters for answer in answers])
         rotations = rotation(step_response(GRIPPER, network, inertia=False), TORQUE, times)
         for problem, answer, own in zip(problems[name], answers, rotations, strict=True):
-            misfit = np.sqrt(np.mean((own - problem.residuals.trace.cleared_rad) ** 2))
-            assert answer.misfit_rad == pytest.approx(misfit, rel=1e-9)
+            misfit = np.sqrt(np.mean((own - problem.residuals.trace.cleared) ** 2))
+            assert answer.misfit == pytest.approx(misfit, rel=1e-9)
 
 
 def test_elements_vanish_where_the_range_does_not_reach() -> None:

@@ -15,7 +15,7 @@ from biogrip.fit.problem import CaseProblem, Identification, Problem
 from biogrip.fit.trace_fit import TraceFit, fit_traces, gripper_functions
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, Outliers, add_noise
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import MOST_SAMPLES
 from tests.helpers.default import STUDY
 
@@ -27,7 +27,7 @@ TRUTH = POSED.logs(CASE.parameters)
 
 def simulated(gripper: Gripper, x: Array) -> Array:
     network = POSED.searched.network(np.exp(x))
-    return simulated_rotation(gripper, network, POSED.torque, TIMES, nonlinear=False)[0]
+    return simulated_response(gripper, network, POSED.torque, TIMES, nonlinear=False)[0]
 
 
 CLEAN = simulated(POSED.gripper, TRUTH)
@@ -69,7 +69,7 @@ def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
         name: {"stiffness_Nm_per_rad": value}
         for name, value in zip(("left", "right"), known, strict=True)
     }
-    case_problem = replace(POSED, uncertainty=uncertainty, noise_rad=float(level))
+    case_problem = replace(POSED, uncertainty=uncertainty, noise_sd=float(level))
     trace = noisy(Noise("gaussian", 0.02, "peak"))
     fit = fitted(case_problem, trace)
     _, slopes = fit.problem.residuals(np.log(fit.found.parameters))

@@ -69,7 +69,7 @@ def test_weighted_fits_are_scipys() -> None:
         rotation, TIMES, trace, start, deviations, absolute_sigma=True, xtol=1e-13, ftol=1e-13
     )
     problem = POLYSTYRENE.weighted(deviations)
-    fit, known = fitted(problem, trace), {"noise_rad": problem.noise_rad}
+    fit, known = fitted(problem, trace), {"noise_rad": problem.noise_sd}
     diagnosis = diagnose(fit.problem, problem.searched, fit.found, confidence=0.95, **known)
     best = diagnosis.likelihood.best
     assert [best[0], np.exp(best[1]), best[2]] == pytest.approx(expected, rel=2e-6)
@@ -77,7 +77,7 @@ def test_weighted_fits_are_scipys() -> None:
     assert [each.deviation for each in diagnosis.findings] == pytest.approx(errors, rel=2e-3)
     left = (trace - rotation(TIMES, *expected)) / deviations
     likelihood = diagnosis.likelihood
-    chi_squared = len(TIMES) * (likelihood.misfit_rad / likelihood.noise_rad) ** 2
+    chi_squared = len(TIMES) * (likelihood.misfit / likelihood.noise_sd) ** 2
     assert chi_squared == pytest.approx(left @ left, rel=1e-6)
     assert likelihood.threshold == pytest.approx(3.8415, abs=1e-4)
     assert diagnosis.notes == []

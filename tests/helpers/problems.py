@@ -69,7 +69,7 @@ def run(method: str, case_problem: Problem, seed: int = 0) -> Identification:
 def likelihood_of(posed: Problem, seed: int = 0) -> Likelihood:
     """What is judged of a trace: its best fit by least squares."""
     found = run("least_squares", posed, seed)
-    return make_likelihood(posed, np.log(found.parameters), found.misfit_rad, confidence=0.95)
+    return make_likelihood(posed, np.log(found.parameters), found.misfit, confidence=0.95)
 
 
 def condensed_of(

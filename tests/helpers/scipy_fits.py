@@ -27,21 +27,21 @@ class ScipyFit:
 
     log_parameters: Array
     square_sum: float
-    misfit_rad: float
+    misfit: float
 
 
 def scipy_fit(
     problem: Problem,
     start: Array,
     more: Callable[[Array], tuple[Array, Array]] | None = None,
-    noise_rad: float | None = None,
+    noise_sd: float | None = None,
     tolerance: float = 1e-8,
 ) -> ScipyFit:
     """Fit all samples from log-parameters with SciPy's bounded trust-region least squares.
 
     There may be more residuals, in units of the noise, with their slopes.
     """
-    noise_rad = noise_rad or problem.residuals.noise_scale_rad
+    noise_sd = noise_sd or problem.residuals.noise_scale
 
     # Rows and slopes of the same point are asked for in turn.
     @functools.lru_cache(1)
@@ -49,7 +49,7 @@ def scipy_fit(
         x = np.frombuffer(point)
         residual, slopes = problem.residuals(x)
         values, turns = more(x) if more else (np.zeros(0), np.zeros((0, len(x))))
-        return np.append(residual / noise_rad, values), np.vstack((slopes.T / noise_rad, turns))
+        return np.append(residual / noise_sd, values), np.vstack((slopes.T / noise_sd, turns))
 
     inside = 1e-9 * (problem.high - problem.low)
     found = least_squares(
@@ -61,8 +61,8 @@ def scipy_fit(
         **dict.fromkeys(("ftol", "xtol", "gtol"), tolerance),
     )
     square_sum = 2 * float(found.cost)
-    misfit_rad = noise_rad * float(np.sqrt(square_sum / problem.residuals.samples))
-    return ScipyFit(found.x, square_sum, misfit_rad)
+    misfit = noise_sd * float(np.sqrt(square_sum / problem.residuals.samples))
+    return ScipyFit(found.x, square_sum, misfit)
 
 
 def rise_with_held(
@@ -84,8 +84,8 @@ def rise_with_held(
         values, turns = map(np.array, zip(*held, strict=True))
         return values, turns
 
-    found = scipy_fit(likelihood.problem, start, more, likelihood.noise_rad, tolerance)
-    shares = likelihood.misfit_rad / likelihood.noise_rad
+    found = scipy_fit(likelihood.problem, start, more, likelihood.noise_sd, tolerance)
+    shares = likelihood.misfit / likelihood.noise_sd
     return found.square_sum - residuals.samples * shares**2, found.log_parameters
 
 

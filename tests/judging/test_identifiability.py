@@ -156,10 +156,10 @@ def test_a_noise_that_leaves_more_than_it_is_is_doubted(times: float, said: bool
     """But of a trace without noise nothing is left at all, whatever noise it is held against."""
     (damper_problem,) = case_problem(*clean("liquid_drop_2"), 1, DAMPER)
     found = run("least_squares", damper_problem)
-    noise_rad = times * found.misfit_rad
-    exact = replace(found, misfit_rad=1e-5 * noise_rad)
+    noise_sd = times * found.misfit
+    exact = replace(found, misfit=1e-5 * noise_sd)
     for fit, doubted in ((found, said), (exact, False)):
-        told = diagnose(damper_problem, DAMPER, fit, confidence=0.95, noise_rad=noise_rad)
+        told = diagnose(damper_problem, DAMPER, fit, confidence=0.95, noise_sd=noise_sd)
         words = f"The noise that was given is {times:.2g} times what the fit leaves"
         assert any(note.text.startswith(words) for note in told.notes) == doubted
 

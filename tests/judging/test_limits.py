@@ -56,10 +56,10 @@ def test_an_optimum_that_was_missed_is_judged_again() -> None:
     case_problem = posed_for(maxwell, times, response + noise)
     found = run("least_squares", case_problem)
     elsewhere = found.parameters * np.array([1.1, 1.02])
-    misfit_rad = float(case_problem.residuals.misfit(elsewhere[None])[0])
-    missed = replace(found, parameters=elsewhere, misfit_rad=misfit_rad)
+    misfit = float(case_problem.residuals.misfit(elsewhere[None])[0])
+    missed = replace(found, parameters=elsewhere, misfit=misfit)
     right, again = (diagnose(case_problem, maxwell, f, confidence=0.95) for f in (found, missed))
-    assert again.likelihood.misfit_rad == pytest.approx(right.likelihood.misfit_rad, rel=1e-9)
+    assert again.likelihood.misfit == pytest.approx(right.likelihood.misfit, rel=1e-9)
     for one, other in zip(right.findings, again.findings, strict=True):
         assert one.verdict == DETERMINED
         assert other.profile.low == pytest.approx(one.profile.low, abs=1e-6)
@@ -107,8 +107,8 @@ def test_no_limit_is_said_only_of_what_has_none() -> None:
     rise = max(plain.increases[[0, -1]])
     said = []
     for wanted in (2.0, 7.0):
-        noise_rad = likelihood.noise_rad * np.sqrt(rise / wanted)
-        ((found,),) = compute_profiles([replace(likelihood, noise_rad=noise_rad)], k, smooth=False)
+        noise_sd = likelihood.noise_sd * np.sqrt(rise / wanted)
+        ((found,),) = compute_profiles([replace(likelihood, noise_sd=noise_sd)], k, smooth=False)
         assert (found.low, found.high) == (None, None)
         assert max(found.increases[[0, -1]]) == pytest.approx(wanted, rel=0.05)
         said.append(Finding(QUANTITIES[0], found, 0.1).words())
@@ -120,15 +120,15 @@ def test_no_limit_is_said_only_of_what_has_none() -> None:
 def test_limits_tell_of_an_optimum_that_was_missed() -> None:
     right = likelihood_for("liquid_drop_2", 0)
     away = right.best + np.array([0.1, 0.0, 0.02, 0.0])
-    misfit_rad = float(right.problem.residuals.misfit(np.exp(away)[None])[0])
-    missed = replace(right, best=away, misfit_rad=misfit_rad)
+    misfit = float(right.problem.residuals.misfit(np.exp(away)[None])[0])
+    missed = replace(right, best=away, misfit=misfit)
     quantities = [QUANTITIES[0], QUANTITIES[4]]
     assert find_limits([right], quantities)[1] == {}
     lower = find_limits([right, missed], quantities)[1]
     assert list(lower) == [1]
     again = refitted(missed, lower[1], 0.95)
     assert again is not None
-    assert again.misfit_rad == pytest.approx(right.misfit_rad, rel=1e-9)
+    assert again.misfit == pytest.approx(right.misfit, rel=1e-9)
     assert refitted(right, right.best, 0.95) is None
     # What is shown of it is what is shown of the right one.
     of_right, of_missed = shown_of([right, missed], quantities, 0.95)

@@ -120,7 +120,7 @@ def test_the_search_range_determines_no_combination() -> None:
     noise = 4e-6 * np.random.default_rng(1).standard_normal(len(times))
     problem = posed_for(MODEL, times, clean_rad + noise)
     found, k_and_k_p = run("least_squares", problem), find_combinations(MODEL, [0, 1])
-    told = diagnose(problem, MODEL, found, confidence=0.95, noise_rad=1e-4)
+    told = diagnose(problem, MODEL, found, confidence=0.95, noise_sd=1e-4)
     series = next(q for q in k_and_k_p if q.sense < 0)
     # To first order it is known well enough to be looked at.
     assert told.likelihood.deviation(series) < 0.5
@@ -145,10 +145,10 @@ def test_noise_and_threshold_are_those_of_a_regression(taken_out: dict[str, bool
     (problem,) = case_problem(times, response, 1, model, **taken_out)
     best = scipy_fit(problem, np.log([1.0, 10.0]))
     left = len(times) - 2 - len(taken_out)
-    found = make_likelihood(problem, best.log_parameters, best.misfit_rad, confidence=0.95)
-    assert found.noise_rad**2 == pytest.approx(len(times) * best.misfit_rad**2 / left)
+    found = make_likelihood(problem, best.log_parameters, best.misfit, confidence=0.95)
+    assert found.noise_sd**2 == pytest.approx(len(times) * best.misfit**2 / left)
     assert found.threshold == pytest.approx(t.ppf(0.975, left) ** 2)
-    known = make_likelihood(problem, found.best, best.misfit_rad, confidence=0.95, noise_rad=1e-6)
+    known = make_likelihood(problem, found.best, best.misfit, confidence=0.95, noise_sd=1e-6)
     assert known.threshold == pytest.approx(norm.ppf(0.975) ** 2)
 
 

@@ -197,14 +197,14 @@ def test_the_explorer_shows_the_judged_trace_and_its_fits(
     (batch,) = (results / "measurements" / case).glob("seeds_0-*.npz")
     measured = read_measurements(batch, [0])
     noisy = drawn.pop("noisy trace" if case != "mine" else "recorded trace")
-    assert np.allclose(noisy, measured.rotation_rad[0], rtol=1e-5, atol=0)
+    assert np.allclose(noisy, measured.readings[0], rtol=1e-5, atol=0)
     if case != "mine":
-        assert measured.target_rad is not None
-        assert np.allclose(drawn.pop("target"), measured.target_rad, rtol=1e-5, atol=0)
+        assert measured.target is not None
+        assert np.allclose(drawn.pop("target"), measured.target, rtol=1e-5, atol=0)
     assert set(drawn) == {"genetic algorithm", "multi-start least squares"}
     found = read_identifications(results / "identifications" / f"{case}.csv").set_index("seed")
     for misfit, method in found.loc[0, ["misfit", "method"]].itertuples(index=False):
-        residual = measured.rotation_rad[0] - drawn[METHODS[method].title]
+        residual = measured.readings[0] - drawn[METHODS[method].title]
         assert np.sqrt(np.mean(residual**2)) == pytest.approx(misfit, rel=1e-4)
     assert page.locator("canvas").count() == 0
     assert opened.problems == []

@@ -28,8 +28,8 @@ def test_free_motion_against_radau(damping: float) -> None:
     arm = dataclasses.replace(ARM, damping_Nms_per_rad=damping)
     motion = free_motion(arm, TIME_S, *CAUSES)
     for record, torque, rate in (
-        (motion.step_rad, CAUSES[0], 0.0),
-        (motion.impulse_rad, 0.0, CAUSES[1] / ARM.inertia_kgm2),
+        (motion.step, CAUSES[0], 0.0),
+        (motion.impulse, 0.0, CAUSES[1] / ARM.inertia_kgm2),
     ):
         solved = solve_ivp(
             lambda _, y, torque=torque: [y[1], (torque - damping * y[1] - 4.4e-7 * y[0]) / 1e-14],
@@ -47,7 +47,7 @@ def noisy(arm: Arm, level: float, seed: int) -> FreeMotion:
     motion = free_motion(arm, TIME_S, *CAUSES)
     rng, noise = np.random.default_rng(seed), Noise("gaussian", level, "peak")
     return FreeMotion(
-        TIME_S, add_noise(motion.step_rad, noise, rng), add_noise(motion.impulse_rad, noise, rng)
+        TIME_S, add_noise(motion.step, noise, rng), add_noise(motion.impulse, noise, rng)
     )
 
 

@@ -30,13 +30,13 @@ def test_the_tips_close_by_what_the_sample_leaves(gripper: Gripper, size_um: flo
     # Tip positions from their coordinates: each goes half of the way.
     travel = 1.5e-3 * (math.cos(after) - math.cos(before))
     assert travel == pytest.approx(0.5e-6 * (150 - size_um), rel=1e-10)
-    assert before - after == pytest.approx(found.closing_rad)
-    assert found.torque_Nm == pytest.approx(4.4e-7 * found.closing_rad)
+    assert before - after == pytest.approx(found.closing)
+    assert found.torque_Nm == pytest.approx(4.4e-7 * found.closing)
 
 
 def test_of_unequal_arms_the_stiffer_one_asks_for_the_torque(unequal_gripper: Gripper) -> None:
     found = contact(unequal_gripper, 150e-6, TABLE_2, 60e-6)
-    assert found.torque_Nm == pytest.approx(5.5e-7 * found.closing_rad)
+    assert found.torque_Nm == pytest.approx(5.5e-7 * found.closing)
     assert torque(TABLE_2, found.voltage_V) == pytest.approx(found.torque_Nm)
 
 

@@ -15,7 +15,7 @@ from biogrip.physics.modes import linear_responses
 from biogrip.physics.protocol import Load, Phase, TorqueHistory, hold, load, torque_history
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_response
 from tests.helpers.laplace import IMPEDANCES, Impedance, drawn, inverted
 
 DRIVEN = pytest.mark.parametrize("deforms", [False, True], ids=["creep", "relaxation"])
@@ -37,7 +37,7 @@ PHASES = (
 
 
 def simulated(network: Network, history: TorqueHistory, time_s: Array) -> Array:
-    return simulated_rotation(NO_ARMS, network, history, time_s, nonlinear=False)[0]
+    return simulated_response(NO_ARMS, network, history, time_s, nonlinear=False)[0]
 
 
 def example(model: SampleModel) -> Network:
@@ -185,7 +185,7 @@ def test_creep_and_relaxation_are_inverse_laplace_transforms(
     sample = sample_of(model, seed)
     given, held = drawn(model, sample), torque_history((hold(2e3, 1.0),), deforms=deforms)
     network = MODELS[model].network(sample)
-    found = simulated_rotation(NO_ARMS, network, held, TIMES, nonlinear=False)[0]
+    found = simulated_response(NO_ARMS, network, held, TIMES, nonlinear=False)[0]
     expected = np.array(
         [inverted(lambda s: given(s) / s if deforms else 1 / (s * given(s)), t) for t in TIMES]
     )

@@ -67,12 +67,12 @@ def test_a_ring_shows_by_its_norm_beside_the_noise(gripper: Gripper) -> None:
     # A parallel damper that is seen only while it rings does not end the ring.
     free = replace(network, c_p=np.zeros(1))
     change = np.where(time_s < ringing_s(gripper), ring(gripper, free, torque, time_s)[0], 0.0)
-    noise_rad = 0.1 * np.abs(change).max()
-    found = find_ring(*given, lambda rows: rows / noise_rad)
+    noise_sd = 0.1 * np.abs(change).max()
+    found = find_ring(*given, lambda rows: rows / noise_sd)
     assert found is not None
     assert found.largest == pytest.approx(10.0)
     norms = [
-        np.linalg.norm(change[time_s > last]) / noise_rad
+        np.linalg.norm(change[time_s > last]) / noise_sd
         for last in (found.lasts_s, found.lasts_s - 1e-9)
     ]
     assert norms[0] <= VISIBLE < norms[1]

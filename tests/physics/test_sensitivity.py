@@ -116,9 +116,9 @@ def test_the_gradient_is_that_of_all_readings(
     residuals = posed(steps, gripper, times, basis, 0 * times)
     residual, slopes = residuals(AT)
     np.testing.assert_array_equal(residuals.left(AT), residual)
-    (gradient,), (misfit_rad,) = residuals.gradients(AT[None], [residuals])
+    (gradient,), (misfit,) = residuals.gradients(AT[None], [residuals])
     np.testing.assert_allclose(gradient, slopes @ residual, rtol=1e-11)
-    assert misfit_rad == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
+    assert misfit == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
 
 
 def test_a_later_protocol_is_one_of_earlier_readings(
@@ -132,4 +132,4 @@ def test_a_later_protocol_is_one_of_earlier_readings(
     np.testing.assert_array_equal(moved(AT)[0], there(AT)[0])
     expected = there.misfit(parameters)
     assert moved.misfit(parameters) == pytest.approx(expected, rel=1e-12)
-    assert moved.noise_scale_rad == here.noise_scale_rad
+    assert moved.noise_scale == here.noise_scale

@@ -131,7 +131,7 @@ def test_against_lsoda_with_events(
     time_s = np.linspace(0, torque.end_s, 401)[:-1] + 1e-3
     expected, changes = integrated(gripper, sample, torque, time_s)
     ours = unilateral_response(gripper, generalized_maxwell(sample), torque, time_s)
-    states = np.vstack((ours.rotation_rad, ours.shortening_m, ours.dampers_m, ours.jaw_force_N))
+    states = np.vstack((ours.rotation, ours.shortening_m, ours.dampers_m, ours.jaw_force_N))
     scale = np.abs(expected).max(axis=1, keepdims=True)
     # The integrator's tolerance over some hundred steps and a few events.
     assert np.max(np.abs(states - expected) / scale) < 1e-7
@@ -152,14 +152,14 @@ def test_over_the_whole_search_range_the_jaws_never_pull(
         found = unilateral_response(either_gripper, network, steps, time_s)
         both = jaw_force(either_gripper, network, steps, time_s, nonlinear=False, inertia=False)[0]
         assert np.all(found.jaw_force_N >= 0)
-        gap = found.shortening_m - either_gripper.lever_m * found.rotation_rad.sum(axis=0)
+        gap = found.shortening_m - either_gripper.lever_m * found.rotation.sum(axis=0)
         assert np.all(gap > -1e-9 * found.shortening_m.max())
         until = time_s < (found.parted_s[0] if found.parted_s else 400.0)
         assert np.max(np.abs(found.jaw_force_N - both)[until]) < 1e-6 * both.max()
         response = step_response(either_gripper, network, inertia=False)
         for arm in (0, 1):
             expected = rotation(response, steps, time_s, arm)[0]
-            away = np.abs(found.rotation_rad[arm] - expected)
+            away = np.abs(found.rotation[arm] - expected)
             # And to rounding of arms that nothing is between.
             assert np.max(away[until]) < 1e-10 * expected.max() + 1e-14 * 1.6e-9 / 4.4e-7
         assert bool(found.parted_s) == bool(both.min() < -1e-9 * both.max())
@@ -184,6 +184,6 @@ def test_ends_do_not_depend_on_when_one_looks(gripper: Gripper) -> None:
         return unilateral_response(gripper, network, RAMPS, times)
 
     whole, some = seen(time_s), seen(time_s[::37])
-    np.testing.assert_allclose(whole.rotation_rad[:, ::37], some.rotation_rad, rtol=1e-13)
+    np.testing.assert_allclose(whole.rotation[:, ::37], some.rotation, rtol=1e-13)
     assert whole.parted_s == some.parted_s
     assert len(whole.parted_s) > 3

@@ -53,8 +53,8 @@ def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> No
     write_measurements(path, given)
     for seeds in (None, [6, 4]):
         read = read_measurements(path, seeds)
-        assert list(read.rotation_rad) == (seeds or list(traces))
-        for seed, trace in read.rotation_rad.items():
+        assert list(read.readings) == (seeds or list(traces))
+        for seed, trace in read.readings.items():
             np.testing.assert_array_equal(trace, traces[seed])
             assert trace.flags.c_contiguous
         for name in ("time_s", "target_rad", "sd_rad"):

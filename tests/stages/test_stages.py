@@ -29,7 +29,7 @@ def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
         network=Sample("maxwell").model.sample({"k": 1.0, "c": 1.0}),
         nonlinear_target=False,
         unilateral=unilateral,
-        stroke_rad=0.0785,
+        stroke=0.0785,
     )
 
 

@@ -47,7 +47,7 @@ def said(
     gripper: Gripper = GRIPPER,
     phases: tuple[Phase, ...] = STUDY.phases,
     *,
-    noise_rad: float | None = None,
+    noise_sd: float | None = None,
     offset: bool = False,
 ) -> str:
     """What is said of a trace on lines 2, 3, ...: why it is refused, a note on it, or nothing."""
@@ -56,7 +56,7 @@ def said(
     recording = Recording(time_s, values, lines, 0, file, columns, units)
     problem = replace(set_up(gripper, phases, Sample("maxwell")), offset=offset)
     try:
-        return check_recording(recording, problem, noise_rad) or ""
+        return check_recording(recording, problem, noise_sd) or ""
     except BiogripError as error:
         return str(error)
 
@@ -124,11 +124,11 @@ def test_a_stiff_sample_passes_if_its_rotation_is_far_above_a_given_noise() -> N
     values = trace((35e3, 12.3e3, 3e5, 1.0))
     refused = "allowed is at least 7.27e-06 rad, or less with a given noise (--noise)"
     assert refused in said(TIMES, values)
-    assert refused in said(TIMES, values, noise_rad=values.max() / 5)
-    note = said(TIMES, values, noise_rad=values.max() / 20)
+    assert refused in said(TIMES, values, noise_sd=values.max() / 5)
+    note = said(TIMES, values, noise_sd=values.max() / 20)
     assert note.startswith("The largest rotation is")
     assert "the sample is very stiff, or the unit is not the right one. It would fit if" in note
-    assert said(TIMES, trace(SAMPLES["liquid_drop_1"]), noise_rad=1e-6) == ""
+    assert said(TIMES, trace(SAMPLES["liquid_drop_1"]), noise_sd=1e-6) == ""
 
 
 @pytest.mark.parametrize("rate_Hz", [10.0, 0.1])
@@ -183,7 +183,7 @@ def test_what_rounding_leaves_of_a_torque_is_no_response(samples: int) -> None:
 def test_the_free_rotation_is_that_of_the_left_arm() -> None:
     """In closed form, with hinges of 0.44 and 0.55 uN m."""
     ramp = Phase(7.0, Load(0.0, 2e-10), Load(0.0, 2e-10))
-    for phases, largest_rad in (
+    for phases, largest in (
         ((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)), 1.6e-9 / 4.4e-7),
         ((hold(1.0, -1.6e-9), hold(1.0, 0.32e-9)), 1.6e-9 / 4.4e-7),
         ((hold(1.0, 0.0), hold(1e-9, 1.6e-9), hold(1.0, 0.0)), 1.6e-9 / 4.4e-7),
@@ -192,7 +192,7 @@ def test_the_free_rotation_is_that_of_the_left_arm() -> None:
         ((hold(1.0, 1.0e-9, -1.6e-9),), 2.6e-9 / 9.9e-7),
     ):
         found = free_rotation(UNEQUAL, torque_history(phases))
-        assert found == pytest.approx(largest_rad, rel=1e-12)
+        assert found == pytest.approx(largest, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -77,10 +77,10 @@ def test_a_kept_file_is_read_or_refused_as_its_table_says(
     assert found.form == {key: it for key, it in form.items() if it is not None}
     assert found.without_number == form["gaps"]
     assert found.time_s[[0, -1]].tolist() == [form["first_s"], form["last_s"]]
-    assert first_last_sum(found.rotation_rad) == pytest.approx(kept["reading"], rel=1e-14)
+    assert first_last_sum(found.readings) == pytest.approx(kept["reading"], rel=1e-14)
     if "sd" in kept:
-        assert found.sd_rad is not None
-        assert first_last_sum(found.sd_rad) == pytest.approx(kept["sd"], rel=1e-14)
+        assert found.sd is not None
+        assert first_last_sum(found.sd) == pytest.approx(kept["sd"], rel=1e-14)
 
 
 GAPS = ("", "NaN", "NA", "N/A", "-", '""', '" nan "', "n/a", "#N/A", "#NV", " ", "nan, ")
@@ -158,7 +158,7 @@ def test_what_pandas_writes_is_read_to_the_last_bit(
     found = read_recording(path, Columns("time_s", "angle, left (urad)"))
     assert found.form["encoding"] == ENCODINGS[encoding]
     np.testing.assert_array_equal(found.time_s, times)
-    np.testing.assert_array_equal(found.rotation_rad, np.array(values) * 1e-6)
+    np.testing.assert_array_equal(found.readings, np.array(values) * 1e-6)
     assert found.without_number == 1
     for line, time in zip(found.lines, times, strict=True):
         assert repr(float(time)).replace(".", decimal) in lines[line - 1]
@@ -266,13 +266,13 @@ def test_readings_of_equal_times_are_averaged(tmp_path: Path, sd: dict[str, str]
     groups = frame.groupby("time_s")
     counts = groups.size()
     np.testing.assert_array_equal(found.time_s, np.arange(15))
-    np.testing.assert_allclose(found.rotation_rad, groups["rotation_rad"].mean(), rtol=1e-13)
+    np.testing.assert_allclose(found.readings, groups["rotation_rad"].mean(), rtol=1e-13)
     np.testing.assert_array_equal(found.lines, frame.drop_duplicates("time_s").index + 2)
     assert found.form["averaged"] == counts[counts > 1].sum() > 0
     if sd:
         of_means = groups["sd"].apply(lambda own: np.sqrt((own**2).sum())) / counts
-        assert found.sd_rad is not None
-        np.testing.assert_allclose(found.sd_rad, of_means, rtol=1e-13)
+        assert found.sd is not None
+        np.testing.assert_allclose(found.sd, of_means, rtol=1e-13)
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
@@ -335,6 +335,6 @@ def test_a_damaged_file_is_refused_or_leaves_a_trace(kept: dict[str, Any], tmp_p
         with suppress(BiogripError):
             found = read_recording(path, columns)
             assert np.all(np.diff(found.time_s) > 0)
-            assert np.all(np.isfinite(found.rotation_rad))
+            assert np.all(np.isfinite(found.readings))
             read += 1
     assert 0 < read < 60

@@ -60,13 +60,13 @@ def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:
     """Draw a trace, its target, its fit and others, by label; return factor and unit."""
     fit = next(iter(fits.values()))
     factor, unit = scale_of_fit(fit)
-    axes.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **_READINGS)
-    kind = "recorded trace" if fit.target_rad is None else "noisy measurement"
+    axes.plot(fit.time_s, factor * fit.measured, color=MEASURED, **_READINGS)
+    kind = "recorded trace" if fit.target is None else "noisy measurement"
     axes.plot([], [], ".", color=MEASURED, markersize=4, label=kind)
-    if fit.target_rad is not None:
-        axes.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
+    if fit.target is not None:
+        axes.plot(fit.time_s, factor * fit.target, color=TARGET, label="target")
     for (label, each), color in zip(fits.items(), RUNS, strict=False):
-        axes.plot(each.time_s, factor * each.fitted_rad, "--", color=color, label=label)
+        axes.plot(each.time_s, factor * each.fitted, "--", color=color, label=label)
     axes.set_ylabel(with_unit(fit.read.title, unit))
     return factor, unit
 
@@ -80,23 +80,23 @@ def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = 
     drawn = figure(COLUMN_IN, 3.6)
     traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
     factor, unit = draw_traces(traces, fits)
-    low, high = (end([*axis_rad, end(fit.measured_rad)]) for end in (np.min, np.max))
+    low, high = (end([*axis_rad, end(fit.measured)]) for end in (np.min, np.max))
     margin = 0.02 * (high - low)
     traces.set_ylim(factor * (low - margin), factor * (high + margin))
     drawn.legend(loc="outside upper left", ncols=2)
     traces.set_title(literal(title))
-    residual = fit.measured_rad - fit.fitted_rad
-    residual = factor * residual if fit.sd_rad is None else residual / fit.sd_rad
+    residual = fit.measured - fit.fitted
+    residual = factor * residual if fit.sd is None else residual / fit.sd
     residuals.plot(fit.time_s, residual, color=MEASURED, **_READINGS)
-    if fit.target_rad is not None:
-        residuals.plot(fit.time_s, factor * (fit.target_rad - fit.fitted_rad), color=TARGET)
+    if fit.target is not None:
+        residuals.plot(fit.time_s, factor * (fit.target - fit.fitted), color=TARGET)
     for other, color in zip(others, RUNS[1:], strict=False):
-        left = factor * (np.asarray(other.target_rad) - other.fitted_rad)
+        left = factor * (np.asarray(other.target) - other.fitted)
         residuals.plot(other.time_s, left, color=color)
     residuals.axhline(0, color=FITTED, linestyle="--", linewidth=0.8)
     bound = 1.15 * float(np.max(np.abs(residual)))
     residuals.set_ylim(-bound, bound)
-    residuals.set_ylabel(with_unit("residual", unit) if fit.sd_rad is None else "residual / sd")
+    residuals.set_ylabel(with_unit("residual", unit) if fit.sd is None else "residual / sd")
     residuals.set_xlabel("time (s)")
     residuals.set_xlim(fit.time_s[0], fit.time_s[-1])
     if is_over_decades(fit.time_s):

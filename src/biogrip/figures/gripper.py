@@ -30,7 +30,7 @@ from biogrip.physics import gripper as actuator
 from biogrip.physics.contact import LARGEST_M, SMALLEST_M, contact
 from biogrip.physics.gripper import CombDrive, Gripper
 from biogrip.physics.protocol import torque_at, torque_history
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_response
 from biogrip.study.study import Study
 
 
@@ -187,7 +187,7 @@ def draw_linkage(study: Study) -> Figure:
     (whole, tips), (names, networks) = drawn.subplots(2, 2, width_ratios=[1.15, 1])
     _whole(whole, gripper)
     panel(whole, "a", "linkage A-B-C-D, to scale")
-    _tips(tips, gripper, _largest_rotation_rad(study))
+    _tips(tips, gripper, _largest_rotation(study))
     panel(tips, "b", "tips B and C")
     _names(names)
     panel(names, "c", "angles and displacements, not to scale", most_letters=40)
@@ -200,12 +200,12 @@ def draw_linkage(study: Study) -> Figure:
     return drawn
 
 
-def _joints(gripper: Gripper, closing_rad: float, factor: float) -> dict[str, Place]:
+def _joints(gripper: Gripper, closing: float, factor: float) -> dict[str, Place]:
     """Return positions of the four joints times a factor, with both arms closed by an angle."""
     length, angle = 1e3 * gripper.arm_length_m, math.radians(gripper.reference_angle_deg)
     base = 0.5e3 * LARGEST_M + length * math.cos(angle)
-    x = factor * (-base + length * math.cos(angle - closing_rad))
-    y = factor * length * math.sin(angle - closing_rad)
+    x = factor * (-base + length * math.cos(angle - closing))
+    y = factor * length * math.sin(angle - closing)
     return {"A": (-factor * base, 0), "B": (x, y), "C": (-x, y), "D": (factor * base, 0)}
 
 
@@ -241,25 +241,25 @@ def _whole(axes: Axes, gripper: Gripper) -> None:
     axes.set(xlim=(a[0] - 0.75, d[0] + 0.75), ylim=(-0.25, b[1] + 0.2))
 
 
-def _largest_rotation_rad(study: Study) -> float:
+def _largest_rotation(study: Study) -> float:
     """Return the largest rotation of all samples, or a visible one if there is none."""
     peaks = [0.0]
     for case in study.cases.values():
         time_s = np.linspace(0.0, case.torque.end_s, 401)
         device = case.gripper, case.network, case.torque
-        rotation = simulated_rotation(*device, time_s, nonlinear=False)
+        rotation = simulated_response(*device, time_s, nonlinear=False)
         peaks.append(float(rotation.max()))
     return max(peaks) or _VISIBLE_RAD
 
 
-def _tips(axes: Axes, gripper: Gripper, rotation_rad: float) -> None:
+def _tips(axes: Axes, gripper: Gripper, rotation: float) -> None:
     """Draw the tips at the reference and at the largest rotation, which is enlarged; in um."""
-    times = max(1, round(_VISIBLE_RAD / rotation_rad))
+    times = max(1, round(_VISIBLE_RAD / rotation))
     enlarged = f" (drawn {times} times)" if times > 1 else ""
-    reference, moved = (_joints(gripper, turn, 1e3) for turn in (0.0, times * rotation_rad))
+    reference, moved = (_joints(gripper, turn, 1e3) for turn in (0.0, times * rotation))
     for joints, color, label in (
         (reference, GREY, "reference"),
-        (moved, BLUE, f"closed by {1e3 * rotation_rad:.2g} mrad{enlarged}"),
+        (moved, BLUE, f"closed by {1e3 * rotation:.2g} mrad{enlarged}"),
     ):
         for foot, tip in (("A", "B"), ("D", "C")):
             _line(axes, joints[foot], joints[tip], color, 2)

@@ -62,7 +62,7 @@ def draw_force(case: Case, target: Path) -> Figure:
     name = "target" + (", jaws that let go" if case.unilateral else "")
     rotations.plot(time_s, factor * rotation, color=BLACK, label=name)
     if apart and not case.unilateral:
-        shown = _from_loss(apart, apart.rotation_rad[0])
+        shown = _from_loss(apart, apart.rotation[0])
         rotations.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
     rotations.set_ylabel(f"rotation ({unit})")
     low, high = (factor * float(end) for end in (min(rotation.min(), 0), rotation.max()))

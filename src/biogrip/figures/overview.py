@@ -93,7 +93,7 @@ def draw_overview(
 def _fits(axes: Axes, case: Case, fits: Mapping[str, Fit]) -> None:
     factor, _ = draw_traces(axes, fits)
     fit = next(iter(fits.values()))
-    axes.set_ylim(top=1.65 * factor * fit.measured_rad.max())
+    axes.set_ylim(top=1.65 * factor * fit.measured.max())
     axes.set(xlim=(fit.time_s[0], fit.time_s[-1]), xlabel="time (s)")
     axes.legend(loc="upper right")
     panel(axes, "a", case.title)
@@ -144,7 +144,7 @@ def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list
     panel(device, "1", "two arms squeeze")
     fit = judged_fit(case, found, measurements, calibrated)
     factor, unit = draw_traces(trace, {"fit": fit})
-    trace.set_ylim(top=1.45 * factor * fit.measured_rad.max())
+    trace.set_ylim(top=1.45 * factor * fit.measured.max())
     trace.set(xlabel="time (s)", ylabel=with_unit("rotation", unit))
     handles, _ = trace.get_legend_handles_labels()
     trace.legend(handles[::2], ["trace", "fit"], loc="upper right", ncols=2, columnspacing=1)

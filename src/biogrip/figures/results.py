@@ -12,7 +12,7 @@ from biogrip.errors import BiogripError
 from biogrip.fit.methods import ALL, basins
 from biogrip.fit.problem import CaseProblem
 from biogrip.physics.instruments import ROTATION, Quantity
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import within
 from biogrip.records.identifications import read_histories, read_identifications
 from biogrip.records.traces import Measurements, read_measurements
@@ -29,13 +29,13 @@ class Fit:
 
     time_s: Array
     """Sampling times, (n_samples,)."""
-    target_rad: Array | None
+    target: Array | None
     """Noise-free rotation, (n_samples,); None if the trace was recorded."""
-    measured_rad: Array
+    measured: Array
     """Noisy rotation, (n_samples,)."""
-    fitted_rad: Array
+    fitted: Array
     """Fitted rotation, (n_samples,)."""
-    sd_rad: Array | None = None
+    sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
     read: Quantity = ROTATION
     """What is read."""
@@ -71,14 +71,14 @@ def fit_of(
 ) -> Fit:
     """Return the trace of a seed, and the response of parameters with nuisance terms fitted."""
     network = problem.model.sample(parameters)
-    simulated = simulated_rotation(
+    simulated = simulated_response(
         problem.gripper, network, problem.torque, recorded.time_s, nonlinear=False
     )[0]
-    measured = recorded.rotation_rad[seed]
+    measured = recorded.readings[seed]
     nuisance = problem.nuisance(recorded.time_s)
-    fitted = simulated + within(nuisance, measured - simulated, recorded.sd_rad)
-    target, read = recorded.target_rad, problem.instrument.read
-    return Fit(recorded.time_s, target, measured, fitted, recorded.sd_rad, read)
+    fitted = simulated + within(nuisance, measured - simulated, recorded.sd)
+    target, read = recorded.target, problem.instrument.read
+    return Fit(recorded.time_s, target, measured, fitted, recorded.sd, read)
 
 
 def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
@@ -113,7 +113,7 @@ def scale_of(values: Array, unit: str) -> tuple[float, str]:
 def scale_of_fit(fit: Fit) -> tuple[float, str]:
     """Return factor and unit with a prefix, where the unit of the readings may have one."""
     plain = fit.read.unit.isalpha()
-    return scale_of(fit.fitted_rad, fit.read.unit) if plain else (1.0, fit.read.unit)
+    return scale_of(fit.fitted, fit.read.unit) if plain else (1.0, fit.read.unit)
 
 
 def _holding(seed: int, measurements: list[Path]) -> Path:

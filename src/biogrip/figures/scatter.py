@@ -51,7 +51,7 @@ def draw_scatter(
     time_s, _, rotation = read_target(target)
     log_truth = case_problem.logs(case.parameters)
     _, sensitivity = case_problem.of(time_s, rotation).residuals(log_truth)
-    noise_rad = standard_deviation(rotation, case.noise)
+    noise_sd = standard_deviation(rotation, case.noise)
     quantities = parameters_and_sum(case_problem.searched)
     drawn, grid = row_of_panels(len(quantities), 3.1)
     for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
@@ -61,7 +61,7 @@ def draw_scatter(
             axes.axis("off")
             continue
         ratios = found[[p.column for p in names]].sum(axis=1) / value
-        limit = bound(sensitivity, noise_rad, log_truth, quantity)
+        limit = bound(sensitivity, noise_sd, log_truth, quantity)
         verdict = verdicts[quantity.label]
         # The bound is a tangent at the truth: no use if the quantity is not determined, or if it
         # is zero.

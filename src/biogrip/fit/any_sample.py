@@ -67,7 +67,7 @@ def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:
     return amplitudes / sizes, float(norm**2)
 
 
-def proportional_deviations(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> Array:
+def proportional_deviations(problem: CaseProblem, time_s: Array, readings: Array) -> Array:
     """Compute standard deviations of readings in proportion to the smooth rotation, (n_samples,).
 
     The problem has that share, and the standard deviation of further noise. If it is not known, no
@@ -78,26 +78,26 @@ def proportional_deviations(problem: CaseProblem, time_s: Array, rotation_rad: A
     ----------
     problem
         What the trace was recorded with, and what is known of its noise.
-    time_s, rotation_rad : (n_samples,)
+    time_s, readings : (n_samples,)
         A recorded trace, times ascending.
     """
-    share, noise_rad = problem.noise_share or 0.0, problem.noise_rad
+    share, noise_sd = problem.noise_share or 0.0, problem.noise_sd
     nuisance = problem.nuisance(time_s)
     shortest = _SHORTEST * float(np.diff(time_s).min()) / problem.torque.end_s
     count = 2 + int(_A_DECADE * np.log10(_LONGEST / shortest))
     lags = np.append(np.geomspace(shortest, _LONGEST, count), _LASTING)
     family = extreme_responses(problem, lags.tolist())(time_s)
     functions = np.vstack((family, nuisance, -nuisance))
-    deviations = np.full(len(time_s), share * np.max(np.abs(rotation_rad)))
+    deviations = np.full(len(time_s), share * np.max(np.abs(readings)))
     for _ in range(_ROUNDS):
-        amplitudes, _ = fit_responses(rotation_rad / deviations, functions / deviations)
-        smooth, rest = amplitudes[: len(family)] @ family, rotation_rad - amplitudes @ functions
+        amplitudes, _ = fit_responses(readings / deviations, functions / deviations)
+        smooth, rest = amplitudes[: len(family)] @ family, readings - amplitudes @ functions
         deviations = share * np.abs(smooth)
-        if noise_rad is not None:
-            deviations = np.hypot(deviations, noise_rad)
+        if noise_sd is not None:
+            deviations = np.hypot(deviations, noise_sd)
         else:
             deviations = np.maximum(deviations, _least(np.abs(smooth), rest, share))
-    return np.maximum(deviations, _ROUNDING * float(np.max(np.abs(rotation_rad))))
+    return np.maximum(deviations, _ROUNDING * float(np.max(np.abs(readings))))
 
 
 def _least(sizes: Array, rest: Array, share: float) -> float:

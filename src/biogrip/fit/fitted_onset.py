@@ -44,13 +44,13 @@ _NEAR, _ACCURATE = 2, 1e-3
 _ROUNDING = 1e-14
 
 
-def estimate_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> float:
+def estimate_onset(problem: CaseProblem, time_s: Array, readings: Array) -> float:
     """Estimate from when a trace follows the torque, without a sample model, in s of its clock.
 
     The trace is (n_samples,), times ascending. One that begins constant may have an offset.
     """
     torque, last = problem.torque, len(time_s) - 1
-    offset = problem.offset or begins_constant(time_s, rotation_rad)
+    offset = problem.offset or begins_constant(time_s, readings)
     shortest = float(np.min(np.diff(time_s)))
     decades = np.log10(_LONGEST * torque.end_s / shortest)
     shares = np.geomspace(shortest / torque.end_s, _LONGEST, 2 + int(_A_DECADE * decades))
@@ -59,7 +59,7 @@ def estimate_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> 
     def square_sum(onset_s: float, some: IntArray) -> float:
         nuisance = nuisance_basis(time_s[some], offset=offset, drift=problem.drift)
         own = without(nuisance, responses(time_s[some] - onset_s))
-        return fit_responses(without(nuisance, rotation_rad[some]), own)[1]
+        return fit_responses(without(nuisance, readings[some]), own)[1]
 
     low, high = time_s[0], max(time_s[0], time_s[-1] - _LEAST_AFTER * torque.end_s)
     while True:
@@ -73,16 +73,16 @@ def estimate_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> 
             return float(onsets[best])
 
 
-def begins_constant(time_s: Array, rotation_rad: Array, onset_s: float | None = None) -> bool:
+def begins_constant(time_s: Array, readings: Array, onset_s: float | None = None) -> bool:
     """Return True if the readings before an onset are constant within the noise of the trace.
 
     Without an onset, the first few readings are looked at. The last one before it may be on a ramp.
     """
-    before = rotation_rad[:_FEWEST_BEFORE]
+    before = readings[:_FEWEST_BEFORE]
     if onset_s is not None:
-        before = rotation_rad[time_s < onset_s][:-1]
-    noise_rad, peak_rad = estimate_noise(rotation_rad), float(np.ptp(rotation_rad))
-    size = max(_CONSTANT * noise_rad, _CONSTANT_OF_PEAK * peak_rad)
+        before = readings[time_s < onset_s][:-1]
+    noise_sd, peak = estimate_noise(readings), float(np.ptp(readings))
+    size = max(_CONSTANT * noise_sd, _CONSTANT_OF_PEAK * peak)
     return len(before) >= _FEWEST_BEFORE and bool(np.std(before) < size)
 
 
@@ -94,7 +94,7 @@ class OnsetFit:
     """The onset, on the trace's clock."""
     log_parameters: Array
     """Sample parameters, (n_parameters,)."""
-    misfit_rad: float
+    misfit: float
     """RMS misfit."""
 
 
@@ -104,8 +104,8 @@ def spacing_at(time_s: Array, at_s: float) -> float:
     return float(time_s[after] - time_s[after - 1])
 
 
-def _misfit_rad(fit: OnsetFit) -> float:
-    return fit.misfit_rad
+def _misfit(fit: OnsetFit) -> float:
+    return fit.misfit
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class OnsetFits:
     """Assumptions of the identification."""
     time_s: Array
     """Times, ascending on any clock, (n_samples,)."""
-    rotation_rad: Array
+    readings: Array
     """The trace, (n_samples,)."""
 
     @cached_property
@@ -125,18 +125,18 @@ class OnsetFits:
 
     def posed(self, onset_s: float) -> Problem:
         """Return the problem for an onset."""
-        return self._identified.of(self.time_s - onset_s, self.rotation_rad)
+        return self._identified.of(self.time_s - onset_s, self.readings)
 
     def at(self, onset_s: float, near: Array) -> OnsetFit:
         """Fit the sample for an onset by a local fit from log-parameters, (n_parameters,)."""
         fit = fit_from([self.posed(onset_s)], near)
-        return OnsetFit(onset_s, fit.x[0], float(fit.misfit_rad[0]))
+        return OnsetFit(onset_s, fit.x[0], float(fit.misfit[0]))
 
     def best(self, guess_s: float) -> OnsetFit:
         """Fit the onset along, beginning with a guess in s."""
         rngs = [np.random.default_rng(0)]
         (found,) = identify_many([self.posed(guess_s)], _BUDGET, rngs, silent)
-        start = OnsetFit(guess_s, np.log(found.parameters), found.misfit_rad)
+        start = OnsetFit(guess_s, np.log(found.parameters), found.misfit)
         return self.near(start, _FIRST_STEP)
 
     def near(self, best: OnsetFit, first_step: float = 1.0) -> OnsetFit:
@@ -152,21 +152,21 @@ class OnsetFits:
             if step_s < _LAST_STEP * min(interval_s, spacing_at(self.time_s, best.onset_s)):
                 break
             sides = (self.at(best.onset_s + s, best.log_parameters) for s in (-step_s, step_s))
-            lower = min(sides, key=_misfit_rad)
-            if lower.misfit_rad < best.misfit_rad:
+            lower = min(sides, key=_misfit)
+            if lower.misfit < best.misfit:
                 best = lower
             else:
                 step_s /= 2
         tried = [best]
 
-        def misfit_rad(onset_s: float) -> float:
+        def misfit(onset_s: float) -> float:
             tried.append(self.at(float(onset_s), best.log_parameters))
-            return tried[-1].misfit_rad
+            return tried[-1].misfit
 
         for low, high in self._smooth_intervals(best.onset_s):
             accurate = {"xatol": _ACCURATE * (high - low)}
-            minimize_scalar(misfit_rad, bounds=(low, high), method="bounded", options=accurate)
-        return min(tried, key=_misfit_rad)
+            minimize_scalar(misfit, bounds=(low, high), method="bounded", options=accurate)
+        return min(tried, key=_misfit)
 
     def _smooth_intervals(self, onset_s: float) -> Iterator[tuple[float, float]]:
         """Yield intervals of onsets around one, within which no reading passes a change of torque.

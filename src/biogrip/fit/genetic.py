@@ -173,10 +173,10 @@ def evolve(
 
 
 def _identification(course: list[Row], has_stalled: bool) -> Identification:
-    parameters, misfit_rad, _, evaluations = course[-1]
+    parameters, misfit, _, evaluations = course[-1]
     why = "stalled" if has_stalled else "generation limit"
     history = History.of(course)
-    return Identification(parameters, misfit_rad, len(course) - 1, evaluations, why, history)
+    return Identification(parameters, misfit, len(course) - 1, evaluations, why, history)
 
 
 def select(

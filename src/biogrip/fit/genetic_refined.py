@@ -52,7 +52,7 @@ def _survivors(evolution: Evolution, chosen: Polishing) -> tuple[Array, Row]:
     last, first = evolution.last_survivors, evolution.first_survivors
     starts = np.concatenate((last[: chosen.last], first[: chosen.first]))
     median = float(coarse.history.median_misfit[-1])
-    before = coarse.parameters, coarse.misfit_rad, median, coarse.evaluations
+    before = coarse.parameters, coarse.misfit, median, coarse.evaluations
     return np.log(starts), before
 
 

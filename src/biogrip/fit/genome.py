@@ -200,7 +200,7 @@ _AT_ONCE = 3
 
 
 def lowest_encodable(misfit: Misfit, ranges: Sequence[GeneRange], starts: Array) -> float:
-    """Return the lowest misfit in rad of all encodable points around some starts.
+    """Return the lowest misfit of all encodable points around some starts.
 
     Around each start's nearest encodable point all neighbours are computed, the last digit or the
     one before it up or down by one in up to three parameters, and then around the best of them,

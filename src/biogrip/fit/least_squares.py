@@ -120,9 +120,9 @@ def _best_of_alike(
         rows = _descents(rough[trace == own], first_row)
         # Newton's steps are not counted: the last bits of a processor decide their number.
         finished = fine.evaluations[trace_of_fine == own].sum()
-        misfit_rad, evaluations = float(best.misfit_rad[own]), rows[-1][3] + int(finished)
-        rows[-1] = np.exp(best.x[own]), misfit_rad, misfit_rad, evaluations
-        progress(evaluations, misfit_rad)
+        misfit, evaluations = float(best.misfit[own]), rows[-1][3] + int(finished)
+        rows[-1] = np.exp(best.x[own]), misfit, misfit, evaluations
+        progress(evaluations, misfit)
         answers.append(_answer_of(rows, converged=bool(best.converged[own])))
     return answers
 
@@ -142,31 +142,29 @@ def _finished(
 def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
     """Return the indices of the best fits among those that `which` marks."""
     chosen = np.flatnonzero(which)
-    order = np.argsort(found.misfit_rad[chosen].astype(np.float32), kind="stable")
+    order = np.argsort(found.misfit[chosen].astype(np.float32), kind="stable")
     best: IntArray = chosen[order[:count]]
     return best
 
 
 def _descents(found: Minima, before: Row) -> list[Row]:
     """Return the rows of a history: the given first one, and one for each fit."""
-    rows, evaluations, best, sorted_rad = [before], before[3], 0, list[float]()
-    ranks = found.misfit_rad.astype(np.float32)
-    for fit, misfit_rad in enumerate(found.misfit_rad.tolist()):
+    rows, evaluations, best, ordered = [before], before[3], 0, list[float]()
+    ranks = found.misfit.astype(np.float32)
+    for fit, misfit in enumerate(found.misfit.tolist()):
         evaluations += int(found.evaluations[fit])
         best = fit if ranks[fit] < ranks[best] else best
-        insort(sorted_rad, misfit_rad)
-        median = 0.5 * (sorted_rad[fit // 2] + sorted_rad[(fit + 1) // 2])
-        rows.append((np.exp(found.x[best]), float(found.misfit_rad[best]), median, evaluations))
+        insort(ordered, misfit)
+        median = 0.5 * (ordered[fit // 2] + ordered[(fit + 1) // 2])
+        rows.append((np.exp(found.x[best]), float(found.misfit[best]), median, evaluations))
     return rows
 
 
 def _answer_of(rows: list[Row], *, converged: bool) -> Identification:
     """Return an identification with a history, whose last row is its result."""
-    parameters, misfit_rad, _, evaluations = rows[-1]
+    parameters, misfit, _, evaluations = rows[-1]
     steps, why = len(rows) - 1, "all starts fitted"
-    return Identification(
-        parameters, misfit_rad, steps, evaluations, why, History.of(rows), converged
-    )
+    return Identification(parameters, misfit, steps, evaluations, why, History.of(rows), converged)
 
 
 def identify_from(problem: Problem, start: Array) -> Identification:
@@ -234,7 +232,7 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     closer = minimize(convex, found.x, low, high, _CLOSE, None, _DAMPING, _MOST_STEPS)
     evaluations = closer.evaluations * (1 + 2 * found.x.shape[1])
     here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
-    rounding = _rounding(fits, here.misfit_rad, trace)
+    rounding = _rounding(fits, here.misfit, trace)
     state = _State(fits, trace, rounding, found.x.copy(), here)
     state.move(moving, closer.x)
     left, damping = np.full(len(moving), np.inf), np.zeros(len(moving))
@@ -264,7 +262,7 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
         moving = moving[kept | ~converged[moving]]
     order = fits.problems[0].residuals.model.in_order(np.exp(state.x))
     x = np.take_along_axis(state.x, order, axis=1)
-    return Minima(x, state.here.misfit_rad, evaluations, left <= np.maximum(_UNTOLD, rounding))
+    return Minima(x, state.here.misfit, evaluations, left <= np.maximum(_UNTOLD, rounding))
 
 
 def _on_grid(x: Array, step: Array) -> Array:
@@ -294,13 +292,13 @@ class _State:
         return kept
 
 
-def _rounding(fits: LocalFits, misfit_rad: Array, trace: IntArray) -> Array:
+def _rounding(fits: LocalFits, misfit: Array, trace: IntArray) -> Array:
     """Estimate the rounding errors of sums of squares, (n,)."""
     residuals = [fits.problems[own].residuals for own in trace.tolist()]
     samples = np.array([each.samples for each in residuals])
-    noise_rad = np.array([each.noise_scale_rad for each in residuals])
-    more_rad = _ROUNDING * np.array([each.peak_rad for each in residuals])
-    found: Array = samples * more_rad * (2 * misfit_rad + more_rad) / noise_rad**2
+    noise_sd = np.array([each.noise_scale for each in residuals])
+    more = _ROUNDING * np.array([each.peak for each in residuals])
+    found: Array = samples * more * (2 * misfit + more) / noise_sd**2
     return found
 
 

@@ -71,7 +71,7 @@ class Normal(Rows):
     information: Array
     """Half its Hessian, in the Gauss-Newton approximation unless noted otherwise, (n, n_parameters,
     n_parameters)."""
-    misfit_rad: Array
+    misfit: Array
     """RMS misfit to the trace, (n,)."""
 
 
@@ -101,7 +101,7 @@ class Minima(Rows):
 
     x: Array
     """Final points, (n, n_parameters)."""
-    misfit_rad: Array
+    misfit: Array
     """RMS misfits there, (n,)."""
     evaluations: IntArray
     """Number of linearisations of each problem, (n,)."""
@@ -267,7 +267,7 @@ def _damp(state: _State, gained: Array, predicted: Array) -> None:
 
 def _leave(state: _State, minima: Minima) -> None:
     minima.x[state.problem] = state.x
-    minima.misfit_rad[state.problem] = state.normal.misfit_rad
+    minima.misfit[state.problem] = state.normal.misfit
 
 
 def _either(which: BoolArray, one: Normal, other: Normal) -> Normal:

@@ -60,7 +60,7 @@ class LocalFits:
         self.high = np.stack([problem.high for problem in problems])
         self._residuals = problems[0].residuals
         self._traces = np.stack([problem.residuals.condensed_trace for problem in problems])
-        self._noise_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
+        self._noise_sd = np.array([problem.residuals.noise_scale for problem in problems])
         self._middle = 0.5 * (self.low + self.high)
 
     def normal(self, x: Array, trace: IntArray) -> Normal:
@@ -100,21 +100,21 @@ class LocalFits:
         # One product per fit: the order of its sums does not depend on the number of fits.
         second = ((ahead - behind) @ residual[:, :, None])[:, :, 0] / (2 * _APART)
         second = second.reshape(count, parameters, parameters)
-        second /= (self._noise_rad[trace] ** 2)[:, None, None]
+        second /= (self._noise_sd[trace] ** 2)[:, None, None]
         return 0.5 * (second + second.swapaxes(1, 2))
 
     def on_all_samples(self, x: Array, trace: IntArray) -> Normal:
         """Return sums of squares and gradients from all readings, without the information."""
         traces = [self.problems[own].residuals for own in trace.tolist()]
-        gradients, misfit_rad = self._residuals.gradients(x, traces)
-        noise_rad = self._noise_rad[trace]
+        gradients, misfit = self._residuals.gradients(x, traces)
+        noise_sd = self._noise_sd[trace]
         away = (x - self._middle[trace]) / PRIOR_WIDTH
-        square_sum = self._residuals.samples * (misfit_rad / noise_rad) ** 2
+        square_sum = self._residuals.samples * (misfit / noise_sd) ** 2
         return Normal(
-            np.where(np.isnan(misfit_rad), np.inf, square_sum + np.sum(away**2, axis=1)),
-            gradients / noise_rad[:, None] ** 2 + away / PRIOR_WIDTH,
+            np.where(np.isnan(misfit), np.inf, square_sum + np.sum(away**2, axis=1)),
+            gradients / noise_sd[:, None] ** 2 + away / PRIOR_WIDTH,
             np.empty((*x.shape, 0)),
-            misfit_rad,
+            misfit,
         )
 
     def _normal_of(self, rows: Array, x: Array, trace: IntArray) -> Normal:
@@ -123,8 +123,8 @@ class LocalFits:
         rows[~answered] = 0.0
         rows[:, 0] -= self._traces[trace]
         products = rows @ rows.swapaxes(1, 2)
-        misfit_rad = np.sqrt(products[:, 0, 0] / self._residuals.samples)
-        products /= (self._noise_rad[trace] ** 2)[:, None, None]
+        misfit = np.sqrt(products[:, 0, 0] / self._residuals.samples)
+        products /= (self._noise_sd[trace] ** 2)[:, None, None]
         away = (x - self._middle[trace]) / PRIOR_WIDTH
         diagonal = np.arange(1, 1 + x.shape[1])
         products[:, diagonal, diagonal] += 1 / PRIOR_WIDTH**2
@@ -133,7 +133,7 @@ class LocalFits:
             np.where(answered, square_sum, np.inf),
             products[:, 0, 1:] + away / PRIOR_WIDTH,
             products[:, 1:, 1:],
-            np.where(answered, misfit_rad, np.inf),
+            np.where(answered, misfit, np.inf),
         )
 
     def fitted(

@@ -132,8 +132,8 @@ def _add_branches(name: str, problems: Sequence[Problem], found: dict[str, Answe
         traces = [trace for trace, _ in pairs]
         starts = np.array([x for _, x in pairs])
         ends = fit_from([problems[t] for t in traces], starts, roughly=True)
-        for trace, x, misfit_rad in zip(traces, ends.x, ends.misfit_rad.tolist(), strict=True):
-            if _is_noticeably_lower(misfit_rad, found[name][trace].misfit_rad, problems[trace]):
+        for trace, x, misfit in zip(traces, ends.x, ends.misfit.tolist(), strict=True):
+            if _is_noticeably_lower(misfit, found[name][trace].misfit, problems[trace]):
                 found[name][trace] = _better_from(found[name][trace], problems[trace], x)
 
 
@@ -184,7 +184,7 @@ def _take_simpler(problems: Mapping[str, Sequence[Problem]], found: dict[str, An
         parameters = as_richer(name, inner, simpler.parameters)
         reached = simpler.converged and not is_within(parameters, problems[name][trace])
         found[name][trace] = found[name][trace].replaced(
-            parameters, simpler.misfit_rad, converged=reached
+            parameters, simpler.misfit, converged=reached
         )
 
 
@@ -194,25 +194,25 @@ def _worse(found: Mapping[str, Answers]) -> Iterator[tuple[str, str, int]]:
         for inner in contained_in(name, found):
             pairs = zip(found[name], found[inner], strict=True)
             for trace, (answer, simpler) in enumerate(pairs):
-                if _digits(simpler.misfit_rad) < _digits(answer.misfit_rad):
+                if _digits(simpler.misfit) < _digits(answer.misfit):
                     yield name, inner, trace
 
 
-def _is_noticeably_lower(misfit_rad: float, than_rad: float, problem: Problem) -> bool:
+def _is_noticeably_lower(misfit: float, than: float, problem: Problem) -> bool:
     """Return True if a misfit is lower by what the data could tell: see `_NOTICEABLE`."""
-    gain = problem.residuals.samples * (than_rad**2 - misfit_rad**2)
-    return gain > _NOTICEABLE * misfit_rad**2
+    gain = problem.residuals.samples * (than**2 - misfit**2)
+    return gain > _NOTICEABLE * misfit**2
 
 
 def _better_from(answer: Identification, problem: Problem, start: Array) -> Identification:
     """Return the fit from a start if its misfit is lower, or else the answer itself."""
     again = answer.at(fit_from([problem], start))
-    return again if _digits(again.misfit_rad) < _digits(answer.misfit_rad) else answer
+    return again if _digits(again.misfit) < _digits(answer.misfit) else answer
 
 
-def _digits(misfit_rad: float) -> float:
+def _digits(misfit: float) -> float:
     """Round a misfit to nine digits, below which processors differ."""
-    return float(f"{misfit_rad:.8e}")
+    return float(f"{misfit:.8e}")
 
 
 def within_range(parameters: Array, problem: Problem) -> Array:
@@ -250,7 +250,7 @@ class FittedModel:
 
 
 def aic_and_bic(
-    misfit_rad: ArrayLike, samples: ArrayLike, parameters: ArrayLike
+    misfit: ArrayLike, samples: ArrayLike, parameters: ArrayLike
 ) -> tuple[Array, Array]:
     """Compute AIC and BIC for Gaussian noise of unknown standard deviation.
 
@@ -258,16 +258,14 @@ def aic_and_bic(
     parameter more; of RMS misfits of best fits, n samples and p parameters, of any one shape.
     """
     counted = np.asarray(parameters) + 1
-    square = np.asarray(samples) * 2 * np.log(misfit_rad)
+    square = np.asarray(samples) * 2 * np.log(misfit)
     return square + 2 * counted, square + counted * np.log(samples)
 
 
-def ranked(
-    candidates: Sequence[str], misfits_rad: Sequence[float], samples: int
-) -> list[FittedModel]:
+def ranked(candidates: Sequence[str], misfits: Sequence[float], samples: int) -> list[FittedModel]:
     """Compare the best fits of several models to one trace by AIC and BIC, keeping their order."""
     counts = [len(CANDIDATES[name].model.names) for name in candidates]
-    criteria = aic_and_bic(misfits_rad, samples, counts)
+    criteria = aic_and_bic(misfits, samples, counts)
     aic, bic = (values - values.min() for values in criteria)
     return [
         FittedModel(name, float(a), float(b))

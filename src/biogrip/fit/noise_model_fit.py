@@ -46,7 +46,7 @@ GAUSSIAN = 0.6744897501960817
 _AROUND = 11
 
 
-def outliers_of(residual: Array, rounding_rad: float = 0.0) -> BoolArray:
+def outliers_of(residual: Array, rounding: float = 0.0) -> BoolArray:
     """Find outliers among residuals by a Hampel filter [5]_, (n_samples,).
 
     They are further than `FAR` from the median of the eleven residuals around, in standard
@@ -58,7 +58,7 @@ def outliers_of(residual: Array, rounding_rad: float = 0.0) -> BoolArray:
     others = apart[apart > 0]
     if not len(others):
         return np.zeros(len(residual), dtype=bool)
-    scale = max(float(np.median(others)) / GAUSSIAN, rounding_rad / ROOT_12)
+    scale = max(float(np.median(others)) / GAUSSIAN, rounding / ROOT_12)
     found: BoolArray = apart > FAR * scale
     return found
 
@@ -77,7 +77,7 @@ _FALSE_ALARM = 0.003
 _TAILS, _GROWTH_LEAST, _GROWTH_MOST = 4.0, -9.0, 20.0
 
 
-def compute_growth(residual: Array, rotation_rad: Array, rounding_rad: float = 0.0) -> Array:
+def compute_growth(residual: Array, readings: Array, rounding: float = 0.0) -> Array:
     """Compute how the noise grows with the rotation of a fit, (n_samples,), from its residuals.
 
     Returns its standard deviation over its root mean square; ones if it does not grow. Distances
@@ -86,8 +86,8 @@ def compute_growth(residual: Array, rotation_rad: Array, rounding_rad: float = 0
     """
     from scipy.optimize import minimize_scalar
 
-    apart = np.maximum(measure_distances(residual), 1.5 * rounding_rad)
-    size = np.abs(rotation_rad)
+    apart = np.maximum(measure_distances(residual), 1.5 * rounding)
+    size = np.abs(readings)
     if not _grows(apart, size):
         return np.ones(len(residual))
     found = minimize_scalar(

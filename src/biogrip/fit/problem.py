@@ -28,14 +28,14 @@ from biogrip.physics.whitening import (
 )
 
 Progress = Callable[[int, float], None]
-"""Callback that receives the number of simulated responses and the lowest misfit in rad."""
+"""Callback that receives the number of simulated responses and the lowest misfit."""
 
 
 Row = tuple[Array, float, float, int]
 """Row of a history: best parameters so far, lowest and median misfit, evaluations so far."""
 
 
-def silent(evaluations: int, misfit_rad: float) -> None:
+def silent(evaluations: int, misfit: float) -> None:
     """Ignore a report of progress."""
 
 
@@ -44,7 +44,7 @@ class History:
     """Course of an identification, step by step; the method defines what a step is."""
 
     best_misfit: Array
-    """Lowest misfit so far in rad, (n_steps + 1,)."""
+    """Lowest misfit so far in the unit of the readings, (n_steps + 1,)."""
     median_misfit: Array
     """Median over the method's population or fits, (n_steps + 1,)."""
     best_parameters: Array
@@ -65,7 +65,7 @@ class Identification:
 
     parameters: Array
     """Parameters of lowest misfit, (n_parameters,)."""
-    misfit_rad: float
+    misfit: float
     """RMS misfit of these parameters."""
     generations: int
     """Number of steps: generations, or local fits."""
@@ -81,20 +81,18 @@ class Identification:
 
     def at(self, fit: Minima) -> "Identification":
         """Return a copy with the optimum of a local fit of this trace alone."""
-        misfit_rad, converged = float(fit.misfit_rad[0]), bool(fit.converged[0])
-        return self.replaced(np.exp(fit.x[0]), misfit_rad, converged=converged)
+        misfit, converged = float(fit.misfit[0]), bool(fit.converged[0])
+        return self.replaced(np.exp(fit.x[0]), misfit, converged=converged)
 
-    def replaced(
-        self, parameters: Array, misfit_rad: float, *, converged: bool
-    ) -> "Identification":
+    def replaced(self, parameters: Array, misfit: float, *, converged: bool) -> "Identification":
         """Return a copy with other parameters and misfit, in its last row of history as well."""
         history = self.history
         best_misfit, best_parameters = history.best_misfit.copy(), history.best_parameters.copy()
-        best_misfit[-1], best_parameters[-1] = misfit_rad, parameters
+        best_misfit[-1], best_parameters[-1] = misfit, parameters
         return replace(
             self,
             parameters=parameters,
-            misfit_rad=misfit_rad,
+            misfit=misfit,
             converged=converged,
             history=replace(history, best_misfit=best_misfit, best_parameters=best_parameters),
         )
@@ -165,11 +163,11 @@ class CaseProblem:
     """True if the instrument may have added a constant."""
     drift: bool = False
     """True if it may have added a drift linear in time."""
-    noise_rad: float | None = None
+    noise_sd: float | None = None
     """Standard deviation of the noise, if it is known."""
     noise_share: float | None = None
     """Standard deviation of the noise as a share of the rotation; read by `read_checked`."""
-    sd_rad: Array | None = field(default=None, compare=False)
+    sd: Array | None = field(default=None, compare=False)
     """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
     coloured: bool = False
     """True if the noise of a trace may be autocorrelated, see `fit_traces`."""
@@ -200,14 +198,14 @@ class CaseProblem:
         ranges = {name: genes for name, genes in self.ranges.items() if name in chosen}
         return replace(self, ranges=ranges, coloured=False, uncertainty={})
 
-    def weighted(self, sd_rad: Array | None) -> "CaseProblem":
+    def weighted(self, sd: Array | None) -> "CaseProblem":
         """Divide the readings of a trace by their standard deviations, if these are known.
 
         The noise becomes white, with their root mean square as its standard deviation.
         """
-        if sd_rad is None:
+        if sd is None:
             return self
-        return replace(self, sd_rad=sd_rad, noise_rad=float(np.sqrt(np.mean(sd_rad**2))))
+        return replace(self, sd=sd, noise_sd=float(np.sqrt(np.mean(sd**2))))
 
     @property
     def unknowns(self) -> int:
@@ -242,23 +240,23 @@ class CaseProblem:
     def of(
         self,
         time_s: Array,
-        rotation_rad: Array,
+        readings: Array,
         model: SampleModel | None = None,
-        noise_rad: float | None = None,
+        noise_sd: float | None = None,
         condensed: Condensed | None = None,
     ) -> Problem:
         """Pose the problem of a trace, (n_samples,), times ascending.
 
-        `model`, `noise_rad`, and `condensed` from `in_noise` replace those of the case.
+        `model`, `noise_sd`, and `condensed` from `in_noise` replace those of the case.
         """
         rows = condensed or self._condensed(time_s)
-        trace = Trace(time_s, rotation_rad, rows, noise_rad or self.noise_rad)
+        trace = Trace(time_s, readings, rows, noise_sd or self.noise_sd)
         given = self.gripper, model or self.searched, self.torque, trace
         return make_problem(Residuals(*given, instrument=self.instrument), self.ranges)
 
     def _condensed(self, time_s: Array) -> Condensed:
-        """Return rows for times, weighted if `sd_rad` is known; those in use, if there are any."""
-        sd = None if self.sd_rad is None else self.sd_rad.tobytes()
+        """Return rows for times, weighted if `sd` is known; those in use, if there are any."""
+        sd = None if self.sd is None else self.sd.tobytes()
         held = self.phases, self.instrument, self.offset, self.drift
         key = *held, sd, time_s.tobytes()
         if (rows := _IN_USE.get(key)) is None:
@@ -289,8 +287,8 @@ class CaseProblem:
         and (n_samples,).
         """
         nuisance, whitening = self.nuisance(time_s), None
-        if noise_model is None and self.sd_rad is not None:
-            noise_model, growing = WEIGHTED, self.sd_rad
+        if noise_model is None and self.sd is not None:
+            noise_model, growing = WEIGHTED, self.sd
         if noise_model is not None:
             whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
         basis = with_uncertain(nuisance, uncertain)

@@ -16,7 +16,7 @@ from biogrip.errors import BiogripError
 from biogrip.fit.least_squares import fit_from
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
 from biogrip.fit.problem import CaseProblem, Identification, Problem
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, drift_is_flow
 
 # Square of three standard uncertainties.
@@ -32,7 +32,7 @@ def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Arra
     and has the amplitude of an error of three standard uncertainties. Without it limits would be
     too narrow where the noise is far below the square.
 
-    Rows are changes in rad at ascending times, (2 n_properties, n_times), those of first order of
+    Rows are changes at ascending times, (2 n_properties, n_times), those of first order of
     each uncertain property, then those of second.
 
     References
@@ -52,7 +52,7 @@ def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Arra
             arm = getattr(gripper, part)
             arm = replace(arm, **{key: getattr(arm, key) + error})
             gripper = replace(gripper, **{part: arm})
-        return simulated_rotation(gripper, network, torque, time_s, nonlinear=False)[0]
+        return simulated_response(gripper, network, torque, time_s, nonlinear=False)[0]
 
     if not case_problem.uncertain:
         return np.zeros((0, len(time_s)))
@@ -159,11 +159,11 @@ def fit_traces(
 
 
 def _fit_in_noise(
-    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
+    case_problem: CaseProblem, time_s: Array, readings: Array, find: Find
 ) -> TraceFit:
     kept = np.ones(len(time_s), dtype=bool)
     if not case_problem.coloured:
-        plain = case_problem.of(time_s, rotation_rad)
+        plain = case_problem.of(time_s, readings)
         found = find(plain)
     else:
         if len(time_s) > MOST_SAMPLES:
@@ -171,12 +171,12 @@ def _fit_in_noise(
                 f"found {len(time_s)} samples, allowed are at most {MOST_SAMPLES} with a coloured "
                 "noise model: average neighbouring samples."
             )
-        kept, plain, found = _without_outliers(case_problem, time_s, rotation_rad, find)
-    time_s, rotation_rad = time_s[kept], rotation_rad[kept]
-    problem, found, noise_model = _in_turn(case_problem, time_s, rotation_rad, plain, found)
+        kept, plain, found = _without_outliers(case_problem, time_s, readings, find)
+    time_s, readings = time_s[kept], readings[kept]
+    problem, found, noise_model = _in_turn(case_problem, time_s, readings, plain, found)
     # Slow deviations now weigh less, so that another basin may be the deepest.
     other = find(problem)
-    if np.float32(other.misfit_rad) < np.float32(found.misfit_rad):
+    if np.float32(other.misfit) < np.float32(found.misfit):
         found = other
     return TraceFit(problem, found, noise_model, ~kept, _fitted_along(case_problem, time_s))
 
@@ -193,26 +193,26 @@ def _fitted_along(case_problem: CaseProblem, time_s: Array) -> str:
 
 
 def _without_outliers(
-    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
+    case_problem: CaseProblem, time_s: Array, readings: Array, find: Find
 ) -> tuple[BoolArray, Problem, Identification]:
     kept = np.ones(len(time_s), dtype=bool)
     for _ in range(_ROUNDS):
-        plain = case_problem.of(time_s[kept], rotation_rad[kept])
+        plain = case_problem.of(time_s[kept], readings[kept])
         found = find(plain)
         residual = plain.residuals.left(logs := np.log(found.parameters))
-        step_rad = plain.residuals.rounding_rad
-        growth = compute_growth(residual, plain.residuals.rotation(logs), step_rad)
-        struck = outliers_of(residual / growth, step_rad)
+        step = plain.residuals.rounding
+        growth = compute_growth(residual, plain.residuals.response(logs), step)
+        struck = outliers_of(residual / growth, step)
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
-    return kept, case_problem.of(time_s[kept], rotation_rad[kept]), found
+    return kept, case_problem.of(time_s[kept], readings[kept]), found
 
 
 def _in_turn(
     case_problem: CaseProblem,
     time_s: Array,
-    rotation_rad: Array,
+    readings: Array,
     plain: Problem,
     found: Identification,
 ) -> tuple[Problem, Identification, NoiseModel | None]:
@@ -220,32 +220,32 @@ def _in_turn(
     problem, noise_model = plain, None
     logs = np.log(found.parameters)
     residuals = plain.residuals
-    growth = compute_growth(residuals.left(logs), residuals.rotation(logs), residuals.rounding_rad)
+    growth = compute_growth(residuals.left(logs), residuals.response(logs), residuals.rounding)
     grows = case_problem.coloured and np.ptp(growth) > 0
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)
         uncertain = gripper_functions(case_problem, time_s, found.parameters)
         left = problem.residuals.free - len(found.parameters)
-        noise_rad = case_problem.noise_rad or found.misfit_rad * np.sqrt(len(time_s) / left)
+        noise_sd = case_problem.noise_sd or found.misfit * np.sqrt(len(time_s) / left)
         before: NoiseModel | None = noise_model
-        growing = plain.residuals.rotation(start) if grows else None
+        growing = plain.residuals.response(start) if grows else None
         if case_problem.coloured:
             nuisance = case_problem.nuisance(time_s)
             directions = np.vstack((sensitivity, nuisance, uncertain))
             likelihood = NoiseModelLikelihood(time_s, residual, directions, growing)
             noise_model = likelihood.best(near=before)
         condensed = case_problem.in_noise(
-            time_s, noise_model, uncertain / noise_rad, growing=growing
+            time_s, noise_model, uncertain / noise_sd, growing=growing
         )
-        problem = case_problem.of(time_s, rotation_rad, condensed=condensed)
+        problem = case_problem.of(time_s, readings, condensed=condensed)
         found = found.at(fit := fit_from([problem], start))
         slopes = problem.residuals.condensed_responses(fit.x)[0, 1:]
-        moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_rad
+        moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_sd
         if moved < _STAYED and _alike(before, noise_model):
             break
     if noise_model is not None:
-        freedom = likelihood.freedom(noise_model, sensitivity / noise_rad, nuisance)
+        freedom = likelihood.freedom(noise_model, sensitivity / noise_sd, nuisance)
         problem = replace(problem, residuals=problem.residuals.with_freedom(freedom))
     return problem, found, noise_model
 

@@ -41,7 +41,7 @@ from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
 from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.keys import plain
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import within
 from biogrip.processes import worker_processes
 from biogrip.records.identifications import exact_data
@@ -202,7 +202,7 @@ def identify_alike(
         first.problem.searched,
         [fit.found for fit in fits],
         confidence=first.case.confidence,
-        noise_rad=[own.problem.noise_rad for own in traces],
+        noise_sd=[own.problem.noise_sd for own in traces],
     )
     progress.done()
     progress.doing("trying other sample models")
@@ -305,12 +305,12 @@ def _fitted_along(
     found = {"onset_s": float(recorded.onset_s or 0.0)} if problem.fit_start else {}
     if not (problem.offset or problem.drift):
         return found
-    time_s, measured = recorded.time_s, recorded.rotation_rad[0]
+    time_s, measured = recorded.time_s, recorded.readings[0]
     network = problem.searched.network(parameters)
-    simulated = simulated_rotation(
+    simulated = simulated_response(
         problem.gripper, network, problem.torque, time_s, nonlinear=False
     )[0]
-    added = within(problem.nuisance(time_s), measured - simulated, problem.sd_rad)
+    added = within(problem.nuisance(time_s), measured - simulated, problem.sd)
     slope = float((added[-1] - added[0]) / (time_s[-1] - time_s[0]))
     if problem.offset:
         found["offset_rad"] = float(added[0] - slope * time_s[0])

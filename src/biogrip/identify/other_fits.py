@@ -67,9 +67,9 @@ def fits_of(traces: Sequence[TraceCase], progress: Progress) -> list[TraceFit]:
 
 
 def _diagnosed(trace: TraceCase, fit: TraceFit, found: Identification) -> Diagnosis:
-    known = trace.case.confidence, trace.problem.noise_rad
+    known = trace.case.confidence, trace.problem.noise_sd
     searched = trace.problem.searched
-    return diagnose(fit.problem, searched, found, confidence=known[0], noise_rad=known[1])
+    return diagnose(fit.problem, searched, found, confidence=known[0], noise_sd=known[1])
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class FittedModels:
                 "model": each.candidate,
                 "title": each.model.title,
                 "parameters": len(each.model.names),
-                "misfit_rad": self.answers[each.candidate].misfit_rad,
+                "misfit_rad": self.answers[each.candidate].misfit,
                 "vanished": _vanished(each.candidate, self.answers[each.candidate]),
                 "converged": self.answers[each.candidate].converged,
                 "delta_aic": each.delta_aic,
@@ -167,11 +167,11 @@ def _misfits(
 
     Noise that grows by a rejected fit is its misfit.
     """
-    misfits = [answer.misfit_rad for answer in answers.values()]
+    misfits = [answer.misfit for answer in answers.values()]
     residuals, best = diagnosis.likelihood.problem.residuals, diagnosis.likelihood.best
     if diagnosis.status == REJECTED:
         return misfits
-    growth = compute_growth(residuals.left(best), residuals.rotation(best), residuals.rounding_rad)
+    growth = compute_growth(residuals.left(best), residuals.response(best), residuals.rounding)
     if compare_extremes(growth) <= CLEARLY:
         return misfits
     for place, (name, problem) in enumerate(problems.items()):
@@ -189,9 +189,9 @@ def _at_own_onset(
         return found
     fits = OnsetFits(replace(trace.problem, sample=CANDIDATES[name], fixed={}), *trace.readings)
     best = fits.near(fits.at(0.0, within_range(found.parameters, problem)))
-    if best.misfit_rad >= found.misfit_rad:
+    if best.misfit >= found.misfit:
         return found
-    return found.replaced(np.exp(best.log_parameters), best.misfit_rad, converged=found.converged)
+    return found.replaced(np.exp(best.log_parameters), best.misfit, converged=found.converged)
 
 
 def _candidates(trace: TraceCase, fit: TraceFit) -> tuple[str, ...]:
@@ -219,7 +219,7 @@ def judge_again(
     Return the new diagnosis, or the one so far, and a note if the lower chi^2 is outside the range.
     """
     own = models.answers.get(models.chosen)
-    if own is None or (increase := diagnosis.likelihood.increase(own.misfit_rad)) > -MISSED:
+    if own is None or (increase := diagnosis.likelihood.increase(own.misfit)) > -MISSED:
         return diagnosis, []
     if is_within(own.parameters, fit.problem):
         return _diagnosed(trace, fit, own), []
@@ -294,9 +294,9 @@ def _better(
         problem, likelihood = traces[index].problem, diagnoses[index].likelihood
         fall = compute_fall(
             fit.problem.residuals.samples,
-            likelihood.misfit_rad,
-            fit.found.misfit_rad,
-            likelihood.noise_rad if problem.noise_rad is not None else None,
+            likelihood.misfit,
+            fit.found.misfit,
+            likelihood.noise_sd if problem.noise_sd is not None else None,
         )
         added = own.problem.offset + own.problem.drift - problem.offset - problem.drift
         if (chance := float(chdtrc(added, max(fall, 0.0)))) < FALSE_ALARM:

@@ -62,7 +62,7 @@ class TraceCase:
     @property
     def readings(self) -> tuple[Array, Array]:
         """Times and rotations, (n_samples,) each."""
-        return self.recorded.time_s, self.recorded.rotation_rad[0]
+        return self.recorded.time_s, self.recorded.readings[0]
 
     @property
     def names_models(self) -> bool:
@@ -120,12 +120,12 @@ def read_trace(asked: Asked) -> TraceCase:
 
 
 def _with_ranges(case: Case, trace: Measurements, given: Mapping[str, Any]) -> TraceCase:
-    ranges = ranges_of(case.problem.weighted(trace.sd_rad), trace.time_s, trace.rotation_rad[0])
+    ranges = ranges_of(case.problem.weighted(trace.sd), trace.time_s, trace.readings[0])
     for name in given.get("search_range") or {}:
         ranges.pop(name, None)
     block = replace(case.block, search_range=replace(case.block.search_range, **ranges))
     case = replace(case, block=block)
-    return TraceCase(case, trace, case.problem.weighted(trace.sd_rad), given)
+    return TraceCase(case, trace, case.problem.weighted(trace.sd), given)
 
 
 def _without_likenesses(case: Case, time_s: Array) -> Case:
@@ -141,25 +141,23 @@ def _without_likenesses(case: Case, time_s: Array) -> Case:
     return replace(case, block=replace(case.block, measurement=measured))
 
 
-def ranges_of(
-    case_problem: CaseProblem, time_s: Array, rotation_rad: Array
-) -> dict[str, GeneRange]:
+def ranges_of(case_problem: CaseProblem, time_s: Array, readings: Array) -> dict[str, GeneRange]:
     """Compute search ranges of springs and dampers from the scales of a trace, (n_samples,).
 
     The problem has the noise, if it is known. Ranges are by name, without that of exponents.
     """
-    turned = rotation_rad - np.mean(rotation_rad) if case_problem.offset else rotation_rad
-    noise_rad = case_problem.sd_rad
-    if noise_rad is None:
-        own = case_problem.noise_rad or estimate_noise(rotation_rad)
-        noise_rad = np.full(len(turned), own)
-    turn_rad = float(np.max(np.abs(turned)))
-    ratios = np.linalg.norm([turned / noise_rad, turn_rad / noise_rad], axis=1)
+    turned = readings - np.mean(readings) if case_problem.offset else readings
+    noise_sd = case_problem.sd
+    if noise_sd is None:
+        own = case_problem.noise_sd or estimate_noise(readings)
+        noise_sd = np.full(len(turned), own)
+    largest = float(np.max(np.abs(turned)))
+    ratios = np.linalg.norm([turned / noise_sd, largest / noise_sd], axis=1)
     softer, stiffer = _MARGIN * np.clip(ratios, 1.0, _CLEAREST)
     torque_Nm = abs(largest_load(case_problem.phases))
-    stiffness = torque_Nm / (case_problem.gripper.lever_m**2 * turn_rad)
+    stiffness = torque_Nm / (case_problem.gripper.lever_m**2 * largest)
     if case_problem.instrument.deforms:
-        stiffness = turn_rad / torque_Nm
+        stiffness = largest / torque_Nm
     low, high = stiffness / softer, stiffness * stiffer
     short_s, long_s = float(np.min(np.diff(time_s))), float(np.ptp(time_s))
     dampers = _decades(low * short_s, high * long_s)

@@ -208,18 +208,16 @@ class ConstrainedFits:
         self._optima = np.stack([likelihood.best for likelihood in likelihoods])
         self.best = self._optima[self.trace]
         self.at_best = np.array([q.log(x) for x in self._optima for q in quantities])
-        settings = [
-            (one.threshold, one.certainty, one.misfit_rad, one.noise_rad) for one in likelihoods
-        ]
-        threshold, certainty, self._misfit_rad, self._noise_rad = np.array(settings).T
+        settings = [(one.threshold, one.certainty, one.misfit, one.noise_sd) for one in likelihoods]
+        threshold, certainty, self._misfit, self._noise_sd = np.array(settings).T
         self.threshold = threshold[self.trace]
         self.certainty = np.maximum(certainty, threshold)[self.trace]
         self.missed: dict[int, tuple[float, Array]] = {}
         self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
-        scale_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
+        scale = np.array([problem.residuals.noise_scale for problem in problems])
         # Ratio of chi^2 to the fits' sums of squares.
-        self._ratio = (scale_rad / self._noise_rad) ** 2
+        self._ratio = (scale / self._noise_sd) ** 2
 
     def at(
         self, profile: IntArray, targets: Array, near: Array, tolerance: float
@@ -264,8 +262,8 @@ class ConstrainedFits:
         return self._increases(found, trace), found.x
 
     def _increases(self, found: Minima, trace: IntArray) -> Array:
-        excess = found.misfit_rad**2 - self._misfit_rad[trace] ** 2
-        increases = self._residuals.samples * excess / self._noise_rad[trace] ** 2
+        excess = found.misfit**2 - self._misfit[trace] ** 2
+        increases = self._residuals.samples * excess / self._noise_sd[trace] ** 2
         for index in np.flatnonzero(increases < -MISSED):
             of_trace = int(trace[index])
             if of_trace not in self.missed or increases[index] < self.missed[of_trace][0]:

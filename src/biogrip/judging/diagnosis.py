@@ -72,11 +72,11 @@ def diagnose(
     found: Identification,
     *,
     confidence: float,
-    noise_rad: float | None = None,
+    noise_sd: float | None = None,
 ) -> Diagnosis:
     """Judge the identification of one trace by profile likelihoods, as `diagnose_all` does."""
     (diagnosis,) = diagnose_all(
-        [problem], model, [found], confidence=confidence, noise_rad=[noise_rad]
+        [problem], model, [found], confidence=confidence, noise_sd=[noise_sd]
     )
     return diagnosis
 
@@ -87,7 +87,7 @@ def diagnose_all(
     found: Sequence[Identification],
     *,
     confidence: float,
-    noise_rad: Sequence[float | None],
+    noise_sd: Sequence[float | None],
 ) -> list[Diagnosis]:
     """Judge the identification of each of several traces by profile likelihoods.
 
@@ -101,9 +101,9 @@ def diagnose_all(
             make_likelihood(
                 problems[trace],
                 np.log(best[trace].parameters),
-                best[trace].misfit_rad,
+                best[trace].misfit,
                 confidence=confidence,
-                noise_rad=noise_rad[trace],
+                noise_sd=noise_sd[trace],
             )
             for trace in left
         ]
@@ -141,7 +141,7 @@ def _lower_optimum(judged: Diagnosis, found: Identification) -> Identification |
     if lowest.increases.min() > -MISSED:
         return None
     missed = found.at(fit_from([judged.likelihood.problem], lowest.lowest))
-    return None if judged.likelihood.increase(missed.misfit_rad) > -MISSED else missed
+    return None if judged.likelihood.increase(missed.misfit) > -MISSED else missed
 
 
 def _with_notes(judged: Diagnosis, model: SampleModel, *, converged: bool) -> Diagnosis:
@@ -187,7 +187,7 @@ def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
             start[index] += outward * _BEYOND
             (low if outward < 0 else high)[index] += outward * _WIDER
             wider = fit_from([replace(problem, low=low, high=high)], start, roughly=True)
-            if likelihood.increase(float(wider.misfit_rad[0])) < -_NOTICEABLE:
+            if likelihood.increase(float(wider.misfit[0])) < -_NOTICEABLE:
                 unit = f" {parameter.unit}" if parameter.unit else ""
                 yield Note(
                     REJECTION,
@@ -211,8 +211,8 @@ def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
     if damper:
         network = replace(network, c_p=np.array([damper[0].low or 0.0]))
     misfit = rejected or np.isfinite(likelihood.independent)
-    noise_rad = residuals.noise_scale_rad if misfit else likelihood.noise_rad
-    if ring := residuals.ring(network, noise_rad):
+    noise_sd = residuals.noise_scale if misfit else likelihood.noise_sd
+    if ring := residuals.ring(network, noise_sd):
         yield Note(
             REJECTION if rejected else DOUBT,
             "The arms ring: their inertia, which fits leave out, changes readings of this sample "

@@ -119,28 +119,28 @@ class Remainder:
 
 def examine_residuals(likelihood: Likelihood) -> Remainder:
     """Test what the best fit of a trace leaves for noise, and for misfit."""
-    residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
-    least_rad = min(_NOISE_FREE * likelihood.noise_rad, _NOISE_FREE_OF_PEAK * residuals.peak_rad)
-    if misfit_rad < max(least_rad, _UNRESOLVED * residuals.peak_rad):
+    residuals, misfit = likelihood.problem.residuals, likelihood.misfit
+    least = min(_NOISE_FREE * likelihood.noise_sd, _NOISE_FREE_OF_PEAK * residuals.peak)
+    if misfit < max(least, _UNRESOLVED * residuals.peak):
         return Remainder([])
     residual, slopes = _left(residuals, likelihood.best)
-    rounding_rad = residuals.rounding_rad
-    growth = compute_growth(residual, residuals.rotation(likelihood.best), rounding_rad)
+    rounding = residuals.rounding
+    growth = compute_growth(residual, residuals.response(likelihood.best), rounding)
     directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
     basis = absorbed(directions / growth)
     standard = residual / growth
     if np.ptp(growth):
         # What a fit with these weights would leave, to first order.
         standard = without(basis, standard)
-    struck = outliers_of(by_leverage(standard, basis), rounding_rad)
+    struck = outliers_of(by_leverage(standard, basis), rounding)
     if far_out(standard, struck, basis) >= FALSE_ALARM:
         struck[:] = False
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
     bulk = standard[~struck]
     basis = absorbed(basis[:, ~struck]) if struck.any() else basis
-    scale = residuals.noise_scale_rad
+    scale = residuals.noise_scale
     if np.ptp(growth):
-        scale = max(scale, estimate_noise(standard, rounding_rad))
+        scale = max(scale, estimate_noise(standard, rounding))
     times = float(np.sqrt(np.mean(bulk**2))) / scale
     correlation, chance = correlated(bulk, basis)
     notes: list[Note] = []
@@ -171,7 +171,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
             Note(
                 DOUBT,
                 "The noise that was given is "
-                f"{plain(likelihood.noise_rad / misfit_rad, 2)} times what the fit leaves: its "
+                f"{plain(likelihood.noise_sd / misfit, 2)} times what the fit leaves: its "
                 "value, or its unit, is not the right one.",
             )
         )
@@ -196,18 +196,18 @@ def _misfit(
 
     Given are residuals with slopes, and those that are no outliers with what the fit absorbs.
     """
-    if has_uneven_noise(left[0], residuals.rounding_rad):
+    if has_uneven_noise(left[0], residuals.rounding):
         text = (
             "The noise differs from one part of the trace to another, and the intervals do not "
             "allow for that: leave out the readings that scatter most (--from, --until), or give "
             "standard deviations (--sd)."
         )
         return Remainder([Note(DOUBT, text)])
-    more, read = plain(times, 2), residuals.trace.rotation_rad
-    share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak_rad
+    more, read = plain(times, 2), residuals.trace.readings
+    share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak
     of_peak = f"{plain(100 * share, 2)} % of the peak"
     suspects = residuals.instrument.suspects(unit=True)
-    if not residuals.rounding_rad and np.mean(read[1:] == read[:-1]) > _REPEATED:
+    if not residuals.rounding and np.mean(read[1:] == read[:-1]) > _REPEATED:
         text = (
             "Most readings repeat the one before, as of a sensor that is read less often than it "
             "is logged: keep one of each."
@@ -251,7 +251,7 @@ def _about_growth(
     )
     # Of noise that grows little the share is hardly known.
     if not residuals.coloured and times > CLEARLY:
-        share = scale * growth / np.abs(residuals.rotation(log_parameters))
+        share = scale * growth / np.abs(residuals.response(log_parameters))
         text += f" Readings are weighted by --noise-share {plain(np.median(share), 2)}."
     yield text
 
@@ -309,7 +309,7 @@ def _is_far_from_given(likelihood: Likelihood) -> bool:
     if likelihood.freedom < np.inf:
         return False
     residuals = likelihood.problem.residuals
-    share = likelihood.misfit_rad / likelihood.noise_rad
+    share = likelihood.misfit / likelihood.noise_sd
     left = max(residuals.free - len(likelihood.best), 1)
     sum_of_squares = residuals.samples * share**2
     too_little = share < _TOO_LITTLE and float(chdtr(left, sum_of_squares)) < FALSE_ALARM
@@ -381,12 +381,12 @@ def has_fast_noise(residuals: Residuals, residual: Array, slopes: Array) -> bool
     noise_model = NoiseModelLikelihood(time_s, residual, slopes).best()
     fast = noise_model.time_s <= _SLOW * residuals.duration_s
     # Neighbours of such noise differ by a root of its readings less than all of it scatters.
-    scatter = np.sqrt(np.mean(residual**2)) / max(residuals.noise_scale_rad, 1e-300)
+    scatter = np.sqrt(np.mean(residual**2)) / max(residuals.noise_scale, 1e-300)
     rough = scatter < _SMOOTH * np.sqrt(max(_SLOW * len(time_s), 1.0))
     return fast and bool(rough) and noise_model.ar1 > _NOTICEABLE
 
 
-def has_uneven_noise(residual: Array, rounding_rad: float) -> bool:
+def has_uneven_noise(residual: Array, rounding: float) -> bool:
     """Return True if what a fit leaves, (n_samples,), is as large as a scatter that differs.
 
     So it is where an instrument averages for longer and longer, or settles at first. A misfit of
@@ -396,7 +396,7 @@ def has_uneven_noise(residual: Array, rounding_rad: float) -> bool:
     if count < _FEWEST_STRETCHES:
         return False
     stretches = np.array_split(residual, count)
-    scales = [estimate_noise(each, rounding_rad) for each in stretches]
+    scales = [estimate_noise(each, rounding) for each in stretches]
     if max(scales) < _UNEVEN * min(scales):
         return False
     own = np.concatenate([each / scale for each, scale in zip(stretches, scales, strict=True)])

@@ -50,9 +50,9 @@ class Likelihood:
     """The trace and the model."""
     best: Array
     """Log-parameters of the global optimum, (n_parameters,)."""
-    misfit_rad: float
+    misfit: float
     """Misfit there."""
-    noise_rad: float
+    noise_sd: float
     """Standard deviation of the noise, known or estimated from the residual."""
     threshold: float
     """Increase of chi^2 at the confidence limits. It is that of an interval with two ends: a single
@@ -73,23 +73,23 @@ class Likelihood:
         All residuals count as so many independent ones, and their variance has this freedom: see
         `biogrip.judging.whiteness.as_correlated`.
         """
-        noise_rad = self.misfit_rad * math.sqrt(self.problem.residuals.samples / independent)
+        noise_sd = self.misfit * math.sqrt(self.problem.residuals.samples / independent)
         threshold, _ = _thresholds(self.confidence, freedom)
         # What few degrees of freedom say of one misfit in a thousand is not known.
         known, certain = _thresholds(self.confidence, inf)
         return replace(
             self,
-            noise_rad=noise_rad,
+            noise_sd=noise_sd,
             threshold=threshold,
             certainty=threshold * certain / known,
             freedom=freedom,
             independent=independent,
         )
 
-    def increase(self, misfit_rad: float) -> float:
+    def increase(self, misfit: float) -> float:
         """Return the increase of chi^2 over the optimum."""
-        excess = misfit_rad**2 - self.misfit_rad**2
-        return float(self.problem.residuals.samples * excess / self.noise_rad**2)
+        excess = misfit**2 - self.misfit**2
+        return float(self.problem.residuals.samples * excess / self.noise_sd**2)
 
     def deviation(self, quantity: Quantity) -> float:
         """Return the first-order standard deviation of a quantity's logarithm.
@@ -99,7 +99,7 @@ class Likelihood:
         `bound`, no parameter is left out for want of information.
         """
         rows = self.problem.residuals.condensed_responses(self.best[None])[0]
-        relative = rows[1:] / self.noise_rad
+        relative = rows[1:] / self.noise_sd
         slope = quantity.gradient(self.best)
         information = relative @ relative.T + np.eye(len(slope))
         return float(np.sqrt(slope @ np.linalg.solve(information, slope)))
@@ -108,24 +108,22 @@ class Likelihood:
 def make_likelihood(
     problem: Problem,
     best: Array,
-    misfit_rad: float,
+    misfit: float,
     *,
     confidence: float,
-    noise_rad: float | None = None,
+    noise_sd: float | None = None,
 ) -> Likelihood:
     """Compute the noise and the thresholds for the profile likelihoods of a trace.
 
     Without the standard deviation of the noise, it is estimated from the misfit.
     """
     freedom = inf
-    if noise_rad is None:
+    if noise_sd is None:
         left = problem.residuals.free - len(best)
-        noise_rad = misfit_rad * float(np.sqrt(problem.residuals.samples / left))
+        noise_sd = misfit * float(np.sqrt(problem.residuals.samples / left))
         freedom = float(min(left, problem.residuals.freedom))
     threshold, certainty = _thresholds(confidence, freedom)
-    return Likelihood(
-        problem, best, misfit_rad, noise_rad, threshold, certainty, freedom, confidence
-    )
+    return Likelihood(problem, best, misfit, noise_sd, threshold, certainty, freedom, confidence)
 
 
 def _thresholds(confidence: float, freedom: float) -> tuple[float, float]:
@@ -143,23 +141,21 @@ def _thresholds(confidence: float, freedom: float) -> tuple[float, float]:
     return at_limits, certain
 
 
-def compute_fall(
-    samples: int, before_rad: float, after_rad: float, noise_rad: float | None = None
-) -> float:
+def compute_fall(samples: int, before: float, after: float, noise_sd: float | None = None) -> float:
     """Compute the decrease of chi^2, twice the increase of log-likelihood, between RMS residuals.
 
     If the standard deviation of the noise is not known, each fit's misfit estimates it.
     """
-    if noise_rad is not None:
-        return samples * (before_rad**2 - after_rad**2) / noise_rad**2
-    return 2 * samples * float(np.log(before_rad / after_rad))
+    if noise_sd is not None:
+        return samples * (before**2 - after**2) / noise_sd**2
+    return 2 * samples * float(np.log(before / after))
 
 
 # Members with a smaller share in a sum are neglected, whatever their uncertainty.
 _NEGLIGIBLE = 1e-2
 
 
-def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
+def covariance(sensitivity: Array, noise_sd: float | Array) -> Array:
     """Compute the first-order covariance of log-parameters estimated by least squares.
 
     With the same Gaussian noise everywhere, it is the inverse of the Fisher
@@ -172,11 +168,11 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
     carries no information. It is fixed for the others' covariance: near zero on a
     logarithmic scale, the linear approximation of its effect fails.
 
-    J is d rotation / d log parameter in rad, (n_parameters, n_samples), sigma a number or
+    J is d rotation / d log parameter, (n_parameters, n_samples), sigma a number or
     (n_samples,). The covariance, (n_parameters, n_parameters), is infinite on the diagonal for
     parameters without information, and zero without noise.
     """
-    sigma = np.broadcast_to(noise_rad, sensitivity.shape[1])
+    sigma = np.broadcast_to(noise_sd, sensitivity.shape[1])
     scale = float(np.sqrt(np.mean(sigma**2)))
     if not scale:
         return np.zeros((len(sensitivity), len(sensitivity)))
@@ -196,15 +192,13 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
     return found
 
 
-def bound(
-    sensitivity: Array, noise_rad: float | Array, log_parameters: Array, q: Quantity
-) -> float:
+def bound(sensitivity: Array, noise_sd: float | Array, log_parameters: Array, q: Quantity) -> float:
     """Return the first-order standard deviation of a quantity's logarithm, by `covariance`."""
     slope = q.gradient(log_parameters)
     members = np.abs(slope) > _NEGLIGIBLE
     if not np.any(members):
         return float("inf")
-    found = covariance(sensitivity, noise_rad)[np.ix_(members, members)]
+    found = covariance(sensitivity, noise_sd)[np.ix_(members, members)]
     if np.any(np.isinf(found)):
         return float("inf")
     return float(np.sqrt(slope[members] @ found @ slope[members]))

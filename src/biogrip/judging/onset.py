@@ -57,7 +57,7 @@ _ACCURACY = 0.01
 def notes_on_start(
     case_problem: CaseProblem,
     time_s: Array,
-    rotation_rad: Array,
+    readings: Array,
     diagnosis: Diagnosis,
     *,
     may_be_late: bool,
@@ -73,23 +73,23 @@ def notes_on_start(
     ----------
     case_problem
         Assumptions of the identification, with a protocol that starts at 0.
-    time_s, rotation_rad : (n_samples,)
+    time_s, readings : (n_samples,)
         The trace, times ascending.
     diagnosis
         That of the best fit with that protocol.
     may_be_late
         True if the user says nothing of the start.
     """
-    fits, ramp = OnsetFits(case_problem, time_s, rotation_rad), _with_ramp(case_problem, time_s)
+    fits, ramp = OnsetFits(case_problem, time_s, readings), _with_ramp(case_problem, time_s)
     notes: list[Note] = []
     if may_be_late and ramp and is_cut_off(time_s):
         notes += _about_clock(fits, diagnosis)
-    elif begins_constant(time_s, rotation_rad):
+    elif begins_constant(time_s, readings):
         # A constant that is not zero is an offset, with which the onset would be biased.
         free, onset_s = replace(case_problem, offset=True), 0.0
         if may_be_late or case_problem.fit_start:
-            onset_s = estimate_onset(free, time_s, rotation_rad)
-        if begins_constant(time_s, rotation_rad, onset_s):
+            onset_s = estimate_onset(free, time_s, readings)
+        if begins_constant(time_s, readings, onset_s):
             if may_be_late:
                 notes += _about_late_onset(replace(fits, case_problem=free), diagnosis, onset_s)
             if not case_problem.offset and (notes or not may_be_late):
@@ -101,12 +101,12 @@ def notes_on_start(
 
 def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> Iterator[Note]:
     """Yield a note if a trace is constant up to an onset, with which it fits far better."""
-    trace, noise_rad = (fits.time_s, fits.rotation_rad), fits.case_problem.noise_rad
+    trace, noise_sd = (fits.time_s, fits.readings), fits.case_problem.noise_sd
     found, given = fits.best(guess_s), fits.at(0.0, diagnosis.likelihood.best)
-    fall = compute_fall(len(trace[0]), given.misfit_rad, found.misfit_rad, noise_rad)
+    fall = compute_fall(len(trace[0]), given.misfit, found.misfit, noise_sd)
     if fall < chdtri(1, _FALSE_ALARM) or not begins_constant(*trace, found.onset_s):
         return
-    fit = fits.posed(found.onset_s), found.log_parameters, found.misfit_rad
+    fit = fits.posed(found.onset_s), found.log_parameters, found.misfit
     likelihood = make_likelihood(*fit, confidence=diagnosis.likelihood.confidence)
     limits = onset_limits(likelihood, fits.time_s - found.onset_s)
     when = instant(found.onset_s, *(found.onset_s + end_s for end_s in limits))
@@ -121,7 +121,7 @@ def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> 
 
 def _about_tare(fits: OnsetFits, diagnosis: Diagnosis, onset_s: float) -> Iterator[Note]:
     """Yield a note if the readings before an onset are not zero, by a t test."""
-    before = fits.rotation_rad[fits.time_s < onset_s][:-1]
+    before = fits.readings[fits.time_s < onset_s][:-1]
     mean, error = float(np.mean(before)), float(np.std(before, ddof=1)) / np.sqrt(len(before))
     if abs(mean) > error * stdtrit(len(before) - 1, 1 - _AS_GOOD / 2):
         unit = f" {fits.case_problem.instrument.read.unit}".rstrip()
@@ -150,13 +150,13 @@ def is_cut_off(time_s: Array) -> bool:
 
 def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
     """Yield a note if a trace may be on another clock, with its step just before it."""
-    time_s, noise_rad = fits.time_s, estimate_noise(fits.rotation_rad)
+    time_s, noise_sd = fits.time_s, estimate_noise(fits.readings)
     later_s, best = 2 * time_s[0] - time_s[1], diagnosis.likelihood.best
     given, rejected = fits.at(0.0, best), diagnosis.status == REJECTED
     other = fits.best(later_s) if rejected else fits.at(later_s, best)
-    fall = compute_fall(len(time_s), given.misfit_rad, other.misfit_rad, None)
+    fall = compute_fall(len(time_s), given.misfit, other.misfit, None)
     found = ""
-    if rejected and 0 < other.onset_s < time_s[0] and other.misfit_rad < _WHITE * noise_rad:
+    if rejected and 0 < other.onset_s < time_s[0] and other.misfit < _WHITE * noise_sd:
         far = fall > chdtri(1, _FALSE_ALARM)
         found = f"the fit is far better (χ² falls by {plain(fall)})" if far else ""
     elif not rejected and fall > -chdtri(1, _AS_GOOD):
@@ -247,13 +247,13 @@ def _at(best: Likelihood, change_s: float) -> Likelihood:
     """Return the likelihood of an onset that is later by some s, relative to that of the best."""
     problem = best.problem.later(change_s)
     fit = fit_from([problem], best.best)
-    misfit_rad = float(fit.misfit_rad[0])
-    cost = best.increase(misfit_rad)
+    misfit = float(fit.misfit[0])
+    cost = best.increase(misfit)
     return replace(
         best,
         problem=problem,
         best=fit.x[0],
-        misfit_rad=misfit_rad,
+        misfit=misfit,
         threshold=best.threshold - cost,
         certainty=best.certainty - cost,
     )

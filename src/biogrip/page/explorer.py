@@ -85,14 +85,14 @@ def _lines(fits: Fits) -> list[Scatter]:
         )
         return Scatter(x=x, y=y, name=name, **style)
 
-    kind = "recorded trace" if trace.target_rad is None else "noisy trace"
+    kind = "recorded trace" if trace.target is None else "noisy trace"
     dots = {"size": 3, "color": MEASURED}
-    lines = [line(trace.measured_rad, kind, mode="markers", marker=dots)]
-    if trace.target_rad is not None:
-        lines.append(line(trace.target_rad, "target", mode="lines", line_color=TARGET))
+    lines = [line(trace.measured, kind, mode="markers", marker=dots)]
+    if trace.target is not None:
+        lines.append(line(trace.target, "target", mode="lines", line_color=TARGET))
     for method, fit in fits:
         style = {"color": COLORS[method.color], "dash": _DASHES[method.dashes]}
-        lines.append(line(fit.fitted_rad, method.title, mode="lines", line=style))
+        lines.append(line(fit.fitted, method.title, mode="lines", line=style))
     return lines
 
 

@@ -117,9 +117,9 @@ class FreeMotion:
 
     time_s: Array
     """Time since step and impulse, (n_samples,)."""
-    step_rad: Array
+    step: Array
     """Rotation after a step, (n_samples,)."""
-    impulse_rad: Array
+    impulse: Array
     """Rotation after an impulse, (n_samples,)."""
 
 
@@ -161,11 +161,11 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
     from scipy.optimize import least_squares
 
     start = _first_guess(record, step_Nm)
-    measured = np.stack((record.step_rad, record.impulse_rad))
+    measured = np.stack((record.step, record.impulse))
 
     def differences(logarithms: Array) -> Array:
         motion = free_motion(Arm(*np.exp(logarithms)), record.time_s, step_Nm, impulse_Nms)
-        return np.stack((motion.step_rad, motion.impulse_rad)) - measured
+        return np.stack((motion.step, motion.impulse)) - measured
 
     scale, logarithms = np.ptp(measured, axis=1), np.log(start)
     # In the second fit, each record is weighted by its own noise.
@@ -190,14 +190,14 @@ def _first_guess(record: FreeMotion, step_Nm: float) -> Array:
         found = f"found {counted(len(record.time_s), 'sample')}"
         raise BiogripError(f"calibration: {found}, allowed are {_FEWEST_SAMPLES} or more.")
     tail = len(record.time_s) // 4
-    stiffness = step_Nm / np.mean(record.step_rad[-tail:])
+    stiffness = step_Nm / np.mean(record.step[-tail:])
     if not stiffness > 0:
         raise BiogripError("calibration: the arm does not follow the torque step.")
     interval = record.time_s[1] - record.time_s[0]
-    spectrum = np.abs(np.fft.rfft(record.impulse_rad))
+    spectrum = np.abs(np.fft.rfft(record.impulse))
     peak = int(np.argmax(spectrum[1:])) + 1
     omega = 2 * np.pi * np.fft.rfftfreq(len(record.time_s), interval)[peak]
-    early, late = (float(np.std(part)) for part in np.array_split(record.impulse_rad, 8)[:2])
+    early, late = (float(np.std(part)) for part in np.array_split(record.impulse, 8)[:2])
     decay = np.log(max(early / late, 1.01)) / (len(record.time_s) // 8 * interval)
     inertia = stiffness / omega**2
     return np.array([inertia, 2 * inertia * decay, stiffness])

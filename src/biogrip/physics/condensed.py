@@ -210,9 +210,9 @@ class Condensed:
         """True if the noise is whitened."""
         return self.whitening is not None
 
-    def of_trace(self, rotation_rad: Array) -> Array:
+    def of_trace(self, readings: Array) -> Array:
         """Return rows of a trace without nuisance, (n_rows,); no response reaches the last."""
-        projected, rest = self.dense.rows_of_samples(rotation_rad)
+        projected, rest = self.dense.rows_of_samples(readings)
         rows = projected @ self._basis
         return np.append(rows, np.hypot(np.linalg.norm(projected - self._basis @ rows), rest))
 

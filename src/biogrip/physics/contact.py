@@ -31,7 +31,7 @@ class Contact:
 
     size_m: float
     """Diameter of the sample."""
-    closing_rad: float
+    closing: float
     """Rotation of each arm from its neutral position."""
     reference_angle_deg: float
     """hat-theta_2 in this configuration."""
@@ -112,13 +112,13 @@ def drag_of_arm(gripper: Gripper, width_m: float, viscosity_Pa_s: float = WATER_
     return a_length * length**3 / 3
 
 
-def rolling_of_contact(gripper: Gripper, size_m: float, rotation_rad: float) -> float:
+def rolling_of_contact(gripper: Gripper, size_m: float, rotation: float) -> float:
     """Return the shift of the contact point along the jaw, as a share of the arm's length.
 
     A round sample rolls on the turning jaw by its radius times the rotation. (The circle
     on which the tip moves is part of the nonlinear model.)
     """
-    return 0.5 * size_m * rotation_rad / gripper.arm_length_m
+    return 0.5 * size_m * rotation / gripper.arm_length_m
 
 
 def fringing_of_comb(comb: CombDrive) -> float:

@@ -31,7 +31,7 @@ from biogrip.physics.sample_model import Network, SampleModel
 _AT_ONCE = 7000
 
 Misfit = Callable[[Array], Array]
-"""Function from parameters, (n, n_parameters), to RMS misfits in rad, (n,)."""
+"""Function from parameters, (n, n_parameters), to RMS misfits in the unit of the readings, (n,)."""
 
 Misfits = Callable[[Array, IntArray], Array]
 """The same from (n_populations, n, n_parameters) and trace indices to (n_populations, n)."""
@@ -55,7 +55,7 @@ def make_misfit(residuals: Residuals) -> Misfit:
         and residuals.model.network([residuals.model.example]).k.shape[1] == 1
     ):
         given = residuals.gripper, residuals.model, torque, end_s / intervals
-        return SeriesMisfit(*given, trace.rotation_rad)
+        return SeriesMisfit(*given, trace.readings)
     return residuals.misfit
 
 
@@ -89,10 +89,10 @@ class SeriesMisfit:
         model: SampleModel,
         torque: TorqueHistory,
         interval_s: float,
-        rotation_rad: Array,
+        readings: Array,
     ) -> None:
         self._simulated = (gripper, model, torque, interval_s)
-        self._traces = np.atleast_2d(rotation_rad)
+        self._traces = np.atleast_2d(readings)
         self._samples = self._traces.shape[1]
         # Change of the torque at the start of each phase, and level after it.
         self._heights = torque.left[:, 0, None, None]
@@ -122,11 +122,11 @@ class SeriesMisfit:
         return DecayTable(self.exact_projections, self._samples)
 
     def __call__(self, parameters: Array) -> Array:
-        """Compute misfits in rad, (n,), of parameters, (n, n_parameters), to the first trace."""
+        """Compute misfits, (n,), of parameters, (n, n_parameters), to the first trace."""
         return self.of_each(parameters[None], np.zeros(1, dtype=np.int64))[0]
 
     def of_each(self, parameters: Array, traces: IntArray) -> Array:
-        """Compute the misfits in rad of populations, each to one trace, (n_populations, n).
+        """Compute the misfits of populations, each to one trace, (n_populations, n).
 
         Populations are (n_populations, n, n_parameters), in the model's order and SI units; traces
         are given by their indices, (n_populations,).

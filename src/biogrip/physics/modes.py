@@ -95,7 +95,7 @@ def linear_responses(
     Returns
     -------
     (n, 1 + n_parameters, n_times)
-        Rotations of the left arm in rad, and their derivatives; without `slopes`, (n, 1, n_times).
+        Rotations of the left arm, and their derivatives; without `slopes`, (n, 1, n_times).
     """
     modes = compute_modes(gripper, model, torque, parameters, slopes=slopes)
     rows = np.empty((len(parameters), 1 + modes.rate_slopes.shape[1], len(time_s)))

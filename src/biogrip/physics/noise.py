@@ -105,7 +105,7 @@ class Noise(Block):
 
 
 def add_noise(
-    rotation_rad: Array, noise: Noise, rng: np.random.Generator, time_s: Array | None = None
+    readings: Array, noise: Noise, rng: np.random.Generator, time_s: Array | None = None
 ) -> Array:
     """Return a noisy copy of a trace, (n_samples,).
 
@@ -116,12 +116,12 @@ def add_noise(
     ValueError
         If the times are required and missing.
     """
-    unit = KINDS[noise.kind](rng, len(rotation_rad))
+    unit = KINDS[noise.kind](rng, len(readings))
     if not noise.white:
         if time_s is None:
             raise ValueError("noise with parts that are not white needs the sampling times")
         unit = _with_parts(unit, time_s, noise, rng)
-    noisy: Array = rotation_rad + standard_deviation(rotation_rad, noise) * unit
+    noisy: Array = readings + standard_deviation(readings, noise) * unit
     return noisy
 
 
@@ -146,12 +146,12 @@ def _with_parts(unit: Array, time_s: Array, noise: Noise, rng: np.random.Generat
     return unit
 
 
-def standard_deviation(rotation_rad: Array, noise: Noise) -> Array:
-    """Return the noise's standard deviation in rad at every reading of a noise-free trace.
+def standard_deviation(readings: Array, noise: Noise) -> Array:
+    """Return the noise's standard deviation at every reading of a noise-free trace.
 
     Drift and outliers are not included.
     """
-    magnitude = np.abs(rotation_rad)
+    magnitude = np.abs(readings)
     if noise.level_rad is not None:
         return np.full_like(magnitude, noise.level_rad)
     scale = magnitude if noise.reference == "signal" else np.full_like(magnitude, magnitude.max())

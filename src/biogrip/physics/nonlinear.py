@@ -57,7 +57,7 @@ class Correction:
 
     edges_s: Array
     """The mesh, (n_elements + 1,)."""
-    values_rad: Array
+    values: Array
     """Rotation at the start of each element and at its nodes, (n, n_arms, n_elements, _STAGES +
     1)."""
     force_N: Array
@@ -77,7 +77,7 @@ class Correction:
 
     def at(self, time_s: Array, arm: int = LEFT) -> Array:
         """Evaluate nonlinear minus linear rotation in rad at ascending times, (n, n_times)."""
-        own = self.values_rad[:, min(arm, self.values_rad.shape[1] - 1)]
+        own = self.values[:, min(arm, self.values.shape[1] - 1)]
         return self._interpolated(own, time_s)
 
     def force_at(self, time_s: Array) -> Array:

@@ -138,7 +138,7 @@ class ModeRows:
             self._table[here] = powers.transpose(2, 0, 3, 1)
 
     def __call__(self, modes: Modes) -> Array:
-        """Return rows of responses with derivatives, (n, 1 + n_parameters, n_rows) in rad."""
+        """Return rows of responses with derivatives, (n, 1 + n_parameters, n_rows)."""
         count, parameters, n_modes = modes.rate_slopes.shape
         scaled, width = -self._end_s * modes.rates, _WIDTH / _SHORTER_OF_ROWS
         u = np.log1p(scaled) / width

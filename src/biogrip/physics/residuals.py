@@ -26,44 +26,44 @@ class Trace:
 
     time_s: Array
     """Ascending sampling times, (n_samples,)."""
-    rotation_rad: Array
+    readings: Array
     """What was read, (n_samples,)."""
     condensed: Condensed
     """Rows for the protocol and these times; specify nuisance functions and noise model."""
-    known_noise_rad: float | None = None
+    known_noise: float | None = None
     """Standard deviation of the noise; None to estimate it from neighbouring readings."""
 
     @cached_property
-    def cleared_rad(self) -> Array:
+    def cleared(self) -> Array:
         """The trace without nuisance, in white noise, (n_samples,)."""
-        return self.condensed.cleared(self.rotation_rad)
+        return self.condensed.cleared(self.readings)
 
     @cached_property
-    def rounding_rad(self) -> float:
+    def rounding(self) -> float:
         """Step that the readings are multiples of, or zero."""
-        return measure_rounding(self.rotation_rad)
+        return measure_rounding(self.readings)
 
     @cached_property
-    def noise_rad(self) -> float:
+    def noise_sd(self) -> float:
         """Standard deviation of the noise, known or estimated."""
-        if self.known_noise_rad is not None:
-            return self.known_noise_rad
-        return estimate_noise(self.cleared_rad, self.rounding_rad)
+        if self.known_noise is not None:
+            return self.known_noise
+        return estimate_noise(self.cleared, self.rounding)
 
     @cached_property
     def rows(self) -> Array:
         """Condensed rows, (n_rows,)."""
-        return self.condensed.of_trace(self.cleared_rad)
+        return self.condensed.of_trace(self.cleared)
 
     @cached_property
     def at_nodes(self) -> tuple[Array, float]:
         """Rows of the nodes, and the norm of what no response reaches."""
-        return self.condensed.dense.rows_of_samples(self.cleared_rad)
+        return self.condensed.dense.rows_of_samples(self.cleared)
 
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Simulated minus measured rotation as a function of log-parameters, in white noise."""
+    """Simulated minus measured response as a function of log-parameters, in white noise."""
 
     gripper: Gripper
     """Arms."""
@@ -95,19 +95,19 @@ class Residuals:
         return float(self.trace.time_s[-1])
 
     @property
-    def noise_scale_rad(self) -> float:
+    def noise_scale(self) -> float:
         """Standard deviation of the noise."""
-        return self.trace.noise_rad
+        return self.trace.noise_sd
 
     @property
-    def rounding_rad(self) -> float:
+    def rounding(self) -> float:
         """Step that the readings are multiples of, or zero."""
-        return self.trace.rounding_rad
+        return self.trace.rounding
 
     @cached_property
-    def peak_rad(self) -> float:
+    def peak(self) -> float:
         """Largest reading without nuisance, in magnitude."""
-        return float(np.max(np.abs(self.trace.cleared_rad)))
+        return float(np.max(np.abs(self.trace.cleared)))
 
     @property
     def coloured(self) -> bool:
@@ -121,7 +121,7 @@ class Residuals:
 
     @property
     def condensed_trace(self) -> Array:
-        """Condensed rows of the trace, (n_rows,) in rad."""
+        """Condensed rows of the trace, (n_rows,) in the unit of the readings."""
         return self.trace.rows
 
     def of_model(self, model: SampleModel) -> "Residuals":
@@ -136,7 +136,7 @@ class Residuals:
         """Return the residuals of the same trace for a protocol that starts later by some s."""
         trace = self.trace
         condensed = trace.condensed.later(change_s)
-        moved = Trace(trace.time_s - change_s, trace.rotation_rad, condensed, trace.noise_rad)
+        moved = Trace(trace.time_s - change_s, trace.readings, condensed, trace.noise_sd)
         return replace(self, trace=moved)
 
     def shares_responses(self, other: "Residuals") -> bool:
@@ -145,7 +145,7 @@ class Residuals:
         return same_rows and (self.gripper, self.model) == (other.gripper, other.model)
 
     def __call__(self, log_parameters: Array) -> tuple[Array, Array]:
-        """Return residuals, (n_samples,), and derivatives, (n_parameters, n_samples), in rad.
+        """Return residuals, (n_samples,), and derivatives, (n_parameters, n_samples),.
 
         Parameters
         ----------
@@ -154,15 +154,15 @@ class Residuals:
         """
         rows = self._simulated(log_parameters[None], self.trace.time_s)[0]
         cleared = self.trace.condensed.cleared
-        return cleared(rows[0]) - self.trace.cleared_rad, cleared(rows[1:])
+        return cleared(rows[0]) - self.trace.cleared, cleared(rows[1:])
 
     def left(self, log_parameters: Array) -> Array:
-        """Return the residuals alone, (n_samples,) in rad."""
-        rotation = self.trace.condensed.cleared(self.rotation(log_parameters))
-        return rotation - self.trace.cleared_rad
+        """Return the residuals alone, (n_samples,) in the unit of the readings."""
+        response = self.trace.condensed.cleared(self.response(log_parameters))
+        return response - self.trace.cleared
 
-    def rotation(self, log_parameters: Array) -> Array:
-        """Return the simulated rotation, neither cleared nor whitened, (n_samples,) in rad."""
+    def response(self, log_parameters: Array) -> Array:
+        """Return the simulated response, neither cleared nor whitened, (n_samples,)."""
         return self._simulated(log_parameters[None], self.trace.time_s)[0, 0]
 
     def gradients(
@@ -180,8 +180,8 @@ class Residuals:
         Returns
         -------
         gradients : (n, n_parameters)
-            Of half the sums of squares, in rad^2.
-        misfits_rad : (n,)
+            Of half the sums of squares, in the square of that unit.
+        misfits : (n,)
             Root mean squares.
         """
         n, parameters = log_parameters.shape
@@ -217,7 +217,7 @@ class Residuals:
         return condensed.of_modes(compute_modes(*given, parameters, slopes=slopes))
 
     def misfit(self, parameters: Array) -> Array:
-        """Compute RMS misfits of a population, (n,) in rad, each independent of the others.
+        """Compute RMS misfits of a population, (n,), each independent of the others.
 
         Parameters
         ----------
@@ -238,11 +238,11 @@ class Residuals:
         network = self.model.network(np.exp(log_parameters))
         return compute_grip(self.gripper, network, self.torque, nonlinear=False)
 
-    def ring(self, network: Network, noise_rad: float) -> Ring | None:
+    def ring(self, network: Network, noise_sd: float) -> Ring | None:
         """Return what noise of this size lets be seen of the arms' ringing on a sample, if any."""
         trace = self.trace
         given = self.gripper, network, self.torque, trace.time_s
-        return find_ring(*given, lambda change: trace.condensed.cleared(change) / noise_rad)
+        return find_ring(*given, lambda change: trace.condensed.cleared(change) / noise_sd)
 
     def _simulated(self, log_parameters: Array, time_s: Array) -> Array:
         parameters = np.exp(log_parameters)

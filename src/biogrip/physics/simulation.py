@@ -101,7 +101,7 @@ def jaw_force(
 ) -> Array:
     """Compute the jaws' force on the sample in N, positive while they press, (n, n_times).
 
-    By either model, as in `simulated_rotation`; at the instant of a step: what follows it. Without
+    By either model, as in `simulated_response`; at the instant of a step: what follows it. Without
     inertia, the force may jump.
     """
     response = jaw_force_response(gripper, network, symmetric=torque.symmetric, inertia=inertia)
@@ -148,7 +148,7 @@ def compute_grip(
 ) -> Grip:
     """Compute the extreme forces of the jaws on the first sample, without inertia.
 
-    By either model, as in `simulated_rotation`.
+    By either model, as in `simulated_response`.
     """
     time_s = _instants(torque)
     force = jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear, inertia=False)[0]
@@ -173,7 +173,7 @@ def _instants(torque: TorqueHistory) -> Array:
     return np.unique(np.append(np.concatenate(pieces), torque.end_s))
 
 
-def simulated_rotation(
+def simulated_response(
     gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, *, nonlinear: bool
 ) -> Array:
     """Simulate the closing rotation of the left arm in rad, with inertia, (n, n_times).
@@ -194,7 +194,7 @@ def simulated_rotation(
 def simulated_shortening(
     gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, *, nonlinear: bool
 ) -> Array:
-    """Simulate the shortening of samples in m, (n, n_times); see `simulated_rotation`."""
+    """Simulate the shortening of samples in m, (n, n_times); see `simulated_response`."""
     if nonlinear:
         turns = (nonlinear_rotation(gripper, network, torque, time_s, a) for a in (LEFT, RIGHT))
         left, right = (displacement_of_tip(gripper, turn) for turn in turns)

@@ -41,7 +41,7 @@ _GROWTH = 1.1
 class UnilateralResponse:
     """Response of gripper and sample with unilateral contact."""
 
-    rotation_rad: Array
+    rotation: Array
     """Closing rotations of the left and the right arm, (2, n_times)."""
     jaw_force_N: Array
     """Never negative, (n_times,)."""

@@ -126,7 +126,7 @@ ROOT_12 = np.sqrt(12.0)
 _OFTEN, _ALL_BUT_JUMPS, _MULTIPLE = 0.05, 0.98, 0.05
 
 
-def estimate_noise(rotation_rad: Array, rounding_rad: float | None = None) -> float:
+def estimate_noise(readings: Array, rounding: float | None = None) -> float:
     """Estimate the standard deviation of white noise on a smooth trace without a model.
 
     The median of second differences is used, on which slopes and jumps of a protocol have
@@ -142,26 +142,26 @@ def estimate_noise(rotation_rad: Array, rounding_rad: float | None = None) -> fl
     .. [1] B. Widrow, I. Kollar and M.-C. Liu, Statistical theory of quantization, IEEE Transactions
        on Instrumentation and Measurement 45 (1996), 353-361: step over the root of 12.
     """
-    second = np.abs(np.diff(rotation_rad, 2))
+    second = np.abs(np.diff(readings, 2))
     # Gaussian: the median is 0.6745 standard deviations, and those of second differences sqrt 6.
     noise = float(np.median(second)) / (0.6745 * np.sqrt(6.0)) if len(second) else 0.0
-    step = measure_rounding(rotation_rad) if rounding_rad is None else rounding_rad
+    step = measure_rounding(readings) if rounding is None else rounding
     if len(second) and step:
         most = second[second <= np.quantile(second, _ALL_BUT_JUMPS)]
         noise = max(float(np.sqrt(np.mean(most**2) / 6)), step / ROOT_12)
-    return max(noise, 1e-9 * float(np.max(np.abs(rotation_rad))))
+    return max(noise, 1e-9 * float(np.max(np.abs(readings))))
 
 
-def measure_rounding(rotation_rad: Array) -> float:
-    """Return the step in rad that the readings of a trace are multiples of.
+def measure_rounding(readings: Array) -> float:
+    """Return the step in the unit of the readings that the readings of a trace are multiples of.
 
     It is zero if neighbouring readings are seldom the same: rounding is then not seen beside the
     noise.
     """
-    same = np.count_nonzero(rotation_rad[1:] == rotation_rad[:-1])
-    if same < max(1.0, _OFTEN * len(rotation_rad)):
+    same = np.count_nonzero(readings[1:] == readings[:-1])
+    if same < max(1.0, _OFTEN * len(readings)):
         return 0.0
-    apart = np.diff(np.unique(rotation_rad))
+    apart = np.diff(np.unique(readings))
     step = float(apart.min()) if len(apart) else 0.0
     multiples = apart / step if step else apart
     return step if np.all(np.abs(multiples - np.rint(multiples)) < _MULTIPLE) else 0.0

@@ -47,7 +47,7 @@ _DIGITS = 8
 LEADING = ("case", "method", "seed")
 TRAILING = ("misfit", "noise_rms", "generations", "evaluations", "stop_reason")
 ENCODABLE = "encodable_misfit"
-"""Last column of the identifications of a case: lowest misfit in rad that genes can encode of the
+"""Last column of the identifications of a case: lowest misfit that genes can encode of the
 trace, see `lowest_encodable`; empty if it was recorded."""
 
 MODEL_FITS = RowFile(
@@ -134,7 +134,7 @@ def write_identifications(path: Path, records: list[Record]) -> None:
         (
             *(record.case, record.method, record.seed),
             *(f"{value:.6g}" for value in record.by_column(record.answer.parameters).values()),
-            f"{record.answer.misfit_rad:.6e}",
+            f"{record.answer.misfit:.6e}",
             "" if record.noise_rms is None else f"{record.noise_rms:.6e}",
             *(record.answer.generations, record.answer.evaluations, record.answer.stop_reason),
         )
@@ -217,9 +217,9 @@ def exact_data(
         "fit": status,
         "reasons": find_reasons(ordered),
         "samples": likelihood.problem.residuals.samples,
-        "misfit_rad": likelihood.misfit_rad,
-        "noise_rad": None if rejected else likelihood.noise_rad,
-        "scatter_rad": likelihood.problem.residuals.noise_scale_rad,
+        "misfit_rad": likelihood.misfit,
+        "noise_rad": None if rejected else likelihood.noise_sd,
+        "scatter_rad": likelihood.problem.residuals.noise_scale,
         "threshold": likelihood.threshold,
         "certainty": likelihood.certainty,
         "quantities": [_finding(each, rejected=rejected) for each in diagnosis.findings],

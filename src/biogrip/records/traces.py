@@ -24,13 +24,13 @@ class Measurements:
 
     time_s: Array
     """Sampling instants, ascending, (n_samples,)."""
-    target_rad: Array | None
+    target: Array | None
     """Trace without noise, (n_samples,); None for a recorded trace."""
-    rotation_rad: dict[int, Array]
+    readings: dict[int, Array]
     """Noisy trace of each seed, (n_samples,) each."""
     gaps: int = 0
     """Number of rows of a recording that were left out for want of a number."""
-    sd_rad: Array | None = None
+    sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
     suspicion: str | None = None
     """Sentence on a rotation of a recording that is hardly plausible."""
@@ -70,9 +70,9 @@ def write_target(
     write_rows(path, columns, rows)
 
 
-def as_written(rotation_rad: Array) -> Array:
+def as_written(readings: Array) -> Array:
     """Return a rotation rounded like a target that was written and read."""
-    return np.array([float(_WRITTEN.format(value)) for value in rotation_rad])
+    return np.array([float(_WRITTEN.format(value)) for value in readings])
 
 
 def read_target(path: Path) -> tuple[Array, Array, Array]:
@@ -90,10 +90,10 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
     """Write noisy traces as npz: time_s, target and sd if known, seeds, traces in their order."""
     arrays = {
         "time_s": measurements.time_s,
-        "target": measurements.target_rad,
-        "sd": measurements.sd_rad,
-        "seeds": list(measurements.rotation_rad),
-        "traces": list(measurements.rotation_rad.values()),
+        "target": measurements.target,
+        "sd": measurements.sd,
+        "seeds": list(measurements.readings),
+        "traces": list(measurements.readings.values()),
     }
     write_arrays(path, {name: values for name, values in arrays.items() if values is not None})
 
@@ -105,4 +105,4 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
     if missing := set(seeds or ()) - set(traces):
         raise BiogripError(f"{path}: has no trace of seed {min(missing)}.")
     chosen = traces if seeds is None else {seed: traces[seed] for seed in seeds}
-    return Measurements(found["time_s"], found.get("target"), chosen, sd_rad=found.get("sd"))
+    return Measurements(found["time_s"], found.get("target"), chosen, sd=found.get("sd"))

@@ -53,17 +53,17 @@ def identify(
     case_problem = case.problem.to_identify().calibrated(calibrated)
     identified = identifier(method, case.method(method))
     recorded = read_measurements(measurements, list(seeds))
-    case_problem = case_problem.weighted(recorded.sd_rad)
+    case_problem = case_problem.weighted(recorded.sd)
     progress = Progress(f"{case.name}, {method}", len(seeds))
     whose = case.name, method, case_problem.model, case_problem.searched, case_problem.fixed
     records = []
     for group in groups(seeds):
-        traces = [recorded.rotation_rad[seed] for seed in group]
+        traces = [recorded.readings[seed] for seed in group]
         rngs = [stream(case.study.study_seed, case.name, seed, method) for seed in group]
         problems = [case_problem.of(recorded.time_s, trace) for trace in traces]
         answers = identified(problems, rngs, progress.within)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
-            noise = None if recorded.target_rad is None else rms(trace - recorded.target_rad)
+            noise = None if recorded.target is None else rms(trace - recorded.target)
             records.append(Record(*whose, seed, answer, noise))
         progress.done(len(group))
     write_identifications(parameters, records)
@@ -94,7 +94,7 @@ def join(
     lowest: dict[str, str] = {}
     for file in measurements:
         recorded = read_measurements(file)
-        traces, weighted = recorded.rotation_rad, problem.weighted(recorded.sd_rad)
+        traces, weighted = recorded.readings, problem.weighted(recorded.sd)
         posed = [weighted.of(recorded.time_s, trace) for trace in traces.values()]
         for seed, of_trace in zip(map(str, traces), posed, strict=True):
             misfit = lowest_encodable(of_trace.residuals.misfit, ranges, np.array(ends[seed]))
@@ -114,11 +114,11 @@ def fit(
     models = {name: sample.model for name, sample in case.models.items()}
     recorded = read_measurements(measurements, list(seeds))
     problem = case.problem.to_identify(*models.values()).calibrated(calibrated)
-    problem = problem.weighted(recorded.sd_rad)
+    problem = problem.weighted(recorded.sd)
     progress = Progress(f"{case.name}, models", len(models) * len(seeds))
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
     for group in groups(seeds):
-        traces = [problem.of(recorded.time_s, recorded.rotation_rad[seed]) for seed in group]
+        traces = [problem.of(recorded.time_s, recorded.readings[seed]) for seed in group]
         found = fit_models(
             {
                 name: [problem.for_model(trace, model) for trace in traces]
@@ -137,7 +137,7 @@ def fit(
         for name, answers in found.items():
             sizes = len(models[name].names), len(recorded.time_s)
             rows[name] += [
-                (case.name, name, seed, *sizes, f"{answer.misfit_rad:.8e}")
+                (case.name, name, seed, *sizes, f"{answer.misfit:.8e}")
                 for seed, answer in zip(group, answers, strict=True)
             ]
     MODEL_FITS.write(fits, (row for of_model in rows.values() for row in of_model))

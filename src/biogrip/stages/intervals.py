@@ -117,7 +117,7 @@ def _limited(
     """Return likelihoods of optima and their limits; refit where a profile has a lower chi^2."""
     confidence = case.confidence
     found = [
-        make_likelihood(problem, np.log(each.parameters), each.misfit_rad, confidence=confidence)
+        make_likelihood(problem, np.log(each.parameters), each.misfit, confidence=confidence)
         for problem, each in optima
     ]
     limits, missed = find_limits(found, quantities)
@@ -149,10 +149,10 @@ def _optima(
 def refitted(likelihood: Likelihood, missed: Array, confidence: float) -> Likelihood | None:
     """Fit again, started at parameters of a chi^2 below the optimum's; None if it did not fall."""
     fit = fit_from([likelihood.problem], missed)
-    misfit_rad = float(fit.misfit_rad[0])
-    if likelihood.increase(misfit_rad) > -MISSED:
+    misfit = float(fit.misfit[0])
+    if likelihood.increase(misfit) > -MISSED:
         return None
-    return make_likelihood(likelihood.problem, fit.x[0], misfit_rad, confidence=confidence)
+    return make_likelihood(likelihood.problem, fit.x[0], misfit, confidence=confidence)
 
 
 def shown_of(

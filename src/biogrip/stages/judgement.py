@@ -56,8 +56,8 @@ def fits_judged(
 def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
     """Fit the trace of seed 0 by least squares, and write verdicts, profiles and valley."""
     recorded = read_measurements(measurements, [TRACE])
-    case_problem = case.problem.calibrated(calibrated).weighted(recorded.sd_rad)
-    trace = recorded.rotation_rad[TRACE]
+    case_problem = case.problem.calibrated(calibrated).weighted(recorded.sd)
+    trace = recorded.readings[TRACE]
     (fit,) = fits_judged([case], [case_problem], [(recorded.time_s, trace)], TRACE)
     diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
     if case_problem.fit_start:
@@ -75,8 +75,8 @@ def notes_on_fit(fit: TraceFit) -> list[Note]:
     if fit.noise_model is None:
         return notes
     residuals = fit.problem.residuals
-    peak_rad = np.max(np.abs(residuals.rotation(np.log(fit.found.parameters))))
-    share = float(fit.found.misfit_rad * np.sqrt(fit.noise_model.ar1) / peak_rad)
+    peak = np.max(np.abs(residuals.response(np.log(fit.found.parameters))))
+    share = float(fit.found.misfit * np.sqrt(fit.noise_model.ar1) / peak)
     misfit = find_slow_misfit(fit.noise_model, residuals.duration_s, share, residuals.instrument)
     return [misfit, *notes] if misfit else notes
 
@@ -85,13 +85,13 @@ def _diagnosed(
     problem: Problem, case_problem: CaseProblem, found: Identification, confidence: float
 ) -> tuple[Diagnosis, dict[str, Any] | None]:
     """Diagnose a trace, and again from a fit along its valley, if that has a lower chi^2."""
-    model, noise_rad = case_problem.searched, case_problem.noise_rad
-    diagnosis = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+    model, noise_sd = case_problem.searched, case_problem.noise_sd
+    diagnosis = diagnose(problem, model, found, confidence=confidence, noise_sd=noise_sd)
     valley, missed = compute_valley(diagnosis.likelihood, model)
     if missed is not None:
         again = found.at(fit_from([problem], missed))
-        if diagnosis.likelihood.increase(again.misfit_rad) < -MISSED:
-            diagnosis = diagnose(problem, model, again, confidence=confidence, noise_rad=noise_rad)
+        if diagnosis.likelihood.increase(again.misfit) < -MISSED:
+            diagnosis = diagnose(problem, model, again, confidence=confidence, noise_sd=noise_sd)
             valley, _ = compute_valley(diagnosis.likelihood, model)
     return diagnosis, valley
 
@@ -104,11 +104,11 @@ def expect(case: Case, target: Path, calibrated: list[Path], verdicts: Path) -> 
     """
     case_problem = case.problem.to_identify().calibrated(calibrated)
     time_s, _, rotation = read_target(target)
-    noise_rad = rms(standard_deviation(rotation, case.noise)) or None
-    problem = case_problem.of(time_s, rotation, noise_rad=noise_rad)
+    noise_sd = rms(standard_deviation(rotation, case.noise)) or None
+    problem = case_problem.of(time_s, rotation, noise_sd=noise_sd)
     found = identify_from(problem, case_problem.logs(case.parameters))
     diagnosis = diagnose(
-        problem, case_problem.searched, found, confidence=case.confidence, noise_rad=noise_rad
+        problem, case_problem.searched, found, confidence=case.confidence, noise_sd=noise_sd
     )
     _write(verdicts, case, diagnosis_data(diagnosis))
 

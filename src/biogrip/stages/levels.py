@@ -28,7 +28,7 @@ from biogrip.physics.instruments import GRIPPER, INSTRUMENTS
 from biogrip.physics.models import Sample
 from biogrip.physics.noise import stream
 from biogrip.physics.protocol import Phase, hold, load
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_response
 
 INSTRUMENTS_JUDGED = ("creep", "relaxation", "gripper")
 READINGS = (10, 20, 40, 80, 400, 4000)
@@ -125,7 +125,7 @@ def _one(instrument: str, protocol: tuple[Phase, ...], tau_s: float, time_s: Arr
     """Simulate what is read of a sample with one relaxation time."""
     experiment = _experiment(instrument, protocol, _MODELS[instrument])
     network = experiment.model.sample(_parameters(instrument, tau_s))
-    return simulated_rotation(
+    return simulated_response(
         experiment.gripper, network, experiment.torque, time_s, nonlinear=False
     )[0]
 
@@ -225,7 +225,7 @@ def _cell(instrument: str, readings: int, decades: int, set_up: str, traces: int
                 experiment.searched,
                 found,
                 confidence=_CONFIDENCE,
-                noise_rad=[it.noise_rad for it in given],
+                noise_sd=[it.noise_sd for it in given],
             )
             status.update(each.status for each in judged)
             for each, tau in zip(judged, taus, strict=True):
@@ -236,7 +236,7 @@ def _cell(instrument: str, readings: int, decades: int, set_up: str, traces: int
             exact = [experiment.of(told_s, clean) for clean in some]
             fits = identify_many(exact, _BUDGET, rngs[: len(exact)], silent) if exact else []
             sds = [_NOISE * float(np.max(np.abs(clean))) for clean in some]
-            misfits += [fit.misfit_rad / sd for fit, sd in zip(fits, sds, strict=True)]
+            misfits += [fit.misfit / sd for fit, sd in zip(fits, sds, strict=True)]
     row: dict[str, Any] = {
         "instrument": instrument,
         "readings": readings,
@@ -265,5 +265,5 @@ def _held(judged: Diagnosis, experiment: CaseProblem, truth: dict[str, float]) -
 def _status_of(problem: Problem, found: Identification) -> str:
     """Return the status of a fit by what it leaves, without limits."""
     best = np.log(found.parameters)
-    likelihood = make_likelihood(problem, best, found.misfit_rad, confidence=_CONFIDENCE)
+    likelihood = make_likelihood(problem, best, found.misfit, confidence=_CONFIDENCE)
     return compute_status(examine_residuals(likelihood).notes)

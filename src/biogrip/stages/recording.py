@@ -49,7 +49,7 @@ def read_checked(
         )
     onset_s = columns.start_s
     if problem.fit_start:
-        onset_s = estimate_onset(problem, trace.time_s, trace.rotation_rad)
+        onset_s = estimate_onset(problem, trace.time_s, trace.readings)
     if onset_s is not None:
         trace = without_padding(replace(trace, time_s=trace.time_s - onset_s))
     at_steps: tuple[float, ...] = ()
@@ -61,17 +61,17 @@ def read_checked(
             f"{place(recorded)}: found {len(trace.time_s)} readings for {problem.unknowns} unknown "
             "parameters; allowed are more readings than parameters, or a simpler model."
         )
-    noise_rad = _typical_noise(trace, problem)
-    suspicion = check_recording(trace, problem, noise_rad, onset_s)
-    sd_rad = trace.sd_rad
+    noise_sd = _typical_noise(trace, problem)
+    suspicion = check_recording(trace, problem, noise_sd, onset_s)
+    sd = trace.sd
     if problem.noise_share is not None:
-        sd_rad = proportional_deviations(problem, trace.time_s, trace.rotation_rad)
+        sd = proportional_deviations(problem, trace.time_s, trace.readings)
     return Measurements(
         trace.time_s,
         None,
-        {0: trace.rotation_rad},
+        {0: trace.readings},
         gaps=trace.without_number,
-        sd_rad=sd_rad,
+        sd=sd,
         suspicion=suspicion,
         onset_s=onset_s,
         at_steps=at_steps,
@@ -95,9 +95,9 @@ def _part(trace: Recording, kept: BoolArray) -> Recording:
     return replace(
         trace,
         time_s=trace.time_s[kept],
-        rotation_rad=trace.rotation_rad[kept],
+        readings=trace.readings[kept],
         lines=trace.lines[kept],
-        sd_rad=None if trace.sd_rad is None else trace.sd_rad[kept],
+        sd=None if trace.sd is None else trace.sd[kept],
     )
 
 
@@ -106,7 +106,7 @@ def without_padding(trace: Recording) -> Recording:
 
     The last of them stays: it tells that the protocol had not yet started.
     """
-    differs = np.flatnonzero(trace.rotation_rad != trace.rotation_rad[0])
+    differs = np.flatnonzero(trace.readings != trace.readings[0])
     first = max(min([*differs[:1], np.count_nonzero(trace.time_s < 0)]) - 1, 0)
     kept = np.arange(len(trace.time_s)) >= first
     return replace(_part(trace, kept), without_number=trace.without_number + first)
@@ -116,19 +116,19 @@ def with_fitted_onset(trace: Measurements, problem: CaseProblem) -> Measurements
     """Return a recording with its estimated onset replaced by that of a fit, if that is wanted."""
     if not problem.fit_start or trace.onset_s is None:
         return trace
-    problem = problem.weighted(trace.sd_rad)
-    later_s = OnsetFits(problem, trace.time_s, trace.rotation_rad[0]).best(0.0).onset_s
+    problem = problem.weighted(trace.sd)
+    later_s = OnsetFits(problem, trace.time_s, trace.readings[0]).best(0.0).onset_s
     return replace(trace, time_s=trace.time_s - later_s, onset_s=trace.onset_s + later_s)
 
 
 def _typical_noise(trace: Recording, problem: CaseProblem) -> float | None:
     """Return the standard deviation of the noise, if it is given; typical where it differs."""
-    if trace.sd_rad is not None:
-        return float(np.median(trace.sd_rad))
+    if trace.sd is not None:
+        return float(np.median(trace.sd))
     if problem.noise_share is not None:
-        largest_rad = float(np.max(np.abs(trace.rotation_rad)))
-        return math.hypot(problem.noise_share * largest_rad, problem.noise_rad or 0.0)
-    return problem.noise_rad
+        largest = float(np.max(np.abs(trace.readings)))
+        return math.hypot(problem.noise_share * largest, problem.noise_sd or 0.0)
+    return problem.noise_sd
 
 
 def notes_on_recording(trace: Measurements) -> list[str]:

@@ -20,7 +20,7 @@ from biogrip.judging.likelihood import bounds_percent, headlines
 from biogrip.judging.quantities import Quantity
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH
-from biogrip.physics.simulation import simulated_rotation
+from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import INTERPRETATIONS, read_identifications
 from biogrip.records.rows import RowFile
 from biogrip.records.traces import read_target
@@ -86,7 +86,7 @@ def _rows(
             found = pd.concat([read_identifications(path, method) for path in batches])
             if case.noise.absent:
                 # Without noise, the misfit of the true values rounded to the genes' digits.
-                found = found.assign(noise_rms=_resolution_rad(case, true))
+                found = found.assign(noise_rms=_resolution(case, true))
             near = float(np.mean(near_noise(found, study.near_noise_tolerance)))
             for judged in _judged(case, true, found, bounds[point.name], heads, near):
                 yield point.name, point.row.shown, point.column.shown, method, *judged
@@ -132,7 +132,7 @@ def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
     return away <= np.fmax(_FACTOR, _BOUNDS * bound)
 
 
-def _resolution_rad(point: Case, true: Mapping[str, float]) -> float:
+def _resolution(point: Case, true: Mapping[str, float]) -> float:
     """Return the noise-free RMS misfit of the encodable parameters nearest to the truth."""
     problem = point.problem
     time_s = point.sampling.over(problem.torque.end_s)
@@ -141,7 +141,7 @@ def _resolution_rad(point: Case, true: Mapping[str, float]) -> float:
         problem.fixed.get(p.name, nearest_encodable(value, problem.ranges[p.range_name]))
         for p, value in zip(problem.model.parameters, truth, strict=True)
     ]
-    both = simulated_rotation(
+    both = simulated_response(
         problem.gripper,
         problem.model.network(np.array([truth, rounded])),
         problem.torque,
@@ -180,7 +180,7 @@ def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, 
                 yield (
                     *(case.name, name, seed),
                     *(f"{values.get(p.name, 0.0):.6g}" for p in SINGLE_BRANCH),
-                    f"{answer.misfit_rad:.6e}",
+                    f"{answer.misfit:.6e}",
                     f"{rms(trace - rotation):.6e}",
                     int(falls[-1]) + 1 if len(falls) else 0,
                 )

@@ -23,7 +23,7 @@ from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.nonlinear import correction
 from biogrip.physics.protocol import TorqueHistory, sample_times, torque_at
 from biogrip.physics.sample_model import Network
-from biogrip.physics.simulation import compute_grip, jaw_force, simulated_rotation
+from biogrip.physics.simulation import compute_grip, jaw_force, simulated_response
 from biogrip.physics.unilateral import unilateral_response
 from biogrip.records.identifications import DIFFERENCES
 from biogrip.records.rows import write_arrays
@@ -46,17 +46,17 @@ def simulate(case: Case, target: Path) -> None:
     controlled = torque_at(case.torque, time_s)
     if not case.instrument.has_jaws:
         device = case.gripper, case.network, case.torque
-        read = simulated_rotation(*device, time_s, nonlinear=False)[0]
+        read = simulated_response(*device, time_s, nonlinear=False)[0]
         _check_finite(case, time_s, read)
         write_target(target, case.instrument, time_s, controlled, read)
         return
     rotation, force = _response(case, time_s)
     _check_finite(case, time_s, rotation)
     largest = float(np.max(np.abs(rotation)))
-    if largest > case.stroke_rad:
+    if largest > case.stroke:
         raise BiogripError(
             f"the protocol turns the arms by {1e3 * largest:.4g} mrad, allowed is what the comb "
-            f"drive's stroke leaves, {1e3 * case.stroke_rad:.4g} mrad."
+            f"drive's stroke leaves, {1e3 * case.stroke:.4g} mrad."
         )
     _warn_if_contact_is_lost(case)
     write_target(target, case.instrument, time_s, controlled, rotation, force)
@@ -67,8 +67,8 @@ def _response(case: Case, time_s: Array) -> tuple[Array, Array]:
     device, nonlinear = (case.gripper, case.network, case.torque), case.nonlinear_target
     if case.unilateral:
         found = unilateral_response(*device, time_s)
-        return found.rotation_rad[0], found.jaw_force_N
-    rotation = simulated_rotation(*device, time_s, nonlinear=nonlinear)
+        return found.rotation[0], found.jaw_force_N
+    rotation = simulated_response(*device, time_s, nonlinear=nonlinear)
     return rotation[0], jaw_force(*device, time_s, nonlinear=nonlinear)[0]
 
 
@@ -113,10 +113,10 @@ def run(case: Case, gripper: Path, records: Path) -> None:
         rng = stream(case.study.study_seed, case.name, 0, f"calibration {name}")
         record = FreeMotion(
             time_s,
-            add_noise(motion.step_rad, noise, rng),
-            add_noise(motion.impulse_rad, noise, rng),
+            add_noise(motion.step, noise, rng),
+            add_noise(motion.impulse, noise, rng),
         )
-        columns |= {f"{name}_step_rad": record.step_rad, f"{name}_impulse_rad": record.impulse_rad}
+        columns |= {f"{name}_step_rad": record.step, f"{name}_impulse_rad": record.impulse}
         found[name] = calibrate(record, *causes)
     write_arrays(records, columns)
     write_text(gripper, calibration_yaml(found["left"], found["right"]))

@@ -120,10 +120,10 @@ class Case:
         return replace(neutral, reference_angle_deg=at.reference_angle_deg) if at else neutral
 
     @property
-    def stroke_rad(self) -> float:
+    def stroke(self) -> float:
         """Rotation left for gripping: the comb drive's stroke minus closing onto the sample."""
-        closing_rad = self._contact.closing_rad if self._contact else 0.0
-        return math.radians(self.actuator.stroke_deg) - closing_rad
+        closing = self._contact.closing if self._contact else 0.0
+        return math.radians(self.actuator.stroke_deg) - closing
 
     @cached_property
     def problem(self) -> CaseProblem:
@@ -142,7 +142,7 @@ class Case:
             self.instrument,
             offset=measurement.fits_offset,
             drift=measurement.fits_drift,
-            noise_rad=measurement.noise_rad,
+            noise_sd=measurement.noise_rad,
             noise_share=measurement.noise_share,
             coloured=measurement.coloured,
             uncertainty=uncertainty.by_part if uncertainty else {},

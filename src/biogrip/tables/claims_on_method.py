@@ -118,7 +118,7 @@ def judge_free_arm(results: Results) -> Judged:
     noise = Noise("gaussian", test.noise_level, "peak")
     rng = stream(results.study.study_seed, "claims", 0, "calibration")
     record = FreeMotion(
-        time_s, add_noise(motion.step_rad, noise, rng), add_noise(motion.impulse_rad, noise, rng)
+        time_s, add_noise(motion.step, noise, rng), add_noise(motion.impulse, noise, rng)
     )
     found = calibrate(record, *causes).arm
     errors = [100 * abs(getattr(found, key) / getattr(arm, key) - 1) for key in ARM_KEYS]

@@ -63,7 +63,7 @@ def coverage(
         found = estimated[estimated["case"] == name]
         time_s, _, rotation = read_target(target)
         _, sensitivity = case_problem.of(time_s, rotation).residuals(log_truth)
-        noise_rad = standard_deviation(rotation, case.noise)
+        noise_sd = standard_deviation(rotation, case.noise)
         for quantity in parameters_and_sum(case_problem.searched):
             mine = found[found["quantity"] == quantity.label]
             fitted = mine[mine["estimate_rest_known"].notna()]
@@ -74,7 +74,7 @@ def coverage(
             names = [case_problem.searched.names[index] for index in quantity.members]
             truth = sum(case.parameters[member] for member in names)
             head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
-            limit = 100 * bound(sensitivity, noise_rad, log_truth, quantity)
+            limit = 100 * bound(sensitivity, noise_sd, log_truth, quantity)
             numbers = _spreads(fitted, truth, limit, case.confidence) | _shown(shown, truth)
             rows.append({**head, "target": truth, **numbers})
     caption = (

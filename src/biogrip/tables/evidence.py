@@ -108,7 +108,7 @@ def _axis(case: Case, traces: list[Path]) -> list[_Told]:
     extremes = [
         (trace.min(), trace.max())
         for path in traces
-        for trace in read_measurements(path).rotation_rad.values()
+        for trace in read_measurements(path).readings.values()
     ]
     remark = (
         f"median of {counted(len(extremes), 'noisy trace')}; the paper's is the end of its axis"

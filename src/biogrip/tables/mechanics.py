@@ -31,7 +31,7 @@ from biogrip.physics.protocol import largest_load
 from biogrip.physics.simulation import (
     compute_grip,
     jaw_force,
-    simulated_rotation,
+    simulated_response,
     simulated_shortening,
 )
 from biogrip.physics.unilateral import unilateral_response
@@ -67,7 +67,7 @@ def contacts(study: Study) -> Table:
         rows.append(
             {
                 "size_um": size_um,
-                "closing_mrad": 1e3 * found.closing_rad,
+                "closing_mrad": 1e3 * found.closing,
                 "reference_angle_deg": found.reference_angle_deg,
                 "off_percent": 100 * ((sines[0] / sines[1]) ** 2 - 1),
                 "torque_nNm": 1e9 * found.torque_Nm,
@@ -293,8 +293,8 @@ def _loss_of(study_seed: int, case: Case) -> list[Row]:
     free = unilateral_response(*device, time_s)
     if not free.parted_s:
         return []
-    held = as_written(simulated_rotation(*device, time_s, nonlinear=False)[0])
-    let_go = as_written(free.rotation_rad[0])
+    held = as_written(simulated_response(*device, time_s, nonlinear=False)[0])
+    let_go = as_written(free.rotation[0])
     rngs = [
         stream(study_seed, case.name, seed, "noise") for seed in range(min(case.seeds, _MOST_SEEDS))
     ]
@@ -348,7 +348,7 @@ def _medians(
         for quantity in problem.model.quantities
     }
     if level := rms(noise):
-        medians["misfit"] = np.median([each.misfit_rad for each in found]) / level
+        medians["misfit"] = np.median([each.misfit for each in found]) / level
     return medians
 
 

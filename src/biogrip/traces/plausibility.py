@@ -46,7 +46,7 @@ _ABSURD = 1e9
 def check_recording(
     recording: Recording,
     problem: CaseProblem,
-    noise_rad: float | None = None,
+    noise_sd: float | None = None,
     onset_s: float | None = None,
 ) -> str | None:
     """Refuse a trace that is impossible with the instrument and protocol.
@@ -81,7 +81,7 @@ def check_recording(
     """
     torque, instrument = problem.torque, problem.instrument
     _check_times(recording, torque, onset_s)
-    time_s, trace = recording.time_s, recording.rotation_rad
+    time_s, trace = recording.time_s, recording.readings
     free, largest = free_rotation(problem.gripper, torque), float(np.abs(trace).max())
     if largest > _ABSURD * free:
         return _check_turn(recording, largest, free, None)
@@ -116,7 +116,7 @@ def check_recording(
     if not instrument.has_jaws:
         return None
     turn = float(np.abs(amplitudes @ responses).max())
-    return _check_turn(recording, turn, free, noise_rad)
+    return _check_turn(recording, turn, free, noise_sd)
 
 
 def _either_sign(trace: Array, responses: Array, nuisance: Array) -> list[tuple[Array, float]]:
@@ -184,7 +184,7 @@ def _check_times(recording: Recording, torque: TorqueHistory, onset_s: float | N
 
 
 def _check_turn(
-    recording: Recording, turn: float, free: float, noise_rad: float | None
+    recording: Recording, turn: float, free: float, noise_sd: float | None
 ) -> str | None:
     columns, smallest, largest = recording.read, _SMALLEST_SHARE * free, _LARGEST_SHARE * free
 
@@ -195,7 +195,7 @@ def _check_turn(
         return None
     hint = _other_units(recording.units[1], columns.quantity.units, fits)
     alone = f"without any sample the arm turns by {free:.3g} rad"
-    if noise_rad is not None and _FAR_ABOVE * noise_rad < turn < smallest:
+    if noise_sd is not None and _FAR_ABOVE * noise_sd < turn < smallest:
         return (
             f"The largest rotation is {turn:.3g} rad, where {alone}: the sample is very stiff, or "
             f"the unit is not the right one.{hint}"
@@ -206,10 +206,10 @@ def _check_turn(
             f"at least {smallest:.3g} rad, or less with a given noise (--noise) {_FAR_ABOVE:g} "
             f"times smaller still, where {alone}"
         )
-    sample = np.argmax(np.abs(recording.rotation_rad))
+    sample = np.argmax(np.abs(recording.readings))
     raise BiogripError(
         f"{place(recording.path, recording.lines[sample], columns.reading)}: found "
-        f"{recording.rotation_rad[sample]:.3g} rad as the largest rotation, and {turn:.3g} rad as "
+        f"{recording.readings[sample]:.3g} rad as the largest rotation, and {turn:.3g} rad as "
         f"the largest with the noise smoothed out; allowed is {limit}.{hint}"
     )
 

@@ -56,7 +56,7 @@ class Recording:
 
     time_s: Array
     """Strictly increasing times, (n_samples,)."""
-    rotation_rad: Array
+    readings: Array
     """Closing rotation of the left arm, or another reading in SI units, (n_samples,)."""
     lines: IntArray
     """Line number of each sample, from 1, (n_samples,)."""
@@ -68,7 +68,7 @@ class Recording:
     """What was read of it."""
     units: tuple[str, str]
     """Units of the times and of the readings in the file."""
-    sd_rad: Array | None = None
+    sd: Array | None = None
     """Standard deviations of the rotations, (n_samples,), where the file has them."""
     form: Mapping[str, Any] = field(default_factory=dict)
     """What was recognised in the file, for people to check before they believe a fit; `read_as` of
@@ -161,7 +161,7 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         path,
         columns,
         (units[0], units[1]),
-        sd_rad=None if columns.sd is None else kept[:, 2] * (unit * abs(columns.scale)),
+        sd=None if columns.sd is None else kept[:, 2] * (unit * abs(columns.scale)),
         form={key: value for key, value in form.items() if value is not None},
         load=load,
     )
