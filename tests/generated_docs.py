@@ -23,6 +23,7 @@ from biogrip.fit.methods import identifier, share_in_words
 from biogrip.fit.problem import silent
 from biogrip.page.answers import (
     compared_rows,
+    say_what_claims_are,
     say_what_the_study_gives,
     say_what_traces_tell,
     say_which_method_finds_it,
@@ -30,7 +31,6 @@ from biogrip.page.answers import (
 from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.rows import read_table
-from biogrip.tables.claims import count_verdicts
 from biogrip.terminal import QUIET
 from tests.helpers.default import study_of
 from tests.helpers.key_reference import file_schema, reference
@@ -95,7 +95,7 @@ def answer() -> str:
         say_what_the_study_gives(methods, own, titles, "Run again, the paper's"),
         say_which_method_finds_it(methods, own),
         say_what_traces_tell(_verdicts()),
-        count_verdicts(row["verdict"] for row in claimed).replace(
+        say_what_claims_are(claimed).replace(
             "claims", "[claims](results/published/tables/claims.md)"
         ),
     )

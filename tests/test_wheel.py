@@ -56,7 +56,7 @@ def test_the_wheel_identifies_the_example(installed: Callable[..., str], tmp_pat
 
 
 def test_the_wheel_runs_a_study(installed: Callable[..., str], tmp_path: Path) -> None:
-    """Snakefile, rules, profile and config come with it, and published results for the claims."""
+    """Snakefile, rules, profile and config come with it, and the claims of the paper."""
     (tmp_path / "tiny.yaml").write_text(yaml.safe_dump(TINY))
     (tmp_path / "mine.csv").write_bytes(EXAMPLE.read_bytes())
     place = installed(tmp_path, "python", "-c", "import biogrip; print(biogrip.__file__)")

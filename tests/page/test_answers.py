@@ -4,6 +4,7 @@ import pytest
 
 from biogrip.page.answers import (
     compared_rows,
+    say_what_claims_are,
     say_what_the_study_gives,
     say_what_traces_tell,
     say_which_method_finds_it,
@@ -92,3 +93,13 @@ def test_the_paper_s_values_stand_beside_medians_of_each_basin() -> None:
     (only,) = compared_rows([*every, *split], VERDICTS, TITLES)
     # Wilson's interval of 23 of 50.
     assert only["runs"].replace("\xa0", " ") == "46 % (33 to 60 %) near the noise"
+
+
+def test_verdicts_on_claims_are_counted() -> None:
+    verdicts = ("in part", "not", "replicated", "in part", "cannot be told")
+    claims = [{"verdict": verdict} for verdict in (*verdicts, "outside the printed encoding")]
+    assert say_what_claims_are(claims) == (
+        "Of the paper's 6 claims 1 are replicated, 2 in part, 1 not; 1 are outside the printed "
+        "encoding, and 1 cannot be told."
+    )
+    assert say_what_claims_are([]) == ""

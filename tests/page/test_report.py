@@ -12,6 +12,7 @@ from biogrip.digits import legible
 from biogrip.figures.results import Fit
 from biogrip.fit.methods import METHODS
 from biogrip.page.answers import (
+    say_what_claims_are,
     say_what_the_study_gives,
     say_what_traces_tell,
     say_which_method_finds_it,
@@ -21,7 +22,6 @@ from biogrip.page.page import entry_of
 from biogrip.records.identifications import read_identifications
 from biogrip.records.rows import read_table
 from biogrip.records.traces import read_measurements
-from biogrip.tables.claims import count_verdicts
 from tests.helpers.browser import Opened
 
 MOST_BYTES = 8_000_000
@@ -101,7 +101,7 @@ def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path
         legible(say_what_the_study_gives(compared, own, titles, who)),
         legible(say_which_method_finds_it(compared, own)),
         say_what_traces_tell(sorted(verdicts, key=lambda row: row["case"])).replace("_", ""),
-        count_verdicts(row["verdict"] for row in read_table(tables / "claims.csv")),
+        say_what_claims_are(read_table(tables / "claims.csv")),
     ]
     # No caption of a table stands twice.
     told = page.locator("#tables summary").all_text_contents()

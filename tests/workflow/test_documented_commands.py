@@ -66,7 +66,7 @@ model_selection: {models: [damper, maxwell]}
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the repository, in which a reader works."""
     folder = tmp_path_factory.mktemp("reader")
-    for name in ("src", "workflow", "config", "profiles", "data", "results/published"):
+    for name in ("src", "workflow", "config", "profiles", "data"):
         shutil.copytree(ROOT / name, folder / name)
     shutil.copy(ROOT / "Snakefile", folder)
     # A long trace; few of its readings do.

@@ -90,7 +90,7 @@ def test_five_seeds_more_keep_what_there_is(tiny_copy: Path) -> None:
 def test_an_edit_of_the_library_runs_everything_again_and_is_named(
     tiny: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("src", "config", "results/published"):
+    for name in ("src", "config"):
         shutil.copytree(ROOT / name, tmp_path / name)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "src"))
     with (tmp_path / "src" / "biogrip" / "arrays.py").open("a") as module:

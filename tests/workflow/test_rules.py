@@ -8,7 +8,7 @@ import pytest
 from tests.helpers.places import ROOT
 
 RULES = sorted((ROOT / "workflow").rglob("*.smk"))
-SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
+SCRIPTS = sorted((ROOT / "workflow").glob("[ps]*/*.py"))
 _RULE = re.compile(r"^ *rule (\w+):\n((?: *\n| +.*\n)*)", re.MULTILINE)
 WRITTEN = {
     name: (file, body) for file in RULES for name, body in _RULE.findall(file.read_text("utf-8"))
@@ -33,7 +33,9 @@ def test_a_job_reads_no_config_but_its_params(script: Path) -> None:
     text = script.read_text("utf-8")
     for way in ("load_study", "read_config", "default_config", "snakemake.config", "results/"):
         assert way not in text, way
-    assert f'"../scripts/{script.name}"' in "".join(body for _, body in WRITTEN.values())
+    assert f'"../{script.parent.name}/{script.name}"' in "".join(
+        body for _, body in WRITTEN.values()
+    )
 
 
 def test_no_private_name_of_snakemake_is_used() -> None:

@@ -62,29 +62,3 @@ rule tables:
         "Writing the tables of the study"
     script:
         "../scripts/tables.py"
-
-
-rule claims:
-    input:
-        identifications=files("results/identifications/{case}.csv", STUDY.published),
-        histories=files("results/histories/{case}.npz", STUDY.published),
-        tables=[f"results/tables/{name}.csv" for name in TABLES]
-        + files("results/tables/verdicts_{case}.csv", STUDY.cases),
-        # As published, since these sweeps take longer than the study.
-        sweeps=[
-            str(shipped(f"results/published/{sweep}.csv"))
-            for sweep in (
-                *(f"robustness/tables/robustness_{name}" for name in ("noise", "gripper")),
-                "interpretations/tables/interpretations",
-            )
-        ],
-    output:
-        *table("claims"),
-    log:
-        "results/logs/claims.log",
-    params:
-        **settings_of(*WHOLE),
-    message:
-        "Judging the claims of the paper"
-    script:
-        "../scripts/claims.py"

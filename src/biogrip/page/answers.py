@@ -1,6 +1,6 @@
 """The study's answers in sentences and in one table, written from rows of its tables."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 
@@ -71,6 +71,19 @@ def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
     if shown in found and shown != surest:
         said += f"; the {shown} takes {_responses(found[shown])}"
     return f"{said}."
+
+
+def say_what_claims_are(claims: Iterable[Row]) -> str:
+    """Say how many of the paper's claims have each verdict; "" if there are none."""
+    counts = Counter(row["verdict"] for row in claims)
+    if not counts:
+        return ""
+    return (
+        f"Of the paper's {counts.total()} claims {counts['replicated']} are replicated, "
+        f"{counts['in part']} in part, {counts['not']} not; "
+        f"{counts['outside the printed encoding']} are outside the printed encoding, and "
+        f"{counts['cannot be told']} cannot be told."
+    )
 
 
 def compared_rows(

@@ -23,7 +23,6 @@ from biogrip.records.rows import read_table
 from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import target_of
-from biogrip.tables.claims import count_verdicts
 
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
@@ -116,7 +115,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
                 answers.say_what_the_study_gives(*asked, titles, who),
                 answers.say_which_method_finds_it(*asked),
                 answers.say_what_traces_tell(judged),
-                count_verdicts(row["verdict"] for row in claimed),
+                answers.say_what_claims_are(claimed),
             ],
             compared=answers.compared_rows(errors, judged, titles),
             cases=list(zip(cases, map(read_verdicts, files["verdicts"]), strict=True)),
