@@ -3,17 +3,27 @@
 A cell of the table is an instrument, a number of readings, their times, and what is read. The
 relaxation time of each trace's sample is drawn between 1 and 20 % of the trace. Every trace is
 fitted from random starts and judged as a user's is, but for what needs other models' fits.
+
+    python -m benchmarks.levels                      every cell that is not there, and the page
+    python -m benchmarks.levels creep 10 --traces 5  one cell
+
+Cells are kept in `results/levels`; remove those that are to be measured again.
 """
 
+import argparse
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from itertools import product
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from benchmarks.one_thread import keep_to_one_thread
 from biogrip.arrays import Array
 from biogrip.files import write_text
 from biogrip.fit.genome import GeneRange
@@ -67,7 +77,7 @@ _PAGE = """# How often a verdict is right
 Simulated traces of creep, relaxation and the gripper, at times that are even or spread over three
 or six decades, with noise of 2 % of the peak: {traces} of each row, with the 95 % interval of a
 share (Wilson's). `levels.csv` has every instrument and spacing.
-`snakemake -j2 docs/levels.md` makes this page.
+`python -m benchmarks.levels` makes this page.
 
 **The set-up is right.** All should be ok, none rejected, and 95 % of limits should hold the truth.
 Noise that grows with what is read is to be told: if it is not, traces are doubtful once there are
@@ -267,3 +277,36 @@ def _status_of(problem: Problem, found: Identification) -> str:
     best = np.log(found.parameters)
     likelihood = make_likelihood(problem, best, found.misfit, confidence=_CONFIDENCE)
     return compute_status(examine_residuals(likelihood).notes)
+
+
+def main() -> None:
+    """Judge the cells that are asked for, and count verdicts if there are all of them."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("instrument", nargs="?", choices=INSTRUMENTS_JUDGED, help="default: all")
+    parser.add_argument("readings", nargs="?", type=int, choices=READINGS, help="default: all")
+    parser.add_argument("--traces", type=int, default=20, help="traces of each row (20)")
+    parser.add_argument("--jobs", type=int, default=2, help="processes (2)")
+    parser.add_argument("--folder", type=Path, default=Path("results/levels"), help="of cells")
+    parser.add_argument("--docs", type=Path, default=Path("docs"), help="of the page")
+    asked = parser.parse_args()
+    asked.folder.mkdir(parents=True, exist_ok=True)
+    cells = {
+        asked.folder / f"{instrument}_{readings}.csv": (instrument, readings)
+        for instrument, readings in product(INSTRUMENTS_JUDGED, READINGS)
+    }
+    with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as workers:
+        running = [
+            workers.submit(judge_cells, instrument, readings, asked.traces, file)
+            for file, (instrument, readings) in cells.items()
+            if asked.instrument in (None, instrument) and asked.readings in (None, readings)
+            if not file.is_file()
+        ]
+        for job in running:
+            job.result()
+    if all(file.is_file() for file in cells):
+        summarise(list(cells), asked.docs / "levels.csv", asked.docs / "levels.md")
+
+
+if __name__ == "__main__":
+    keep_to_one_thread()
+    main()
