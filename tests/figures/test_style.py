@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from matplotlib.lines import Line2D
 
-from biogrip.figures.gripper import draw_torque
 from biogrip.figures.results import scale_of
 from biogrip.figures.style import (
     figure,
@@ -19,6 +18,7 @@ from biogrip.figures.style import (
 )
 from biogrip.fit.methods import METHODS
 from tests.helpers.default import STUDY
+from workflow.paper.gripper import draw_torque
 
 
 def test_a_matplotlibrc_changes_no_figure(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ from biogrip.records.identifications import INTERPRETATIONS, read_identification
 from biogrip.stages.identification import identify
 from biogrip.stages.sweeps import identify_interpreted
 from biogrip.stages.targets import measure, simulate
-from biogrip.tables.sweeps import interpretations
 from tests.helpers.default import study_of
+from workflow.paper.interpretations import interpretations
 
 OVERLAY = """
 seeds: 3

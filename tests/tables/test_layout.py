@@ -7,16 +7,24 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.records.rows import read_rows
-from biogrip.tables.layout import Column, Table, compare, write
+from biogrip.tables.layout import Column, ShownTable, compare, convert, write
+
+
+def written(table: ShownTable, folder: Path) -> list[str]:
+    """Markdown, LaTeX and HTML of a table, which is `t.csv` in a folder."""
+    write(table, folder / "t.csv")
+    for end in ("md", "tex"):
+        convert(folder / "t.html", folder / f"t.{end}")
+    return [(folder / f"t.{end}").read_text() for end in ("md", "tex", "html")]
 
 
 def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
     columns = Column("case", "Case"), Column("value", "Value", 3), Column("none", "None")
     rows = [{"case": "a_b", "value": 1234.5678}, {"case": "c & d", "value": -0.0, "none": None}]
-    write(Table("Fifty % of a_b.", columns, [*rows, {"none": float("nan")}]), tmp_path / "t.csv")
+    table = ShownTable("Fifty % of a_b.", columns, [*rows, {"none": float("nan")}])
+    markdown, latex, page = written(table, tmp_path)
     found = read_rows(tmp_path / "t.csv", ["case", "value", "none"])[1:]
     assert found == [["a_b", "1234.57", ""], ["c & d", "0", ""], ["", "", ""]]
-    markdown, latex, page = ((tmp_path / f"t.{end}").read_text() for end in ("md", "tex", "html"))
     assert "1.23e+03" in markdown
     assert "None" not in markdown + latex + page
     assert r"Fifty \% of a\_b." in latex
@@ -35,13 +43,12 @@ def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
 def test_markup_is_text_in_every_format(tmp_path: Path, given: str, latex: str) -> None:
     """Of a caption, a heading and a cell."""
     heading = given.replace("\n", " ")
-    write(Table(given, (Column("a", heading),), [{"a": given}]), tmp_path / "t.csv")
-    written = (tmp_path / "t.tex").read_text()
-    assert rf"\caption{{{latex}}}" in written
-    assert not re.search(r"(?<!\\)[#$%&_~^]|\\input", written)
-    markdown = (tmp_path / "t.md").read_text()
+    table = ShownTable(given, (Column("a", heading),), [{"a": given}])
+    markdown, tex, page = written(table, tmp_path)
+    assert rf"\caption{{{latex}}}" in tex
+    assert not re.search(r"(?<!\\)[#$%&_~^]|\\input", tex)
     assert [len(re.findall(r"(?<!\\)\|", row)) for row in markdown.splitlines()[-3:]] == [2] * 3
-    assert "<img" not in markdown + (tmp_path / "t.html").read_text()
+    assert "<img" not in markdown + page
     assert read_rows(tmp_path / "t.csv", ["a"])[1:] == [[given]]
 
 

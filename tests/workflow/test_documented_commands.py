@@ -27,7 +27,7 @@ LEFT = {
     ],
     "groups.md": ["found.csv"],
     "design.md": ["my_designed.yaml"],
-    "howto/case.md": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
+    "howto/case.md": ["results/tables/errors_my_cell.html", "results/summaries/my_cell.html"],
     "howto/trace.md": [
         *("found.json", "drifting.json", "coloured.json", "page.html", "traces.csv"),
         *("maxwell.json", "uncertain.json"),
@@ -52,7 +52,7 @@ LONG_HOWTOS = ("case", "trace", "noise", "figure", "noise_kind", "posterior")
 TAKES_LONG |= {f"howto/{name}.md" for name in LONG_HOWTOS}
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
-    "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
+    "my.yaml": ["results/tables/errors_my_cell.html", "results/summaries/my_cell.html"],
 }
 # A trace fitted from few starts, with few models, of which the chosen one has two parameters unless
 # the document says which.

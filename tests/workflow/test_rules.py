@@ -15,9 +15,10 @@ WRITTEN = {
 }
 # Of what the reader asks for, with no files of its own.
 TARGETS = ("check", "publish", "rulegraph")
+COLLECTING = ("latex_tables", "markdown_tables")
 
 
-@pytest.mark.parametrize("name", WRITTEN)
+@pytest.mark.parametrize("name", [name for name in WRITTEN if name not in COLLECTING])
 def test_a_rule_says_what_it_does_and_depends_on(name: str) -> None:
     body = WRITTEN[name][1]
     for part in ("log:", "message:"):

@@ -25,7 +25,7 @@ from biogrip.records.identifications import read_histories, read_identifications
 from biogrip.records.rows import read_frame
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Table, write
+from biogrip.tables.layout import Column, ShownTable, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -225,7 +225,7 @@ def judge(claim: Mapping[str, Any], results: Results) -> Judged:
     return altogether(verdicts) if verdicts else "", around
 
 
-def judge_all(claims: Sequence[Mapping[str, Any]], results: Results, caption: str) -> Table:
+def judge_all(claims: Sequence[Mapping[str, Any]], results: Results, caption: str) -> ShownTable:
     """Judge every claim by the study's results."""
     rows = []
     for claim in claims:
@@ -237,7 +237,7 @@ def judge_all(claims: Sequence[Mapping[str, Any]], results: Results, caption: st
         rows.append(row | {"evidence": evidence})
     headings = ("Place", "Claim of the paper", "Verdict", "Evidence")
     names = ("place", "claim", "verdict", "evidence")
-    return Table(caption, tuple(map(Column, names, headings)), rows)
+    return ShownTable(caption, tuple(map(Column, names, headings)), rows)
 
 
 def read_results(
@@ -359,4 +359,4 @@ if __name__ == "__main__":
         results = read_results(study.of(study.published), *read)
         claims = yaml.safe_load(Path(given.claims).read_text(encoding="utf-8"))
         caption = " ".join(Path(given.caption).read_text(encoding="utf-8").split())
-        write(judge_all(claims, results, caption), Path(snakemake.output[0]))
+        write(judge_all(claims, results, caption), Path(snakemake.output.table))

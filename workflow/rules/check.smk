@@ -18,7 +18,7 @@ def published(kind, *suffixes):
 # Neither has an output, so that neither is ever taken for done.
 rule check:
     input:
-        made=published("tables", ".csv", ".md", ".tex"),
+        made=published("tables", ".csv", ".md"),
     log:
         "results/logs/check.log",
     localrule: True
@@ -32,7 +32,7 @@ rule check:
 
 rule publish:
     input:
-        published("tables", ".csv", ".md", ".tex"),
+        published("tables", ".csv", ".md"),
         published("figures", ".png", ".pdf"),
     log:
         "results/logs/publish.log",

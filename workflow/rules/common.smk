@@ -101,13 +101,13 @@ TABLES += ["linearisation", "mechanics"] if STUDY.gripped else []
 TABLES += ["methods"] if STUDY.simulated else []
 TABLES += ["coverage"] if STUDY.covered else []
 TABLES += ["models"] if SELECTING else []
-TABLES += ["evidence", "printed_values", "sampling_evidence"] if STUDY.published else []
 TABLES += ["verdict_counts"] if COUNTED else []
+EVIDENCE = ["evidence", "printed_values", "sampling_evidence"]
 OTHER_TABLES = ["contact_loss"] if STUDY.gripped else []
-OTHER_TABLES += ["claims"] if STUDY.published else []
+OTHER_TABLES += ["claims", *EVIDENCE] if STUDY.published else []
 OTHER_TABLES += ["interpretations", "interpretations_jointly"] * bool(STUDY.config.interpretations)
-FIGURES = ["comb", "linkage", "torque"] if STUDY.has_gripper else []
-FIGURES += ["linearisation"] if STUDY.gripped else []
+GRIPPER_FIGURES = ["comb", "linkage", "torque"] if STUDY.has_gripper else []
+FIGURES = ["linearisation"] if STUDY.gripped else []
 FIGURES += ["answer"] if ANSWERED else []
 FIGURES += ["moduli", "overview"] if STUDY.simulated else []
 
@@ -127,7 +127,7 @@ SHOWN = {
         *(("robustness", sweep) for sweep in STUDY.sweeps),
     ],
     "figures": [
-        *((name, "") for name in FIGURES),
+        *((name, "") for name in [*GRIPPER_FIGURES, *FIGURES]),
         *(
             (name, case)
             for case, its in STUDY.cases.items()
@@ -155,17 +155,14 @@ def shown(path, kind, item, whose):
     return report(path, caption=caption, category=kind.title(), labels=labels)
 
 
-def table(name, whose=""):
-    """The files of a table, of which the last is in Snakemake's report."""
-    path = f"results/tables/{stem(name, whose)}"
-    page = shown(f"{path}.html", "tables", name, whose)
-    return [*multiext(path, ".csv", ".md", ".tex"), page]
+def page_of_table(name, whose=""):
+    """The page of a table, in Snakemake's report."""
+    return shown(f"results/tables/{stem(name, whose)}.html", "tables", name, whose)
 
 
-def figure(name, whose=""):
-    """The files of a figure, of which the first is in Snakemake's report."""
-    path = f"results/figures/{stem(name, whose)}"
-    return [shown(f"{path}.png", "figures", name, whose), f"{path}.pdf"]
+def picture(name, whose=""):
+    """The picture of a figure, in Snakemake's report."""
+    return shown(f"results/figures/{stem(name, whose)}.png", "figures", name, whose)
 
 
 wildcard_constraints:

@@ -5,7 +5,8 @@ def case_figures(simulated, valley):
     """The files of the figures of a case, and its summary."""
     drawn = case_figure_names(simulated, valley)
     summary = shown("results/summaries/{case}.html", "pages", "summary", "{case}")
-    return [*(file for name in drawn for file in figure(name, "{case}")), summary]
+    prints = [f"results/figures/{name}_{{case}}.pdf" for name in drawn]
+    return [*(picture(name, "{case}") for name in drawn), *prints, summary]
 
 
 # Of a recorded trace nobody knows the target; a valley has who searches for c and c_p.
@@ -66,7 +67,8 @@ rule figures:
         differences="results/linearisation.csv" if STUDY.gripped else [],
         answered=[*files("results/identifiability/{case}.json", ANSWERED), *first_traces(ANSWERED)],
     output:
-        [file for name in FIGURES for file in figure(name)],
+        pictures=[picture(name) for name in FIGURES],
+        prints=expand("results/figures/{name}.pdf", name=FIGURES),
     log:
         "results/logs/figures.log",
     params:

@@ -1,12 +1,6 @@
-"""What only some configs have: sweeps, interpretations of the paper, and tables of recorded traces."""
+"""What only some configs have: sweeps, and tables of recorded traces."""
 
-from biogrip.physics.models import SINGLE_BRANCH
 from biogrip.identify.settings import Setting, check_settings, read_table
-
-# Simulated cases whose model has the paper's parameters, and what is read of each.
-OURS = {parameter.name for parameter in SINGLE_BRANCH}
-INTERPRETED_CASE = ["actuator", *(field.name for field in fields(CaseBlock))]
-INTERPRETED = [n for n in STUDY.simulated if set(STUDY.case(n).sample.model.names) <= OURS]
 
 
 def points(sweep):
@@ -26,8 +20,10 @@ rule sweep:
         ),
     output:
         points="results/robustness/{sweep}.csv",
-        table=table("robustness", "{sweep}"),
-        figure=figure("robustness", "{sweep}"),
+        table="results/tables/robustness_{sweep}.csv",
+        page=page_of_table("robustness", "{sweep}"),
+        figure=picture("robustness", "{sweep}"),
+        print="results/figures/robustness_{sweep}.pdf",
     log:
         "results/logs/sweep/{sweep}.log",
     params:
@@ -36,39 +32,6 @@ rule sweep:
         "Judging and drawing the sweep {wildcards.sweep}"
     script:
         "../scripts/sweep.py"
-
-
-rule interpretations_of_case:
-    input:
-        target="results/targets/{case}.csv",
-    output:
-        rows="results/interpretations/{case}.csv",
-    log:
-        "results/logs/interpretations_of_case/{case}.log",
-    resources:
-        runtime=120,
-    params:
-        **settings_of("study_seed", "seeds", "interpretations", *INTERPRETED_CASE),
-    message:
-        "Identifying {wildcards.case} under every interpretation of the paper"
-    script:
-        "../scripts/interpretations_of_case.py"
-
-
-rule interpretations:
-    input:
-        found=files("results/interpretations/{case}.csv", INTERPRETED),
-    output:
-        apart=table("interpretations"),
-        jointly=table("interpretations_jointly"),
-    log:
-        "results/logs/interpretations.log",
-    params:
-        **settings_of("interpretations", "evaluation", *keys_of_cases(STUDY)),
-    message:
-        "Comparing the interpretations of the paper"
-    script:
-        "../scripts/interpretations.py"
 
 
 if STUDY.traces:

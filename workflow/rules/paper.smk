@@ -1,4 +1,85 @@
-"""What only the study of the paper has: verdicts on its claims."""
+"""What only the study of the paper has: its gripper drawn, evidence, interpretations, and claims."""
+
+from biogrip.physics.models import SINGLE_BRANCH
+
+# Simulated cases whose model has the paper's parameters, and what is read of each.
+OURS = {parameter.name for parameter in SINGLE_BRANCH}
+INTERPRETED_CASE = ["actuator", *(field.name for field in fields(CaseBlock))]
+INTERPRETED = [n for n in STUDY.simulated if set(STUDY.case(n).sample.model.names) <= OURS]
+
+
+rule gripper_figures:
+    output:
+        comb=picture("comb"),
+        torque=picture("torque"),
+        linkage=picture("linkage"),
+        prints=expand("results/figures/{name}.pdf", name=GRIPPER_FIGURES),
+    log:
+        "results/logs/gripper_figures.log",
+    params:
+        **settings_of(*WHOLE),
+    message:
+        "Drawing the gripper"
+    script:
+        "../paper/gripper.py"
+
+
+# Of the cases whose axis the paper shows, the traces.
+rule evidence:
+    input:
+        identifications=files("results/identifications/{case}.csv", STUDY.published),
+        measurements=files(
+            "results/measurements/{case}/{batch}.npz",
+            [name for name in STUDY.published if STUDY.case(name).published.axis_rad],
+        ),
+    output:
+        evidence="results/tables/evidence.csv",
+        printed_values="results/tables/printed_values.csv",
+        sampling_evidence="results/tables/sampling_evidence.csv",
+        pages=[page_of_table(name) for name in EVIDENCE],
+    log:
+        "results/logs/evidence.log",
+    params:
+        **settings_of(*WHOLE),
+    message:
+        "Holding the paper's numbers against each other"
+    script:
+        "../paper/evidence.py"
+
+
+rule interpretations_of_case:
+    input:
+        target="results/targets/{case}.csv",
+    output:
+        rows="results/interpretations/{case}.csv",
+    log:
+        "results/logs/interpretations_of_case/{case}.log",
+    resources:
+        runtime=120,
+    params:
+        **settings_of("study_seed", "seeds", "interpretations", *INTERPRETED_CASE),
+    message:
+        "Identifying {wildcards.case} under every interpretation of the paper"
+    script:
+        "../scripts/interpretations_of_case.py"
+
+
+rule interpretations:
+    input:
+        found=files("results/interpretations/{case}.csv", INTERPRETED),
+    output:
+        apart="results/tables/interpretations.csv",
+        apart_page=page_of_table("interpretations"),
+        jointly="results/tables/interpretations_jointly.csv",
+        jointly_page=page_of_table("interpretations_jointly"),
+    log:
+        "results/logs/interpretations.log",
+    params:
+        **settings_of("interpretations", "evaluation", *keys_of_cases(STUDY)),
+    message:
+        "Comparing the interpretations of the paper"
+    script:
+        "../paper/interpretations.py"
 
 
 # By what this study has: only some configs have sweeps and interpretations.
@@ -8,9 +89,10 @@ rule claims:
         caption=workflow.source_path("../report/tables/claims.rst"),
         identifications=files("results/identifications/{case}.csv", STUDY.published),
         histories=files("results/histories/{case}.npz", STUDY.published),
-        tables=[file for file in made("tables", ".csv") if file != "results/tables/claims.csv"],
+        tables=[file for file in made("tables", ".csv") if not file.endswith("/claims.csv")],
     output:
-        *table("claims"),
+        table="results/tables/claims.csv",
+        page=page_of_table("claims"),
     log:
         "results/logs/claims.log",
     params:

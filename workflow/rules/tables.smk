@@ -12,8 +12,10 @@ rule case_tables:
     output:
         identifications="results/identifications/{case}.csv",
         history="results/histories/{case}.npz",
-        errors=table("errors", "{case}"),
-        verdicts=table("verdicts", "{case}"),
+        errors="results/tables/errors_{case}.csv",
+        errors_page=page_of_table("errors", "{case}"),
+        verdicts="results/tables/verdicts_{case}.csv",
+        verdicts_page=page_of_table("verdicts", "{case}"),
     log:
         "results/logs/case_tables/{case}.log",
     wildcard_constraints:
@@ -29,7 +31,8 @@ rule case_tables:
 rule model_errors:
     output:
         differences="results/linearisation.csv",
-        contact_loss=table("contact_loss"),
+        contact_loss="results/tables/contact_loss.csv",
+        contact_loss_page=page_of_table("contact_loss"),
     log:
         "results/logs/model_errors.log",
     params:
@@ -49,11 +52,11 @@ rule tables:
         identifications=files("results/identifications/{case}.csv", STUDY.cases),
         targets=files("results/targets/{case}.csv", STUDY.simulated),
         intervals=files("results/coverage/{case}/{batch}.csv", STUDY.covered),
-        measurements=files("results/measurements/{case}/{batch}.npz", STUDY.cases),
         calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
         differences="results/linearisation.csv" if STUDY.gripped else [],
     output:
-        [file for name in TABLES for file in table(name)],
+        tables=expand("results/tables/{name}.csv", name=TABLES),
+        pages=[page_of_table(name) for name in TABLES],
     log:
         "results/logs/tables.log",
     params:
@@ -62,3 +65,32 @@ rule tables:
         "Writing the tables of the study"
     script:
         "../scripts/tables.py"
+
+
+rule convert_table:
+    input:
+        "results/tables/{name}.html",
+    output:
+        "results/tables/{name}.{format}",
+    log:
+        "results/logs/convert_table/{name}.{format}.log",
+    wildcard_constraints:
+        format="md|tex",
+    localrule: True
+    params:
+        **settings_of(),
+    message:
+        "Writing the table {wildcards.name} as {wildcards.format}"
+    script:
+        "../scripts/convert_table.py"
+
+
+# Every table in a format that papers or forges read.
+rule latex_tables:
+    input:
+        made("tables", ".tex"),
+
+
+rule markdown_tables:
+    input:
+        made("tables", ".md"),

@@ -16,6 +16,6 @@ with logged(snakemake):
         identifications,
         Path(made.history),
     )
-    write(errors_of_case(case, identifications), Path(made.errors[0]))
+    write(errors_of_case(case, identifications), Path(made.errors))
     judged = verdicts(case, Path(files.verdicts), paths(files.expected))
-    write(judged, Path(made.verdicts[0]))
+    write(judged, Path(made.verdicts))

@@ -1,11 +1,6 @@
 """Draw the figures of the study, as far as it has what they show."""
 
-from pathlib import Path
-
-from biogrip.figures import gripper as actuator
-from biogrip.figures import gripper as linkage
-from biogrip.figures import mechanics as linearisation
-from biogrip.figures import moduli, overview
+from biogrip.figures import mechanics, moduli, overview
 from biogrip.figures.overview import draw_answer, shown_cases
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
@@ -27,10 +22,7 @@ with logged(snakemake):
         "answer": lambda: draw_answer(
             study.cases[answered], *given["answered"], calibrated_of(answered)
         ),
-        "comb": lambda: actuator.draw_comb(study),
-        "torque": lambda: actuator.draw_torque(study),
-        "linkage": lambda: linkage.draw_linkage(gripped),
-        "linearisation": lambda: linearisation.draw_linearisation(gripped, *given["differences"]),
+        "linearisation": lambda: mechanics.draw_linearisation(gripped, *given["differences"]),
         "moduli": lambda: moduli.draw_moduli(shown, of("identifications"), of("targets")),
         "overview": lambda: overview.draw_overview(
             shown,
@@ -40,7 +32,6 @@ with logged(snakemake):
             calibrated_of(first),
         ),
     }
-    for file in map(Path, snakemake.output):
-        if file.suffix == ".png":
-            with styled():
-                save(drawings[file.stem](), file)
+    for file in paths(snakemake.output.pictures):
+        with styled():
+            save(drawings[file.stem](), file)

@@ -10,4 +10,4 @@ from biogrip.tables.mechanics import contact_loss
 with logged(snakemake):
     study = job_study(snakemake)
     compare(study.of(study.gripped), Path(snakemake.output.differences))
-    write(contact_loss(study), Path(snakemake.output.contact_loss[0]))
+    write(contact_loss(study), Path(snakemake.output.contact_loss))

@@ -14,6 +14,6 @@ with logged(snakemake):
     identifications = paths(snakemake.input.identifications)
     points = Path(snakemake.output.points)
     judge(study, sweep, identifications, paths(snakemake.input.calibrated), points)
-    write(robustness(study, sweep, points), Path(snakemake.output.table[0]))
+    write(robustness(study, sweep, points), Path(snakemake.output.table))
     with styled():
-        save(draw_robustness(study, sweep, points), Path(snakemake.output.figure[0]))
+        save(draw_robustness(study, sweep, points), Path(snakemake.output.figure))

@@ -1,18 +1,15 @@
 """Write the tables of the study, as far as it has what they are of."""
 
-from pathlib import Path
-
 from biogrip.stages.job import job_study, logged, paths
-from biogrip.tables import cases, coverage, evidence, inputs, mechanics, methods
+from biogrip.tables import cases, coverage, inputs, mechanics, methods
 from biogrip.tables.layout import write
 
 with logged(snakemake):
     study = job_study(snakemake)
     given = {name: paths(files) for name, files in snakemake.input.items()}
     gripped, simulated = study.of(study.gripped), study.of(study.simulated)
-    published, covered = study.of(study.published), study.of(study.covered)
+    covered = study.of(study.covered)
     counted = study.of(n for n in study.covered if study.case(n).verdicts_every == 1)
-    axes = [name for name in study.published if study.cases[name].published.axis_rad]
 
     def of(study, name):
         return [file for file in given[name] if file.stem in study.cases]
@@ -35,14 +32,6 @@ with logged(snakemake):
             counted, [file for file in given["intervals"] if file.parent.name in counted.cases]
         ),
         "models": lambda: methods.models(study, given["fits"]),
-        "evidence": lambda: evidence.evidence(
-            published,
-            of(published, "identifications"),
-            [file for file in given["measurements"] if file.parent.name in axes],
-        ),
-        "printed_values": lambda: evidence.printed_values(published),
-        "sampling_evidence": lambda: evidence.sampling_evidence(published),
     }
-    for file in map(Path, snakemake.output):
-        if file.suffix == ".csv":
-            write(tables[file.stem](), file)
+    for file in paths(snakemake.output.tables):
+        write(tables[file.stem](), file)

@@ -1,1 +1,1 @@
-"""The study's tables, each as CSV, Markdown, LaTeX and HTML."""
+"""The study's tables, each as CSV and HTML."""

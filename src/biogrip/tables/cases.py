@@ -15,7 +15,7 @@ from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.models import Published
 from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, Table
+from biogrip.tables.layout import Column, Row, ShownTable
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -47,7 +47,7 @@ def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:
     return (*_COLUMNS, Column("near_noise_share", share, 2), *ends)
 
 
-def errors_of_case(case: Case, identifications: Path) -> Table:
+def errors_of_case(case: Case, identifications: Path) -> ShownTable:
     """Compare target and identified values of one case, given its identifications, CSV."""
     tolerance = case.study.near_noise_tolerance
     found = read_identifications(identifications, case.study.shown)
@@ -80,7 +80,7 @@ def errors_of_case(case: Case, identifications: Path) -> Table:
         if case.parameters
         else f"{case.title}: parameters identified in the recorded trace."
     )
-    return Table(caption, _columns(tolerance), rows)
+    return ShownTable(caption, _columns(tolerance), rows)
 
 
 def error_percent(target: float | None, identified: Array) -> Array:
@@ -102,7 +102,7 @@ def _of_paper(published: Published, names: list[str], target: float | None) -> R
     return {"paper_identified": value, "paper_error_percent": error}
 
 
-def errors(study: Study, identifications: list[Path]) -> Table:
+def errors(study: Study, identifications: list[Path]) -> ShownTable:
     """Join the tables of errors of all cases, given the identifications of each, CSV."""
     files = zip(study.cases.values(), identifications, strict=True)
     rows = [dict(row) for case, file in files for row in errors_of_case(case, file).rows]
@@ -111,7 +111,7 @@ def errors(study: Study, identifications: list[Path]) -> Table:
         with suppress(ValueError, TypeError, KeyError):
             row["paper_error_percent"] = float(row["paper_error_percent"])
     columns = _columns(study.near_noise_tolerance)
-    return Table(f"Identification errors of all cases. {_BASINS}", columns, rows)
+    return ShownTable(f"Identification errors of all cases. {_BASINS}", columns, rows)
 
 
 _VERDICT_COLUMNS = (
@@ -131,7 +131,7 @@ _VERDICT_COLUMNS = (
 )
 
 
-def verdicts(case: Case, measured: Path, expected: list[Path]) -> Table:
+def verdicts(case: Case, measured: Path, expected: list[Path]) -> ShownTable:
     """List the verdicts on all quantities of a case, and those expected, where there are any."""
     found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
     foreseen_of = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
@@ -163,7 +163,7 @@ def verdicts(case: Case, measured: Path, expected: list[Path]) -> Table:
         caption += " Expected: the same for the trace without noise, judged at the noise level."
     percent = f"{100 * found['confidence']:g} %"
     columns = tuple(replace(c, heading=c.heading.format(percent=percent)) for c in _VERDICT_COLUMNS)
-    return Table(caption, columns, rows)
+    return ShownTable(caption, columns, rows)
 
 
 def target_of(quantity: str, parameters: Mapping[str, float]) -> float | None:

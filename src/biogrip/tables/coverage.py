@@ -21,7 +21,7 @@ from biogrip.records.identifications import INTERVALS
 from biogrip.records.traces import read_target
 from biogrip.study.study import Study
 from biogrip.tables.cases import target_of
-from biogrip.tables.layout import Column, Row, Table
+from biogrip.tables.layout import Column, Row, ShownTable
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -48,7 +48,7 @@ _COUNTED = {"determined": (DETERMINED,), "one_sided": (BOUNDED_BELOW, BOUNDED_AB
 
 def coverage(
     study: Study, targets: list[Path], intervals: list[Path], calibrated: list[Path]
-) -> Table:
+) -> ShownTable:
     """Compare estimates and intervals of many seeds with the true values and the bound.
 
     Targets are files of all cases, in their order; calibrated grippers those of the cases that have
@@ -88,7 +88,7 @@ def coverage(
         f"in {_judged_seeds(study)}, and how many of them are true; one-sided limits hold more "
         "often than the confidence says."
     )
-    return Table(caption, _COLUMNS, rows)
+    return ShownTable(caption, _COLUMNS, rows)
 
 
 def _judged_seeds(study: Study) -> str:
@@ -152,7 +152,7 @@ _COUNT_COLUMNS = (
 )
 
 
-def verdict_counts(study: Study, intervals: list[Path]) -> Table:
+def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
     """Count verdicts of whole profiles, and those whose limits hold the true value."""
     rows: list[Row] = []
     estimated = pd.concat([INTERVALS.read(it) for it in intervals], ignore_index=True)
@@ -169,7 +169,7 @@ def verdict_counts(study: Study, intervals: list[Path]) -> Table:
         "how often each is reached, with the 95 % interval of its share, and how often its limits "
         "hold the true value, with the 95 % interval of that share (Clopper and Pearson)."
     )
-    return Table(caption, _COUNT_COLUMNS, rows)
+    return ShownTable(caption, _COUNT_COLUMNS, rows)
 
 
 def _counts(found: pd.DataFrame, target: float | None) -> Iterator[Row]:

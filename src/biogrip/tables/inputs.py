@@ -2,7 +2,7 @@
 
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.study.study import Study
-from biogrip.tables.layout import Column, Table
+from biogrip.tables.layout import Column, ShownTable
 
 _LEGEND = (
     " Stated: by the paper, or by whoever changed the config. "
@@ -49,7 +49,7 @@ _RANGE_COLUMNS = (
 )
 
 
-def gripper(study: Study) -> Table:
+def gripper(study: Study) -> ShownTable:
     """Table 1: parameters of the gripper."""
     block = study.gripper
     angle = block.reference_angle_deg
@@ -65,7 +65,7 @@ def gripper(study: Study) -> Table:
     return _quantities(study, "gripper", "Table 1. Parameters of the gripper.", rows)
 
 
-def actuator(study: Study) -> Table:
+def actuator(study: Study) -> ShownTable:
     """Table 2: geometry of the comb drive."""
     rows = [
         (key, symbol, meaning, getattr(study.actuator, key), unit)
@@ -75,7 +75,7 @@ def actuator(study: Study) -> Table:
     return _quantities(study, "actuator", caption, rows)
 
 
-def gene_ranges(study: Study) -> Table:
+def gene_ranges(study: Study) -> ShownTable:
     """Table 3: values that the genes may take."""
     rows = []
     for name in (parameter.name for parameter in SINGLE_BRANCH):
@@ -85,10 +85,10 @@ def gene_ranges(study: Study) -> Table:
             gene = {"gene": f"g_{name}{index}", "parameter": name, "role": role, "source": source}
             rows.append(gene | {"min": low, "max": high, "values": high - low + 1})
     caption = "Table 3. Values that the genes of the chromosome may take."
-    return Table(caption + _LEGEND, _GENE_COLUMNS, rows)
+    return ShownTable(caption + _LEGEND, _GENE_COLUMNS, rows)
 
 
-def parameter_ranges(study: Study) -> Table:
+def parameter_ranges(study: Study) -> ShownTable:
     """Table 4: ranges of the parameters, as they follow from the genes."""
     rows = [
         {"parameter": p.name, "meaning": p.meaning, "unit": p.unit}
@@ -96,19 +96,19 @@ def parameter_ranges(study: Study) -> Table:
         for p in SINGLE_BRANCH
     ]
     caption = "Table 4. Ranges of the sample's parameters, computed from the genes of Table 3."
-    return Table(caption, _RANGE_COLUMNS, rows)
+    return ShownTable(caption, _RANGE_COLUMNS, rows)
 
 
 def _quantities(
     study: Study, block: str, caption: str, rows: list[tuple[str, str, str, float, str]]
-) -> Table:
+) -> ShownTable:
     """Return a table of keys of a block, each with symbol, meaning, value and unit."""
     cells = [
         {"symbol": symbol, "meaning": meaning, "value": value, "unit": unit}
         | {"source": _source(study, f"{block}.{key}")}
         for key, symbol, meaning, value, unit in rows
     ]
-    return Table(caption + _LEGEND, _QUANTITY_COLUMNS, cells)
+    return ShownTable(caption + _LEGEND, _QUANTITY_COLUMNS, cells)
 
 
 def _source(study: Study, key: str) -> str:

@@ -1,9 +1,10 @@
-"""Tables: written as CSV for computing, as Markdown, LaTeX and HTML for reading; and compared.
+"""Tables: written as CSV for computing and as HTML for reading; put in other formats; compared.
 
 CSV has six significant digits, print as many as a column says, of the number in the CSV.
 """
 
 import re
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import unified_diff
@@ -49,7 +50,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class ShownTable:
     """A table with caption, columns and rows."""
 
     caption: str
@@ -65,8 +66,8 @@ class Table:
             raise ValueError(f"cells of no column: {', '.join(sorted(extra))}")
 
 
-def write(table: Table, output: Path) -> None:
-    """Write a table as CSV, and without empty columns as .md, .tex and .html beside it."""
+def write(table: ShownTable, output: Path) -> None:
+    """Write a table as CSV, and without empty columns as HTML beside it."""
     columns = table.columns
     shown = pd.DataFrame(
         [[_text(row.get(c.name), c.digits) for c in columns] for row in table.rows],
@@ -74,25 +75,37 @@ def write(table: Table, output: Path) -> None:
     )
     if len(shown):
         shown = shown.loc[:, (shown != "").any()]
-    barless = shown.map(_without_bars).rename(columns=_without_bars)
-    markdown = barless.to_markdown(index=False, disable_numparse=True)
-    latex = shown.to_latex(
-        index=False,
-        escape=True,
-        caption=" ".join(table.caption.split()).translate(_LATEX),
-        label=f"tab:{output.stem}",
-        column_format="l" * shown.shape[1],
-    )
     html = (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><style>{_STYLE}</style>'
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"/><style>{_STYLE}</style>'
         f"</head><body>\n<p>{escape(table.caption)}</p>\n{shown.to_html(index=False, border=0)}\n"
         "</body></html>\n"
     )
     cells = ([_text(row.get(c.name), 6) for c in columns] for row in table.rows)
     write_rows(output, [c.name for c in columns], cells)
-    write_text(output.with_suffix(".md"), f"{_TAG.sub('&lt;', table.caption)}\n\n{markdown}\n")
-    write_text(output.with_suffix(".tex"), latex)
     write_text(output.with_suffix(".html"), html)
+
+
+def convert(page: Path, output: Path) -> None:
+    """Write a table's HTML as Markdown or LaTeX, which the ending of the output says."""
+    # Well-formed after its first line, as `write` made it, but for what pandas makes of two blanks.
+    text = page.read_text(encoding="utf-8").partition("\n")[2].replace("&nbsp;", " ")
+    body = ElementTree.fromstring(text)[1]
+    caption = body.findtext("p", "")
+    headings, *rows = ([cell.text or "" for cell in row] for row in body.iter("tr"))
+    shown = pd.DataFrame(rows, columns=headings)
+    if output.suffix == ".md":
+        barless = shown.map(_without_bars).rename(columns=_without_bars)
+        table = barless.to_markdown(index=False, disable_numparse=True)
+        text = f"{_TAG.sub('&lt;', caption)}\n\n{table}\n"
+    else:
+        text = shown.to_latex(
+            index=False,
+            escape=True,
+            caption=" ".join(caption.split()).translate(_LATEX),
+            label=f"tab:{output.stem}",
+            column_format="l" * shown.shape[1],
+        )
+    write_text(output, text)
 
 
 def _text(cell: Any, digits: int) -> str:

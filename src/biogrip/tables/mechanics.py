@@ -38,7 +38,7 @@ from biogrip.physics.unilateral import unilateral_response
 from biogrip.records.identifications import DIFFERENCES
 from biogrip.records.traces import as_written
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, Table
+from biogrip.tables.layout import Column, Row, ShownTable
 
 _CONTACT_COLUMNS = (
     Column("size_um", "Sample (um)"),
@@ -52,7 +52,7 @@ _CONTACT_COLUMNS = (
 )
 
 
-def contacts(study: Study) -> Table:
+def contacts(study: Study) -> ShownTable:
     """Return the state of the gripper closed onto samples from the smallest to the largest."""
     grip_Nm = largest_load(study.phases)
     neutral_deg = study.gripper.reference_angle_deg
@@ -84,7 +84,7 @@ def contacts(study: Study) -> Table:
         "torque and voltage that hold it there. Grip torques come on top; the last voltage "
         f"is with the protocol's largest, {1e9 * grip_Nm:.3g} nN m."
     )
-    return Table(caption, _CONTACT_COLUMNS, rows)
+    return ShownTable(caption, _CONTACT_COLUMNS, rows)
 
 
 _MECHANICS_COLUMNS = (
@@ -103,7 +103,7 @@ _MECHANICS_COLUMNS = (
 )
 
 
-def mechanics(study: Study) -> Table:
+def mechanics(study: Study) -> ShownTable:
     """Compute strain, force, stiffness and modulus of every sample."""
     caption = (
         "Each sample while jaws hold it: shortening and strain at the end of the first phase; the "
@@ -116,7 +116,7 @@ def mechanics(study: Study) -> Table:
         "largest sample that the gripper takes."
     )
     rows = [row for case in study.cases.values() for row in _mechanics_of(case)]
-    return Table(caption, _MECHANICS_COLUMNS, rows)
+    return ShownTable(caption, _MECHANICS_COLUMNS, rows)
 
 
 def _mechanics_of(case: Case) -> list[Row]:
@@ -164,7 +164,7 @@ _LEFT_OUT_COLUMNS = (
 )
 
 
-def left_out(study: Study) -> Table:
+def left_out(study: Study) -> ShownTable:
     """Estimate effects that the model leaves out, for the largest sample."""
     gripper, arm = study.gripper, study.gripper.left
     b, length_mm = gripper.lever_m, 1e3 * gripper.arm_length_m
@@ -201,7 +201,7 @@ def left_out(study: Study) -> Table:
         f"What the model leaves out, estimated for a sample of {1e6 * LARGEST_M:g} um: its size, "
         "and its share of what it would add to."
     )
-    return Table(caption, _LEFT_OUT_COLUMNS, rows)
+    return ShownTable(caption, _LEFT_OUT_COLUMNS, rows)
 
 
 def _damping(case: Case) -> float:
@@ -222,7 +222,7 @@ _LINEARISATION_COLUMNS = (
 )
 
 
-def linearisation(differences: Path) -> Table:
+def linearisation(differences: Path) -> ShownTable:
     """Return, for every case and angle, the torque factor that reaches `LIMIT_PERCENT`."""
     rows = []
     for (case, angle), group in DIFFERENCES.read(differences).groupby(
@@ -239,7 +239,7 @@ def linearisation(differences: Path) -> Table:
         "torque of the case's protocol, and the multiple of that torque at which it reaches "
         f"{LIMIT_PERCENT:g} % (empty: not up to {factor[-1]:g})."
     )
-    return Table(caption, _LINEARISATION_COLUMNS, rows)
+    return ShownTable(caption, _LINEARISATION_COLUMNS, rows)
 
 
 def _crossing(factor: Array, share: Array) -> float | None:
@@ -269,7 +269,7 @@ _COLUMNS = (
 )
 
 
-def contact_loss(study: Study) -> Table:
+def contact_loss(study: Study) -> ShownTable:
     """Identify traces with bilateral and with unilateral contact, both linear; compare errors."""
     linear = [case for name in study.gripped if not (case := study.cases[name]).nonlinear_target]
     rows = [row for case in linear for row in _loss_of(study.study_seed, case)]
@@ -281,7 +281,7 @@ def contact_loss(study: Study) -> Table:
         "of the noise. Errors are (target - identified)/target; empty beyond "
         f"{_LARGEST_PERCENT:g} %."
     )
-    return Table(caption, _COLUMNS, rows)
+    return ShownTable(caption, _COLUMNS, rows)
 
 
 def _loss_of(study_seed: int, case: Case) -> list[Row]:

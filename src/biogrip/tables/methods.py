@@ -10,7 +10,7 @@ from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.records.identifications import ENCODABLE, MODEL_FITS, read_identifications
 from biogrip.study.study import Study
 from biogrip.tables.cases import error_percent, target_of
-from biogrip.tables.layout import Column, Row, Table
+from biogrip.tables.layout import Column, Row, ShownTable
 
 _METHOD_COLUMNS = (
     Column("case", "Case"),
@@ -25,7 +25,7 @@ _METHOD_COLUMNS = (
 )
 
 
-def methods(study: Study, identifications: list[Path]) -> Table:
+def methods(study: Study, identifications: list[Path]) -> ShownTable:
     """Compare success rate, errors and cost of each method."""
     rows = []
     labels = {}
@@ -63,7 +63,7 @@ def methods(study: Study, identifications: list[Path]) -> Table:
         "just within the bound would not count. Δχ² is above the lowest that any method, or the "
         "truth, has on the trace. Errors are medians of the absolute error."
     )
-    return Table(caption, (*_METHOD_COLUMNS, *errors), rows)
+    return ShownTable(caption, (*_METHOD_COLUMNS, *errors), rows)
 
 
 _MODEL_COLUMNS = (
@@ -78,7 +78,7 @@ _MODEL_COLUMNS = (
 )
 
 
-def models(study: Study, fits: list[Path]) -> Table:
+def models(study: Study, fits: list[Path]) -> ShownTable:
     """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
     found = pd.concat([MODEL_FITS.read(path) for path in fits])
     found["aic"], found["bic"] = aic_and_bic(found["misfit"], found["samples"], found["parameters"])
@@ -102,4 +102,4 @@ def models(study: Study, fits: list[Path]) -> Table:
         "Simplest adequate model: by how much each model's AIC and BIC exceed the lowest, and in "
         "how many seeds it has the lowest."
     )
-    return Table(caption, _MODEL_COLUMNS, rows)
+    return ShownTable(caption, _MODEL_COLUMNS, rows)

@@ -10,13 +10,13 @@ from scipy.stats import beta
 from biogrip.records.identifications import INTERPRETATIONS
 from biogrip.records.rows import read_table
 from biogrip.tables.layout import write
-from biogrip.tables.sweeps import (
+from tests.helpers.default import study_of
+from workflow.paper.interpretations import (
     interpretations_jointly,
     limits,
     own_shares,
     share_not_larger,
 )
-from tests.helpers.default import study_of
 
 OVERLAY = """
 seeds: 4

@@ -3,7 +3,8 @@
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,13 +26,19 @@ from biogrip.figures.style import (
     SKY,
     figure,
     panel,
+    save,
+    styled,
 )
 from biogrip.physics import gripper as actuator
 from biogrip.physics.contact import LARGEST_M, SMALLEST_M, contact
 from biogrip.physics.gripper import CombDrive, Gripper
 from biogrip.physics.protocol import torque_at, torque_history
 from biogrip.physics.simulation import simulated_response
+from biogrip.stages.job import job_study, logged
 from biogrip.study.study import Study
+
+if TYPE_CHECKING:
+    snakemake: Any
 
 
 def draw_comb(study: Study) -> Figure:
@@ -385,3 +392,11 @@ def _damper(axes: Axes, x0: float, x1: float, y: float, label: str, size: float 
     axes.plot([left, right, right, left], cup, color=SKY, linewidth=1)
     _line(axes, (right, y), (x1, y), SKY, 1)
     axes.annotate(label, (middle, y + 0.22 * size), ha="center", va="bottom", fontsize=7)
+
+
+if __name__ == "__main__":
+    with logged(snakemake), styled():
+        of_job, made = job_study(snakemake), snakemake.output
+        save(draw_comb(of_job), Path(made.comb))
+        save(draw_torque(of_job), Path(made.torque))
+        save(draw_linkage(of_job.of(of_job.gripped)), Path(made.linkage))

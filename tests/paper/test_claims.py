@@ -132,22 +132,17 @@ def test_an_order_of_magnitude_is_half_a_decade_on_both_sides() -> None:
 
 
 def test_runs_are_read_at_generations_and_with_their_last_improvement(tmp_path: Path) -> None:
-    misfits = {0: [5.0, 4.0, 4.0, 3.0, 3.0], 1: [5.0, 5.0, 5.0], 2: [9.0, 1.0, 1.5]}
-    at = [0, 10, 19, 30, 40]
-    rows = [
-        {"method": "genetic", "seed": seed, "generation": generation, "best_misfit": misfit}
-        for seed, each in misfits.items()
-        for generation, misfit in zip(at, each, strict=False)
-    ]
-    history = pd.DataFrame(rows)
-    columns = {p.column: history["generation"] for p in case_of(5).sample.model.parameters}
-    history = history.assign(**columns)
-    last = history.groupby("seed", as_index=False).last().assign(case="mine", misfit=1.02)
-    last = last.assign(noise_rms=1.0, generations=9, evaluations=9, stop_reason="stalled")
+    """With the generation as the value of every parameter."""
+    at = [*(0, 10, 19, 30, 40), *(0, 10, 19), *(0, 10, 19)]
+    misfits = [*(5.0, 4.0, 4.0, 3.0, 3.0), *(5.0, 5.0, 5.0), *(9.0, 1.0, 1.5)]
+    columns = {p.column: at for p in case_of(5).sample.model.parameters}
+    columns |= {"seed": [*5 * [0], *3 * [1], *3 * [2]], "generation": at}
+    history = {"method": 11 * ["genetic"], "best_misfit": misfits, **columns}
+    write_arrays(tmp_path / "h.npz", {name: np.array(each) for name, each in history.items()})
+    known = {"case": "mine", "method": "genetic", "misfit": 1.02, "noise_rms": 1.0}
+    known |= {"generations": 9, "evaluations": 9, "stop_reason": "stalled"}
+    last = pd.DataFrame(columns).groupby("seed", as_index=False).last().assign(**known)
     last.to_csv(tmp_path / "f.csv", index=False)
-    text = {"method": history["method"].to_numpy("U")}
-    arrays = {name: history[name].to_numpy() for name in history.columns.drop("method")}
-    write_arrays(tmp_path / "h.npz", arrays | text)
     runs = read_runs(case_of(5), tmp_path / "f.csv", tmp_path / "h.npz")
     assert runs[""]["last_improvement"].tolist() == [30, 0, 10]
     assert runs[""]["rises"].tolist() == [False, False, True]

@@ -7,7 +7,7 @@ bounds.
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,9 +21,13 @@ from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import compute_grip
 from biogrip.records.identifications import read_identifications
 from biogrip.records.traces import read_measurements
+from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import error_percent
-from biogrip.tables.layout import Column, Row, Table
+from biogrip.tables.layout import Column, Row, ShownTable, write
+
+if TYPE_CHECKING:
+    snakemake: Any
 
 _COLUMNS = (
     Column("quantity", "Quantity"),
@@ -45,7 +49,7 @@ _PRINTED_GENE_VALUES = "9 or 12"
 _Told = tuple[str, str, str | None, float, str]
 
 
-def evidence(study: Study, identifications: list[Path], measurements: list[Path]) -> Table:
+def evidence(study: Study, identifications: list[Path], measurements: list[Path]) -> ShownTable:
     """Compare statements of the paper with results of the study."""
     told = _of_device(study)
     for name, case in study.cases.items():
@@ -59,7 +63,7 @@ def evidence(study: Study, identifications: list[Path], measurements: list[Path]
                 told.append((quantity, "", str(case.published.generation), median, remark))
     names = [column.name for column in _COLUMNS]
     rows = [dict(zip(names, cells, strict=True)) for cells in told]
-    return Table("Statements of the paper beside what the study computes.", _COLUMNS, rows)
+    return ShownTable("Statements of the paper beside what the study computes.", _COLUMNS, rows)
 
 
 def _of_device(study: Study) -> list[_Told]:
@@ -133,7 +137,7 @@ _PRINTED_COLUMNS = (
 )
 
 
-def printed_values(study: Study) -> Table:
+def printed_values(study: Study) -> ShownTable:
     """Compare published values with encoding, range and error formula."""
     rows = []
     for name_of_case, case in study.cases.items():
@@ -162,7 +166,7 @@ def printed_values(study: Study) -> Table:
         "Printed values of Tables 5 to 7 against the two-digit encoding of eq. (10), the ranges "
         "of Table 4, and the printed errors against (target - identified) / target."
     )
-    return Table(caption, _PRINTED_COLUMNS, rows)
+    return ShownTable(caption, _PRINTED_COLUMNS, rows)
 
 
 _RATES_HZ = (0.1, 1.0, 10.0, 100.0)
@@ -176,7 +180,7 @@ _SAMPLING_COLUMNS = (
 )
 
 
-def sampling_evidence(study: Study) -> Table:
+def sampling_evidence(study: Study) -> ShownTable:
     """Compare errors of the paper with bounds at several sampling rates."""
     found = [
         (name, *cells) for name, case in study.cases.items() for cells in _errors_and_bounds(case)
@@ -194,7 +198,7 @@ def sampling_evidence(study: Study) -> Table:
     )
     names = [column.name for column in _SAMPLING_COLUMNS]
     rows = [dict(zip(names, cells, strict=True)) for cells in found]
-    return Table(caption, _SAMPLING_COLUMNS, rows)
+    return ShownTable(caption, _SAMPLING_COLUMNS, rows)
 
 
 def _errors_and_bounds(case: Case) -> list[tuple[Any, ...]]:
@@ -229,3 +233,14 @@ def _drop_redundant(bounds: list[tuple[Quantity, float]]) -> list[Quantity]:
         else:
             left_out.append(total)
     return [q for q, _ in bounds if q not in left_out]
+
+
+if __name__ == "__main__":
+    with logged(snakemake):
+        of_paper = job_study(snakemake)
+        of_paper = of_paper.of(of_paper.published)
+        given, made = snakemake.input, snakemake.output
+        told = evidence(of_paper, paths(given.identifications), paths(given.measurements))
+        write(told, Path(made.evidence))
+        write(printed_values(of_paper), Path(made.printed_values))
+        write(sampling_evidence(of_paper), Path(made.sampling_evidence))
