@@ -12,7 +12,7 @@ from tests.helpers.places import ROOT
 from tests.helpers.runs import TINY, dry_run, planned, results_of, snakemake
 
 # Of the study: what puts all cases together.
-STUDY = {"figures": 1, "tables": 1, "claims": 1, "page": 1}
+STUDY = {"figures": 1, "tables": 1, "evidence": 1, "claims": 1, "page": 1}
 # Of a simulated case and of a recorded trace.
 RECORDED = {"case_tables": 2, "case_figures": 1, "recorded_case_figures": 1}
 CELL = {"sample": {"model": "liquid_drop", "k": 20.0, "k_p": 5.0, "c": 80.0}}
@@ -35,7 +35,7 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         {"cases": {"new": CELL, "liquid_drop_2": {"title": "A drop"}}},
         {"target": 1, "measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1}
         | {"judgement": 1, "model_errors": 1, "case_tables": 2}
-        | {"case_figures": 1, "case_figures_without_valley": 1}
+        | {"case_figures": 1, "case_figures_without_valley": 1, "gripper_figures": 1}
         | STUDY,
     ),
     "seeds": (

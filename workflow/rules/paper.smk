@@ -17,7 +17,13 @@ rule gripper_figures:
     log:
         "results/logs/gripper_figures.log",
     params:
-        **settings_of(*WHOLE),
+        **settings_of(
+            *("gripper", "actuator", "protocol"),
+            *keys_of_cases(
+                STUDY,
+                *"instrument gripper actuator protocol sample fixed measurement.file".split(),
+            ),
+        ),
     message:
         "Drawing the gripper"
     script:
