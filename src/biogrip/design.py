@@ -20,15 +20,11 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs, write_text
 from biogrip.identify.outputs import WRITTEN_BY, check_output
+from biogrip.physics.linear import jaw_force_response, linear_jaw_force
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.protocol import Phase, Sampling, hold, largest_load, torque_history
-from biogrip.physics.simulation import (
-    compute_grip,
-    jaw_force_response,
-    linear_jaw_force,
-    simulated_response,
-)
+from biogrip.physics.simulation import compute_grip, simulated_response
 from biogrip.study.config import DesignBlock
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config, overlaid, read_config

@@ -11,9 +11,11 @@ from biogrip.arrays import Array
 from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import hold, torque_history
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import VISIBLE, elapsed_s, find_ring, ring, ringing_s
+from tests.helpers.laplace import drawn, rotations
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE
 
 # Dampers between the jaws end a ring before it is seen; a spring in front of them goes on.
@@ -51,6 +53,22 @@ def test_rings_are_over_when_they_are_said_to_be(either_gripper: Gripper, stiffn
         for inertia in (True, False)
     )
     assert np.max(np.abs(with_it - without)) < 1e-14 * np.max(np.abs(without))
+
+
+@pytest.mark.parametrize("beyond", [0.0, 1e-12, 1e-10, 1e-8, 1e-6])
+@pytest.mark.parametrize("model", ["kelvin_voigt", "generalized_maxwell"])
+def test_arms_that_are_critically_damped(model: str, beyond: float) -> None:
+    """Two roots coincide, or nearly; the branch that makes a third is far away."""
+    inertia, hinge, k_p, damper = 1e-14, 4.4e-7, 0.3, 1e-6
+    sample = [k_p, damper] if model == "kelvin_voigt" else [1e-12, k_p, 10.0, damper]
+    lever = 1.5e-3 * np.sin(np.radians(75.0))
+    both = 2 * np.sqrt(inertia * (hinge + 2 * lever**2 * k_p)) * (1 + beyond)
+    arm = Arm(inertia, both - 2 * lever**2 * damper, hinge)
+    damped = Gripper(1.5e-3, 75.0, arm, arm)
+    torque, times = torque_history((hold(1.0, 1e-9),)), np.geomspace(1e-5, 0.5, 20)
+    found = rotation(step_response(damped, MODELS[model].network(sample)), torque, times)[0]
+    exact = rotations(damped, drawn(model, sample), torque, times, inertia=True)[0]
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-7 * exact.max())
 
 
 def test_times_count_from_the_last_change_of_the_torque() -> None:

@@ -10,7 +10,12 @@ from scipy.integrate import solve_ivp
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, displacement_of_tip, rotation_of_tip
-from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.linear import (
+    jaw_force_response,
+    linear_jaw_force,
+    rotation,
+    step_response,
+)
 from biogrip.physics.maxwell_models import damper, generalized_maxwell, kelvin_voigt, maxwell
 from biogrip.physics.nonlinear import correction, nonlinear_rotation
 from biogrip.physics.protocol import (
@@ -21,7 +26,7 @@ from biogrip.physics.protocol import (
     torque_at,
     torque_history,
 )
-from biogrip.physics.simulation import compute_grip, jaw_force, jaw_force_response, linear_jaw_force
+from biogrip.physics.simulation import compute_grip, jaw_force
 from tests.helpers.radau import TOLERANCE, equal_arms, tip
 from tests.helpers.responses import random_samples
 from tests.physics.test_protocols import TORQUE

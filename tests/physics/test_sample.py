@@ -86,7 +86,7 @@ def response(gripper: Gripper, candidate: str, parameters: Array, inertia: bool)
 def test_a_richer_model_becomes_the_simpler_one(
     gripper: Gripper, richer: str, simpler: str, inertia: bool
 ) -> None:
-    """To rounding: that of polynomials of degree nine, where there are eight branches."""
+    """To rounding, of as many as eight branches."""
     rng = np.random.default_rng(0)
     for _ in range(3):
         parameters = drawn(simpler, rng)

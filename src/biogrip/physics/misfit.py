@@ -24,7 +24,7 @@ from biogrip.physics.linear import is_symmetric
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.rate_tables import DecayTable
 from biogrip.physics.residuals import Residuals
-from biogrip.physics.roots import real_quadratic_roots
+from biogrip.physics.roots import zeros_of_one_branch
 from biogrip.physics.sample_model import Network, SampleModel
 
 # Individuals computed together: many enough for few calls, few enough for the cache.
@@ -224,22 +224,15 @@ def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array,
     weights : (2, n)
         Weights of the exponentials, in rad per N m.
     """
-    k_p, c_p, c = network.k_p, network.c_p, network.c[:, 0]
-    relaxation_s = c / network.k[:, 0]
-    coupling = 2 * lever_m**2
-    stiffness, damping = arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad
-    # The denominator Z Q + 2 b^2 P, ascending powers.
-    denominator = np.empty((3, len(k_p)))
-    denominator[0] = coupling * k_p + stiffness
-    denominator[1] = coupling * (k_p * relaxation_s + c_p + c) + (
-        stiffness * relaxation_s + damping
-    )
-    denominator[2] = (coupling * c_p + damping) * relaxation_s
-    rates = real_quadratic_roots(denominator.T).T
-    slope = denominator[2] * (rates[0] - rates[1])
-    weights = (1 + relaxation_s * rates) / (rates * slope)
-    np.negative(weights[1], out=weights[1])
-    return 1 / denominator[0], rates, weights
+    squared_lever = lever_m**2
+    rate = network.k[:, 0] / network.c[:, 0]
+    spring = squared_lever * network.k_p + 0.5 * arm.stiffness_Nm_per_rad
+    branch = squared_lever * network.k[:, 0]
+    damper = squared_lever * network.c_p + 0.5 * arm.damping_Nms_per_rad
+    zeros = zeros_of_one_branch((spring, branch), rate, damper)
+    x = zeros.values
+    share = x / zeros.from_pole(rate)
+    return 0.5 / spring, -x, -0.5 / (spring + branch * share * share)
 
 
 def _sum(terms: Array) -> Array:

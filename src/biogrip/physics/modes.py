@@ -29,7 +29,6 @@ References
 """
 
 from collections.abc import Callable, Sequence
-from itertools import permutations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,17 +36,10 @@ from numpy.typing import NDArray
 
 from biogrip.arrays import Array, parts
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.linear import (
-    LEFT,
-    evaluate,
-    phi_function,
-    poles,
-    slope_at_poles,
-    transfer_functions,
-)
-from biogrip.physics.many_branches import modes_with_slopes
+from biogrip.physics.linear import Arms, Impedance, phi_function
 from biogrip.physics.protocol import TorqueHistory
-from biogrip.physics.sample_model import MOST_BRANCHES, Network, SampleModel
+from biogrip.physics.roots import interlaced_zeros
+from biogrip.physics.sample_model import Network, SampleModel
 
 _COMPLEX_STEP = 1e-30
 # Rate at which a bare damper forgets, in 1/s; its force is c times the rate of the deformation.
@@ -144,33 +136,60 @@ def compute_modes(
             rate_slopes.swapaxes(0, 1),
             weight_slopes.swapaxes(0, 1)[:, :, None],
         )
-    if network.k.shape[1] > MOST_BRANCHES:
-        found = modes_with_slopes(
-            gripper, network, _COMPLEX_STEP, count, symmetric=torque.symmetric
-        )
-        return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in found))
-    numerators, denominator = transfer_functions(gripper, network, symmetric=torque.symmetric)
-    denominator, denominator_slopes = _split_complex_step(denominator, count)
-    numerators, numerator_slopes = _split_complex_step(numerators[LEFT], count)
-    rates = poles(denominator, real=True)
-    slope = slope_at_poles(denominator, rates)
-    # A pole stays where the denominator is zero.
-    rate_slopes = -evaluate(denominator_slopes, rates) / slope
-    # Of log(p_j D'(p_j)), with D'(p_j) the leading coefficient times all p_j - p_i.
-    steepening = rate_slopes / rates + (denominator_slopes[..., -1] / denominator[:, -1])[..., None]
-    for i, j in permutations(range(rates.shape[1]), 2):
-        approach = rate_slopes[..., i] - rate_slopes[..., j]
-        steepening[..., i] += approach / (rates[:, i] - rates[:, j])
-    weights = evaluate(numerators, rates) / (rates * slope)
-    along = evaluate(numerators[..., 1:] * np.arange(1, numerators.shape[-1]), rates)
-    change = evaluate(numerator_slopes, rates) + along * rate_slopes[:, None]
-    weight_slopes = change / (rates * slope) - weights * steepening[:, None]
-    return Modes(
-        rates,
-        weights.swapaxes(0, 1),
-        rate_slopes.swapaxes(0, 1),
-        weight_slopes.transpose(2, 0, 1, 3),
-    )
+    found = _between_arms(gripper, network, count, symmetric=torque.symmetric)
+    return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in found))
+
+
+def _between_arms(
+    gripper: Gripper, network: Network, count: int, *, symmetric: bool
+) -> tuple[Array, Array, Array, Array]:
+    """Compute rates and weights of the left arm, with derivatives by the log-parameters.
+
+    With H(x; p) = 0 at a rate, dx = (sum_j dK_j/(x - r_j) + ...) / (S/x^2); S and N follow. The
+    network has n samples, and after them the same with each of `count` parameters tilted into the
+    complex plane by the complex step.
+
+    Returns
+    -------
+    rates : (n_modes, n)
+    weights : (n_drives, n_modes, n)
+    rate_slopes : (n_parameters, n_modes, n)
+    weight_slopes : (n_parameters, n_drives, n_modes, n)
+    """
+    arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
+    given = arms.with_sample(network)
+    parts = [
+        of.reshape(*of.shape[:-1], count + 1, -1)
+        for of in (given.weights, given.rates, given.level)
+    ]
+    impedance = Impedance(*(of[..., 0, :].real for of in parts))
+    # (n_parameters, n) of every weight and rate, and of the level.
+    d_weights, d_rates, d_level = (of[..., 1:, :].imag / _COMPLEX_STEP for of in parts)
+    zeros = interlaced_zeros(impedance.weights, impedance.rates, impedance.level)
+    x = zeros.values
+    moved = np.zeros((count, *x.shape)) - d_level[:, None]
+    steepness = np.zeros_like(x)
+    branches = list(zip(impedance.weights, impedance.rates, d_weights, d_rates, strict=True))
+    for weight, rate, d_weight, d_rate in branches:
+        inverse = 1 / zeros.from_pole(rate)
+        steepness += weight * (x * inverse) ** 2
+        moved += d_weight[:, None] * inverse
+        if np.any(d_rate):
+            moved += (weight * d_rate)[:, None] * (inverse * inverse)
+    moved *= x * x / steepness
+    steepening = np.zeros_like(moved)
+    for weight, rate, d_weight, d_rate in branches:
+        inverse = 1 / zeros.from_pole(rate)
+        ratio = x * inverse
+        away = 2 * weight * rate * ratio * inverse * inverse
+        steepening += d_weight[:, None] * (ratio * ratio) - moved * away
+        if np.any(d_rate):
+            steepening += d_rate[:, None] * (2 * weight * (ratio * inverse) * ratio)
+    drives = slice(1 if symmetric else 2)
+    numerators, slopes = (of[0, drives] for of in arms.rotations(zeros))
+    weights = -numerators / steepness
+    weight_slopes = -(slopes * moved[:, None] + weights * steepening[:, None]) / steepness
+    return -x, weights, -moved, weight_slopes
 
 
 def _complex_step_network(

@@ -25,11 +25,13 @@ References
    (1994): both neighbouring poles matched in value and slope, the middle way.
 .. [5] J. R. Bunch, C. P. Nielsen and D. C. Sorensen, Rank-one modification of the symmetric
    eigenproblem, Numerische Mathematik 31 (1978), 31-48.
+.. [6] N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM, 2002, section
+   1.8: the quadratic formula without cancellation.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,29 +46,10 @@ double root symmetrically apart by g changes the response by g^2. Both stay
 below 1e-9 here.
 """
 
-_Root = TypeVar("_Root", np.float64, np.complex128)
-
 # Most sweeps over the roots of polynomials, and over the zeros of sums of poles.
 _SWEEPS, _MOST_SWEEPS = 80, 60
 # Share of a sum of poles below which it is zero, and of a distance below which a step is the last.
 _ROUNDING, _SHORT = 4e-16, 1e-9
-
-
-def real_quadratic_roots(coefficients: Array) -> Array:
-    """Compute the roots, (n, 2), of a + b s + c s^2 that are known to be real and negative.
-
-    Coefficients are positive, (n, 3). The fast root comes first; the two are never closer together
-    than `SMALLEST_GAP`.
-
-    References
-    ----------
-    .. [1] N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM, 2002,
-       section 1.8: the quadratic formula without cancellation.
-    """
-    a, b, c = coefficients.T
-    discriminant = np.maximum(b * b - 4 * a * c, (SMALLEST_GAP * b) ** 2)
-    q = -0.5 * (b + np.sqrt(discriminant))
-    return np.array((q / c, a / q)).T
 
 
 def roots(coefficients: Array) -> ComplexArray:
@@ -80,53 +63,58 @@ def roots(coefficients: Array) -> ComplexArray:
     # No symmetry, so that no two starting points can move in step.
     angles = np.pi + np.array([0.4, -0.9, 1.1, -0.25, 0.7, -1.3, 0.15])[np.arange(degree) % 7]
     z = radii * np.exp(1j * (angles + 0.05 * np.arange(degree)))
-    return separate(find_zeros(z, lambda z: _newton_step(coefficients, z)))
+    return find_zeros(z, lambda z: _newton_step(coefficients, z), np.zeros(z.shape))
 
 
 def find_zeros(
-    z: ComplexArray,
+    beyond: ComplexArray,
     newton_step: Callable[[ComplexArray], ComplexArray],
-    between: Array | None = None,
+    origin: Array,
 ) -> ComplexArray:
     """Move points onto the zeros of functions, all zeros of each at once (Ehrlich-Aberth).
 
-    Starts are (n, n_points), for each function as many as it has zeros; a Newton step is the
-    function divided by its derivative. If each point is counted from an origin of its own, the
-    differences of origins, (n, n_points, n_points), are added to differences of points.
+    Points are at -origin + beyond, (n, n_points), for each function as many as it has zeros; a
+    Newton step is the function divided by its derivative. The result is what zeros, pairwise at
+    least `SMALLEST_GAP` apart, are beyond the origins.
     """
-    off_diagonal = ~np.eye(z.shape[1], dtype=bool)
+    off_diagonal = ~np.eye(beyond.shape[1], dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
-        converged = resting = np.zeros((len(z), 1), dtype=bool)
+        converged = resting = np.zeros((len(beyond), 1), dtype=bool)
         for _ in range(_SWEEPS):
-            newton = newton_step(z)
-            distance = z[:, :, None] - z[:, None, :]
-            if between is not None:
-                distance = between + distance
+            newton = newton_step(beyond)
+            distance = distances(beyond, origin)
             repulsion = np.where(off_diagonal, 1 / distance, 0).sum(axis=2)
             step = newton / (1 - newton * repulsion)
             # Converged points rest, so that their last bits do not depend on other functions.
             step = np.where(np.isfinite(step) & ~resting, step, 0)
-            z = z - step
+            beyond = beyond - step
             if np.all(converged):
                 break
             # The error is cubed in a sweep, so one more takes it below rounding.
             resting = converged
-            converged = np.all(np.abs(step) <= 1e-8 * np.abs(z), axis=1, keepdims=True)
-    return z
+            converged = np.all(np.abs(step) <= 1e-8 * np.abs(beyond), axis=1, keepdims=True)
+    return separate(beyond, origin)
 
 
-def separate(z: NDArray[_Root]) -> NDArray[_Root]:
-    """Move roots that (nearly) coincide symmetrically apart to `SMALLEST_GAP`."""
-    z = z.copy()
-    first, second = np.triu_indices(z.shape[1], 1)
-    if not np.any(np.abs(z[:, first] - z[:, second]) < SMALLEST_GAP * np.abs(z[:, first])):
-        return z
+def distances(beyond: ComplexArray, origin: Array) -> ComplexArray:
+    """Return the differences of points at -origin + beyond, (n, n_points, n_points)."""
+    return (origin[:, None] - origin[..., None]) + (beyond[..., None] - beyond[:, None])
+
+
+def separate(beyond: ComplexArray, origin: Array) -> ComplexArray:
+    """Move points at -origin + beyond that (nearly) coincide apart to `SMALLEST_GAP`."""
+    first, second = np.triu_indices(beyond.shape[1], 1)
+    size = SMALLEST_GAP * np.abs(beyond - origin)
+    if not np.any(np.abs(distances(beyond, origin)[:, first, second]) < size[:, first]):
+        return beyond
+    beyond = beyond.copy()
     for i, j in zip(first, second, strict=True):
-        close = np.abs(z[:, i] - z[:, j]) < SMALLEST_GAP * np.abs(z[:, i])
-        middle = 0.5 * (z[:, i] + z[:, j])
-        z[:, i] = np.where(close, middle * (1 + SMALLEST_GAP / 2), z[:, i])
-        z[:, j] = np.where(close, middle * (1 - SMALLEST_GAP / 2), z[:, j])
-    return z
+        distance = (origin[:, j] - origin[:, i]) + (beyond[:, i] - beyond[:, j])
+        gap = SMALLEST_GAP * (beyond[:, i] - origin[:, i])
+        lack = np.where(np.abs(distance) < np.abs(gap), 0.5 * (gap - distance), 0)
+        beyond[:, i] += lack
+        beyond[:, j] -= lack
+    return beyond
 
 
 def _newton_step(coefficients: Array, z: ComplexArray) -> ComplexArray:
@@ -177,7 +165,7 @@ def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -
 
     The zeros of a function are bitwise independent of the other functions. Weights and poles are
     (n_poles, n), levels (n,). Weights and levels are positive; an imaginary part, far smaller than
-    the real one, carries a derivative. Poles are ascending and real.
+    the real one, carries a derivative. Poles are real and ascend from zero.
     """
     if not (np.iscomplexobj(weights) or np.iscomplexobj(level)):
         return _real_zeros(weights, poles, level)
@@ -207,7 +195,29 @@ class _Sides:
     above_slope: Array
 
 
+def zeros_of_one_branch(weights: Sequence[Array], rate: Array, level: Array) -> Zeros:
+    """Return the zeros of w_0/x + w_1/(x - p) - b; weights, the rate p and the level b are (n,).
+
+    Both are roots of quadratic equations, for x and for x - p, without cancellation [6]_.
+    """
+    (first, second), scaled = weights, level * rate
+    half, product = 0.5 * (second + (first - scaled)), second * scaled
+    larger = np.abs(half) + np.sqrt(half * half + product)
+    beyond = np.where(half > 0, larger, product / larger) / level
+    fast = rate + beyond
+    slow = first * rate / (level * fast)
+    near_zero = slow < 0.5 * rate
+    return Zeros(
+        np.array((np.where(near_zero, 0.0, rate), rate)),
+        np.array((np.where(near_zero, slow, -second * rate / (level * beyond)), beyond)),
+    )
+
+
 def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
+    if len(poles) == 1:
+        return Zeros(poles, weights / level)
+    if len(poles) == 2:
+        return zeros_of_one_branch(tuple(weights), poles[1], level)
     pole, side, gap, start = _intervals(weights, poles, level)
     found = start.copy()
     # State of the search for each unfinished zero: its pole, the side of it, the gap to the next

@@ -1,15 +1,5 @@
 """Simulated rotation and shortening of samples, and the force on them, linear or nonlinear.
 
-The jaws exert on the sample the force F = G delta, positive while they press. In the linear model
-it is a rational function of the torques like the rotations,
-
-    F = [b P (Z_2 + Z_4) tau_2 - b P Z_2 (tau_2 - tau_4)] / D
-
-(with equal arms and torques 2 b P tau / (Z Q + 2 b^2 P)), so its modes have the rates of the
-rotations and weights of their own. The arm's equation gives it too, b F = tau - Z phi, but where a
-liquid has given way that is a difference of nearly equal torques; here the constant and every mode
-are products of what is positive, and late in a phase only what is left of the slow modes is summed.
-
 In the nonlinear model, the arm's equation, divided by its lever, gives
 F - F_linear = g - (c u' + k u)/b_0^2 with g the load and u the correction of
 `biogrip.physics.nonlinear`. All of them are of second order: again no large terms cancel.
@@ -21,7 +11,6 @@ of the ring shows in a trace is found here, too.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import factorial
 
 import numpy as np
 
@@ -30,64 +19,15 @@ from biogrip.physics.gripper import Gripper, displacement_of_tip
 from biogrip.physics.linear import (
     LEFT,
     RIGHT,
-    StepResponse,
-    add,
-    arm_polynomial,
-    multiply,
-    partial_fractions,
-    phi_function,
+    jaw_force_response,
+    linear_jaw_force,
     rotation,
-    sample_polynomials,
     step_response,
-    transfer_functions,
 )
-from biogrip.physics.many_branches import modes_of_many
 from biogrip.physics.modes import relaxation
 from biogrip.physics.nonlinear import correction, nonlinear_rotation
 from biogrip.physics.protocol import TorqueHistory
-from biogrip.physics.sample_model import MOST_BRANCHES, Network
-
-
-def jaw_force_response(
-    gripper: Gripper, network: Network, *, symmetric: bool = True, inertia: bool = True
-) -> StepResponse:
-    """Compute the jaw force of n samples after unit torque steps, in N per N m.
-
-    The force takes the place of an arm. Arguments are those of `step_response`; without inertia a
-    parallel damper makes the force jump with the torque.
-    """
-    if network.k.shape[1] > MOST_BRANCHES:
-        return StepResponse(
-            *modes_of_many(gripper, network, symmetric=symmetric, inertia=inertia, force=True)
-        )
-    _, denominator = transfer_functions(gripper, network, symmetric=symmetric, inertia=inertia)
-    p = gripper.lever_m * sample_polynomials(network)[0]
-    z_2 = arm_polynomial(gripper.left, inertia)
-    if symmetric and gripper.left == gripper.right:
-        numerators = [2 * p]
-    else:
-        both = add(z_2, arm_polynomial(gripper.right, inertia))
-        numerators = [multiply(p, both), -multiply(p, z_2)][: 1 if symmetric else 2]
-    return partial_fractions(np.array([numerators]).swapaxes(2, 3), denominator, real=not inertia)
-
-
-def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Array) -> Array:
-    """Compute the jaw force of the linear model in N, (n, n_times), at any times.
-
-    The response is that of `jaw_force_response`; at the instant of a step: what follows it.
-    """
-    force = np.zeros((len(response.rates), len(time_s)))
-    rates = response.rates[:, :, None]
-    static, weights = response.static[:, 0], response.weights[:, 0]
-    for start, order, heights in torque.jumps:
-        after = time_s >= start
-        elapsed = time_s[after] - start
-        constant, amplitude = static @ heights, np.einsum("ndj,d->nj", weights, heights)
-        z = rates * elapsed
-        growth = elapsed**order * (phi_function(order, z) if order else np.exp(z))
-        rest = constant[:, None] * elapsed**order / factorial(order)
-        force[:, after] += rest + np.einsum("nj,njt->nt", amplitude, growth).real
-    return force
+from biogrip.physics.sample_model import Network
 
 
 def jaw_force(
