@@ -42,9 +42,7 @@ def vectorised(trace: NoisyTrace, samples: Array) -> Array:
 def in_blocks(trace: NoisyTrace, samples: Array) -> Array:
     """Do so with as many at a time as fit a processor's cache."""
     at_once = max(1, _AT_ONCE // len(trace.time_s))
-    response_of = partial(
-        step_response, trace.gripper, symmetric=trace.steps.symmetric, inertia=False
-    )
+    response_of = partial(step_response, trace.gripper, inertia=False)
     found = []
     for some in parts(len(samples), at_once):
         response = response_of(trace.model.network(samples[some]))

@@ -310,14 +310,10 @@ def as_config(
     """Return a config, as YAML, with an experiment as that of its cases."""
     found = deepcopy(given)
     cases = found.setdefault("cases", {})
-    for block in (found, *filter(None, cases.values())):
-        for key in {"times_s", "bursts"} & set(block.get("measurement") or {}):
-            del block["measurement"][key]
     for one, experiment in zip(specimens, after, strict=True):
         column = one.case.instrument.controlled.column
         phases = [
-            {"duration_s": phase.duration_s, column: phase.left.value_Nm}
-            for phase in experiment.phases
+            {"duration_s": phase.duration_s, column: phase.level} for phase in experiment.phases
         ]
         measured = {"noise": {"level_rad": one.noise}, "rate_Hz": rate_Hz}
         own = {"protocol": {"phases": phases}, "measurement": measured}

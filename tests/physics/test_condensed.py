@@ -62,7 +62,7 @@ def test_least_squares_sees_no_difference(
         residuals = posed(arms, MAXWELL, condensed, noise(len(time_s)))
         for sample in random_samples(8, seed=8):
             rows = assert_alike(residuals, np.log(sample))
-            assert rows <= min(80 if torque.symmetric else 160, len(time_s) + 1)
+            assert rows <= min(80, len(time_s) + 1)
 
 
 @pytest.mark.parametrize("protocol", ["steps", "ramps and parabola"])

@@ -12,7 +12,7 @@ from biogrip.physics.gripper import NO_ARMS
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS
 from biogrip.physics.modes import linear_responses
-from biogrip.physics.protocol import Load, Phase, TorqueHistory, hold, load, torque_history
+from biogrip.physics.protocol import Phase, TorqueHistory, hold, ramp, torque_history
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
 from biogrip.physics.simulation import simulated_response
@@ -22,16 +22,12 @@ DRIVEN = pytest.mark.parametrize("deforms", [False, True], ids=["creep", "relaxa
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 
 
-def _alike(duration_s: float, given: Load) -> Phase:
-    return Phase(duration_s, given, given)
-
-
 # A ramp of finite rate, a hold, a parabola, a ramp down that ends with a jump, recovery.
 PHASES = (
-    _alike(0.5, load(0.5, 0.0, 2.0)),
+    ramp(0.5, 0.0, 2.0),
     hold(2.0, 2.0),
-    _alike(1.0, Load(2.0, 0.5, -0.8)),
-    _alike(2.0, load(2.0, 1.0, 0.7)),
+    Phase(1.0, 2.0, 0.5, -0.8),
+    ramp(2.0, 1.0, 0.7),
     hold(2.0, 0.0),
 )
 
@@ -53,7 +49,7 @@ def by_laplace(given: Impedance, history: TorqueHistory, time_s: float) -> float
     def response(held: Impedance) -> Impedance:
         return lambda s: held(s) * given(s) if history.deforms else held(s) / given(s)
 
-    changes = [(start, power(height[0], order)) for start, order, height in history.jumps]
+    changes = [(start, power(height, order)) for start, order, height in history.jumps]
     return sum(
         inverted(response(held), time_s - start) for start, held in changes if start < time_s
     )

@@ -27,9 +27,7 @@ def direct(
     samples: np.ndarray,
 ) -> np.ndarray:
     """Form every response, subtract, square, average."""
-    response = step_response(
-        gripper, MODEL.network(samples), symmetric=steps.symmetric, inertia=False
-    )
+    response = step_response(gripper, MODEL.network(samples), inertia=False)
     return np.sqrt(np.mean((rotation(response, steps, time_s) - trace) ** 2, axis=1))
 
 
@@ -38,7 +36,7 @@ def test_agrees_with_forming_the_responses(name: str, gripper: Gripper) -> None:
     phases, rate_Hz = PROTOCOLS[name]
     steps = torque_history(phases)
     time_s = sample_times(steps.end_s, rate_Hz)
-    response = step_response(gripper, MODEL.network(TRUTH), symmetric=steps.symmetric)
+    response = step_response(gripper, MODEL.network(TRUTH))
     noise = np.random.default_rng(1).standard_normal(len(time_s))
     clean = rotation(response, steps, time_s)[0]
     trace = clean + 0.1 * np.abs(clean).max() * noise
@@ -61,7 +59,7 @@ def test_projections_agree_with_direct_sums(name: str, gripper: Gripper) -> None
     rates = -np.concatenate(([1e-300], np.geomspace(1e-9, 1e9, 500)))
     found = misfit.projections(rates)
     expected, scale = np.zeros((2, 1, len(rates)))
-    for start, height in zip(steps.time_s * rate_Hz, steps.left[:, 0], strict=True):
+    for start, height in zip(steps.time_s * rate_Hz, steps.changes[:, 0], strict=True):
         first = round(start)
         terms = np.exp(np.outer(rates, np.arange(first, count) - start)) * trace[first:]
         expected += height * terms.sum(axis=1)

@@ -23,7 +23,7 @@ def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
     stiffness = gripper.left.stiffness_Nm_per_rad + u * spring
     rate = stiffness / (gripper.left.damping_Nms_per_rad + u * damper)
     expected = np.zeros_like(TIMES)
-    for start, height in zip(steps.time_s, steps.left[:, 0], strict=True):
+    for start, height in zip(steps.time_s, steps.changes[:, 0], strict=True):
         expected -= height / stiffness * np.expm1(-rate * np.maximum(TIMES - start, 0))
     for c, c_p in ((9.9, 0.1), (2.0, 8.0), (0.1, 9.9)):
         response = step_response(gripper, generalized_maxwell([1e7, spring, c, c_p]))

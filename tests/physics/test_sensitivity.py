@@ -64,9 +64,7 @@ def _check(gripper: Gripper, model: SampleModel, protocol: str, sample: Array) -
     phi, *slopes = linear_responses(gripper, model, torque, TIMES, sample[None])[0]
 
     def simulated(parameters: Array) -> Array:
-        response = step_response(
-            gripper, model.network(parameters), symmetric=torque.symmetric, inertia=False
-        )
+        response = step_response(gripper, model.network(parameters), inertia=False)
         return rotation(response, torque, TIMES)[0]
 
     np.testing.assert_allclose(phi, simulated(sample), rtol=1e-12, atol=1e-12 * np.abs(phi).max())

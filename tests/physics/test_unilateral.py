@@ -18,7 +18,6 @@ from biogrip.physics.maxwell_models import (
 )
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import (
-    Load,
     Phase,
     TorqueHistory,
     hold,
@@ -33,14 +32,8 @@ from tests.helpers.responses import random_samples
 SLOW = Arm(1e-14, 4e-8, 4.4e-7)
 OTHER = Arm(1e-14, 7e-8, 6.0e-7)
 THREE = torque_history((hold(20.0, 1.6e-9), hold(20.0, 0.2e-9), hold(20.0, 2.4e-9)))
-FALLING, RISING = Load(1.95e-9, -9.5e-10), Load(5e-11, 9.5e-10)
-RAMPS = torque_history(
-    (
-        hold(5.0, 1.6e-9),
-        *(Phase(2.0, each, each) for each in (FALLING, RISING) * 6),
-        Phase(10.0, Load(2e-9, -1.5e-10), Load(1e-9)),
-    )
-)
+FALLING, RISING = Phase(2.0, 1.95e-9, -9.5e-10), Phase(2.0, 5e-11, 9.5e-10)
+RAMPS = torque_history((hold(5.0, 1.6e-9), *(FALLING, RISING) * 6, Phase(10.0, 2e-9, -1.5e-10)))
 
 
 def integrated(
@@ -55,8 +48,8 @@ def integrated(
     def touching_rates(t: float, z: Array) -> tuple[Array, float]:
         delta, spring = b * (z[0] + z[1]), 0.0
         spring = k_p * delta + k * (delta - z[3])
-        tau = [float(torque_at(torque, t, arm)) for arm in ("left", "right")]
-        free = (tau[0] - k_2 * z[0]) / c_2, (tau[1] - k_4 * z[1]) / c_4
+        tau = float(torque_at(torque, t))
+        free = (tau - k_2 * z[0]) / c_2, (tau - k_4 * z[1]) / c_4
         # phi_i' = free_i - b F/c_i and F = spring + c_p b (phi_2' + phi_4').
         force = (spring + c_p * b * sum(free)) / (1 + c_p * b * b * (1 / c_2 + 1 / c_4))
         rates = np.array([free[0] - b * force / c_2, free[1] - b * force / c_4, 0.0, 0.0])
@@ -64,11 +57,11 @@ def integrated(
         return rates, force
 
     def apart_rates(t: float, z: Array) -> Array:
-        tau = [float(torque_at(torque, t, arm)) for arm in ("left", "right")]
+        tau = float(torque_at(torque, t))
         damper_rate = k / c * (z[2] - z[3])
         delta_rate = -(k_p * z[2] + k * (z[2] - z[3])) / c_p if c_p else k / (k + k_p) * damper_rate
         return np.array(
-            [(tau[0] - k_2 * z[0]) / c_2, (tau[1] - k_4 * z[1]) / c_4, delta_rate, damper_rate]
+            [(tau - k_2 * z[0]) / c_2, (tau - k_4 * z[1]) / c_4, delta_rate, damper_rate]
         )
 
     def lets_go(t: float, z: Array) -> float:

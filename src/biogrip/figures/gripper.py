@@ -120,24 +120,20 @@ def draw_torque(study: Study) -> Figure:
     # Include both sides of every jump, and enough points for ramps.
     grid = np.linspace(0, history.end_s, 4001)
     time_s = np.sort(np.concatenate((grid, history.time_s, np.nextafter(history.time_s, -1))))
-    arms = [np.maximum(torque_at(history, time_s, arm), 0) for arm in ("left", "right")]
+    torque = np.maximum(torque_at(history, time_s), 0)
     ends = np.append(history.time_s, history.end_s)
     drawn = figure(COLUMN_IN, 3.0)
     upper, lower = drawn.subplots(2, 1, sharex=True, height_ratios=[1, 1.6])
-    _curve(upper, time_s, ends, [1e9 * torque for torque in arms], "nN m", BLUE, "")
-    most = 1e9 * max(float(torque.max()) for torque in arms)
-    upper.set_ylim(0, 1.4 * most)
+    _curve(upper, time_s, ends, 1e9 * torque, "nN m", BLUE, "")
+    upper.set_ylim(0, 1.4e9 * float(torque.max()))
 
     highest = 0.0
     for touching_Nm, colour, label in _touching(study):
-        volts = [actuator.voltage(comb, touching_Nm + torque) for torque in arms]
+        volts = actuator.voltage(comb, touching_Nm + torque)
         _curve(lower, time_s, ends, volts, "V", colour, label)
-        highest = max(highest, *(float(v.max()) for v in volts))
+        highest = max(highest, float(volts.max()))
     lower.set_ylim(0, 1.5 * highest)
     lower.legend(loc="upper center", ncols=3, columnspacing=1.0)
-    if not history.symmetric:
-        upper.plot([], [], "--", color=BLUE, linewidth=1, label="right arm")
-        upper.legend()
     upper.set_ylabel("torque (nN m)")
     lower.set(ylabel="voltage (V)", xlabel="time (s)")
     drawn.align_ylabels()
@@ -157,16 +153,13 @@ def _touching(study: Study) -> Iterator[tuple[float, str, str]]:
 
 
 def _curve(
-    axes: Axes, time_s: Array, ends: Array, arms: list[Array], unit: str, colour: str, label: str
+    axes: Axes, time_s: Array, ends: Array, values: Array, unit: str, colour: str, label: str
 ) -> None:
-    """Draw the values of both arms, and annotate held values."""
-    left, right = arms
-    axes.plot(time_s, left, color=colour, linewidth=1.4, label=label)
-    if not np.array_equal(left, right):
-        axes.plot(time_s, right, "--", color=colour, linewidth=1)
+    """Draw values, and annotate those that are held."""
+    axes.plot(time_s, values, color=colour, linewidth=1.4, label=label)
     for start, end in pairwise(ends):
-        here = left[(time_s >= start) & (time_s < end)]
-        if np.ptp(here) < 1e-9 * left.max():
+        here = values[(time_s >= start) & (time_s < end)]
+        if np.ptp(here) < 1e-9 * values.max():
             text, place = f"{here[0]:.3g} {unit}", (0.5 * (start + end), here[0])
             style: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "fontsize": 7}
             axes.annotate(text, place, (0, 2), **style)

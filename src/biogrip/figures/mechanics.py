@@ -122,7 +122,7 @@ def _difference(axes: Axes, case: Case) -> None:
     """Draw the nonlinear minus the linear rotation, as the curves themselves look the same."""
     gripper, network, torque = case.gripper, case.network, case.torque.times(_SHOWN_FACTOR)
     time_s = np.linspace(0, torque.end_s, 1001)
-    response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
+    response = step_response(gripper, network, inertia=False)
     linear = rotation(response, torque, time_s)[0]
     difference = correction(gripper, network, torque).at(time_s)[0]
     axes.plot(time_s, 1e3 * difference, color=BLUE)

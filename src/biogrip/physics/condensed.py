@@ -265,7 +265,7 @@ class Condensed:
             self.dense.rows_of_values(of[0])
             for of in mode_responses(rates[None], self.torque, time_s)
         )
-        size = np.linalg.norm(growth, axis=2, keepdims=True)
+        size = np.linalg.norm(growth, axis=1, keepdims=True)
         size[size == 0] = 1.0
         family = np.concatenate((growth / size, rates[:, None] * slope / size))
         basis, triangle = np.linalg.qr(family.reshape(-1, len(time_s)).T)

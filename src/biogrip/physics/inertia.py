@@ -4,7 +4,7 @@ The denominator of both rotations is
 
     E = Z + 2 b^2 G    or    E = Z_2 Z_4 + (Z_2 + Z_4) b^2 G
 
-for arms that move alike, or do not (`biogrip.physics.linear`). Times the product of all s + r_j it
+for equal arms, or others (`biogrip.physics.linear`). Times the product of all s + r_j it
 is a polynomial, whose roots the iteration of `biogrip.physics.roots` finds. The iteration only
 needs the quotient of the polynomial and its derivative, a sum over the branches. A root is kept as
 its distance from the nearest branch, so that it has all digits where a branch is weak. Starts are
@@ -50,14 +50,15 @@ class Ringing:
     """Modes of arms with inertia on n samples with any number of branches.
 
     Points are at -origin + beyond, (n, n_points): the origin is the rate of a branch, or zero. The
-    zeros are the rates without inertia; arms are alike if they are equal, and driven alike.
+    zeros are the rates without inertia.
     """
 
-    def __init__(self, gripper: Gripper, network: Network, zeros: Zeros, *, alike: bool) -> None:
-        self._lever_m, self._b_2, self._alike = gripper.lever_m, gripper.lever_m**2, alike
+    def __init__(self, gripper: Gripper, network: Network, zeros: Zeros) -> None:
+        self._lever_m, self._b_2 = gripper.lever_m, gripper.lever_m**2
+        self._alike = gripper.left == gripper.right
         self._arms = gripper.left, gripper.right
         left, right = (arm.inertia_kgm2 for arm in self._arms)
-        self._highest = left if alike else left * right
+        self._highest = left if self._alike else left * right
         self._k_p, self._c_p = network.k_p[:, None], network.c_p[:, None]
         self._k, self._rates = (of.T[:, None] for of in ascending_branches(network))
         origin, beyond = self._begin(zeros)
@@ -78,24 +79,23 @@ class Ringing:
         self._slope = self._highest * factors.prod(axis=2)
 
     def rotations(self) -> ComplexArray:
-        """Return weights of the rotations in rad per N m, (n_arms, n_drives, n_modes, n)."""
+        """Return weights of the rotations in rad per N m, (n_arms, n_modes, n)."""
         if self._alike:
-            return self._weights([[np.ones_like(self.rates)]] * 2)
+            return self._weights([np.ones_like(self.rates)] * 2)
         left, right = (_value(arm, self.rates) for arm in self._arms)
-        sample = self._b_2 * self._sample
-        return self._weights([[right, sample], [left, -(left + sample)]])
+        return self._weights([right, left])
 
-    def forces(self) -> ComplexArray:
-        """Return weights of the jaw force in N per N m, (1, n_drives, n_modes, n)."""
+    def force(self) -> ComplexArray:
+        """Return weights of the jaw force in N per N m, (1, n_modes, n)."""
         force = self._lever_m * self._sample
         if self._alike:
-            return self._weights([[2 * force]])
+            return self._weights([2 * force])
         left, right = (_value(arm, self.rates) for arm in self._arms)
-        return self._weights([[force * (left + right), -force * left]])
+        return self._weights([force * (left + right)])
 
-    def _weights(self, numerators: list[list[ComplexArray]]) -> ComplexArray:
+    def _weights(self, numerators: list[ComplexArray]) -> ComplexArray:
         weights: ComplexArray = np.array(numerators) / (self.rates * self._slope)
-        return weights.swapaxes(2, 3)
+        return weights.swapaxes(1, 2)
 
     def _begin(self, zeros: Zeros) -> tuple[Array, ComplexArray]:
         """Return starts of the iteration: their origins, and distances beyond them."""

@@ -1,16 +1,14 @@
 """The corrected linear model, eqs. (4)-(6), solved exactly for any protocol.
 
-With Z_i(s) = I_i s^2 + c_i s + k_i the impedance of an arm, G(s) that of the sample and
-b = l sin(hat-theta_2) the lever of both arms, the closing rotations are
+With Z_i(s) = I_i s^2 + c_i s + k_i the impedance of an arm, G(s) that of the sample,
+b = l sin(hat-theta_2) the lever and tau the torque of both arms, the closing rotations are
 
-    phi_2 = [Z_4 tau_2 + b^2 G (tau_2 - tau_4)] / E
-    phi_4 = [Z_2 tau_2 - (Z_2 + b^2 G) (tau_2 - tau_4)] / E
-    E     = Z_2 Z_4 + b^2 G (Z_2 + Z_4)
+    phi_2 = Z_4 tau / E    phi_4 = Z_2 tau / E    E = Z_2 Z_4 + b^2 G (Z_2 + Z_4)
 
-and with equal arms and torques, after Z cancels, phi = tau / (Z + 2 b^2 G). The jaws exert the
-force F = G delta on the sample, positive while they press:
+and of equal arms, after Z cancels, phi = tau / (Z + 2 b^2 G). The jaws exert the force F = G delta
+on the sample, positive while they press:
 
-    F = [b G (Z_2 + Z_4) tau_2 - b G Z_2 (tau_2 - tau_4)] / E
+    F = b G (Z_2 + Z_4) tau / E
 
 or 2 b G tau / (Z + 2 b^2 G). The arm's equation gives it too, b F = tau - Z phi, but where a liquid
 has given way that is a difference of nearly equal torques; here the constant and every mode are
@@ -22,13 +20,10 @@ is that of a spring, a damper and one Maxwell branch. So with the sample's
     H = Z + b^2 G = A + B s + sum_j K_j s / (s + r_j)
 
 is a sum of poles, and the rates x of the modes interlace with the r_j (`biogrip.physics.roots`).
-Where H is zero, b^2 G is -Z, so the numerators N of
-
-    phi_2 = [Z_4/(Z_2 + Z_4) tau_2 + b^2 G/(Z_2 + Z_4) (tau_2 - tau_4)] / H,
-
-of phi_4 and of F follow from the arms alone. A mode of N/H has the weight -N/S with
-S = A + sum_j K_j x^2/(x - r_j)^2, a sum of positive terms. Equal arms that are driven alike need no
-branch of theirs: then 2 phi = tau/H. With inertia, see `biogrip.physics.inertia`.
+Where H is zero, b^2 G is -Z, so the numerators N of phi_2 = Z_4/(Z_2 + Z_4) tau / H, of phi_4 and
+of F follow from the arms alone. A mode of N/H has the weight -N/S with
+S = A + sum_j K_j x^2/(x - r_j)^2, a sum of positive terms. Equal arms need no branch of theirs:
+then 2 phi = tau/H. With inertia, see `biogrip.physics.inertia`.
 """
 
 from dataclasses import dataclass
@@ -53,77 +48,75 @@ _LEAST_DIFFERENCE = 1e-30
 
 @dataclass(frozen=True)
 class StepResponse:
-    """Response of n samples to unit torque steps, as a constant plus exponentials.
+    """Response of n samples to a unit step of the load, as a constant plus exponentials.
 
-    A unit step of drive d at time 0 turns arm a (`LEFT`, `RIGHT`) by
-    ``static[:, a, d] + sum_j weights[:, a, d, j] exp(rates[:, j] t)``.
+    A unit torque on both arms at time 0 turns arm a (`LEFT`, `RIGHT`) by
+    ``static[:, a] + sum_j weights[:, a, j] exp(rates[:, j] t)``.
     """
 
     static: Array
-    """Final rotation in rad per N m, (n, n_arms, n_drives)."""
+    """Final rotation in rad per N m, (n, n_arms)."""
     rates: NDArray[Any]
     """Exponents in 1/s, (n, n_modes), real without inertia, complex with it."""
     weights: NDArray[Any]
-    """In rad per N m, (n, n_arms, n_drives, n_modes)."""
+    """In rad per N m, (n, n_arms, n_modes)."""
 
 
-def is_symmetric(gripper: Gripper, torque: TorqueHistory) -> bool:
-    """Return True if both arms move alike, so that one stands for both."""
-    return torque.symmetric and gripper.left == gripper.right
-
-
-def step_response(
-    gripper: Gripper, network: Network, *, symmetric: bool = True, inertia: bool = True
-) -> StepResponse:
+def step_response(gripper: Gripper, network: Network, *, inertia: bool = True) -> StepResponse:
     """Solve the linear model for n samples at once (corrected eqs. 4-6).
 
-    Parameters
-    ----------
-    gripper
-        Its arms may differ.
-    network
-        The samples.
-    symmetric
-        True if both arms are driven alike; determines the drives, see `drives`.
-    inertia
-        True to include inertia: arms ring for milliseconds. Without inertia, all rates are
-        real and negative.
+    With `inertia`, arms ring for milliseconds. Without, all rates are real and negative.
     """
-    return _solve(gripper, network, symmetric=symmetric, inertia=inertia, force=False)
+    return _solve(gripper, network, inertia=inertia, force=False)
 
 
-def jaw_force_response(
-    gripper: Gripper, network: Network, *, symmetric: bool = True, inertia: bool = True
-) -> StepResponse:
+def jaw_force_response(gripper: Gripper, network: Network, *, inertia: bool = True) -> StepResponse:
     """Compute the jaw force of n samples after unit torque steps, in N per N m.
 
-    The force takes the place of an arm. Arguments are those of `step_response`; without inertia a
-    parallel damper makes the force jump with the torque.
+    The force takes the place of an arm. Without inertia a parallel damper makes the force jump with
+    the torque.
     """
-    return _solve(gripper, network, symmetric=symmetric, inertia=inertia, force=True)
+    return _solve(gripper, network, inertia=inertia, force=True)
 
 
-def _solve(
-    gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool, force: bool
-) -> StepResponse:
-    arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
+def _solve(gripper: Gripper, network: Network, *, inertia: bool, force: bool) -> StepResponse:
+    arms = Arms(gripper)
     impedance = arms.with_sample(network)
     zeros = interlaced_zeros(impedance.weights, impedance.rates, impedance.level)
-    static = arms.forces_at_rest(network) if force else arms.rotations_at_rest(network)
+    static = arms.force_at_rest(network) if force else arms.rotations_at_rest(network)
     if inertia:
-        ringing = Ringing(gripper, network, zeros, alike=arms.alike)
+        ringing = Ringing(gripper, network, zeros)
         rates: NDArray[Any] = ringing.rates
-        weights: NDArray[Any] = ringing.forces() if force else ringing.rotations()
+        weights: NDArray[Any] = ringing.force() if force else ringing.rotations()
     else:
-        rates = np.ascontiguousarray(-zeros.values.T)
-        numerators = arms.forces(zeros) if force else arms.rotations(zeros)[0]
-        x, steepness = zeros.values, np.zeros_like(zeros.pole)
-        for weight, rate in zip(impedance.weights, impedance.rates, strict=True):
-            steepness += weight * (x / zeros.from_pole(rate)) ** 2
-        weights = -numerators / steepness
-    drives = slice(1 if symmetric else 2)
-    static, weights = (np.moveaxis(of[:, drives], -1, 0) for of in (static, weights))
-    return StepResponse(np.ascontiguousarray(static), rates, np.ascontiguousarray(weights))
+        rates = -zeros.values.T
+        numerators = arms.force(zeros) if force else arms.rotations(zeros)[0]
+        weights = -numerators / impedance.steepness(zeros)
+    static, rates, weights = (
+        np.ascontiguousarray(of) for of in (static.T, rates, np.moveaxis(weights, -1, 0))
+    )
+    return StepResponse(static, rates, weights)
+
+
+def weights_of_loads(gripper: Gripper, network: Network) -> Array:
+    """Compute weights of the modes without inertia under steps of either arm's load.
+
+    Returns
+    -------
+    (n, n_arms, n_loads, n_modes)
+        In rad per N m; loads are that of both arms and, where these differ, what that of the left
+        arm exceeds that of the right one by. Of equal arms, only that of both, and one stands for
+        both.
+    """
+    arms = Arms(gripper)
+    impedance = arms.with_sample(network)
+    zeros = interlaced_zeros(impedance.weights, impedance.rates, impedance.level)
+    numerators = arms.rotations(zeros)[0][:, None]
+    if arms.alike:
+        numerators = numerators[:1]
+    else:
+        numerators = np.concatenate((numerators, arms.rotations_apart(zeros)[:, None]), axis=1)
+    return np.ascontiguousarray(np.moveaxis(-numerators / impedance.steepness(zeros), -1, 0))
 
 
 def rotation(
@@ -141,14 +134,11 @@ def rotation(
     if a sample creeps far from its rest. Ramps and parabolas are its integrals.
     """
     phi = np.zeros((len(response.static), len(time_s)))
-    # Arms that differ have a second drive, which does nothing if both are driven alike.
-    weights = response.weights[:, arm, : 1 if torque.symmetric else 2]
-    rates = response.rates[:, :, None]
-    for start, order, heights in torque.jumps:
+    weights, rates = response.weights[:, arm], response.rates[:, :, None]
+    for start, order, height in torque.jumps:
         after = time_s >= start
         growth = _growth(order - rate, rates, time_s[after] - start)
-        amplitude = np.einsum("ndj,d->nj", weights, heights)
-        phi[:, after] += np.einsum("nj,njt->nt", amplitude, growth).real
+        phi[:, after] += np.einsum("nj,njt->nt", height * weights, growth).real
     return phi
 
 
@@ -160,14 +150,13 @@ def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Arra
     force = np.zeros((len(response.rates), len(time_s)))
     rates = response.rates[:, :, None]
     static, weights = response.static[:, 0], response.weights[:, 0]
-    for start, order, heights in torque.jumps:
+    for start, order, height in torque.jumps:
         after = time_s >= start
         elapsed = time_s[after] - start
-        constant, amplitude = static @ heights, np.einsum("ndj,d->nj", weights, heights)
         z = rates * elapsed
         growth = elapsed**order * (phi_function(order, z) if order else np.exp(z))
-        rest = constant[:, None] * elapsed**order / factorial(order)
-        force[:, after] += rest + np.einsum("nj,njt->nt", amplitude, growth).real
+        rest = height * static[:, None] * elapsed**order / factorial(order)
+        force[:, after] += rest + np.einsum("nj,njt->nt", height * weights, growth).real
     return force
 
 
@@ -212,16 +201,20 @@ class Impedance:
     level: NDArray[Any]
     """B, (n,)."""
 
+    def steepness(self, zeros: Zeros) -> Array:
+        """Return S at rates of modes, (n_modes, n)."""
+        x, steepness = zeros.values, np.zeros_like(zeros.pole)
+        for weight, rate in zip(self.weights, self.rates, strict=True):
+            steepness += weight * (x / zeros.from_pole(rate)) ** 2
+        return steepness
+
 
 class Arms:
-    """Impedance of both arms as seen from the sample between them.
+    """Impedance of both arms as seen from the sample between them."""
 
-    The arms may differ; they are alike if they are equal, and driven alike.
-    """
-
-    def __init__(self, gripper: Gripper, *, alike: bool) -> None:
+    def __init__(self, gripper: Gripper) -> None:
         self._lever_m = gripper.lever_m
-        self.alike = alike
+        self.alike = gripper.left == gripper.right
         arms = gripper.left, gripper.right
         self._c = np.array([arm.damping_Nms_per_rad for arm in arms])
         self._k = np.array([arm.stiffness_Nm_per_rad for arm in arms])
@@ -233,61 +226,62 @@ class Arms:
 
     def with_sample(self, network: Network) -> Impedance:
         """Return the impedance with a sample between the arms."""
-        b_2, k, c = self._lever_m**2, self._k, self._c
+        b_2, c = self._lever_m**2, self._c
         springs, rates = ascending_branches(network)
         weights = b_2 * springs
         nothing = np.zeros((1, weights.shape[1]))
         if not self.alike:
-            weights = np.concatenate((weights, nothing + self._chi**2 / k.sum()))
+            weights = np.concatenate((weights, nothing + self._chi**2 / self._k.sum()))
             rates = np.concatenate((rates, nothing + self._rate))
             weights, rates = ascending(weights, rates)
-        spring = k.prod() / k.sum() + b_2 * network.k_p
         return Impedance(
-            np.concatenate((spring[None], weights)),
+            np.concatenate((self._spring(network)[None], weights)),
             np.concatenate((nothing, rates)),
             c.prod() / c.sum() + b_2 * network.c_p,
         )
 
     def rotations(self, zeros: Zeros) -> tuple[Array, Array]:
-        """Return N of the rotations of modes, (n_arms, n_drives, n_modes, n), and dN/dx."""
+        """Return N of the rotations of modes, (n_arms, n_modes, n), and dN/dx."""
         if self.alike:
-            half = np.full((2, 1, *zeros.pole.shape), 0.5)
+            half = np.full((2, *zeros.pole.shape), 0.5)
             return half, np.zeros_like(half)
         left, right = self._c / self._c.sum()
         away = zeros.from_pole(np.asarray(self._rate))
         share = self._chi / self._c.sum() / away
-        slope = -share / away
-        through = (left + share) * (share - right)
-        through_slope = slope * (left - right + 2 * share)
-        return (
-            np.array([[right - share, through], [left + share, -(left + share) - through]]),
-            np.array([[-slope, through_slope], [slope, -slope - through_slope]]),
-        )
+        slope = share / away
+        return np.array([right - share, left + share]), np.array([slope, -slope])
 
-    def forces(self, zeros: Zeros) -> Array:
-        """Return N of the jaw force of modes, (1, n_drives, n_modes, n)."""
+    def rotations_apart(self, zeros: Zeros) -> Array:
+        """Return N of the rotations under what the left load exceeds the right one by.
+
+        With these loads phi_2 = [Z_4/(Z_2 + Z_4) tau_2 + b^2 G/(Z_2 + Z_4) (tau_2 - tau_4)] / H.
+        The result is (n_arms, n_modes, n).
+        """
+        of_right, of_left = self.rotations(zeros)[0]
+        through = -of_left * of_right
+        return np.array([through, -of_left - through])
+
+    def force(self, zeros: Zeros) -> Array:
+        """Return N of the jaw force of modes, (1, n_modes, n)."""
         (c_2, c_4), b = self._c, self._lever_m
         if self.alike:
-            return 0.5 / b * (c_2 * zeros.values - self._k[0])[None, None]
+            return 0.5 / b * (c_2 * zeros.values - self._k[0])[None]
         away = zeros.from_pole(np.asarray(self._rate))
         z_2, z_4 = -self._chi - c_2 * away, self._chi - c_4 * away
-        whole = -(c_2 + c_4) * away
-        return np.array([[-z_2 * z_4 / whole / b, (z_2 / whole) ** 2 * z_4 / b]])
+        return (z_2 * z_4 / ((c_2 + c_4) * away) / b)[None]
 
     def rotations_at_rest(self, network: Network) -> Array:
-        """Return the final rotations under unit torques, (n_arms, n_drives, n)."""
-        k_2, k_4 = self._k
-        sample = self._lever_m**2 * network.k_p
-        spring = self._k.prod() / self._k.sum() + sample
-        one = np.ones_like(spring)
+        """Return the final rotations under a unit torque, (n_arms, n)."""
+        spring = self._spring(network)
         if self.alike:
-            return np.array([[0.5 * one]] * 2) / spring
-        rows = [[k_4 * one, sample], [k_2 * one, -(k_2 + sample)]]
-        return np.array(rows) / self._k.sum() / spring
+            return np.array([0.5 / spring] * 2)
+        k_2, k_4 = self._k / self._k.sum()
+        return np.array([k_4 / spring, k_2 / spring])
 
-    def forces_at_rest(self, network: Network) -> Array:
-        """Return the final jaw force under unit torques, (1, n_drives, n)."""
-        sample = self._lever_m * network.k_p
-        spring = self._k.prod() / self._k.sum() + self._lever_m * sample
-        drives = [sample] if self.alike else [sample, -sample * self._k[0] / self._k.sum()]
-        return np.array([drives]) / spring
+    def force_at_rest(self, network: Network) -> Array:
+        """Return the final jaw force under a unit torque, (1, n)."""
+        return (self._lever_m * network.k_p / self._spring(network))[None]
+
+    def _spring(self, network: Network) -> NDArray[Any]:
+        """Return A, (n,)."""
+        return self._k.prod() / self._k.sum() + self._lever_m**2 * network.k_p

@@ -20,7 +20,6 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray, parts
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.linear import is_symmetric
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.rate_tables import DecayTable
 from biogrip.physics.residuals import Residuals
@@ -41,8 +40,8 @@ def make_misfit(residuals: Residuals) -> Misfit:
     """Return the RMS misfit to the trace of residuals.
 
     That of residuals serves any protocol, sampling, noise, sample and gripper. `SeriesMisfit` is
-    the paper's: of a sample with one Maxwell branch between equal arms that steps of a torque drive
-    alike, sampled uniformly from the start on, with a reading at each step, in white noise alone.
+    the paper's: of a sample with one Maxwell branch between equal arms under steps of a torque,
+    sampled uniformly from the start on, with a reading at each step, in white noise alone.
     """
     torque, trace = residuals.torque, residuals.trace
     intervals, end_s = max(residuals.samples - 1, 1), residuals.duration_s
@@ -51,7 +50,7 @@ def make_misfit(residuals: Residuals) -> Misfit:
     if (
         (even and np.allclose(steps, np.rint(steps), rtol=0, atol=1e-9))
         and (torque.only_steps and not torque.deforms and residuals.plain)
-        and is_symmetric(residuals.gripper, torque)
+        and residuals.gripper.left == residuals.gripper.right
         and residuals.model.network([residuals.model.example]).k.shape[1] == 1
     ):
         given = residuals.gripper, residuals.model, torque, end_s / intervals
@@ -95,8 +94,8 @@ class SeriesMisfit:
         self._traces = np.atleast_2d(readings)
         self._samples = self._traces.shape[1]
         # Change of the torque at the start of each phase, and level after it.
-        self._heights = torque.left[:, 0, None, None]
-        self._levels = np.cumsum(torque.left[:, 0])[:, None, None]
+        self._heights = torque.changes[:, 0, None, None]
+        self._levels = np.cumsum(torque.changes[:, 0])[:, None, None]
         starts = np.rint(torque.time_s / interval_s).astype(np.int64)
         self._first_samples = np.minimum(starts, self._samples)
         # Numbers of readings: one, and those of each phase.

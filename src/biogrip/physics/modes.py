@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from biogrip.arrays import Array, parts
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.linear import Arms, Impedance, phi_function
+from biogrip.physics.linear import LEFT, Arms, Impedance, phi_function
 from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.roots import interlaced_zeros
 from biogrip.physics.sample_model import Network, SampleModel
@@ -55,11 +55,11 @@ class Modes(NamedTuple):
     rates: Array
     """In 1/s, (n, n_modes), negative."""
     weights: Array
-    """In rad per N m, (n, n_drives, n_modes); of a deformation, forces over deformations."""
+    """In rad per N m, (n, n_modes); of a deformation, forces over deformations."""
     rate_slopes: Array
     """(n, n_parameters, n_modes)."""
     weight_slopes: Array
-    """(n, n_parameters, n_drives, n_modes)."""
+    """(n, n_parameters, n_modes)."""
 
 
 def linear_responses(
@@ -99,15 +99,13 @@ def linear_responses(
 def _superpose(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
     """Sum responses of modes, w g, and their derivatives, d(w g) = dw g + w dr dg/dr."""
     n, count, m = modes.rate_slopes.shape
-    drives = modes.weights.shape[1]
     by_response = np.concatenate((modes.weights[:, None], modes.weight_slopes), axis=1)
     by_slope = np.zeros_like(by_response)
-    by_slope[:, 1:] = modes.weights[:, None] * modes.rate_slopes[:, :, None]
-    mixing = np.concatenate((by_response, by_slope), axis=2).reshape(n, 1 + count, -1)
+    by_slope[:, 1:] = modes.weights[:, None] * modes.rate_slopes
+    mixing = np.concatenate((by_response, by_slope), axis=2)
     rows = np.empty((n, 1 + count, len(time_s)))
     for some in parts(n, max(1, _NUMBERS_TOGETHER // (m * len(time_s)))):
         both = np.concatenate(mode_responses(modes.rates[some], torque, time_s), axis=1)
-        both = both.reshape(-1, 2 * drives * m, len(time_s))
         # One product per sample: the order of its sums does not depend on the number of samples.
         rows[some] = mixing[some] @ both
     return rows
@@ -132,16 +130,16 @@ def compute_modes(
         )
         return Modes(
             np.ascontiguousarray(rates),
-            np.ascontiguousarray(weights)[:, None],
+            np.ascontiguousarray(weights),
             rate_slopes.swapaxes(0, 1),
-            weight_slopes.swapaxes(0, 1)[:, :, None],
+            weight_slopes.swapaxes(0, 1),
         )
-    found = _between_arms(gripper, network, count, symmetric=torque.symmetric)
+    found = _between_arms(gripper, network, count)
     return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in found))
 
 
 def _between_arms(
-    gripper: Gripper, network: Network, count: int, *, symmetric: bool
+    gripper: Gripper, network: Network, count: int
 ) -> tuple[Array, Array, Array, Array]:
     """Compute rates and weights of the left arm, with derivatives by the log-parameters.
 
@@ -152,11 +150,11 @@ def _between_arms(
     Returns
     -------
     rates : (n_modes, n)
-    weights : (n_drives, n_modes, n)
+    weights : (n_modes, n)
     rate_slopes : (n_parameters, n_modes, n)
-    weight_slopes : (n_parameters, n_drives, n_modes, n)
+    weight_slopes : (n_parameters, n_modes, n)
     """
-    arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
+    arms = Arms(gripper)
     given = arms.with_sample(network)
     parts = [
         of.reshape(*of.shape[:-1], count + 1, -1)
@@ -185,10 +183,9 @@ def _between_arms(
         steepening += d_weight[:, None] * (ratio * ratio) - moved * away
         if np.any(d_rate):
             steepening += d_rate[:, None] * (2 * weight * (ratio * inverse) * ratio)
-    drives = slice(1 if symmetric else 2)
-    numerators, slopes = (of[0, drives] for of in arms.rotations(zeros))
+    numerators, slopes = (of[LEFT] for of in arms.rotations(zeros))
     weights = -numerators / steepness
-    weight_slopes = -(slopes * moved[:, None] + weights * steepening[:, None]) / steepness
+    weight_slopes = -(slopes * moved + weights * steepening) / steepness
     return -x, weights, -moved, weight_slopes
 
 
@@ -215,7 +212,7 @@ def relaxation(network: Network, history: TorqueHistory, time_s: Array) -> Array
     """Compute the load on samples that a protocol deforms, (n, n_times)."""
     rates, weights = _branches(network)
     decay, _ = mode_responses(rates, history, time_s)
-    load: Array = (weights[:, None] @ decay[:, 0])[:, 0]
+    load: Array = (weights[:, None] @ decay)[:, 0]
     return load
 
 
@@ -234,10 +231,9 @@ def _branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def lagged_torques(torque: TorqueHistory, shares: Sequence[float]) -> Callable[[Array], Array]:
-    """Return a function of ascending times for torques that lag behind by relaxation times.
+    """Return a function of ascending times for loads that lag behind, (n_lags, n_times).
 
-    It returns those of the left arm and of the difference of arms, (n_drives * n_lags, n_times); of
-    a deformation, the forces of springs that forget it with these relaxation times.
+    Of a deformation, they are the forces of springs that forget it with these relaxation times.
 
     Parameters
     ----------
@@ -249,8 +245,8 @@ def lagged_torques(torque: TorqueHistory, shares: Sequence[float]) -> Callable[[
     rates, sign = -1 / (torque.end_s * np.array(shares)), 1.0 if torque.deforms else -1.0
 
     def lagged(time_s: Array) -> Array:
-        found = sign * mode_responses(rates[:, None], torque, time_s)[0][:, :, 0]
-        return found.swapaxes(0, 1).reshape(-1, len(time_s))
+        lags: Array = sign * mode_responses(rates[None], torque, time_s)[0][0]
+        return lags
 
     return lagged
 
@@ -270,35 +266,32 @@ def mode_responses(rates: Array, history: TorqueHistory, time_s: Array) -> tuple
 
     Returns
     -------
-    responses, slopes : (n, n_drives, n_modes, n_times)
-        In units of what is controlled, for each of the `drives`, and those times s.
+    responses, slopes : (n, n_modes, n_times)
+        In units of what is controlled, and those times s.
     """
-    rate = rates[:, None, :, None]
-    powers = history.within_phases
-    shape = len(rates), powers.shape[1], rates.shape[1]
-    responses, slopes = np.zeros((2, *shape, len(time_s)))
-    reached, its_slope = np.zeros((2, *shape, 1))
+    rate = rates[:, :, None]
+    responses, slopes = np.zeros((2, *rates.shape, len(time_s)))
+    reached, its_slope = np.zeros((2, *rates.shape, 1))
     ends = np.append(history.time_s[1:], history.end_s)
     firsts = np.append(time_s.searchsorted(history.time_s, side="right"), len(time_s))
-    level = np.zeros(powers.shape[1])
+    level = 0.0
     # The step of a deformation is the start of a phase.
     orders = (1, 2) if history.deforms else (0, 1, 2)
     respond = _stretched if history.deforms else _turned
-    for k, start in enumerate(history.time_s):
+    for k, (start, powers) in enumerate(zip(history.time_s, history.within_phases, strict=True)):
         here = slice(firsts[k], firsts[k + 1])
         # The end of a phase is the initial state of the next.
         elapsed = np.append(time_s[here], ends[k]) - start
         if history.deforms:
-            value, slope, curvature = powers[k].T
-            reached = reached + (value - level)[:, None, None]
+            value, slope, curvature = powers
+            reached = reached + (value - level)
             level = value + slope * elapsed[-1] + curvature * elapsed[-1] ** 2 / 2
         remains = np.exp(rate * elapsed)
         response, slope = reached * remains, (its_slope + reached * elapsed) * remains
         for order in orders:
-            height = powers[k, :, order, None, None]
-            if height.any():
+            if powers[order]:
                 one, one_slope = respond(order, rate, elapsed)
-                response, slope = response + height * one, slope + height * one_slope
+                response, slope = response + powers[order] * one, slope + powers[order] * one_slope
         responses[..., here], slopes[..., here] = response[..., :-1], slope[..., :-1]
         reached, its_slope = response[..., -1:], slope[..., -1:]
     return responses, slopes

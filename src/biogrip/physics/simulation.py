@@ -44,7 +44,7 @@ def jaw_force(
     By either model, as in `simulated_response`; at the instant of a step: what follows it. Without
     inertia, the force may jump.
     """
-    response = jaw_force_response(gripper, network, symmetric=torque.symmetric, inertia=inertia)
+    response = jaw_force_response(gripper, network, inertia=inertia)
     force = linear_jaw_force(response, torque, time_s)
     if nonlinear:
         # Arms with inertia have not moved yet at the instant of a step.
@@ -125,9 +125,7 @@ def simulated_response(
         return nonlinear_rotation(gripper, network, torque, time_s)
     if torque.deforms:
         return relaxation(network, torque, time_s)
-    response = step_response(
-        gripper, network, symmetric=torque.symmetric, inertia=gripper.has_inertia
-    )
+    response = step_response(gripper, network, inertia=gripper.has_inertia)
     return rotation(response, torque, time_s)
 
 
@@ -139,7 +137,7 @@ def simulated_shortening(
         turns = (nonlinear_rotation(gripper, network, torque, time_s, a) for a in (LEFT, RIGHT))
         left, right = (displacement_of_tip(gripper, turn) for turn in turns)
         return left + right
-    response = step_response(gripper, network, symmetric=torque.symmetric)
+    response = step_response(gripper, network)
     both = rotation(response, torque, time_s, LEFT) + rotation(response, torque, time_s, RIGHT)
     return gripper.lever_m * both
 
@@ -222,9 +220,6 @@ def elapsed_s(torque: TorqueHistory, time_s: Array) -> Array:
 
 def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array) -> Array:
     """Compute the change of the left arm's rotation by inertia, (n, n_times) in rad."""
-    responses = (
-        step_response(gripper, network, symmetric=torque.symmetric, inertia=inertia)
-        for inertia in (True, False)
-    )
+    responses = (step_response(gripper, network, inertia=inertia) for inertia in (True, False))
     with_it, without = (rotation(response, torque, time_s) for response in responses)
     return with_it - without

@@ -139,8 +139,8 @@ class _Forcing:
 def _pieces(torque: TorqueHistory) -> Iterator[tuple[float, float, _Forcing]]:
     """Yield start and length of each phase, and the torques of both arms in it."""
     lengths = np.diff(torque.time_s, append=torque.end_s)
-    for start, length, own in zip(torque.time_s, lengths, torque.of_arms, strict=True):
-        yield float(start), float(length), _Forcing(own)
+    for start, length, powers in zip(torque.time_s, lengths, torque.within_phases, strict=True):
+        yield float(start), float(length), _Forcing(np.stack((powers, powers)))
 
 
 class _Modes:

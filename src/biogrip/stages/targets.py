@@ -153,7 +153,7 @@ def difference_over_peak(
     """
     time_s = _times(torque)
     found = correction(gripper, network, torque, factors)
-    response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
+    response = step_response(gripper, network, inertia=False)
     difference = found.at(time_s)
     nonlinear = factors[:, None] * rotation(response, torque, time_s) + difference
     share = np.max(np.abs(difference), axis=1) / np.max(np.abs(nonlinear), axis=1)

@@ -139,16 +139,13 @@ def _responds(trace: Array, nuisance: Array, rest: float, unknowns: int) -> bool
 def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
     """Return the largest static rotation of the left arm in rad that any sample allows.
 
-    Statically phi_2 = (1 - x) tau_2/k_2 + x (tau_2 - tau_4)/(k_2 + k_4), where x
-    goes from 0 without a sample to 1 with a rigid one.
+    Statically phi_2 = (1 - x) tau/k_2, where x goes from 0 without a sample to 1 with a rigid one.
     """
     # Within a phase nothing turns round: its start and its end will do.
     ends_s = np.append(torque.time_s[1:], torque.end_s)
     times = np.concatenate((torque.time_s, np.nextafter(ends_s, 0)))
-    left, right = (torque_at(torque, times, arm) for arm in ("left", "right"))
-    k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
-    alone, pushed = np.abs(left) / k_2, np.abs(left - right) / (k_2 + k_4)
-    return float(max(alone.max(), pushed.max()))
+    largest = np.abs(torque_at(torque, times)).max()
+    return float(largest / gripper.left.stiffness_Nm_per_rad)
 
 
 def _check_times(recording: Recording, torque: TorqueHistory, onset_s: float | None) -> None:
