@@ -27,9 +27,9 @@ from biogrip.physics.sample_model import Network
 _ASIDE, _ASIDE_OF_RING = 1 + 1e-3j, 1 + 2e-3j
 # Relative distance to which equal rates of branches are moved apart; the response changes by as
 # much.
-_CLOSEST = 1e-10
+_LEAST_GAP_OF_RATES = 1e-10
 # Share of a branch's rate within which a root is lost in rounding.
-_LOST = 1e-15
+_LEAST_GAP_OF_ROOTS = 1e-15
 
 
 def ascending_branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -42,7 +42,7 @@ def ascending(weights: NDArray[Any], rates: NDArray[Any]) -> tuple[NDArray[Any],
     order = np.argsort(rates.real, axis=0, kind="stable")
     weights, rates = (np.take_along_axis(of, order, axis=0) for of in (weights, rates))
     for slower, rate in pairwise(rates):
-        rate += np.maximum((1 + _CLOSEST) * slower.real - rate.real, 0)
+        rate += np.maximum((1 + _LEAST_GAP_OF_RATES) * slower.real - rate.real, 0)
     return weights, rates
 
 
@@ -68,8 +68,10 @@ class Ringing:
         away = (self._rates - origin[..., None]) + beyond[..., None]
         # From another start than that of its branch, a root may be found that is nearer to a very
         # weak branch than rounding. Its mode has no weight.
-        lost = (np.abs(away) < _LOST * self._rates) & (self._rates != origin[..., None])
-        inverse = 1 / np.where(lost, _LOST**2 * self._rates, away)
+        lost = (np.abs(away) < _LEAST_GAP_OF_ROOTS * self._rates) & (
+            self._rates != origin[..., None]
+        )
+        inverse = 1 / np.where(lost, _LEAST_GAP_OF_ROOTS**2 * self._rates, away)
         self._sample = self._k_p + self._c_p * s + (self._k * inverse).sum(axis=2) * s
         # dE/ds: the polynomial's, a product over root distances, over all s + r_j. Of roots that
         # nearly coincide it fits their distance.

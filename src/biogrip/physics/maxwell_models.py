@@ -33,7 +33,7 @@ from biogrip.physics.sample_model import (
 )
 
 # A spring or damper of a branch that is gone, in N/m or N s/m: no response shows it.
-_GONE = 1e-18
+_SPRING_OF_NO_BRANCH = 1e-18
 
 
 @of_columns
@@ -58,8 +58,8 @@ def generalized_maxwell(*columns: Array) -> Network:
     k, c = (np.array(columns)[some] for some in (slice(n), slice(n + 1, 2 * n + 1)))
     if not (np.all(k) and np.all(c)):
         # Of several branches that are gone none relaxes with another: equal rates cost digits.
-        weak = _GONE * 10.0 ** np.arange(n)[:, None]
-        k, c = np.where(k, k, _GONE), np.where(c, c, weak)
+        weak = _SPRING_OF_NO_BRANCH * 10.0 ** np.arange(n)[:, None]
+        k, c = np.where(k, k, _SPRING_OF_NO_BRANCH), np.where(c, c, weak)
     return Network(k_p=columns[n], c_p=columns[-1], k=k.T, c=c.T)
 
 

@@ -27,7 +27,7 @@ from biogrip.physics.roots import zeros_of_one_branch
 from biogrip.physics.sample_model import Network, SampleModel
 
 # Individuals computed together: many enough for few calls, few enough for the cache.
-_AT_ONCE = 7000
+_INDIVIDUALS_AT_ONCE = 7000
 
 Misfit = Callable[[Array], Array]
 """Function from parameters, (n, n_parameters), to RMS misfits in the unit of the readings, (n,)."""
@@ -76,10 +76,10 @@ def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:
 
 
 class SeriesMisfit:
-    """RMS difference between the model's rotation and uniformly sampled traces.
+    """RMS difference between the model's response and uniformly sampled traces.
 
     For torque steps, by the linear model without inertia; the first sample is at t = 0, and one is
-    at every step. Traces of the left arm are (n_samples,) or (n_traces, n_samples).
+    at every step. Traces are (n_samples,) or (n_traces, n_samples).
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class SeriesMisfit:
         are given by their indices, (n_populations,).
         """
         populations, size = parameters.shape[:2]
-        some = max(1, _AT_ONCE // size)
+        some = max(1, _INDIVIDUALS_AT_ONCE // size)
         misfit = np.empty((populations, size))
         for these in parts(populations, some):
             misfit[these] = self._of_some(parameters[these], traces[these])
@@ -208,7 +208,7 @@ class SeriesMisfit:
 
 
 def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array, Array]:
-    """Compute the response of either of two equal arms to a unit step of both torques.
+    """Compute the response of either of two equal arms to a unit step of the torque.
 
     A sample with one Maxwell branch has two modes without inertia. This special case of
     `biogrip.physics.linear` is written out for speed: populations are small, and most time goes

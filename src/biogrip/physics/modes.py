@@ -7,14 +7,14 @@ responses, sums of modes. The result for a sample does not depend, to the last b
 samples.
 
 The response of one mode of unit weight to a protocol has a derivative by the mode's rate. After a
-torque's unit step an arm turns by modes e^(r t) - 1, with rates r < 0. So a mode that follows a
-torque T(t), and a branch, spring and damper in series, stretched by x(t), obey
+load's unit step the response is one of modes e^(r t) - 1, with rates r < 0. So a mode that follows
+a load T(t), and a branch, spring and damper in series, stretched by x(t), obey
 
     g' = r g + r T        g' = r g + x'
 
 Both are carried on from phase to phase: a superposition of responses since the start would lose
 digits by cancellation. The second is no difference of the first and x: of a fast branch it would
-leave rounding errors only. Within a phase a torque t^n/n! gives, with z = r t,
+leave rounding errors only. Within a phase a load t^n/n! gives, with z = r t,
 
     g = r t^(n+1) phi_(n+1)(z)        dg/dr = t^(n+1) [phi_n(z) - n phi_(n+1)(z)]
 
@@ -43,19 +43,19 @@ from biogrip.physics.sample_model import Network, SampleModel
 
 _COMPLEX_STEP = 1e-30
 # Rate at which a bare damper forgets, in 1/s; its force is c times the rate of the deformation.
-_AT_ONCE = 1e30
+_RATE_OF_A_DAMPER = 1e30
 # Numbers formed together, which should fit a processor's cache, and times: the responses of modes
 # at a million would take too much memory.
-_NUMBERS_TOGETHER, _TIMES_TOGETHER = 400_000, 100_000
+_NUMBERS_AT_ONCE, _TIMES_AT_ONCE = 400_000, 100_000
 
 
 class Modes(NamedTuple):
-    """Step responses of n samples' left arm, and their derivatives by the log-parameters."""
+    """Step responses of n samples, and their derivatives by the log-parameters."""
 
     rates: Array
     """In 1/s, (n, n_modes), negative."""
     weights: Array
-    """In rad per N m, (n, n_modes); of a deformation, forces over deformations."""
+    """(n, n_modes): the reading over what is controlled."""
     rate_slopes: Array
     """(n, n_parameters, n_modes)."""
     weight_slopes: Array
@@ -87,11 +87,11 @@ def linear_responses(
     Returns
     -------
     (n, 1 + n_parameters, n_times)
-        Rotations of the left arm, and their derivatives; without `slopes`, (n, 1, n_times).
+        Readings, and their derivatives; without `slopes`, (n, 1, n_times).
     """
     modes = compute_modes(gripper, model, torque, parameters, slopes=slopes)
     rows = np.empty((len(parameters), 1 + modes.rate_slopes.shape[1], len(time_s)))
-    for some in parts(len(time_s), _TIMES_TOGETHER):
+    for some in parts(len(time_s), _TIMES_AT_ONCE):
         rows[:, :, some] = _superpose(modes, torque, time_s[some])
     return rows
 
@@ -104,7 +104,7 @@ def _superpose(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
     by_slope[:, 1:] = modes.weights[:, None] * modes.rate_slopes
     mixing = np.concatenate((by_response, by_slope), axis=2)
     rows = np.empty((n, 1 + count, len(time_s)))
-    for some in parts(n, max(1, _NUMBERS_TOGETHER // (m * len(time_s)))):
+    for some in parts(n, max(1, _NUMBERS_AT_ONCE // (m * len(time_s)))):
         both = np.concatenate(mode_responses(modes.rates[some], torque, time_s), axis=1)
         # One product per sample: the order of its sums does not depend on the number of samples.
         rows[some] = mixing[some] @ both
@@ -221,8 +221,8 @@ def _branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
 
     A branch forgets at the rate -k/c, a bare spring never, and a bare damper at once.
     """
-    bare = np.stack((network.k_p, _AT_ONCE * network.c_p), axis=1)
-    fixed = np.broadcast_to([0.0, -_AT_ONCE], bare.shape)
+    bare = np.stack((network.k_p, _RATE_OF_A_DAMPER * network.c_p), axis=1)
+    fixed = np.broadcast_to([0.0, -_RATE_OF_A_DAMPER], bare.shape)
     # A branch so weak that its numbers underflow is none.
     there = network.c.real > 0
     rates = -network.k / np.where(there, network.c, 1.0)
@@ -259,7 +259,7 @@ def mode_responses(rates: Array, history: TorqueHistory, time_s: Array) -> tuple
     rates : (n, n_modes)
         In 1/s, real, negative or zero.
     history
-        The torque; if it deforms, the deformation.
+        The protocol, of a load or a deformation.
     time_s : (n_times,)
         Ascending; at the very instant of a step, what precedes it. Before the protocol nothing
         responds.
@@ -277,7 +277,7 @@ def mode_responses(rates: Array, history: TorqueHistory, time_s: Array) -> tuple
     level = 0.0
     # The step of a deformation is the start of a phase.
     orders = (1, 2) if history.deforms else (0, 1, 2)
-    respond = _stretched if history.deforms else _turned
+    respond = _stretched if history.deforms else _loaded
     for k, (start, powers) in enumerate(zip(history.time_s, history.within_phases, strict=True)):
         here = slice(firsts[k], firsts[k + 1])
         # The end of a phase is the initial state of the next.
@@ -297,8 +297,8 @@ def mode_responses(rates: Array, history: TorqueHistory, time_s: Array) -> tuple
     return responses, slopes
 
 
-def _turned(order: int, rate: Array, elapsed: Array) -> tuple[Array, Array]:
-    """Return the response to a torque t^n/n!, and its derivative."""
+def _loaded(order: int, rate: Array, elapsed: Array) -> tuple[Array, Array]:
+    """Return the response to a load t^n/n!, and its derivative."""
     z = rate * elapsed
     if order == 0:
         growth = np.expm1(z)

@@ -42,7 +42,7 @@ _STAGES = 5
 # length to the one before: the error was below 1e-7 of the peak in all tests.
 _FIRST_S, _GROWTH = 1e-8, 1.3
 # Largest change in the last sweep, relative to the peak, and limit of sweeps.
-_TOLERANCE, _MOST_SWEEPS = 1e-13, 200
+_LARGEST_CHANGE, _MOST_SWEEPS = 1e-13, 200
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ def correction(
         found, extra_rate[left] = modes.respond(load, left)
         change = np.abs(found - extra[left]).max(axis=(1, 2, 3))
         extra[left] = found
-        converged[left] = change <= _TOLERANCE * peak[left]
+        converged[left] = change <= _LARGEST_CHANGE * peak[left]
         left = left[~converged[left] & np.isfinite(change)]
         if not len(left):
             break

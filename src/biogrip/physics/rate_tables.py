@@ -116,7 +116,7 @@ class ModeRows:
     the places within pieces, times the pieces' coefficients.
 
     A matrix, (n_times, n_rows), turns values at ascending times, multiplied from their right, into
-    rows; `shortest_s` is the shortest of these times after a change of torque.
+    rows; `shortest_s` is the shortest of these times after a change of the load.
     """
 
     def __init__(

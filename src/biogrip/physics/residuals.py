@@ -17,7 +17,7 @@ from biogrip.physics.simulation import Grip, Ring, compute_grip, find_ring
 from biogrip.physics.whitening import estimate_noise, measure_rounding, taken_out
 
 # Most numbers in the rows that are formed at once.
-_AT_ONCE = 100_000
+_NUMBERS_AT_ONCE = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +187,7 @@ class Residuals:
         n, parameters = log_parameters.shape
         condensed, sums = self.trace.condensed, np.empty((n, 1 + parameters))
         nodes_s = condensed.dense.time_s
-        for some in parts(n, max(1, _AT_ONCE // (len(nodes_s) * (1 + parameters)))):
+        for some in parts(n, max(1, _NUMBERS_AT_ONCE // (len(nodes_s) * (1 + parameters)))):
             rows = condensed.rows_of_nodes(self._simulated(log_parameters[some], nodes_s))
             measured, rest = zip(*(other.trace.at_nodes for other in others[some]), strict=True)
             rows[:, 0] -= measured
@@ -209,7 +209,7 @@ class Residuals:
         Returns
         -------
         (n, 1 + n_parameters, n_rows)
-            In rad; first the response, then its derivatives by the log-parameters. Without
+            First the response, then its derivatives by the log-parameters. Without
             `slopes`, (n, 1, n_rows).
         """
         given = self.gripper, self.model, self.torque
@@ -225,7 +225,7 @@ class Residuals:
             Sample parameters in the model's order, SI units.
         """
         misfit = np.empty(len(parameters))
-        for some in parts(len(parameters), max(1, _AT_ONCE // len(self.trace.rows))):
+        for some in parts(len(parameters), max(1, _NUMBERS_AT_ONCE // len(self.trace.rows))):
             responses = self.condensed_responses(np.log(parameters[some]), slopes=False)[:, 0]
             rows = responses - self.trace.rows
             misfit[some] = np.sqrt(np.einsum("nr,nr->n", rows, rows) / self.samples)

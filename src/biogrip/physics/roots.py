@@ -47,9 +47,9 @@ below 1e-9 here.
 """
 
 # Most sweeps over the roots of polynomials, and over the zeros of sums of poles.
-_SWEEPS, _MOST_SWEEPS = 80, 60
+_MOST_SWEEPS_OF_ROOTS, _MOST_SWEEPS_OF_ZEROS = 80, 60
 # Share of a sum of poles below which it is zero, and of a distance below which a step is the last.
-_ROUNDING, _SHORT = 4e-16, 1e-9
+_LEAST_SHARE, _SHORTEST_STEP = 4e-16, 1e-9
 
 
 def roots(coefficients: Array) -> ComplexArray:
@@ -80,7 +80,7 @@ def find_zeros(
     off_diagonal = ~np.eye(beyond.shape[1], dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
         converged = resting = np.zeros((len(beyond), 1), dtype=bool)
-        for _ in range(_SWEEPS):
+        for _ in range(_MOST_SWEEPS_OF_ROOTS):
             newton = newton_step(beyond)
             distance = distances(beyond, origin)
             repulsion = np.where(off_diagonal, 1 / distance, 0).sum(axis=2)
@@ -224,12 +224,12 @@ def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
     # one, bounds of the distance, and the distance.
     search = np.array([pole, side, gap, np.zeros_like(pole), 0.5 * gap, start]).reshape(6, -1)
     left = np.arange(pole.size)
-    for _ in range(_MOST_SWEEPS):
+    for _ in range(_MOST_SWEEPS_OF_ZEROS):
         zero, which = np.divmod(left, len(level))
         origin, sign, whole, low, high, at = search
         sides = _sides(weights, poles, zero, which, Zeros(origin, sign * at))
         value = sides.below + sides.above - level[which]
-        converged = np.abs(value) <= _ROUNDING * (sides.below - sides.above + level[which])
+        converged = np.abs(value) <= _LEAST_SHARE * (sides.below - sides.above + level[which])
         np.copyto(low, at, where=sign * value > 0)
         np.copyto(high, at, where=sign * value < 0)
         last = int(np.searchsorted(zero, len(poles) - 1))
@@ -238,7 +238,7 @@ def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
         np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * at)), where=outside)
         np.copyto(moved, at, where=converged)
         # Convergence is quadratic, so after a short step the error is below rounding.
-        converged |= np.abs(moved - at) <= _SHORT * moved
+        converged |= np.abs(moved - at) <= _SHORTEST_STEP * moved
         at[:] = found.flat[left] = moved
         left, search = left[~converged], search[:, ~converged]
         if not len(left):

@@ -55,8 +55,8 @@ def jaw_force(
 
 
 # Forces below this share of the largest one are rounding errors.
-_NOTHING = 1e-9
-_A_PHASE = 200
+_LEAST_FORCE = 1e-9
+_TIMES_OF_PHASE = 200
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def compute_grip(
     """
     time_s = _instants(torque)
     force = jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear, inertia=False)[0]
-    least_shown = _NOTHING * float(np.abs(force).max()) or 1.0
+    least_shown = _LEAST_FORCE * float(np.abs(force).max()) or 1.0
     shown = np.round(force / least_shown)
     most, negative = int(np.argmax(shown)), np.flatnonzero(shown < 0)
     first = 0 if len(negative) else most
@@ -108,7 +108,7 @@ def compute_grip(
 def _instants(torque: TorqueHistory) -> Array:
     """Return times that are dense after every change of torque."""
     lengths = np.diff(torque.time_s, append=torque.end_s)
-    share = np.geomspace(1e-9, 1.0, _A_PHASE)[:-1]
+    share = np.geomspace(1e-9, 1.0, _TIMES_OF_PHASE)[:-1]
     pieces = [start + length * share for start, length in zip(torque.time_s, lengths, strict=True)]
     return np.unique(np.append(np.concatenate(pieces), torque.end_s))
 
@@ -143,7 +143,7 @@ def simulated_shortening(
 
 
 # A ring of exp(-36) is lost in rounding.
-_DECAYED = 36.0
+_EFOLDS_OF_RING = 36.0
 
 VISIBLE = 0.2
 """Norm of a ring in standard deviations of the noise from which it counts as visible.
@@ -209,7 +209,7 @@ def ringing_s(gripper: Gripper) -> float:
     falls at least like exp(-c t / (2 I)).
     """
     arms = gripper.left, gripper.right
-    return _DECAYED * max(2 * arm.inertia_kgm2 / arm.damping_Nms_per_rad for arm in arms)
+    return _EFOLDS_OF_RING * max(2 * arm.inertia_kgm2 / arm.damping_Nms_per_rad for arm in arms)
 
 
 def elapsed_s(torque: TorqueHistory, time_s: Array) -> Array:

@@ -32,7 +32,7 @@ from biogrip.physics.sample_model import Network
 
 _MOST_EVENTS = 100_000
 # Share of the largest force and closing below which a change of contact is rounding.
-_NOTHING = 1e-11
+_LEAST_SHARE = 1e-11
 # Growth of the distances in the grid on which the end of a stretch is bracketed.
 _GROWTH = 1.1
 
@@ -75,8 +75,8 @@ def unilateral_response(
     )
     softest = min(arm.stiffness_Nm_per_rad for arm in (gripper.left, gripper.right))
     least = {
-        True: _NOTHING * most_torque / gripper.lever_m,
-        False: _NOTHING * 2 * gripper.lever_m * most_torque / softest,
+        True: _LEAST_SHARE * most_torque / gripper.lever_m,
+        False: _LEAST_SHARE * 2 * gripper.lever_m * most_torque / softest,
     }
     branches = network.k.shape[1]
     states = np.zeros((3 + branches, len(time_s)))
