@@ -16,7 +16,7 @@ from biogrip.physics.linear import (
     rotation,
     step_response,
 )
-from biogrip.physics.maxwell_models import damper, generalized_maxwell, kelvin_voigt, maxwell
+from biogrip.physics.models import damper, generalized_maxwell, kelvin_voigt, maxwell
 from biogrip.physics.nonlinear import correction, nonlinear_rotation
 from biogrip.physics.protocol import (
     Phase,

@@ -14,8 +14,7 @@ from biogrip.physics.linear import (
     rotation,
     step_response,
 )
-from biogrip.physics.maxwell_models import generalized_maxwell
-from biogrip.physics.models import MODELS
+from biogrip.physics.models import MODELS, generalized_maxwell
 from biogrip.physics.protocol import TorqueHistory, hold, torque_at, torque_history
 from biogrip.physics.sample_model import Network
 from tests.helpers.laplace import drawn, rotations, series

@@ -14,9 +14,8 @@ from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.gripper import torque as torque_of_voltage
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.linear import phi_function, rotation, step_response
-from biogrip.physics.maxwell_models import generalized_maxwell
 from biogrip.physics.misfit import SeriesMisfit, make_misfit
-from biogrip.physics.models import Sample
+from biogrip.physics.models import Sample, generalized_maxwell
 from biogrip.physics.protocol import (
     Phase,
     TorqueHistory,

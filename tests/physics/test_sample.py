@@ -6,8 +6,15 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.maxwell_models import generalized_maxwell
-from biogrip.physics.models import CANDIDATES, MODELS, Sample, as_richer, contained, different_in
+from biogrip.physics.models import (
+    CANDIDATES,
+    MODELS,
+    Sample,
+    as_richer,
+    contained,
+    different_in,
+    generalized_maxwell,
+)
 from biogrip.physics.protocol import TorqueHistory, hold, torque_history
 from biogrip.physics.sample_model import complex_modulus, with_fixed
 from tests.helpers.laplace import IMPEDANCES, series

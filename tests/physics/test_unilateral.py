@@ -9,14 +9,14 @@ from scipy.integrate import solve_ivp
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.maxwell_models import (
+from biogrip.physics.models import (
+    MODELS,
     damper,
     generalized_maxwell,
     kelvin_voigt,
     liquid_drop,
     maxwell,
 )
-from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import (
     Phase,
     TorqueHistory,

@@ -9,8 +9,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.judging.likelihood import headlines
 from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.maxwell_models import generalized_maxwell
-from biogrip.physics.models import MODELS
+from biogrip.physics.models import MODELS, generalized_maxwell
 from biogrip.records.identifications import columns
 from biogrip.records.rows import write_rows
 from biogrip.stages import sweeps as stage

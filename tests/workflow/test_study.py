@@ -10,7 +10,7 @@ from matplotlib.image import imread
 
 from biogrip.figures.style import COLUMN_IN
 from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.maxwell_models import generalized_maxwell
+from biogrip.physics.models import generalized_maxwell
 from tests.helpers.problems import GRIPPER, TORQUE
 from tests.helpers.runs import TINY, snakemake
 

@@ -27,8 +27,7 @@ from biogrip.figures.style import (
     panel,
 )
 from biogrip.physics import gripper as actuator
-from biogrip.physics.contact import LARGEST_M, SMALLEST_M, contact
-from biogrip.physics.gripper import CombDrive, Gripper
+from biogrip.physics.gripper import LARGEST_M, SMALLEST_M, CombDrive, Gripper, contact
 from biogrip.physics.protocol import torque_at, torque_history
 from biogrip.physics.simulation import simulated_response
 from biogrip.study.study import Study

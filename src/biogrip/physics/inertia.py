@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 
 from biogrip.arrays import Array, ComplexArray
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.roots import Zeros, distances, find_zeros, roots
+from biogrip.physics.roots import Zeros, distances, find_zeros, spread_starts
 from biogrip.physics.sample_model import Network
 
-# Factors that move starts off the real axis, which no iteration from a real start would leave, and
-# off one another, as arms may be overdamped.
-_ASIDE, _ASIDE_OF_RING = 1 + 1e-3j, 1 + 2e-3j
+# Factor that moves starts off the real axis, which no iteration from a real start would leave.
+_ASIDE = 1 + 1e-3j
 # Relative distance to which equal rates of branches are moved apart; the response changes by as
 # much.
 _LEAST_GAP_OF_RATES = 1e-10
@@ -102,7 +101,7 @@ class Ringing:
     def _begin(self, zeros: Zeros) -> tuple[Array, ComplexArray]:
         """Return starts of the iteration: their origins, and distances beyond them."""
         branches = self._k.shape[2]
-        ring = roots(self._ring()) * _ASIDE_OF_RING
+        ring = spread_starts(self._ring())
         origin = np.concatenate((zeros.pole[:branches].T, np.zeros(ring.shape)), axis=1)
         slow = -zeros.beyond[:branches].T * _ASIDE
         return origin, np.concatenate((slow, ring), axis=1)

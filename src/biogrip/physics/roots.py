@@ -1,8 +1,8 @@
-"""Roots of polynomials with positive coefficients, and zeros of sums of simple poles, many at once.
+"""Roots of functions of the rate, many at once.
 
 The coefficients of a gripper-sample polynomial span dozens of decades. An eigenvalue solver loses
-the small roots there; iterating on the polynomial itself [1]_, [2]_, from starting radii read off
-its Newton polygon [3]_, keeps every root to full relative accuracy.
+the small roots there; iterating on the function itself [1]_, [2]_, from starting radii read off
+the Newton polygon of its arms [3]_, keeps every root to full relative accuracy.
 
 A network of springs and dampers with parallel Maxwell branches has as many modes as branches, or
 one more. With branch rates p_0 < p_1 < ... the rates of the modes are the zeros of
@@ -46,24 +46,29 @@ double root symmetrically apart by g changes the response by g^2. Both stay
 below 1e-9 here.
 """
 
-# Most sweeps over the roots of polynomials, and over the zeros of sums of poles.
+# Most sweeps over roots that iterations find together, and over zeros of sums of poles.
 _MOST_SWEEPS_OF_ROOTS, _MOST_SWEEPS_OF_ZEROS = 80, 60
 # Share of a sum of poles below which it is zero, and of a distance below which a step is the last.
 _LEAST_SHARE, _SHORTEST_STEP = 4e-16, 1e-9
 
 
-def roots(coefficients: Array) -> ComplexArray:
-    """Compute the roots of polynomials with positive coefficients (Ehrlich-Aberth iteration).
+def spread_starts(coefficients: Array) -> ComplexArray:
+    """Return starts for the roots of polynomials with positive coefficients, (n, degree).
 
-    Coefficients are in ascending powers, (n, degree + 1); roots, (n, degree), are pairwise at least
-    `SMALLEST_GAP` apart.
+    Coefficients are in ascending powers, (n, degree + 1). Moduli are slopes of the concave hull of
+    log(coefficient) over power, the Newton polygon [3]_.
     """
     degree = coefficients.shape[1] - 1
-    radii = _newton_polygon_radii(coefficients)
-    # No symmetry, so that no two starting points can move in step.
-    angles = np.pi + np.array([0.4, -0.9, 1.1, -0.25, 0.7, -1.3, 0.15])[np.arange(degree) % 7]
-    z = radii * np.exp(1j * (angles + 0.05 * np.arange(degree)))
-    return find_zeros(z, lambda z: _newton_step(coefficients, z), np.zeros(z.shape))
+    log = np.log(coefficients)
+    hull = log.copy()
+    for k in range(1, degree):
+        for i in range(k):
+            for j in range(k + 1, degree + 1):
+                chord = log[:, i] + (log[:, j] - log[:, i]) * (k - i) / (j - i)
+                hull[:, k] = np.maximum(hull[:, k], chord)
+    # No symmetry, so that no two points can move in step.
+    angles = np.pi + np.array([0.4, -0.9, 1.1, -0.25])[:degree] + 0.05 * np.arange(degree)
+    return np.exp(hull[:, :-1] - hull[:, 1:]) * np.exp(1j * angles)
 
 
 def find_zeros(
@@ -115,29 +120,6 @@ def separate(beyond: ComplexArray, origin: Array) -> ComplexArray:
         beyond[:, i] += lack
         beyond[:, j] -= lack
     return beyond
-
-
-def _newton_step(coefficients: Array, z: ComplexArray) -> ComplexArray:
-    highest, *others = coefficients.T[::-1, :, None]
-    slope = highest + np.zeros_like(z)
-    value = slope * z + others[0]
-    for coefficient in others[1:]:
-        slope = slope * z + value
-        value = value * z + coefficient
-    return value / slope
-
-
-def _newton_polygon_radii(coefficients: Array) -> Array:
-    """Return moduli of the roots: slopes of the concave hull of log(coefficient) over power."""
-    degree = coefficients.shape[1] - 1
-    log = np.log(coefficients)
-    hull = log.copy()
-    for k in range(1, degree):
-        for i in range(k):
-            for j in range(k + 1, degree + 1):
-                chord = log[:, i] + (log[:, j] - log[:, i]) * (k - i) / (j - i)
-                hull[:, k] = np.maximum(hull[:, k], chord)
-    return np.exp(hull[:, :-1] - hull[:, 1:])
 
 
 @dataclass(frozen=True)

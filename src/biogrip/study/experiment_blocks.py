@@ -14,8 +14,15 @@ from pydantic import BaseModel, Field
 from biogrip.errors import nearest
 from biogrip.keys import OPEN, Block, Checked, OneOf, Problem
 from biogrip.physics.calibration import ARM_KEYS
-from biogrip.physics.contact import LARGEST_M, SMALLEST_M, Contact, contact
-from biogrip.physics.gripper import CombDrive, Gripper, capacitance_slope
+from biogrip.physics.gripper import (
+    LARGEST_M,
+    SMALLEST_M,
+    CombDrive,
+    Contact,
+    Gripper,
+    capacitance_slope,
+    contact,
+)
 from biogrip.physics.instruments import CONTROLLED, Instrument
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import Phase, hold, largest_load, ramp

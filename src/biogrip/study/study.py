@@ -11,8 +11,7 @@ from biogrip.fit.genome import GeneRange
 from biogrip.fit.methods import METHODS, Method
 from biogrip.fit.problem import CaseProblem
 from biogrip.keys import built, plain
-from biogrip.physics.contact import Contact
-from biogrip.physics.gripper import NO_ARMS, Gripper
+from biogrip.physics.gripper import NO_ARMS, Contact, Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import CANDIDATES, UNPUBLISHED, Sample
 from biogrip.physics.protocol import Phase, torque_history
