@@ -82,7 +82,7 @@ def jaw_force_response(gripper: Gripper, network: Network, *, inertia: bool = Tr
 def _solve(gripper: Gripper, network: Network, *, inertia: bool, force: bool) -> StepResponse:
     arms = Arms(gripper)
     impedance = arms.with_sample(network)
-    zeros = interlaced_zeros(impedance.weights, impedance.rates, impedance.level)
+    zeros = impedance.zeros()
     static = arms.force_at_rest(network) if force else arms.rotations_at_rest(network)
     if inertia:
         ringing = Ringing(gripper, network, zeros)
@@ -110,7 +110,7 @@ def weights_of_loads(gripper: Gripper, network: Network) -> Array:
     """
     arms = Arms(gripper)
     impedance = arms.with_sample(network)
-    zeros = interlaced_zeros(impedance.weights, impedance.rates, impedance.level)
+    zeros = impedance.zeros()
     numerators = arms.rotations(zeros)[0][:, None]
     if arms.alike:
         numerators = numerators[:1]
@@ -127,19 +127,19 @@ def rotation(
     *,
     rate: bool = False,
 ) -> Array:
-    """Compute an arm's closing rotation in rad, or its rate in rad/s, (n, n_times), at any times.
+    """Compute the response to a protocol, or its rate, (n, n_times), at any times.
 
-    Responses to changes of torque superpose. A step response starts at zero,
-    so h(t) = sum_j w_j (e^(p_j t) - 1), which loses no digits to the constant
-    if a sample creeps far from its rest. Ramps and parabolas are its integrals.
+    Of a gripper, it is the closing rotation of an arm in rad. Responses to changes superpose. A
+    step response starts at zero, so h(t) = sum_j w_j (e^(p_j t) - 1), which loses no digits to the
+    constant if a sample creeps far from its rest. Ramps and parabolas are its integrals.
     """
-    phi = np.zeros((len(response.static), len(time_s)))
+    total = np.zeros((len(response.static), len(time_s)))
     weights, rates = response.weights[:, arm], response.rates[:, :, None]
     for start, order, height in torque.jumps:
         after = time_s >= start
         growth = _growth(order - rate, rates, time_s[after] - start)
-        phi[:, after] += np.einsum("nj,njt->nt", height * weights, growth).real
-    return phi
+        total[:, after] += np.einsum("nj,njt->nt", height * weights, growth).real
+    return total
 
 
 def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Array) -> Array:
@@ -200,6 +200,10 @@ class Impedance:
     """Zero and the r_j, ascending, (1 + n_rates, n)."""
     level: NDArray[Any]
     """B, (n,)."""
+
+    def zeros(self) -> Zeros:
+        """Return the rates of modes without inertia."""
+        return interlaced_zeros(self.weights, self.rates, self.level)
 
     def steepness(self, zeros: Zeros) -> Array:
         """Return S at rates of modes, (n_modes, n)."""

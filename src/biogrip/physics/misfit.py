@@ -6,7 +6,7 @@ the samples y_n expands into geometric series in z_i z_j, and into the projectio
 the response of each mode. These projections are long sums, but functions of the mode's rate alone:
 computed once at some hundred rates, they are interpolated for all others. No response is formed.
 Other samples, grippers, protocols and samplings, and noise that is not white, need the condensed
-rows of `biogrip.physics.residuals`, which take two to seven times as long.
+rows of `biogrip.physics.residuals`, which take three to ten times as long.
 
 The misfit of an individual is computed element by element, in a fixed order, without reductions of
 arrays: it does not depend, to the last bit, on the rest of the population or on the number of
@@ -78,7 +78,7 @@ def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:
 class SeriesMisfit:
     """RMS difference between the model's response and uniformly sampled traces.
 
-    For torque steps, by the linear model without inertia; the first sample is at t = 0, and one is
+    For steps, by the linear model without inertia; the first sample is at t = 0, and one is
     at every step. Traces are (n_samples,) or (n_traces, n_samples).
     """
 

@@ -38,7 +38,6 @@ from biogrip.arrays import Array, parts
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.linear import LEFT, Arms, Impedance, phi_function
 from biogrip.physics.protocol import TorqueHistory
-from biogrip.physics.roots import interlaced_zeros
 from biogrip.physics.sample_model import Network, SampleModel
 
 _COMPLEX_STEP = 1e-30
@@ -163,7 +162,7 @@ def _between_arms(
     impedance = Impedance(*(of[..., 0, :].real for of in parts))
     # (n_parameters, n) of every weight and rate, and of the level.
     d_weights, d_rates, d_level = (of[..., 1:, :].imag / _COMPLEX_STEP for of in parts)
-    zeros = interlaced_zeros(impedance.weights, impedance.rates, impedance.level)
+    zeros = impedance.zeros()
     x = zeros.values
     moved = np.zeros((count, *x.shape)) - d_level[:, None]
     steepness = np.zeros_like(x)

@@ -106,7 +106,7 @@ def compute_grip(
 
 
 def _instants(torque: TorqueHistory) -> Array:
-    """Return times that are dense after every change of torque."""
+    """Return times that are dense after every change of the load."""
     lengths = np.diff(torque.time_s, append=torque.end_s)
     share = np.geomspace(1e-9, 1.0, _TIMES_OF_PHASE)[:-1]
     pieces = [start + length * share for start, length in zip(torque.time_s, lengths, strict=True)]
