@@ -14,7 +14,7 @@ from flint import acb, arb, ctx
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 
 Impedance = Callable[[Any], Any]
 _NODES = 45
@@ -68,7 +68,7 @@ def inverted(transform: Impedance, t: float) -> float:
 
 
 def rotations(
-    gripper: Gripper, sample: Impedance, torque: TorqueHistory, time_s: Array, *, inertia: bool
+    gripper: Gripper, sample: Impedance, torque: Course, time_s: Array, *, inertia: bool
 ) -> Array:
     """Closing rotations of both arms under steps, (2, n_times), from forces on each arm."""
     with ctx.workdps(45):

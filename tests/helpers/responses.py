@@ -19,7 +19,7 @@ from flint import acb, acb_mat, arb, ctx
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.models import MODELS
-from biogrip.physics.protocol import Phase, TorqueHistory, hold
+from biogrip.physics.protocol import Course, Phase, hold
 from biogrip.physics.sample_model import SampleModel
 
 PROTOCOLS = {
@@ -47,9 +47,7 @@ SAMPLING_TIMES = {
 _DIGITS = 120
 
 
-def exact_50_digits(
-    gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array
-) -> Array:
+def exact_50_digits(gripper: Gripper, parameters: Array, steps: Course, time_s: Array) -> Array:
     """phi_2, and the force of springs and dampers on the tips in N, (2, n_times), with inertia.
 
     Of one sample (k, k_p, c, c_p).
@@ -58,9 +56,7 @@ def exact_50_digits(
         return _solution(gripper, [arb(float(value)) for value in parameters], steps, time_s)
 
 
-def _solution(
-    gripper: Gripper, parameters: Sequence[arb], steps: TorqueHistory, time_s: Array
-) -> Array:
+def _solution(gripper: Gripper, parameters: Sequence[arb], steps: Course, time_s: Array) -> Array:
     k, k_p, c, c_p = parameters
     b = arb(gripper.arm_length_m) * (arb(gripper.reference_angle_deg) / 180).sin_pi()
     inertia, damping, stiffness = (

@@ -10,9 +10,9 @@ from biogrip import library
 from biogrip.arrays import Array
 from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS
-from biogrip.physics.protocol import hold, torque_history
+from biogrip.physics.protocol import hold, join_phases
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import VISIBLE, elapsed_s, find_ring, ring, ringing_s
 from tests.helpers.laplace import drawn, rotations
@@ -35,7 +35,7 @@ def test_an_empty_gripper_rings_like_a_damped_oscillator() -> None:
     envelope = np.exp(-decay * time_s)
     swing = envelope * (np.cos(omega * time_s) + decay / omega * np.sin(omega * time_s))
     nothing = Network(np.zeros(1), np.zeros(1), np.zeros((1, 0)), np.zeros((1, 0)))
-    torque = torque_history((hold(1.0, 1e-9),))
+    torque = join_phases((hold(1.0, 1e-9),))
     found = ring(Gripper(1.5e-3, 75.0, arm, arm), nothing, torque, time_s)[0]
     expected = 1e-9 / stiffness * (np.exp(-stiffness / damping * time_s) - swing)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * 1e-9 / stiffness)
@@ -46,10 +46,10 @@ def test_rings_are_over_when_they_are_said_to_be(either_gripper: Gripper, stiffn
     """Even those of a bare spring, from which only the arms' own dampers take energy."""
     none = np.zeros((1, 0))
     spring = Network(np.array([stiffness]), np.zeros(1), none, none)
-    step = torque_history((hold(1.0, 1e-9),))
+    step = join_phases((hold(1.0, 1e-9),))
     after_s = ringing_s(either_gripper) * np.linspace(1.0, 1.5, 500)
     with_it, without = (
-        rotation(step_response(either_gripper, spring, inertia=inertia), step, after_s)
+        superpose(step_response(either_gripper, spring, inertia=inertia), step, after_s)
         for inertia in (True, False)
     )
     assert np.max(np.abs(with_it - without)) < 1e-14 * np.max(np.abs(without))
@@ -65,14 +65,14 @@ def test_arms_that_are_critically_damped(model: str, beyond: float) -> None:
     both = 2 * np.sqrt(inertia * (hinge + 2 * lever**2 * k_p)) * (1 + beyond)
     arm = Arm(inertia, both - 2 * lever**2 * damper, hinge)
     damped = Gripper(1.5e-3, 75.0, arm, arm)
-    torque, times = torque_history((hold(1.0, 1e-9),)), np.geomspace(1e-5, 0.5, 20)
-    found = rotation(step_response(damped, MODELS[model].network(sample)), torque, times)[0]
+    torque, times = join_phases((hold(1.0, 1e-9),)), np.geomspace(1e-5, 0.5, 20)
+    found = superpose(step_response(damped, MODELS[model].network(sample)), torque, times)[0]
     exact = rotations(damped, drawn(model, sample), torque, times, inertia=True)[0]
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-7 * exact.max())
 
 
 def test_times_count_from_the_last_change_of_the_torque() -> None:
-    torque, times = torque_history((hold(2.0, 1e-9), hold(2.0, 1e-10))), np.array([0.5, 2.0, 3.5])
+    torque, times = join_phases((hold(2.0, 1e-9), hold(2.0, 1e-10))), np.array([0.5, 2.0, 3.5])
     np.testing.assert_allclose(elapsed_s(torque, times), [0.5, 0.0, 1.5])
 
 
@@ -80,7 +80,7 @@ def test_a_ring_shows_by_its_norm_beside_the_noise(gripper: Gripper) -> None:
     """All readings after the one that is named change by less than what counts."""
     time_s = np.random.default_rng(1).permutation(1e-4 * np.arange(1.0, 600.0))
     network = MODEL.sample(RINGING["generalized_maxwell"])
-    torque = torque_history((hold(1.0, 1e-9),))
+    torque = join_phases((hold(1.0, 1e-9),))
     given = gripper, network, torque, time_s
     # A parallel damper that is seen only while it rings does not end the ring.
     free = replace(network, c_p=np.zeros(1))

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.linear import (
+from biogrip.physics.models import MODELS, generalized_maxwell
+from biogrip.physics.protocol import Course, evaluate, hold, join_phases
+from biogrip.physics.response import (
     LEFT,
     RIGHT,
     jaw_force_response,
     linear_jaw_force,
-    rotation,
     step_response,
+    superpose,
 )
-from biogrip.physics.models import MODELS, generalized_maxwell
-from biogrip.physics.protocol import TorqueHistory, hold, torque_at, torque_history
 from biogrip.physics.sample_model import Network
 from tests.helpers.laplace import drawn, rotations, series
 
@@ -34,21 +34,21 @@ SAMPLES = [
 @pytest.mark.parametrize(("model", "sample"), SAMPLES)
 @pytest.mark.parametrize("inertia", [False, True])
 def test_equal_arms_against_inversion(
-    gripper: Gripper, steps: TorqueHistory, model: str, sample: list[float], inertia: bool
+    gripper: Gripper, steps: Course, model: str, sample: list[float], inertia: bool
 ) -> None:
     """Of the response 1e-6, at times of a trace; arms of their own damping and inertia."""
     exact = rotations(gripper, drawn(model, sample), steps, NEAR, inertia=inertia)[0]
     response = step_response(gripper, MODELS[model].network(sample), inertia=inertia)
-    np.testing.assert_allclose(rotation(response, steps, NEAR)[0], exact, rtol=1e-6)
+    np.testing.assert_allclose(superpose(response, steps, NEAR)[0], exact, rtol=1e-6)
 
 
 def test_the_ring_against_inversion(gripper: Gripper) -> None:
     """The first milliseconds, with inertia: the contour is wide enough for the ring."""
     name, sample = "fractional_kelvin_voigt", [0.3, 0.02, 0.5]
-    step, times = torque_history((hold(1.0, TAU),)), np.geomspace(2e-5, 2e-3, 12)
+    step, times = join_phases((hold(1.0, TAU),)), np.geomspace(2e-5, 2e-3, 12)
     response = step_response(gripper, MODELS[name].network(sample))
     exact = rotations(gripper, drawn(name, sample), step, times, inertia=True)[0]
-    ours = rotation(response, step, times)[0]
+    ours = superpose(response, step, times)[0]
     assert np.any(np.abs(response.rates.imag) > 1e3)
     np.testing.assert_allclose(ours, exact, rtol=0, atol=1e-6 * exact.max())
 
@@ -56,7 +56,7 @@ def test_the_ring_against_inversion(gripper: Gripper) -> None:
 @pytest.mark.parametrize("inertia", [True, False])
 @pytest.mark.parametrize("arms", ["gripper", "unequal_gripper", "damped"])
 def test_three_branches_against_inversion(
-    request: pytest.FixtureRequest, steps: TorqueHistory, arms: str, inertia: bool
+    request: pytest.FixtureRequest, steps: Course, arms: str, inertia: bool
 ) -> None:
     """Of rates in no order; arms in a liquid, too. The contour misses the end of a ring."""
     damped = Gripper(1.5e-3, 75.0, Arm(1e-14, 3e-10, 4.4e-7), Arm(1.3e-14, 2e-10, 5.5e-7))
@@ -72,22 +72,22 @@ def test_three_branches_against_inversion(
     exact = rotations(given, impedance, steps, NEAR, inertia=inertia)
     response = step_response(given, network, inertia=inertia)
     for arm in (LEFT, RIGHT):
-        ours = rotation(response, steps, NEAR, arm)[0]
+        ours = superpose(response, steps, NEAR, arm)[0]
         np.testing.assert_allclose(ours, exact[arm], rtol=0, atol=1e-10 * exact[arm].max())
 
 
 @pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
 def test_the_jaw_force_of_three_branches_balances_the_arm(
-    request: pytest.FixtureRequest, steps: TorqueHistory, arms: str
+    request: pytest.FixtureRequest, steps: Course, arms: str
 ) -> None:
     """b F = tau - k phi - c phi', without inertia; of the torque, 1e-12 is lost in differences."""
     given: Gripper = request.getfixturevalue(arms)
     network = generalized_maxwell([2.0, 5.0, 1.0, 0.2, 30.0, 1e3, 0.3, 0.5])
     response = step_response(given, network, inertia=False)
-    turned, rate = (rotation(response, steps, NEAR, rate=of)[0] for of in (False, True))
+    turned, rate = (superpose(response, steps, NEAR, rate=of)[0] for of in (False, True))
     arm = given.left
     moved = arm.stiffness_Nm_per_rad * turned + arm.damping_Nms_per_rad * rate
-    expected = (torque_at(steps, NEAR) - moved) / given.lever_m
+    expected = (evaluate(steps, NEAR) - moved) / given.lever_m
     force = linear_jaw_force(jaw_force_response(given, network, inertia=False), steps, NEAR)[0]
     np.testing.assert_allclose(force, expected, rtol=0, atol=1e-12 * TAU / given.lever_m)
 
@@ -95,14 +95,14 @@ def test_the_jaw_force_of_three_branches_balances_the_arm(
 @pytest.mark.parametrize(("copies", "rtol"), [(2, 1e-10), (6, 1e-9)])
 @pytest.mark.parametrize("inertia", [False, True])
 def test_equal_branches_add_up(
-    gripper: Gripper, steps: TorqueHistory, inertia: bool, copies: int, rtol: float
+    gripper: Gripper, steps: Course, inertia: bool, copies: int, rtol: float
 ) -> None:
     """Equal rates are moved apart by 1e-10."""
     k_p, c_p, k, c = np.array([0.2]), np.array([0.5]), np.array([1.0, 2.0]), np.array([5.0, 400.0])
     shares = np.full(copies, 1 / copies)
     many = Network(k_p, c_p, np.kron(shares, k)[None], np.kron(shares, c)[None])
     ours, theirs = (
-        rotation(step_response(gripper, network, inertia=inertia), steps, NEAR)[0]
+        superpose(step_response(gripper, network, inertia=inertia), steps, NEAR)[0]
         for network in (many, Network(k_p, c_p, k[None], c[None]))
     )
     np.testing.assert_allclose(ours, theirs, rtol=rtol)

@@ -5,7 +5,6 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import (
     CANDIDATES,
     MODELS,
@@ -15,7 +14,8 @@ from biogrip.physics.models import (
     different_in,
     generalized_maxwell,
 )
-from biogrip.physics.protocol import TorqueHistory, hold, torque_history
+from biogrip.physics.protocol import Course, hold, join_phases
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import complex_modulus, with_fixed
 from tests.helpers.laplace import IMPEDANCES, series
 
@@ -23,7 +23,7 @@ TIMES = np.linspace(0.1, 400, 300)
 
 
 def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
-    gripper: Gripper, steps: TorqueHistory
+    gripper: Gripper, steps: Course
 ) -> None:
     """k to infinity: Kelvin-Voigt with c + c_p, one exponential a step, however it is split."""
     u, spring, damper = 2 * gripper.lever_m**2, 0.02, 10.0
@@ -35,7 +35,7 @@ def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
     for c, c_p in ((9.9, 0.1), (2.0, 8.0), (0.1, 9.9)):
         response = step_response(gripper, generalized_maxwell([1e7, spring, c, c_p]))
         # The branch relaxes within c/k = 1e-6 s, and the arms' inertia lags as little.
-        ours = rotation(response, steps, TIMES)[0]
+        ours = superpose(response, steps, TIMES)[0]
         np.testing.assert_allclose(ours, expected, atol=1e-6 * expected.max())
 
 
@@ -70,7 +70,7 @@ def test_fixing_a_parameter_leaves_the_others() -> None:
     assert with_fixed(model, {}) is model
 
 
-TORQUE = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
+TORQUE = join_phases((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
 TIME_S = np.linspace(0.0, 400.0, 801)
 DECADES = {"stiffness": (0, 2), "damping": (0, 3), "springpot": (0, 2), "exponent": (-0.6, -0.2)}
 TRIED = [name for name in CANDIDATES if name[-1] not in "5678"]
@@ -84,7 +84,7 @@ def drawn(candidate: str, rng: np.random.Generator) -> Array:
 
 def response(gripper: Gripper, candidate: str, parameters: Array, inertia: bool) -> Array:
     network = CANDIDATES[candidate].model.network(parameters)
-    found: Array = rotation(step_response(gripper, network, inertia=inertia), TORQUE, TIME_S)[0]
+    found: Array = superpose(step_response(gripper, network, inertia=inertia), TORQUE, TIME_S)[0]
     return found
 
 

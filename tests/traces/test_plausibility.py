@@ -11,10 +11,10 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS
 from biogrip.physics.noise import Noise, add_noise
-from biogrip.physics.protocol import Phase, hold, ramp, sample_times, torque_history
+from biogrip.physics.protocol import Phase, hold, join_phases, ramp, sample_times
+from biogrip.physics.response import step_response, superpose
 from biogrip.traces.columns import Columns
 from biogrip.traces.plausibility import check_recording, free_rotation
 from biogrip.traces.reader import Recording
@@ -188,7 +188,7 @@ def test_the_free_rotation_is_that_of_the_left_arm() -> None:
         ((hold(1.0, 0.0), hold(1e-9, 1.6e-9), hold(1.0, 0.0)), 1.6e-9 / 4.4e-7),
         ((ramp(7.0, 0.0, 1.4e-9),), 1.4e-9 / 4.4e-7),
     ):
-        found = free_rotation(UNEQUAL, torque_history(phases))
+        found = free_rotation(UNEQUAL, join_phases(phases))
         assert found == pytest.approx(largest, rel=1e-12)
 
 
@@ -252,7 +252,7 @@ PULLING = {
 @pytest.mark.parametrize("gripper", [GRIPPER, UNEQUAL])
 def test_the_sign_of_a_trace_is_told(gripper: Gripper, protocol: str) -> None:
     """Nearly all good traces pass, never is one called mirrored; few mirrored ones pass as good."""
-    torque, rng = torque_history(PULLING[protocol]), np.random.default_rng(10)
+    torque, rng = join_phases(PULLING[protocol]), np.random.default_rng(10)
     mirrored = missed = passed = 0
     for trial in range(40):
         model = list(MODELS.values())[trial % len(MODELS)]
@@ -262,7 +262,7 @@ def test_the_sign_of_a_trace_is_told(gripper: Gripper, protocol: str) -> None:
         times = np.sort(rng.uniform(0, torque.end_s, 500))
         # The ring is over before any but one in a thousand of the samples.
         response = step_response(gripper, network, inertia=False)
-        values = rotation(response, torque, times)[0]
+        values = superpose(response, torque, times)[0]
         size = np.abs(values).max()
         values += rng.choice([0.0, 0.05, 0.3]) * size * rng.standard_normal(len(times))
         offset = bool(trial % 3 == 0)

@@ -28,14 +28,14 @@ from biogrip.figures.style import (
 )
 from biogrip.physics import gripper as actuator
 from biogrip.physics.gripper import LARGEST_M, SMALLEST_M, CombDrive, Gripper, contact
-from biogrip.physics.protocol import torque_at, torque_history
+from biogrip.physics.protocol import evaluate, join_phases
 from biogrip.physics.simulation import simulated_response
 from biogrip.study.study import Study
 
 
 def draw_comb(study: Study) -> Figure:
     """Draw all fingers, the first few enlarged, and eq. (9) with the operating points."""
-    comb, steps = study.actuator, torque_history(study.phases)
+    comb, steps = study.actuator, join_phases(study.phases)
     drawn = figure(PAGE_IN, 4.4)
     places = drawn.add_gridspec(2, 2, height_ratios=[1.0, 1.3], width_ratios=[1.1, 1.0])
     whole = drawn.add_subplot(places[0, :])
@@ -52,7 +52,7 @@ def draw_comb(study: Study) -> Figure:
     _dimensions(detail, comb)
     detail.set_ylim(1e6 * comb.first_radius_m - 9, 1e6 * comb.first_radius_m + 14 * shown + 4)
 
-    torques = np.unique(torque_at(steps, steps.time_s))
+    torques = np.unique(evaluate(steps, steps.time_s))
     torques = torques[torques > 0]
     volts = actuator.voltage(comb, torques)
     grid = np.linspace(0, 1.25 * volts.max(), 200)
@@ -115,11 +115,11 @@ def _dimensions(axes: Axes, comb: CombDrive) -> None:
 def draw_torque(study: Study) -> Figure:
     """Draw torque and voltage of both arms against time."""
     comb = study.actuator
-    history = torque_history(study.phases)
+    history = join_phases(study.phases)
     # Include both sides of every jump, and enough points for ramps.
     grid = np.linspace(0, history.end_s, 4001)
     time_s = np.sort(np.concatenate((grid, history.time_s, np.nextafter(history.time_s, -1))))
-    torque = np.maximum(torque_at(history, time_s), 0)
+    torque = np.maximum(evaluate(history, time_s), 0)
     ends = np.append(history.time_s, history.end_s)
     drawn = figure(COLUMN_IN, 3.0)
     upper, lower = drawn.subplots(2, 1, sharex=True, height_ratios=[1, 1.6])

@@ -18,7 +18,7 @@ from scipy.optimize import nnls
 
 from biogrip.arrays import Array
 from biogrip.fit.problem import CaseProblem
-from biogrip.physics.modes import lagged_torques
+from biogrip.physics.modes import lag_course
 
 # Retardation times a decade; shortest over the sampling interval, longest over the protocol, and
 # that of what does not relax.
@@ -42,7 +42,7 @@ def extreme_responses(problem: CaseProblem, lags: Sequence[float]) -> Callable[[
     to at least 0. The extremes are: no sample, and rigid ones that relax with one of the lags. Lags
     are shares of the protocol; the shortest is negligible.
     """
-    lagged, stiffness = lagged_torques(problem.torque, lags), problem.gripper.left
+    lagged, stiffness = lag_course(problem.torque, lags), problem.gripper.left
     return lambda time_s: lagged(time_s) / stiffness.stiffness_Nm_per_rad
 
 

@@ -35,7 +35,7 @@ from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array, IntArray
 from biogrip.physics.modes import mode_responses
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import ModeRows
 from biogrip.physics.whitening import Whitening, without
 
@@ -79,10 +79,10 @@ class DenseSamples:
     if `dense` may nodes replace readings; otherwise each reading is a node.
     """
 
-    def __init__(self, torque: TorqueHistory, time_s: Array, *, dense: bool = True) -> None:
+    def __init__(self, course: Course, time_s: Array, *, dense: bool = True) -> None:
         self._all_s = time_s
         self._kept: dict[tuple[int, int], list[tuple[slice, Array]]] = {}
-        starts = torque.changes_s
+        starts = course.changes_s
         self._starts_s = np.append(-np.inf, starts)
         bounds = np.unique(np.concatenate(([0], time_s.searchsorted(starts), [len(time_s)])))
         self._pieces = [_Piece(0, len(time_s), time_s)]
@@ -180,7 +180,7 @@ class DenseSamples:
 class Condensed:
     """Condensed rows that replace the readings of any trace of a protocol in least squares."""
 
-    torque: TorqueHistory
+    course: Course
     """The protocol."""
     all_s: Array
     """Ascending sampling times, (n_samples,)."""
@@ -237,16 +237,16 @@ class Condensed:
     @cached_property
     def of_modes(self) -> ModeRows:
         """Function from modes of many samples to rows of their responses."""
-        elapsed = np.subtract.outer(self.time_s, self.torque.changes_s)
+        elapsed = np.subtract.outer(self.time_s, self.course.changes_s)
         shortest_s = float(np.min(elapsed, where=elapsed > 0, initial=self.time_s[-1]))
-        return ModeRows(self.torque, self.time_s, self.to_rows, shortest_s)
+        return ModeRows(self.course, self.time_s, self.to_rows, shortest_s)
 
     @cached_property
     def dense(self) -> DenseSamples:
         """Nodes that replace the readings."""
         # Whitened functions are not smooth: each reading is a node.
         dense = self.whitening is None
-        return DenseSamples(self.torque, self.all_s, dense=dense)
+        return DenseSamples(self.course, self.all_s, dense=dense)
 
     @cached_property
     def _nuisance_rows(self) -> Array:
@@ -268,7 +268,7 @@ class Condensed:
         )
         growth, slope = (
             self.dense.rows_of_values(of[0])
-            for of in mode_responses(rates[None], self.torque, time_s)
+            for of in mode_responses(rates[None], self.course, time_s)
         )
         size = np.linalg.norm(growth, axis=1, keepdims=True)
         size[size == 0] = 1.0

@@ -4,7 +4,7 @@ The denominator of both rotations is
 
     E = Z + 2 b^2 G    or    E = Z_2 Z_4 + (Z_2 + Z_4) b^2 G
 
-for equal arms, or others (`biogrip.physics.linear`). Times the product of all s + r_j it
+for equal arms, or others (`biogrip.physics.response`). Times the product of all s + r_j it
 is a polynomial, whose roots the iteration of `biogrip.physics.roots` finds. The iteration only
 needs the quotient of the polynomial and its derivative, a sum over the branches. A root is kept as
 its distance from the nearest branch, so that it has all digits where a branch is weak. Starts are

@@ -20,7 +20,7 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray, parts
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import DecayTable
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.roots import zeros_of_one_branch
@@ -43,17 +43,17 @@ def make_misfit(residuals: Residuals) -> Misfit:
     the paper's: of a sample with one Maxwell branch between equal arms under steps of a torque,
     sampled uniformly from the start on, with a reading at each step, in white noise alone.
     """
-    torque, trace = residuals.torque, residuals.trace
+    course, trace = residuals.course, residuals.trace
     intervals, end_s = max(residuals.samples - 1, 1), residuals.duration_s
-    steps = torque.time_s * intervals / end_s
+    steps = course.time_s * intervals / end_s
     even = np.allclose(trace.time_s * intervals / end_s, np.arange(residuals.samples), rtol=1e-9)
     if (
         (even and np.allclose(steps, np.rint(steps), rtol=0, atol=1e-9))
-        and (torque.only_steps and not torque.deforms and residuals.plain)
+        and (course.only_steps and not course.deforms and residuals.plain)
         and residuals.gripper.left == residuals.gripper.right
         and residuals.model.network([residuals.model.example]).k.shape[1] == 1
     ):
-        given = residuals.gripper, residuals.model, torque, end_s / intervals
+        given = residuals.gripper, residuals.model, course, end_s / intervals
         return SeriesMisfit(*given, trace.readings)
     return residuals.misfit
 
@@ -86,17 +86,17 @@ class SeriesMisfit:
         self,
         gripper: Gripper,
         model: SampleModel,
-        torque: TorqueHistory,
+        course: Course,
         interval_s: float,
         readings: Array,
     ) -> None:
-        self._simulated = (gripper, model, torque, interval_s)
+        self._simulated = (gripper, model, course, interval_s)
         self._traces = np.atleast_2d(readings)
         self._samples = self._traces.shape[1]
         # Change of the torque at the start of each phase, and level after it.
-        self._heights = torque.changes[:, 0, None, None]
-        self._levels = np.cumsum(torque.changes[:, 0])[:, None, None]
-        starts = np.rint(torque.time_s / interval_s).astype(np.int64)
+        self._heights = course.changes[:, 0, None, None]
+        self._levels = np.cumsum(course.changes[:, 0])[:, None, None]
+        starts = np.rint(course.time_s / interval_s).astype(np.int64)
         self._first_samples = np.minimum(starts, self._samples)
         # Numbers of readings: one, and those of each phase.
         lengths = np.concatenate(([1], np.diff(self._first_samples, append=self._samples)))
@@ -110,9 +110,9 @@ class SeriesMisfit:
 
     def joins(self, other: "SeriesMisfit") -> bool:
         """Return True if only the traces of both may differ."""
-        gripper, model, torque, interval_s = self._simulated
-        others, others_model, others_torque, others_interval_s = other._simulated
-        same = model is others_model and torque is others_torque and gripper == others
+        gripper, model, course, interval_s = self._simulated
+        others, others_model, others_course, others_interval_s = other._simulated
+        same = model is others_model and course is others_course and gripper == others
         return same and (interval_s, self._samples) == (others_interval_s, other._samples)
 
     @cached_property
@@ -211,7 +211,7 @@ def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array,
     """Compute the response of either of two equal arms to a unit step of the torque.
 
     A sample with one Maxwell branch has two modes without inertia. This special case of
-    `biogrip.physics.linear` is written out for speed: populations are small, and most time goes
+    `biogrip.physics.response` is written out for speed: populations are small, and most time goes
     into calls.
 
     Returns

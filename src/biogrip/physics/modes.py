@@ -36,8 +36,8 @@ from numpy.typing import NDArray
 
 from biogrip.arrays import Array, parts
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.linear import LEFT, Arms, Impedance, phi_function
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
+from biogrip.physics.response import LEFT, Arms, Impedance, phi_function
 from biogrip.physics.sample_model import Network, SampleModel
 
 _COMPLEX_STEP = 1e-30
@@ -64,7 +64,7 @@ class Modes(NamedTuple):
 def linear_responses(
     gripper: Gripper,
     model: SampleModel,
-    torque: TorqueHistory,
+    course: Course,
     time_s: Array,
     parameters: Array,
     *,
@@ -74,7 +74,7 @@ def linear_responses(
 
     Parameters
     ----------
-    gripper, model, torque
+    gripper, model, course
         Arms, sample model and protocol of the simulation.
     time_s : (n_times,)
         Ascending.
@@ -88,14 +88,14 @@ def linear_responses(
     (n, 1 + n_parameters, n_times)
         Readings, and their derivatives; without `slopes`, (n, 1, n_times).
     """
-    modes = compute_modes(gripper, model, torque, parameters, slopes=slopes)
+    modes = compute_modes(gripper, model, course, parameters, slopes=slopes)
     rows = np.empty((len(parameters), 1 + modes.rate_slopes.shape[1], len(time_s)))
     for some in parts(len(time_s), _TIMES_AT_ONCE):
-        rows[:, :, some] = _superpose(modes, torque, time_s[some])
+        rows[:, :, some] = _superpose(modes, course, time_s[some])
     return rows
 
 
-def _superpose(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
+def _superpose(modes: Modes, course: Course, time_s: Array) -> Array:
     """Sum responses of modes, w g, and their derivatives, d(w g) = dw g + w dr dg/dr."""
     n, count, m = modes.rate_slopes.shape
     by_response = np.concatenate((modes.weights[:, None], modes.weight_slopes), axis=1)
@@ -104,7 +104,7 @@ def _superpose(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
     mixing = np.concatenate((by_response, by_slope), axis=2)
     rows = np.empty((n, 1 + count, len(time_s)))
     for some in parts(n, max(1, _NUMBERS_AT_ONCE // (m * len(time_s)))):
-        both = np.concatenate(mode_responses(modes.rates[some], torque, time_s), axis=1)
+        both = np.concatenate(mode_responses(modes.rates[some], course, time_s), axis=1)
         # One product per sample: the order of its sums does not depend on the number of samples.
         rows[some] = mixing[some] @ both
     return rows
@@ -113,7 +113,7 @@ def _superpose(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
 def compute_modes(
     gripper: Gripper,
     model: SampleModel,
-    torque: TorqueHistory,
+    course: Course,
     parameters: Array,
     *,
     slopes: bool = True,
@@ -123,7 +123,7 @@ def compute_modes(
     All parameters are positive. Without `slopes` there are no derivatives: n_parameters is zero.
     """
     network, count = _complex_step_network(model, parameters, slopes=slopes)
-    if torque.deforms:
+    if course.deforms:
         (rates, rate_slopes), (weights, weight_slopes) = (
             _split_complex_step(of, count) for of in _branches(network)
         )
@@ -207,10 +207,10 @@ def _split_complex_step(values: NDArray[Any], count: int) -> tuple[Array, Array]
     return of_tilts[0].real, of_tilts[1:].imag / _COMPLEX_STEP
 
 
-def relaxation(network: Network, history: TorqueHistory, time_s: Array) -> Array:
+def relaxation(network: Network, course: Course, time_s: Array) -> Array:
     """Compute the load on samples that a protocol deforms, (n, n_times)."""
     rates, weights = _branches(network)
-    decay, _ = mode_responses(rates, history, time_s)
+    decay, _ = mode_responses(rates, course, time_s)
     load: Array = (weights[:, None] @ decay)[:, 0]
     return load
 
@@ -229,35 +229,35 @@ def _branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
     return np.concatenate((rates, fixed), axis=1), np.concatenate((weights, bare), axis=1)
 
 
-def lagged_torques(torque: TorqueHistory, shares: Sequence[float]) -> Callable[[Array], Array]:
+def lag_course(course: Course, shares: Sequence[float]) -> Callable[[Array], Array]:
     """Return a function of ascending times for loads that lag behind, (n_lags, n_times).
 
     Of a deformation, they are the forces of springs that forget it with these relaxation times.
 
     Parameters
     ----------
-    torque
+    course
         The protocol.
     shares
         Relaxation times of the lags over the protocol's duration.
     """
-    rates, sign = -1 / (torque.end_s * np.array(shares)), 1.0 if torque.deforms else -1.0
+    rates, sign = -1 / (course.end_s * np.array(shares)), 1.0 if course.deforms else -1.0
 
     def lagged(time_s: Array) -> Array:
-        lags: Array = sign * mode_responses(rates[None], torque, time_s)[0][0]
+        lags: Array = sign * mode_responses(rates[None], course, time_s)[0][0]
         return lags
 
     return lagged
 
 
-def mode_responses(rates: Array, history: TorqueHistory, time_s: Array) -> tuple[Array, Array]:
+def mode_responses(rates: Array, course: Course, time_s: Array) -> tuple[Array, Array]:
     """Compute responses of modes of unit weight, or of branches of unit stiffness, and dg/dr.
 
     Parameters
     ----------
     rates : (n, n_modes)
         In 1/s, real, negative or zero.
-    history
+    course
         The protocol, of a load or a deformation.
     time_s : (n_times,)
         Ascending; at the very instant of a step, what precedes it. Before the protocol nothing
@@ -271,17 +271,17 @@ def mode_responses(rates: Array, history: TorqueHistory, time_s: Array) -> tuple
     rate = rates[:, :, None]
     responses, slopes = np.zeros((2, *rates.shape, len(time_s)))
     reached, its_slope = np.zeros((2, *rates.shape, 1))
-    ends = np.append(history.time_s[1:], history.end_s)
-    firsts = np.append(time_s.searchsorted(history.time_s, side="right"), len(time_s))
+    ends = np.append(course.time_s[1:], course.end_s)
+    firsts = np.append(time_s.searchsorted(course.time_s, side="right"), len(time_s))
     level = 0.0
     # The step of a deformation is the start of a phase.
-    orders = (1, 2) if history.deforms else (0, 1, 2)
-    respond = _stretched if history.deforms else _loaded
-    for k, (start, powers) in enumerate(zip(history.time_s, history.within_phases, strict=True)):
+    orders = (1, 2) if course.deforms else (0, 1, 2)
+    respond = _stretched if course.deforms else _loaded
+    for k, (start, powers) in enumerate(zip(course.time_s, course.within_phases, strict=True)):
         here = slice(firsts[k], firsts[k + 1])
         # The end of a phase is the initial state of the next.
         elapsed = np.append(time_s[here], ends[k]) - start
-        if history.deforms:
+        if course.deforms:
             value, slope, curvature = powers
             reached = reached + (value - level)
             level = value + slope * elapsed[-1] + curvature * elapsed[-1] ** 2 / 2

@@ -31,8 +31,8 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
-from biogrip.physics.linear import LEFT, rotation, step_response, weights_of_loads
-from biogrip.physics.protocol import TorqueHistory, torque_at
+from biogrip.physics.protocol import Course, evaluate
+from biogrip.physics.response import LEFT, step_response, superpose, weights_of_loads
 from biogrip.physics.sample_model import Network
 
 _STAGES = 5
@@ -94,7 +94,7 @@ class Correction:
 
 
 def nonlinear_rotation(
-    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, arm: int = LEFT
+    gripper: Gripper, network: Network, torque: Course, time_s: Array, arm: int = LEFT
 ) -> Array:
     """Compute the closing rotation of an arm in rad, (n, n_times), by the nonlinear model.
 
@@ -105,11 +105,11 @@ def nonlinear_rotation(
     """
     found = correction(gripper, network, torque).checked()
     linear = step_response(gripper, network)
-    return rotation(linear, torque, time_s, arm) + found.at(time_s, arm)
+    return superpose(linear, torque, time_s, arm) + found.at(time_s, arm)
 
 
 def correction(
-    gripper: Gripper, network: Network, torque: TorqueHistory, factors: Array | None = None
+    gripper: Gripper, network: Network, torque: Course, factors: Array | None = None
 ) -> Correction:
     """Compute nonlinear minus linear rotation, without inertia.
 
@@ -130,10 +130,10 @@ def correction(
     b_0 = gripper.lever_m
     linear, linear_rate = np.empty(shape), np.empty(shape)
     for arm in range(len(arms)):
-        phi = rotation(response, torque, nodes.ravel(), arm)
-        rate = rotation(response, torque, before_jumps, arm, rate=True)
+        phi = superpose(response, torque, nodes.ravel(), arm)
+        rate = superpose(response, torque, before_jumps, arm, rate=True)
         linear[:, arm], linear_rate[:, arm] = (of.reshape(-1, *nodes.shape) for of in (phi, rate))
-    tau = torque_at(torque, before_jumps).reshape(nodes.shape)
+    tau = evaluate(torque, before_jumps).reshape(nodes.shape)
     times = np.ones(shape[0]) if factors is None else factors
     linear, linear_rate, tau = (
         times[:, None, None, None] * each for each in (linear, linear_rate, tau)
@@ -165,7 +165,7 @@ def correction(
     return Correction(edges, values, _from_starts(force, edges, torque), converged)
 
 
-def _from_starts(force: Array, edges_s: Array, torque: TorqueHistory) -> Array:
+def _from_starts(force: Array, edges_s: Array, torque: Course) -> Array:
     """Complete values at the nodes by those at the starts of the elements.
 
     The force is continuous, but for jumps of the torque. The element that follows a jump
@@ -177,7 +177,7 @@ def _from_starts(force: Array, edges_s: Array, torque: TorqueHistory) -> Array:
     return np.concatenate((starts[..., None], force), axis=2)
 
 
-def _mesh(torque: TorqueHistory) -> Array:
+def _mesh(torque: Course) -> Array:
     """Return element edges from 0 to the end, graded towards every change of torque."""
     edges = [0.0]
     for start, end in pairwise([*torque.time_s.tolist(), torque.end_s]):

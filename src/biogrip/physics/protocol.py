@@ -45,7 +45,7 @@ class Phase:
 
 
 @dataclass(frozen=True)
-class TorqueHistory:
+class Course:
     """A protocol as a list of changes, to which linear responses superpose."""
 
     time_s: Array
@@ -82,7 +82,7 @@ class TorqueHistory:
             powers[k + 1] += (*carried, curvature)
         return powers
 
-    def times(self, factor: float) -> "TorqueHistory":
+    def times(self, factor: float) -> "Course":
         """Return the protocol with all that is controlled multiplied by a factor."""
         return replace(self, changes=factor * self.changes)
 
@@ -106,7 +106,7 @@ def ramp(duration_s: float, level: float, to_level: float) -> Phase:
     return Phase(duration_s, level, (to_level - level) / duration_s)
 
 
-def torque_history(phases: tuple[Phase, ...], *, deforms: bool = False) -> TorqueHistory:
+def join_phases(phases: tuple[Phase, ...], *, deforms: bool = False) -> Course:
     """Convert phases that follow one another from t = 0 into a list of changes.
 
     They are of a torque or load or, if the protocol `deforms`, of a deformation.
@@ -127,23 +127,23 @@ def torque_history(phases: tuple[Phase, ...], *, deforms: bool = False) -> Torqu
     # A ramp that ends where the next one begins makes no step, but for rounding.
     steps = changes[1:, 0]
     steps[np.abs(steps) < least] = 0.0
-    return TorqueHistory(starts, changes, float(ends[-1]), deforms)
+    return Course(starts, changes, float(ends[-1]), deforms)
 
 
-def torque_at(history: TorqueHistory, time_s: ArrayLike) -> Array:
+def evaluate(course: Course, time_s: ArrayLike) -> Array:
     """Return what is controlled, (n_times,); at the instant of a step, its value after the step."""
     t = np.asarray(time_s, dtype=float)
     controlled = np.zeros_like(t)
-    for start, (level, slope, curvature) in zip(history.time_s, history.changes, strict=True):
+    for start, (level, slope, curvature) in zip(course.time_s, course.changes, strict=True):
         elapsed = t - start
         gain = level + slope * elapsed + curvature * elapsed**2 / 2
         controlled += np.where(elapsed >= 0, gain, 0.0)
     return controlled
 
 
-def is_held(history: TorqueHistory, time_s: ArrayLike) -> bool:
+def is_held(course: Course, time_s: ArrayLike) -> bool:
     """Return True if what is controlled is the same at all of some times."""
-    return bool(np.ptp(torque_at(history, time_s)) == 0)
+    return bool(np.ptp(evaluate(course, time_s)) == 0)
 
 
 def largest_load(phases: Iterable[Phase]) -> float:

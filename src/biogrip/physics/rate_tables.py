@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from biogrip.arrays import Array, IntArray
 from biogrip.physics.modes import Modes, mode_responses
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 
 # Width and degree of wide pieces, and number of short pieces in one for sums and for rows.
 _WIDTH, _DEGREE = 0.25, 11
@@ -119,19 +119,17 @@ class ModeRows:
     rows; `shortest_s` is the shortest of these times after a change of the load.
     """
 
-    def __init__(
-        self, torque: TorqueHistory, time_s: Array, to_rows: Array, shortest_s: float
-    ) -> None:
-        self._end_s, self._deforms = float(time_s[-1]), torque.deforms
+    def __init__(self, course: Course, time_s: Array, to_rows: Array, shortest_s: float) -> None:
+        self._end_s, self._deforms = float(time_s[-1]), course.deforms
         self._rows = to_rows.shape[1]
-        decayed = _DECAYED if torque.only_steps else _DECAYED_UNDER_RAMPS
+        decayed = _DECAYED if course.only_steps else _DECAYED_UNDER_RAMPS
         wide = int(np.ceil(np.log1p(decayed * self._end_s / shortest_s) / _WIDTH))
         self._last = wide * _SHORTER_OF_ROWS
         # (n_pieces, degree + 1, n_rows).
         self._table = np.empty((self._last, len(_ORDERS), self._rows))
         for piece in range(wide):
             u = _WIDTH * (piece + _NODES)
-            responses, _ = mode_responses(-np.expm1(u)[None] / self._end_s, torque, time_s)
+            responses, _ = mode_responses(-np.expm1(u)[None] / self._end_s, course, time_s)
             values = (responses[0] / self._scale(np.expm1(u))[:, None]) @ to_rows
             powers = _in_short_pieces(values.T, _SHORTER_OF_ROWS)
             here = slice(piece * _SHORTER_OF_ROWS, (piece + 1) * _SHORTER_OF_ROWS)

@@ -16,24 +16,24 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper, displacement_of_tip
-from biogrip.physics.linear import (
+from biogrip.physics.modes import relaxation
+from biogrip.physics.nonlinear import correction, nonlinear_rotation
+from biogrip.physics.protocol import Course
+from biogrip.physics.response import (
     LEFT,
     RIGHT,
     jaw_force_response,
     linear_jaw_force,
-    rotation,
     step_response,
+    superpose,
 )
-from biogrip.physics.modes import relaxation
-from biogrip.physics.nonlinear import correction, nonlinear_rotation
-from biogrip.physics.protocol import TorqueHistory
 from biogrip.physics.sample_model import Network
 
 
 def jaw_force(
     gripper: Gripper,
     network: Network,
-    torque: TorqueHistory,
+    course: Course,
     time_s: Array,
     *,
     nonlinear: bool,
@@ -45,11 +45,11 @@ def jaw_force(
     inertia, the force may jump.
     """
     response = jaw_force_response(gripper, network, inertia=inertia)
-    force = linear_jaw_force(response, torque, time_s)
+    force = linear_jaw_force(response, course, time_s)
     if nonlinear:
         # Arms with inertia have not moved yet at the instant of a step.
         instants = np.nextafter(time_s, -np.inf) if inertia else time_s
-        more = correction(gripper, network, torque).checked().force_at(instants)
+        more = correction(gripper, network, course).checked().force_at(instants)
         force += np.where(instants < 0, 0, more)
     return force
 
@@ -83,15 +83,13 @@ class Grip:
         )
 
 
-def compute_grip(
-    gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlinear: bool
-) -> Grip:
+def compute_grip(gripper: Gripper, network: Network, course: Course, *, nonlinear: bool) -> Grip:
     """Compute the extreme forces of the jaws on the first sample, without inertia.
 
     By either model, as in `simulated_response`.
     """
-    time_s = _instants(torque)
-    force = jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear, inertia=False)[0]
+    time_s = _instants(course)
+    force = jaw_force(gripper, network, course, time_s, nonlinear=nonlinear, inertia=False)[0]
     least_shown = _LEAST_FORCE * float(np.abs(force).max()) or 1.0
     shown = np.round(force / least_shown)
     most, negative = int(np.argmax(shown)), np.flatnonzero(shown < 0)
@@ -105,16 +103,16 @@ def compute_grip(
     )
 
 
-def _instants(torque: TorqueHistory) -> Array:
+def _instants(course: Course) -> Array:
     """Return times that are dense after every change of the load."""
-    lengths = np.diff(torque.time_s, append=torque.end_s)
+    lengths = np.diff(course.time_s, append=course.end_s)
     share = np.geomspace(1e-9, 1.0, _TIMES_OF_PHASE)[:-1]
-    pieces = [start + length * share for start, length in zip(torque.time_s, lengths, strict=True)]
-    return np.unique(np.append(np.concatenate(pieces), torque.end_s))
+    pieces = [start + length * share for start, length in zip(course.time_s, lengths, strict=True)]
+    return np.unique(np.append(np.concatenate(pieces), course.end_s))
 
 
 def simulated_response(
-    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, *, nonlinear: bool
+    gripper: Gripper, network: Network, course: Course, time_s: Array, *, nonlinear: bool
 ) -> Array:
     """Simulate the closing rotation of the left arm in rad, with inertia, (n, n_times).
 
@@ -122,23 +120,23 @@ def simulated_response(
     or the linear one, (4)-(6), at ascending times.
     """
     if nonlinear:
-        return nonlinear_rotation(gripper, network, torque, time_s)
-    if torque.deforms:
-        return relaxation(network, torque, time_s)
+        return nonlinear_rotation(gripper, network, course, time_s)
+    if course.deforms:
+        return relaxation(network, course, time_s)
     response = step_response(gripper, network, inertia=gripper.has_inertia)
-    return rotation(response, torque, time_s)
+    return superpose(response, course, time_s)
 
 
 def simulated_shortening(
-    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, *, nonlinear: bool
+    gripper: Gripper, network: Network, course: Course, time_s: Array, *, nonlinear: bool
 ) -> Array:
     """Simulate the shortening of samples in m, (n, n_times); see `simulated_response`."""
     if nonlinear:
-        turns = (nonlinear_rotation(gripper, network, torque, time_s, a) for a in (LEFT, RIGHT))
+        turns = (nonlinear_rotation(gripper, network, course, time_s, a) for a in (LEFT, RIGHT))
         left, right = (displacement_of_tip(gripper, turn) for turn in turns)
         return left + right
     response = step_response(gripper, network)
-    both = rotation(response, torque, time_s, LEFT) + rotation(response, torque, time_s, RIGHT)
+    both = superpose(response, course, time_s, LEFT) + superpose(response, course, time_s, RIGHT)
     return gripper.lever_m * both
 
 
@@ -166,7 +164,7 @@ class Ring:
 def find_ring(
     gripper: Gripper,
     network: Network,
-    torque: TorqueHistory,
+    course: Course,
     time_s: Array,
     in_noise: Callable[[Array], Array],
 ) -> Ring | None:
@@ -177,7 +175,7 @@ def find_ring(
 
     Parameters
     ----------
-    gripper, network, torque
+    gripper, network, course
         Arms, sample and protocol.
     time_s : (n_samples,)
         Sampling times.
@@ -189,10 +187,10 @@ def find_ring(
     springs = network.k_p + network.k.sum(axis=1) + gripper.jaw_stiffness_N_per_m
     is_seen = network.c_p > ringing_s(gripper) * springs
     network = replace(network, c_p=np.where(is_seen, network.c_p, 0.0))
-    elapsed = elapsed_s(torque, time_s)
+    elapsed = elapsed_s(course, time_s)
     ringing = elapsed <= ringing_s(gripper)
     change = np.zeros(len(time_s))
-    change[ringing] = ring(gripper, network, torque, time_s[ringing])[0]
+    change[ringing] = ring(gripper, network, course, time_s[ringing])[0]
     shown = in_noise(change)
     latest_first = np.argsort(-elapsed, kind="stable")
     norms = np.sqrt(np.cumsum(shown[latest_first] ** 2))
@@ -212,14 +210,14 @@ def ringing_s(gripper: Gripper) -> float:
     return _EFOLDS_OF_RING * max(2 * arm.inertia_kgm2 / arm.damping_Nms_per_rad for arm in arms)
 
 
-def elapsed_s(torque: TorqueHistory, time_s: Array) -> Array:
+def elapsed_s(course: Course, time_s: Array) -> Array:
     """Return the times since the last change of the torque, (n_times,)."""
-    last = np.maximum(torque.changes_s.searchsorted(time_s, side="right") - 1, 0)
-    return time_s - torque.changes_s[last]
+    last = np.maximum(course.changes_s.searchsorted(time_s, side="right") - 1, 0)
+    return time_s - course.changes_s[last]
 
 
-def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array) -> Array:
+def ring(gripper: Gripper, network: Network, course: Course, time_s: Array) -> Array:
     """Compute the change of the left arm's rotation by inertia, (n, n_times) in rad."""
     responses = (step_response(gripper, network, inertia=inertia) for inertia in (True, False))
-    with_it, without = (rotation(response, torque, time_s) for response in responses)
+    with_it, without = (superpose(response, course, time_s) for response in responses)
     return with_it - without

@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from biogrip.arrays import Array, BoolArray
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.linear import phi_function
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
+from biogrip.physics.response import phi_function
 from biogrip.physics.sample_model import Network
 
 _MOST_EVENTS = 100_000
@@ -58,7 +58,7 @@ class UnilateralResponse:
 
 
 def unilateral_response(
-    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array
+    gripper: Gripper, network: Network, torque: Course, time_s: Array
 ) -> UnilateralResponse:
     """Simulate the first sample in unilateral contact with the jaws, without inertia.
 
@@ -136,7 +136,7 @@ class _Forcing:
         return _Forcing(self.powers @ shift)
 
 
-def _pieces(torque: TorqueHistory) -> Iterator[tuple[float, float, _Forcing]]:
+def _pieces(torque: Course) -> Iterator[tuple[float, float, _Forcing]]:
     """Yield start and length of each phase, and the torques of both arms in it."""
     lengths = np.diff(torque.time_s, append=torque.end_s)
     for start, length, powers in zip(torque.time_s, lengths, torque.within_phases, strict=True):

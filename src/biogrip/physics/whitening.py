@@ -31,9 +31,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.physics.modes import lagged_torques
+from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import flicker_rates
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 
 # Least squared norm of a function that is projected out completely, up to rounding.
 _LEAST_NORM = 1 - 1e-9
@@ -97,23 +97,23 @@ _LAG = 1e6
 _LEAST_SHARE_OF_DRIFT = 0.01
 
 
-def drift_is_flow(torque: TorqueHistory, time_s: Array) -> bool:
+def drift_is_flow(course: Course, time_s: Array) -> bool:
     """Return True if a drift looks like the flow of a damper without a spring.
 
     Under a constant load both are the same line. Under a deformation nothing flows on.
 
     Parameters
     ----------
-    torque
+    course
         The protocol.
     time_s : (n_samples,)
         Sampling times.
     """
-    if torque.deforms:
+    if course.deforms:
         return False
     constant = nuisance_basis(time_s, offset=True, drift=False)
-    flows = without(constant, _LAG * lagged_torques(torque, (_LAG,))(time_s))
-    drift = without(constant, time_s / torque.end_s)
+    flows = without(constant, _LAG * lag_course(course, (_LAG,))(time_s))
+    drift = without(constant, time_s / course.end_s)
     basis = np.linalg.qr(flows.T)[0].T
     return bool(np.sum(without(basis, drift) ** 2) < _LEAST_SHARE_OF_DRIFT * np.sum(drift**2))
 

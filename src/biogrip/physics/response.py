@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.inertia import Ringing, ascending, ascending_branches
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 from biogrip.physics.roots import Zeros, interlaced_zeros
 from biogrip.physics.sample_model import Network
 
@@ -119,9 +119,9 @@ def weights_of_loads(gripper: Gripper, network: Network) -> Array:
     return np.ascontiguousarray(np.moveaxis(-numerators / impedance.steepness(zeros), -1, 0))
 
 
-def rotation(
+def superpose(
     response: StepResponse,
-    torque: TorqueHistory,
+    course: Course,
     time_s: Array,
     arm: int = LEFT,
     *,
@@ -135,14 +135,14 @@ def rotation(
     """
     total = np.zeros((len(response.static), len(time_s)))
     weights, rates = response.weights[:, arm], response.rates[:, :, None]
-    for start, order, height in torque.jumps:
+    for start, order, height in course.jumps:
         after = time_s >= start
         growth = _growth(order - rate, rates, time_s[after] - start)
         total[:, after] += np.einsum("nj,njt->nt", height * weights, growth).real
     return total
 
 
-def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Array) -> Array:
+def linear_jaw_force(response: StepResponse, course: Course, time_s: Array) -> Array:
     """Compute the jaw force of the linear model in N, (n, n_times), at any times.
 
     The response is that of `jaw_force_response`; at the instant of a step: what follows it.
@@ -150,7 +150,7 @@ def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Arra
     force = np.zeros((len(response.rates), len(time_s)))
     rates = response.rates[:, :, None]
     static, weights = response.static[:, 0], response.weights[:, 0]
-    for start, order, height in torque.jumps:
+    for start, order, height in course.jumps:
         after = time_s >= start
         elapsed = time_s[after] - start
         z = rates * elapsed
