@@ -37,7 +37,7 @@ from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS
 from biogrip.physics.models import Sample
 from biogrip.physics.noise import stream
-from biogrip.physics.protocol import Phase, hold, load
+from biogrip.physics.protocol import Phase, hold, ramp
 from biogrip.physics.simulation import simulated_response
 
 INSTRUMENTS_JUDGED = ("creep", "relaxation", "gripper")
@@ -111,7 +111,7 @@ def _protocol(instrument: str, late_s: float = 0.0, ramp_s: float = 0.0) -> tupl
     """Return a step of what is controlled, of a gripper one to and fro, later or as a ramp."""
     levels = _TORQUES if instrument == "gripper" else (1.0,)
     waits = [hold(late_s, 0.0)] if late_s else []
-    ramps = [Phase(ramp_s, *[load(ramp_s, 0.0, levels[0])] * 2)] if ramp_s else []
+    ramps = [ramp(ramp_s, 0.0, levels[0])] if ramp_s else []
     rests = [_LASTS_S / len(levels)] * len(levels)
     rests[0] -= ramp_s
     return (*waits, *ramps, *(hold(s, level) for s, level in zip(rests, levels, strict=True)))

@@ -9,7 +9,7 @@ from benchmarks.noisy_traces import OURS, NoisyTrace, noisy_trace
 from benchmarks.report import Row, Section, number, times_ours
 from benchmarks.timing import alternate
 from biogrip.arrays import Array, parts
-from biogrip.physics.linear import rotation, step_response
+from biogrip.physics.response import step_response, superpose
 
 _POPULATION, _ROUNDS = 500, 7
 # Numbers formed at once: what fits a processor's cache is faster than all.
@@ -34,7 +34,7 @@ def measure() -> list[Row]:
 def vectorised(trace: NoisyTrace, samples: Array) -> Array:
     """Form all responses at once and average their squared distance."""
     response = step_response(trace.gripper, trace.model.network(samples), inertia=False)
-    difference = rotation(response, trace.steps, trace.time_s) - trace.trace_rad
+    difference = superpose(response, trace.steps, trace.time_s) - trace.trace_rad
     misfit: Array = np.sqrt(np.mean(difference**2, axis=1))
     return misfit
 
@@ -42,13 +42,11 @@ def vectorised(trace: NoisyTrace, samples: Array) -> Array:
 def in_blocks(trace: NoisyTrace, samples: Array) -> Array:
     """Do so with as many at a time as fit a processor's cache."""
     at_once = max(1, _AT_ONCE // len(trace.time_s))
-    response_of = partial(
-        step_response, trace.gripper, symmetric=trace.steps.symmetric, inertia=False
-    )
+    response_of = partial(step_response, trace.gripper, inertia=False)
     found = []
     for some in parts(len(samples), at_once):
         response = response_of(trace.model.network(samples[some]))
-        difference = rotation(response, trace.steps, trace.time_s)
+        difference = superpose(response, trace.steps, trace.time_s)
         difference -= trace.trace_rad
         squares = np.einsum("nt,nt->n", difference, difference)
         found.append(np.sqrt(squares / len(trace.time_s)))

@@ -14,11 +14,11 @@ from biogrip.fit.problem import CaseProblem, Problem
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.misfit import Misfit, make_misfit
 from biogrip.physics.noise import add_noise, rms
-from biogrip.physics.protocol import TorqueHistory, sample_times, torque_history
+from biogrip.physics.protocol import Course, join_phases, sample_times
 from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
 from biogrip.physics.whitening import nuisance_basis
 from biogrip.study.load import load_study
@@ -43,13 +43,13 @@ def _posed() -> CaseProblem:
 
 
 @cache
-def _clean() -> tuple[TorqueHistory, Array, Array]:
-    steps = torque_history(case().phases)
+def _clean() -> tuple[Course, Array, Array]:
+    steps = join_phases(case().phases)
     time_s = sample_times(steps.end_s, case().sampling.rate_Hz)
     model = case().sample.model
     truth = np.array([case().parameters[name] for name in model.names])
     response = step_response(case().gripper, model.network(truth))
-    return steps, time_s, rotation(response, steps, time_s)[0]
+    return steps, time_s, superpose(response, steps, time_s)[0]
 
 
 @cache
@@ -64,7 +64,7 @@ class NoisyTrace:
 
     gripper: Gripper
     model: SampleModel
-    steps: TorqueHistory
+    steps: Course
     time_s: Array
     trace_rad: Array
     noise_rms_rad: float

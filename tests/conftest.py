@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.protocol import Phase, TorqueHistory, hold, torque_history
+from biogrip.physics.protocol import Course, Phase, hold, join_phases
 from tests.helpers.browser import chromium, executable
 from tests.helpers.required import cannot_run
 from tests.helpers.runs import built_once, run_tiny
@@ -77,8 +77,8 @@ def phases() -> tuple[Phase, ...]:
 
 
 @pytest.fixture(scope="session")
-def steps(phases: tuple[Phase, ...]) -> TorqueHistory:
-    return torque_history(phases)
+def steps(phases: tuple[Phase, ...]) -> Course:
+    return join_phases(phases)
 
 
 @pytest.fixture(scope="session")

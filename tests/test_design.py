@@ -58,7 +58,7 @@ def test_a_design_is_better_keeps_its_limits_and_runs(
     for label in ("noise of the rotation (rad)", "largest torque (N m)", "highest rate (Hz)"):
         assert label in said
     (case,) = study_of(output.read_text()).cases.values()
-    assert max(phase.left.value_Nm for phase in case.phases) <= 1.6e-9 * (1 + 1e-12)
+    assert max(phase.level for phase in case.phases) <= 1.6e-9 * (1 + 1e-12)
     assert case.problem.torque.end_s == pytest.approx(400.0)
     assert len(case.sampling.over(400.0)) == 4001
     # The same command gives the same bytes.

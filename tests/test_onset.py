@@ -13,7 +13,7 @@ from biogrip.fit.fitted_onset import OnsetFits, begins_constant, estimate_onset
 from biogrip.judging.onset import is_cut_off
 from biogrip.library import Sample, TraceResult, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.physics.protocol import Phase, hold, load
+from biogrip.physics.protocol import Phase, hold, ramp
 from tests.helpers.default import STUDY
 from tests.helpers.identified import told
 
@@ -51,7 +51,7 @@ def holding(found: TraceResult) -> list[str]:
     return [name for name, own in limits.iterrows() if own["low"] <= truth[name] <= own["high"]]
 
 
-RAMP = (Phase(30.0, load(30.0, 0.0, 1e-9), load(30.0, 0.0, 1e-9)), hold(30.0, 0.3e-9))
+RAMP = (ramp(30.0, 0.0, 1e-9), hold(30.0, 0.3e-9))
 
 
 @pytest.mark.parametrize("phases", [PHASES, RAMP])

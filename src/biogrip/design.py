@@ -22,13 +22,9 @@ from biogrip.files import refuse_inputs, write_text
 from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import standard_deviation
-from biogrip.physics.protocol import Phase, Sampling, hold, largest_load, torque_history
-from biogrip.physics.simulation import (
-    compute_grip,
-    jaw_force_response,
-    linear_jaw_force,
-    simulated_response,
-)
+from biogrip.physics.protocol import Phase, Sampling, hold, join_phases, largest_load
+from biogrip.physics.response import jaw_force_response, linear_jaw_force
+from biogrip.physics.simulation import compute_grip, simulated_response
 from biogrip.study.config import DesignBlock
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config, overlaid, read_config
@@ -219,7 +215,7 @@ def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
     read = simulated_response(case.gripper, network, problem.torque, times_s, nonlinear=False)
     noise = float(standard_deviation(read[0], case.noise)[0])
     elapsed_s = limits.elapsed_s
-    step = torque_history((hold(elapsed_s[-1], 1.0),), deforms=case.instrument.deforms)
+    step = join_phases((hold(elapsed_s[-1], 1.0),), deforms=case.instrument.deforms)
     values = np.array([[case.parameters[name] for name in model.names]])
     unit = linear_responses(problem.gripper, model, step, elapsed_s, values)[0, 1:]
     if case.instrument.has_jaws:
@@ -314,14 +310,10 @@ def as_config(
     """Return a config, as YAML, with an experiment as that of its cases."""
     found = deepcopy(given)
     cases = found.setdefault("cases", {})
-    for block in (found, *filter(None, cases.values())):
-        for key in {"times_s", "bursts"} & set(block.get("measurement") or {}):
-            del block["measurement"][key]
     for one, experiment in zip(specimens, after, strict=True):
         column = one.case.instrument.controlled.column
         phases = [
-            {"duration_s": phase.duration_s, column: phase.left.value_Nm}
-            for phase in experiment.phases
+            {"duration_s": phase.duration_s, column: phase.level} for phase in experiment.phases
         ]
         measured = {"noise": {"level_rad": one.noise}, "rate_Hz": rate_Hz}
         own = {"protocol": {"phases": phases}, "measurement": measured}

@@ -9,8 +9,8 @@ from biogrip.fit.methods import METHODS, identifier
 from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.quantities import parameters_and_sum
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import Sample
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import with_fixed
 from tests.helpers.default import STUDY, study_of
 from tests.helpers.problems import GRIPPER, TORQUE, case_problem, clean, likelihood_of
@@ -23,7 +23,7 @@ SAMPLE = {"k_1": 30.0, "k_2": 10.0, "k_p": 12.3, "c_1": 150.0, "c_2": 600.0, "c_
 
 def problems(count: int, level: float) -> list[Problem]:
     response = step_response(GRIPPER, TWO.sample(SAMPLE), inertia=False)
-    return case_problem(TIMES, rotation(response, TORQUE, TIMES)[0], count, TWO, level)
+    return case_problem(TIMES, superpose(response, TORQUE, TIMES)[0], count, TWO, level)
 
 
 def identified(method: str, case_problem: list[Problem]) -> list[Identification]:

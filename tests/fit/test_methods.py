@@ -20,10 +20,10 @@ from biogrip.fit.methods import (
     near_noise_words,
 )
 from biogrip.fit.problem import Problem, silent
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.noise import rms
 from biogrip.physics.residuals import Residuals
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
 from tests.helpers.default import STUDY
 from tests.helpers.problems import (
@@ -185,7 +185,7 @@ def test_a_trace_without_noise_gives_every_model_back(name: str) -> None:
         model = Sample("generalized_maxwell", 4).model
         truth = np.concatenate((np.ones(5), np.geomspace(3.0, 3e3, 4), [0.1]))
     times = clean("endothelial_cell")[0]
-    response = rotation(
+    response = superpose(
         step_response(GRIPPER, model.network([truth]), inertia=False), TORQUE, times
     )
     (problem,) = case_problem(times, response[0], 1, model, level=0.0)
@@ -237,7 +237,7 @@ def noisy(model: SampleModel, count: int) -> list[tuple[Problem, Array]]:
     for _ in range(count):
         sample = 0.5 * (low + high) + 0.25 * rng.uniform(-1, 1, len(low)) * (high - low)
         response = step_response(GRIPPER, model.network(np.exp(sample)[None]), inertia=False)
-        trace = rotation(response, TORQUE, TIMES)[0]
+        trace = superpose(response, TORQUE, TIMES)[0]
         noise_sd = 10 ** rng.uniform(-3, -1) * np.abs(trace).max()
         trace = trace + noise_sd * rng.normal(size=len(TIMES))
         problems.append((posed_for(model, TIMES, trace), sample))

@@ -9,8 +9,8 @@ from biogrip.arrays import Array
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.nested_fits import advice, fit_models, is_within, ranked
 from biogrip.fit.problem import CaseProblem, Identification, Problem
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import CANDIDATES, MODELS, contained
+from biogrip.physics.response import step_response, superpose
 from tests.helpers.default import study_of
 from tests.helpers.problems import GRIPPER, SAMPLES, TORQUE, case_problem, clean
 
@@ -61,7 +61,7 @@ def test_a_model_fits_no_worse_than_one_in_it(
     assert worse(problems, found) == []
     for name, answers in found.items():
         network = CANDIDATES[name].model.network([answer.parameters for answer in answers])
-        rotations = rotation(step_response(GRIPPER, network, inertia=False), TORQUE, times)
+        rotations = superpose(step_response(GRIPPER, network, inertia=False), TORQUE, times)
         for problem, answer, own in zip(problems[name], answers, rotations, strict=True):
             misfit = np.sqrt(np.mean((own - problem.residuals.trace.cleared) ** 2))
             assert answer.misfit == pytest.approx(misfit, rel=1e-9)
@@ -70,7 +70,7 @@ def test_a_model_fits_no_worse_than_one_in_it(
 def test_elements_vanish_where_the_range_does_not_reach() -> None:
     """A Maxwell liquid between the jaws: no spring as weak as the range allows is weak enough."""
     times = clean("liquid_drop_1")[0]
-    response = rotation(
+    response = superpose(
         step_response(GRIPPER, MODELS["maxwell"].network([[9.5, 10.0]])), TORQUE, times
     )[0]
     problems, found = fitted(response, times, ("maxwell", "liquid_drop"), 8, 0.1)

@@ -14,7 +14,7 @@ from flint import acb, arb, ctx
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 
 Impedance = Callable[[Any], Any]
 _NODES = 45
@@ -68,7 +68,7 @@ def inverted(transform: Impedance, t: float) -> float:
 
 
 def rotations(
-    gripper: Gripper, sample: Impedance, torque: TorqueHistory, time_s: Array, *, inertia: bool
+    gripper: Gripper, sample: Impedance, torque: Course, time_s: Array, *, inertia: bool
 ) -> Array:
     """Closing rotations of both arms under steps, (2, n_times), from forces on each arm."""
     with ctx.workdps(45):
@@ -78,25 +78,20 @@ def rotations(
         moment = arm.inertia_kgm2 * s * s if inertia else 0
         return moment + arm.damping_Nms_per_rad * s + arm.stiffness_Nm_per_rad
 
-    def transform(torques: tuple[float, float], which: int) -> Impedance:
+    def transform(torque: float, which: int) -> Impedance:
         def both(s: Any) -> Any:
-            # (Z_2 + b^2 G) phi_2 + b^2 G phi_4 = tau_2/s, and the same for the other arm.
+            # (Z_2 + b^2 G) phi_2 + b^2 G phi_4 = tau/s, and the same for the other arm.
             coupled = b * b * sample(s)
             left, right = free(gripper.left, s) + coupled, free(gripper.right, s) + coupled
             determinant = left * right - coupled * coupled
-            loads = [value / s for value in torques]
-            first = right * loads[0] - coupled * loads[1]
-            second = left * loads[1] - coupled * loads[0]
-            return (first, second)[which] / determinant
+            return ((right, left)[which] - coupled) * (torque / s) / determinant
 
         return both
 
     found = np.zeros((2, len(time_s)))
-    steps = zip(torque.time_s, torque.left[:, 0], torque.right[:, 0], strict=True)
-    for start, *torques in steps:
-        given = (float(torques[0]), float(torques[1]))
+    for start, height in zip(torque.time_s, torque.changes[:, 0].tolist(), strict=True):
         for i, t in enumerate(time_s):
             if t > start:
                 for which in (0, 1):
-                    found[which, i] += inverted(transform(given, which), t - start)
+                    found[which, i] += inverted(transform(height, which), t - start)
     return found

@@ -11,11 +11,11 @@ from biogrip.fit.methods import identifier
 from biogrip.fit.problem import Identification, Problem, silent
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS
 from biogrip.physics.noise import Noise, add_noise
-from biogrip.physics.protocol import TorqueHistory, sample_times
+from biogrip.physics.protocol import Course, sample_times
 from biogrip.physics.residuals import Residuals
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
 from biogrip.physics.whitening import nuisance_basis
 from tests.helpers.default import STUDY
@@ -30,7 +30,7 @@ GRIPPER, TORQUE = CASE_PROBLEM.gripper, CASE_PROBLEM.torque
 def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
     times = sample_times(400.0, rate_Hz)
     network = MODEL.network([[SAMPLES[case][name] for name in MODEL.names]])
-    return times, rotation(step_response(GRIPPER, network), TORQUE, times)[0]
+    return times, superpose(step_response(GRIPPER, network), TORQUE, times)[0]
 
 
 def posed_for(model: SampleModel, times: Array, trace: Array, **assumed: Any) -> Problem:
@@ -73,7 +73,7 @@ def likelihood_of(posed: Problem, seed: int = 0) -> Likelihood:
 
 
 def condensed_of(
-    torque: TorqueHistory, time_s: Array, *, offset: bool = False, drift: bool = False
+    torque: Course, time_s: Array, *, offset: bool = False, drift: bool = False
 ) -> Condensed:
     """Rows that stand for the samples of any trace at these times."""
     return Condensed(torque, time_s, nuisance_basis(time_s, offset=offset, drift=drift))

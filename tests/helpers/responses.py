@@ -19,18 +19,16 @@ from flint import acb, acb_mat, arb, ctx
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.models import MODELS
-from biogrip.physics.protocol import Load, Phase, TorqueHistory, hold
+from biogrip.physics.protocol import Course, Phase, hold
 from biogrip.physics.sample_model import SampleModel
 
-FALLING = Load(1.4e-9, -4e-12)
 PROTOCOLS = {
     "steps": (hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)),
     "ramps and parabola": (
-        Phase(50.0, Load(0.0, 2e-11), Load(0.0, 2e-11)),
-        Phase(150.0, Load(1e-9, 1e-12, 1e-14), Load(1e-9, 1e-12, 1e-14)),
-        Phase(200.0, FALLING, FALLING),
+        Phase(50.0, 0.0, 2e-11),
+        Phase(150.0, 1e-9, 1e-12, 1e-14),
+        Phase(200.0, 1.4e-9, -4e-12),
     ),
-    "arms driven differently": (hold(200.0, 1.6e-9, 1.0e-9), hold(200.0, 0.3e-9, 0.5e-9)),
 }
 MODEL_PARAMETERS = {name: list(model.example) for name, model in MODELS.items()}
 # Logarithms between which parameters of each kind are searched for, about.
@@ -49,9 +47,7 @@ SAMPLING_TIMES = {
 _DIGITS = 120
 
 
-def exact_50_digits(
-    gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array
-) -> Array:
+def exact_50_digits(gripper: Gripper, parameters: Array, steps: Course, time_s: Array) -> Array:
     """phi_2, and the force of springs and dampers on the tips in N, (2, n_times), with inertia.
 
     Of one sample (k, k_p, c, c_p).
@@ -60,9 +56,7 @@ def exact_50_digits(
         return _solution(gripper, [arb(float(value)) for value in parameters], steps, time_s)
 
 
-def _solution(
-    gripper: Gripper, parameters: Sequence[arb], steps: TorqueHistory, time_s: Array
-) -> Array:
+def _solution(gripper: Gripper, parameters: Sequence[arb], steps: Course, time_s: Array) -> Array:
     k, k_p, c, c_p = parameters
     b = arb(gripper.arm_length_m) * (arb(gripper.reference_angle_deg) / 180).sin_pi()
     inertia, damping, stiffness = (
@@ -85,9 +79,9 @@ def _solution(
     seen = acb_mat([[1, 0, 0, 0, 0], force])
     of_modes = seen * vectors
     found = [[acb(0)] * len(time_s) for _ in range(2)]
-    for start, left, right in zip(steps.time_s, steps.left[:, 0], steps.right[:, 0], strict=True):
+    for start, height in zip(steps.time_s, steps.changes[:, 0], strict=True):
         load = acb_mat(5, 1)
-        load[2, 0], load[3, 0] = arb(float(left)) / inertia[0], arb(float(right)) / inertia[1]
+        load[2, 0], load[3, 0] = (arb(float(height)) / own for own in inertia)
         rest = a.solve(-load)
         weights, settled = vectors.solve(-rest), seen * rest
         for i, t in enumerate(time_s):

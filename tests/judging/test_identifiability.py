@@ -21,8 +21,8 @@ from biogrip.judging.verdicts import (
     DETERMINED,
     NOT_DETERMINED,
 )
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import CANDIDATES, MODELS, Sample
+from biogrip.physics.response import step_response, superpose
 from tests.helpers.problems import (
     GRIPPER,
     MODEL,
@@ -140,7 +140,7 @@ def test_a_bare_damper_is_known_from_one_side_by_a_spring_it_hides() -> None:
     """A stiff Maxwell liquid, seen slowly: its damper is determined, its spring bounded below."""
 
     times, _ = clean("liquid_drop_1")
-    response = rotation(step_response(GRIPPER, DAMPER.network([[10.0]])), TORQUE, times)[0]
+    response = superpose(step_response(GRIPPER, DAMPER.network([[10.0]])), TORQUE, times)[0]
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     maxwell = MODELS["maxwell"]
     posed = posed_for(maxwell, times, response + noise)

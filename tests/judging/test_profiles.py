@@ -14,9 +14,9 @@ from biogrip.judging.onset import profile_over_onset
 from biogrip.judging.profiles import compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
 from biogrip.library import set_up, simulate
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import hold
+from biogrip.physics.response import step_response, superpose
 from tests.helpers.problems import (
     GRIPPER,
     MODEL,
@@ -116,7 +116,7 @@ def test_the_search_range_determines_no_combination() -> None:
     """
     sample = np.array([[20.0, 5.0, 80.0, 1e-3]])
     times = np.linspace(0.0, 400.0, 801)
-    clean_rad = rotation(step_response(GRIPPER, MODEL.network(sample)), TORQUE, times)[0]
+    clean_rad = superpose(step_response(GRIPPER, MODEL.network(sample)), TORQUE, times)[0]
     noise = 4e-6 * np.random.default_rng(1).standard_normal(len(times))
     problem = posed_for(MODEL, times, clean_rad + noise)
     found, k_and_k_p = run("least_squares", problem), find_combinations(MODEL, [0, 1])
@@ -141,7 +141,7 @@ def test_noise_and_threshold_are_those_of_a_regression(taken_out: dict[str, bool
     Of known noise it is the normal distribution.
     """
     model, times = MODELS["maxwell"], np.arange(0.0, 400.0, 40.0)
-    response = rotation(step_response(GRIPPER, model.network([[1.0, 10.0]])), TORQUE, times)[0]
+    response = superpose(step_response(GRIPPER, model.network([[1.0, 10.0]])), TORQUE, times)[0]
     (problem,) = case_problem(times, response, 1, model, **taken_out)
     best = scipy_fit(problem, np.log([1.0, 10.0]))
     left = len(times) - 2 - len(taken_out)

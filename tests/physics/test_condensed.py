@@ -8,7 +8,7 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.protocol import torque_history
+from biogrip.physics.protocol import join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel
 from tests.helpers.problems import condensed_of, condensed_rows
@@ -41,7 +41,7 @@ def assert_alike(residuals: Residuals, x: Array) -> int:
 
 
 def posed(gripper: Gripper, model: SampleModel, condensed: Condensed, trace: Array) -> Residuals:
-    torque, time_s = condensed.torque, condensed.all_s
+    torque, time_s = condensed.course, condensed.all_s
     return Residuals(gripper, model, torque, Trace(time_s, trace, condensed), instrument=GRIPPER)
 
 
@@ -56,20 +56,20 @@ def test_least_squares_sees_no_difference(
     gripper: Gripper, unequal_gripper: Gripper, protocol: str, times: str, nuisance: bool
 ) -> None:
     """To 1e-10 of the trace, over the whole search range; noise is at least 1e-3 of it."""
-    torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES[times]
+    torque, time_s = join_phases(PROTOCOLS[protocol]), TIMES[times]
     condensed = condensed_of(torque, time_s, offset=nuisance, drift=nuisance)
     for arms in (gripper, unequal_gripper):
         residuals = posed(arms, MAXWELL, condensed, noise(len(time_s)))
         for sample in random_samples(8, seed=8):
             rows = assert_alike(residuals, np.log(sample))
-            assert rows <= min(80 if torque.symmetric else 160, len(time_s) + 1)
+            assert rows <= min(80, len(time_s) + 1)
 
 
 @pytest.mark.parametrize("protocol", ["steps", "ramps and parabola"])
 @pytest.mark.parametrize("name", MODEL_PARAMETERS)
 def test_of_no_model_it_sees_a_difference(gripper: Gripper, name: str, protocol: str) -> None:
     """Rows without slopes are the same, too, but for last bits: they are real numbers."""
-    torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES["few"]
+    torque, time_s = join_phases(PROTOCOLS[protocol]), TIMES["few"]
     condensed = condensed_of(torque, time_s, offset=True)
     residuals = posed(gripper, MODELS[name], condensed, noise(len(time_s)))
     middle, rng = np.log(MODEL_PARAMETERS[name]), np.random.default_rng(5)
@@ -85,7 +85,7 @@ def test_of_no_model_it_sees_a_difference(gripper: Gripper, name: str, protocol:
 def test_rows_do_not_depend_on_who_else_is_there(either_gripper: Gripper, name: str) -> None:
     """Byte for byte, for any subset in any order, down to a single one."""
     model = MODELS.get(name, Sample("generalized_maxwell", 2).model)
-    condensed = condensed_of(torque_history(PROTOCOLS["steps"]), TIMES["few"], offset=True)
+    condensed = condensed_of(join_phases(PROTOCOLS["steps"]), TIMES["few"], offset=True)
     residuals = posed(either_gripper, model, condensed, np.zeros(len(TIMES["few"])))
     low, high = log_range(model)
     x = np.random.default_rng(3).uniform(low, high, (40, len(low)))
@@ -101,7 +101,7 @@ def test_rows_do_not_depend_on_who_else_is_there(either_gripper: Gripper, name: 
 def test_many_readings_are_worth_some_nodes_each(
     gripper: Gripper, protocol: str, times: str
 ) -> None:
-    torque, time_s = torque_history(PROTOCOLS[protocol]), DENSE[times]
+    torque, time_s = join_phases(PROTOCOLS[protocol]), DENSE[times]
     condensed = condensed_of(torque, time_s, offset=True)
     assert len(condensed.dense.time_s) < 8000
     residuals = posed(gripper, MAXWELL, condensed, noise(len(time_s)))

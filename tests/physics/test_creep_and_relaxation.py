@@ -12,7 +12,7 @@ from biogrip.physics.gripper import NO_ARMS
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS
 from biogrip.physics.modes import linear_responses
-from biogrip.physics.protocol import Load, Phase, TorqueHistory, hold, load, torque_history
+from biogrip.physics.protocol import Course, Phase, hold, join_phases, ramp
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
 from biogrip.physics.simulation import simulated_response
@@ -22,21 +22,17 @@ DRIVEN = pytest.mark.parametrize("deforms", [False, True], ids=["creep", "relaxa
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 
 
-def _alike(duration_s: float, given: Load) -> Phase:
-    return Phase(duration_s, given, given)
-
-
 # A ramp of finite rate, a hold, a parabola, a ramp down that ends with a jump, recovery.
 PHASES = (
-    _alike(0.5, load(0.5, 0.0, 2.0)),
+    ramp(0.5, 0.0, 2.0),
     hold(2.0, 2.0),
-    _alike(1.0, Load(2.0, 0.5, -0.8)),
-    _alike(2.0, load(2.0, 1.0, 0.7)),
+    Phase(1.0, 2.0, 0.5, -0.8),
+    ramp(2.0, 1.0, 0.7),
     hold(2.0, 0.0),
 )
 
 
-def simulated(network: Network, history: TorqueHistory, time_s: Array) -> Array:
+def simulated(network: Network, history: Course, time_s: Array) -> Array:
     return simulated_response(NO_ARMS, network, history, time_s, nonlinear=False)[0]
 
 
@@ -44,7 +40,7 @@ def example(model: SampleModel) -> Network:
     return model.network([model.example])
 
 
-def by_laplace(given: Impedance, history: TorqueHistory, time_s: float) -> float:
+def by_laplace(given: Impedance, history: Course, time_s: float) -> float:
     """Response by numerical inversion: of each change of what is held, by itself."""
 
     def power(height: float, order: int) -> Impedance:
@@ -53,7 +49,7 @@ def by_laplace(given: Impedance, history: TorqueHistory, time_s: float) -> float
     def response(held: Impedance) -> Impedance:
         return lambda s: held(s) * given(s) if history.deforms else held(s) / given(s)
 
-    changes = [(start, power(height[0], order)) for start, order, height in history.jumps]
+    changes = [(start, power(height, order)) for start, order, height in history.jumps]
     return sum(
         inverted(response(held), time_s - start) for start, held in changes if start < time_s
     )
@@ -64,7 +60,7 @@ def by_laplace(given: Impedance, history: TorqueHistory, time_s: float) -> float
 def test_responses_to_ramps_and_parabolas_are_inverse_laplace_transforms(
     name: str, deforms: bool
 ) -> None:
-    model, history = MODELS[name], torque_history(PHASES, deforms=deforms)
+    model, history = MODELS[name], join_phases(PHASES, deforms=deforms)
     times = np.array([0.2, 0.5001, 2.9, 3.5001, 4.4, 6.8])
     found = simulated(example(model), history, times)
     given = drawn(name, model.example)
@@ -75,7 +71,7 @@ def test_responses_to_ramps_and_parabolas_are_inverse_laplace_transforms(
 @DRIVEN
 @EVERY_MODEL
 def test_derivatives_are_those_of_finite_differences(model: SampleModel, deforms: bool) -> None:
-    history = torque_history(PHASES, deforms=deforms)
+    history = join_phases(PHASES, deforms=deforms)
     times, step = np.linspace(0.0, 7.4, 40), 1e-4
     logs = np.log([model.example])
 
@@ -97,7 +93,7 @@ READ_S = np.linspace(0.004, 7.5, 1801)
 
 @functools.cache
 def condensed(held: str, deforms: bool) -> Condensed:
-    history = torque_history(HELD[held], deforms=deforms)
+    history = join_phases(HELD[held], deforms=deforms)
     return Condensed(history, READ_S, np.zeros((0, len(READ_S))))
 
 
@@ -108,10 +104,10 @@ def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
     model: SampleModel, held: str, deforms: bool
 ) -> None:
     rows = condensed(held, deforms)
-    true = simulated(example(model), rows.torque, READ_S)
+    true = simulated(example(model), rows.course, READ_S)
     noise = np.random.default_rng(5).standard_normal(len(READ_S))
     given = Trace(READ_S, true + 0.01 * (np.ptp(true) or 1.0) * noise, rows)
-    residuals = Residuals(NO_ARMS, model, rows.torque, given, instrument=GRIPPER)
+    residuals = Residuals(NO_ARMS, model, rows.course, given, instrument=GRIPPER)
     # Exponents stay below one.
     moved = [parameter.kind != "exponent" for parameter in model.parameters]
     logs = np.log([model.example]) + np.linspace(-0.3, 0.4, 5)[:, None] * moved
@@ -129,7 +125,7 @@ def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
 
 def test_a_reading_at_the_instant_of_a_step_is_taken_before_it() -> None:
     network = example(MODELS["zener_maxwell"])
-    history = torque_history((hold(1.0, 1.0), hold(1.0, 3.0)), deforms=True)
+    history = join_phases((hold(1.0, 1.0), hold(1.0, 3.0)), deforms=True)
     found = simulated(network, history, np.array([0.0, 1.0, np.nextafter(1.0, 2.0)]))
     assert found[0] == 0
     at_once = network.k_p[0] + network.k[0, 0]
@@ -183,7 +179,7 @@ def test_creep_and_relaxation_are_inverse_laplace_transforms(
 ) -> None:
     """After a step, whose impulse dampers take; to 1e-6 of it, or of what a springpot has alone."""
     sample = sample_of(model, seed)
-    given, held = drawn(model, sample), torque_history((hold(2e3, 1.0),), deforms=deforms)
+    given, held = drawn(model, sample), join_phases((hold(2e3, 1.0),), deforms=deforms)
     network = MODELS[model].network(sample)
     found = simulated_response(NO_ARMS, network, held, TIMES, nonlinear=False)[0]
     expected = np.array(

@@ -10,10 +10,12 @@ from biogrip import library
 from biogrip.arrays import Array
 from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.protocol import hold, torque_history
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import hold, join_phases
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import VISIBLE, elapsed_s, find_ring, ring, ringing_s
+from tests.helpers.laplace import drawn, rotations
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE
 
 # Dampers between the jaws end a ring before it is seen; a spring in front of them goes on.
@@ -33,7 +35,7 @@ def test_an_empty_gripper_rings_like_a_damped_oscillator() -> None:
     envelope = np.exp(-decay * time_s)
     swing = envelope * (np.cos(omega * time_s) + decay / omega * np.sin(omega * time_s))
     nothing = Network(np.zeros(1), np.zeros(1), np.zeros((1, 0)), np.zeros((1, 0)))
-    torque = torque_history((hold(1.0, 1e-9),))
+    torque = join_phases((hold(1.0, 1e-9),))
     found = ring(Gripper(1.5e-3, 75.0, arm, arm), nothing, torque, time_s)[0]
     expected = 1e-9 / stiffness * (np.exp(-stiffness / damping * time_s) - swing)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * 1e-9 / stiffness)
@@ -44,17 +46,33 @@ def test_rings_are_over_when_they_are_said_to_be(either_gripper: Gripper, stiffn
     """Even those of a bare spring, from which only the arms' own dampers take energy."""
     none = np.zeros((1, 0))
     spring = Network(np.array([stiffness]), np.zeros(1), none, none)
-    step = torque_history((hold(1.0, 1e-9),))
+    step = join_phases((hold(1.0, 1e-9),))
     after_s = ringing_s(either_gripper) * np.linspace(1.0, 1.5, 500)
     with_it, without = (
-        rotation(step_response(either_gripper, spring, inertia=inertia), step, after_s)
+        superpose(step_response(either_gripper, spring, inertia=inertia), step, after_s)
         for inertia in (True, False)
     )
     assert np.max(np.abs(with_it - without)) < 1e-14 * np.max(np.abs(without))
 
 
+@pytest.mark.parametrize("beyond", [0.0, 1e-12, 1e-10, 1e-8, 1e-6])
+@pytest.mark.parametrize("model", ["kelvin_voigt", "generalized_maxwell"])
+def test_arms_that_are_critically_damped(model: str, beyond: float) -> None:
+    """Two roots coincide, or nearly; the branch that makes a third is far away."""
+    inertia, hinge, k_p, damper = 1e-14, 4.4e-7, 0.3, 1e-6
+    sample = [k_p, damper] if model == "kelvin_voigt" else [1e-12, k_p, 10.0, damper]
+    lever = 1.5e-3 * np.sin(np.radians(75.0))
+    both = 2 * np.sqrt(inertia * (hinge + 2 * lever**2 * k_p)) * (1 + beyond)
+    arm = Arm(inertia, both - 2 * lever**2 * damper, hinge)
+    damped = Gripper(1.5e-3, 75.0, arm, arm)
+    torque, times = join_phases((hold(1.0, 1e-9),)), np.geomspace(1e-5, 0.5, 20)
+    found = superpose(step_response(damped, MODELS[model].network(sample)), torque, times)[0]
+    exact = rotations(damped, drawn(model, sample), torque, times, inertia=True)[0]
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-7 * exact.max())
+
+
 def test_times_count_from_the_last_change_of_the_torque() -> None:
-    torque, times = torque_history((hold(2.0, 1e-9), hold(2.0, 1e-10))), np.array([0.5, 2.0, 3.5])
+    torque, times = join_phases((hold(2.0, 1e-9), hold(2.0, 1e-10))), np.array([0.5, 2.0, 3.5])
     np.testing.assert_allclose(elapsed_s(torque, times), [0.5, 0.0, 1.5])
 
 
@@ -62,7 +80,7 @@ def test_a_ring_shows_by_its_norm_beside_the_noise(gripper: Gripper) -> None:
     """All readings after the one that is named change by less than what counts."""
     time_s = np.random.default_rng(1).permutation(1e-4 * np.arange(1.0, 600.0))
     network = MODEL.sample(RINGING["generalized_maxwell"])
-    torque = torque_history((hold(1.0, 1e-9),))
+    torque = join_phases((hold(1.0, 1e-9),))
     given = gripper, network, torque, time_s
     # A parallel damper that is seen only while it rings does not end the ring.
     free = replace(network, c_p=np.zeros(1))

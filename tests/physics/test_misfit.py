@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.misfit import SeriesMisfit
 from biogrip.physics.models import MODELS
-from biogrip.physics.protocol import TorqueHistory, hold, sample_times, torque_history
+from biogrip.physics.protocol import Course, hold, join_phases, sample_times
+from biogrip.physics.response import step_response, superpose
 from tests.helpers.responses import random_samples
 
 MODEL = MODELS["generalized_maxwell"]
@@ -21,26 +21,24 @@ PROTOCOLS = {
 
 def direct(
     gripper: Gripper,
-    steps: TorqueHistory,
+    steps: Course,
     time_s: np.ndarray,
     trace: np.ndarray,
     samples: np.ndarray,
 ) -> np.ndarray:
     """Form every response, subtract, square, average."""
-    response = step_response(
-        gripper, MODEL.network(samples), symmetric=steps.symmetric, inertia=False
-    )
-    return np.sqrt(np.mean((rotation(response, steps, time_s) - trace) ** 2, axis=1))
+    response = step_response(gripper, MODEL.network(samples), inertia=False)
+    return np.sqrt(np.mean((superpose(response, steps, time_s) - trace) ** 2, axis=1))
 
 
 @pytest.mark.parametrize("name", PROTOCOLS)
 def test_agrees_with_forming_the_responses(name: str, gripper: Gripper) -> None:
     phases, rate_Hz = PROTOCOLS[name]
-    steps = torque_history(phases)
+    steps = join_phases(phases)
     time_s = sample_times(steps.end_s, rate_Hz)
-    response = step_response(gripper, MODEL.network(TRUTH), symmetric=steps.symmetric)
+    response = step_response(gripper, MODEL.network(TRUTH))
     noise = np.random.default_rng(1).standard_normal(len(time_s))
-    clean = rotation(response, steps, time_s)[0]
+    clean = superpose(response, steps, time_s)[0]
     trace = clean + 0.1 * np.abs(clean).max() * noise
     samples = np.vstack((TRUTH, random_samples(500, 3)))
     misfit = SeriesMisfit(gripper, MODEL, steps, 1 / rate_Hz, trace)
@@ -54,14 +52,14 @@ def test_agrees_with_forming_the_responses(name: str, gripper: Gripper) -> None:
 def test_projections_agree_with_direct_sums(name: str, gripper: Gripper) -> None:
     """From modes that stand still to those that are over at once."""
     phases, rate_Hz = PROTOCOLS[name]
-    steps = torque_history(phases)
+    steps = join_phases(phases)
     count = len(sample_times(steps.end_s, rate_Hz))
     trace = np.random.default_rng(5).standard_normal(count)
     misfit = SeriesMisfit(gripper, MODEL, steps, 1 / rate_Hz, trace)
     rates = -np.concatenate(([1e-300], np.geomspace(1e-9, 1e9, 500)))
     found = misfit.projections(rates)
     expected, scale = np.zeros((2, 1, len(rates)))
-    for start, height in zip(steps.time_s * rate_Hz, steps.left[:, 0], strict=True):
+    for start, height in zip(steps.time_s * rate_Hz, steps.changes[:, 0], strict=True):
         first = round(start)
         terms = np.exp(np.outer(rates, np.arange(first, count) - start)) * trace[first:]
         expected += height * terms.sum(axis=1)
@@ -71,9 +69,7 @@ def test_projections_agree_with_direct_sums(name: str, gripper: Gripper) -> None
 
 
 @pytest.mark.parametrize(("level", "rtol"), [(1e-4, 1e-9), (0.0, 1e-8)])
-def test_a_constant_trace(
-    level: float, rtol: float, gripper: Gripper, steps: TorqueHistory
-) -> None:
+def test_a_constant_trace(level: float, rtol: float, gripper: Gripper, steps: Course) -> None:
     """Against zero the misfit is the response itself, in the slowest samples what is left of it.
 
     Of their way to rest, 1e6 s, they go a fraction 4e-4; constant and mode cancel to its square.
@@ -85,8 +81,6 @@ def test_a_constant_trace(
     np.testing.assert_allclose(misfit(samples), expected, rtol=rtol)
 
 
-def test_parameters_that_are_not_numbers_have_no_misfit(
-    gripper: Gripper, steps: TorqueHistory
-) -> None:
+def test_parameters_that_are_not_numbers_have_no_misfit(gripper: Gripper, steps: Course) -> None:
     misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, np.ones(4001))
     assert np.isnan(misfit(np.vstack((TRUTH, np.full(4, np.nan))))).tolist() == [False, True]

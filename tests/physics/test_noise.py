@@ -22,7 +22,7 @@ from biogrip.physics.noise import (
     rms,
     stream,
 )
-from biogrip.physics.protocol import hold, sample_times, torque_history
+from biogrip.physics.protocol import hold, join_phases, sample_times
 from biogrip.physics.whitening import (
     WEIGHTED,
     NoiseModel,
@@ -249,7 +249,7 @@ def test_few_rows_stand_for_all_whitened_samples(rate_Hz: float) -> None:
 
 def test_a_drift_is_flow_only_under_a_constant_torque() -> None:
     sampled = np.linspace(0.0, 100.0, 201)
-    assert drift_is_flow(torque_history((hold(100.0, 1e-9),)), sampled)
-    changing = torque_history((hold(50.0, 1e-9), hold(50.0, 0.2e-9)))
+    assert drift_is_flow(join_phases((hold(100.0, 1e-9),)), sampled)
+    changing = join_phases((hold(50.0, 1e-9), hold(50.0, 0.2e-9)))
     assert not drift_is_flow(changing, sampled)
     assert drift_is_flow(changing, sampled[:100])

@@ -5,10 +5,17 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.maxwell_models import generalized_maxwell
-from biogrip.physics.models import CANDIDATES, MODELS, Sample, as_richer, contained, different_in
-from biogrip.physics.protocol import TorqueHistory, hold, torque_history
+from biogrip.physics.models import (
+    CANDIDATES,
+    MODELS,
+    Sample,
+    as_richer,
+    contained,
+    different_in,
+    generalized_maxwell,
+)
+from biogrip.physics.protocol import Course, hold, join_phases
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import complex_modulus, with_fixed
 from tests.helpers.laplace import IMPEDANCES, series
 
@@ -16,19 +23,19 @@ TIMES = np.linspace(0.1, 400, 300)
 
 
 def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
-    gripper: Gripper, steps: TorqueHistory
+    gripper: Gripper, steps: Course
 ) -> None:
     """k to infinity: Kelvin-Voigt with c + c_p, one exponential a step, however it is split."""
     u, spring, damper = 2 * gripper.lever_m**2, 0.02, 10.0
     stiffness = gripper.left.stiffness_Nm_per_rad + u * spring
     rate = stiffness / (gripper.left.damping_Nms_per_rad + u * damper)
     expected = np.zeros_like(TIMES)
-    for start, height in zip(steps.time_s, steps.left[:, 0], strict=True):
+    for start, height in zip(steps.time_s, steps.changes[:, 0], strict=True):
         expected -= height / stiffness * np.expm1(-rate * np.maximum(TIMES - start, 0))
     for c, c_p in ((9.9, 0.1), (2.0, 8.0), (0.1, 9.9)):
         response = step_response(gripper, generalized_maxwell([1e7, spring, c, c_p]))
         # The branch relaxes within c/k = 1e-6 s, and the arms' inertia lags as little.
-        ours = rotation(response, steps, TIMES)[0]
+        ours = superpose(response, steps, TIMES)[0]
         np.testing.assert_allclose(ours, expected, atol=1e-6 * expected.max())
 
 
@@ -63,7 +70,7 @@ def test_fixing_a_parameter_leaves_the_others() -> None:
     assert with_fixed(model, {}) is model
 
 
-TORQUE = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
+TORQUE = join_phases((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
 TIME_S = np.linspace(0.0, 400.0, 801)
 DECADES = {"stiffness": (0, 2), "damping": (0, 3), "springpot": (0, 2), "exponent": (-0.6, -0.2)}
 TRIED = [name for name in CANDIDATES if name[-1] not in "5678"]
@@ -77,7 +84,7 @@ def drawn(candidate: str, rng: np.random.Generator) -> Array:
 
 def response(gripper: Gripper, candidate: str, parameters: Array, inertia: bool) -> Array:
     network = CANDIDATES[candidate].model.network(parameters)
-    found: Array = rotation(step_response(gripper, network, inertia=inertia), TORQUE, TIME_S)[0]
+    found: Array = superpose(step_response(gripper, network, inertia=inertia), TORQUE, TIME_S)[0]
     return found
 
 
@@ -86,7 +93,7 @@ def response(gripper: Gripper, candidate: str, parameters: Array, inertia: bool)
 def test_a_richer_model_becomes_the_simpler_one(
     gripper: Gripper, richer: str, simpler: str, inertia: bool
 ) -> None:
-    """To rounding: that of polynomials of degree nine, where there are eight branches."""
+    """To rounding, of as many as eight branches."""
     rng = np.random.default_rng(0)
     for _ in range(3):
         parameters = drawn(simpler, rng)

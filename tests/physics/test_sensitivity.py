@@ -8,11 +8,11 @@ from biogrip.physics import modes
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.modes import linear_responses
-from biogrip.physics.protocol import TorqueHistory, torque_history
+from biogrip.physics.protocol import Course, join_phases
 from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.physics.whitening import nuisance_basis, with_uncertain, within, without
 from tests.helpers.responses import (
@@ -30,11 +30,11 @@ def test_many_samples_are_looked_at_in_parts(
 ) -> None:
     """Which give what all of them do at once, but for the order of a product's few sums."""
     (sample,) = random_samples(1, seed=8)
-    torque, model = torque_history(PROTOCOLS[protocol]), MODELS["generalized_maxwell"]
+    torque, model = join_phases(PROTOCOLS[protocol]), MODELS["generalized_maxwell"]
     time_s = np.linspace(0, torque.end_s, 1001)
     given = gripper, model, torque, time_s, sample[None]
     whole = linear_responses(*given)[0]
-    monkeypatch.setattr(modes, "_TIMES_TOGETHER", 90)
+    monkeypatch.setattr(modes, "_TIMES_AT_ONCE", 90)
     parts = linear_responses(*given)[0]
     np.testing.assert_allclose(parts, whole, rtol=0, atol=1e-14 * np.abs(whole[0]).max())
 
@@ -60,14 +60,12 @@ def test_two_branches_and_a_known_parameter(gripper: Gripper) -> None:
 
 
 def _check(gripper: Gripper, model: SampleModel, protocol: str, sample: Array) -> None:
-    torque = torque_history(PROTOCOLS[protocol])
+    torque = join_phases(PROTOCOLS[protocol])
     phi, *slopes = linear_responses(gripper, model, torque, TIMES, sample[None])[0]
 
     def simulated(parameters: Array) -> Array:
-        response = step_response(
-            gripper, model.network(parameters), symmetric=torque.symmetric, inertia=False
-        )
-        return rotation(response, torque, TIMES)[0]
+        response = step_response(gripper, model.network(parameters), inertia=False)
+        return superpose(response, torque, TIMES)[0]
 
     np.testing.assert_allclose(phi, simulated(sample), rtol=1e-12, atol=1e-12 * np.abs(phi).max())
     for index in range(len(sample)):
@@ -92,9 +90,7 @@ def test_nuisance_takes_out_offset_and_drift_and_nothing_else(offset: bool, drif
     np.testing.assert_allclose(within(basis, wave + added), added, atol=1e-12)
 
 
-def posed(
-    steps: TorqueHistory, gripper: Gripper, times: Array, basis: Array, added: Array
-) -> Residuals:
+def posed(steps: Course, gripper: Gripper, times: Array, basis: Array, added: Array) -> Residuals:
     """Residuals of noise to which an instrument has added something."""
     trace = np.random.default_rng(0).standard_normal(len(times)) * 1e-4 + added
     given = Trace(times, trace, Condensed(steps, times, basis))
@@ -106,9 +102,7 @@ AT = np.log([2.0, 50.0])
 
 
 @pytest.mark.parametrize("count", [401, 4001])
-def test_the_gradient_is_that_of_all_readings(
-    gripper: Gripper, steps: TorqueHistory, count: int
-) -> None:
+def test_the_gradient_is_that_of_all_readings(gripper: Gripper, steps: Course, count: int) -> None:
     """Whatever part of an amplitude is taken out, and of many readings through their nodes."""
     times = np.linspace(0.0, 400.0, count)
     offset = nuisance_basis(times, offset=True, drift=False)
@@ -121,9 +115,7 @@ def test_the_gradient_is_that_of_all_readings(
     assert misfit == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
 
 
-def test_a_later_protocol_is_one_of_earlier_readings(
-    gripper: Gripper, steps: TorqueHistory
-) -> None:
+def test_a_later_protocol_is_one_of_earlier_readings(gripper: Gripper, steps: Course) -> None:
     here, there = (
         posed(steps, gripper, times, np.zeros((0, 401)), 0 * times)
         for times in (READ_S, READ_S - 3.0)

@@ -8,23 +8,22 @@ from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.maxwell_models import (
+from biogrip.physics.models import (
+    MODELS,
     damper,
     generalized_maxwell,
     kelvin_voigt,
     liquid_drop,
     maxwell,
 )
-from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import (
-    Load,
+    Course,
     Phase,
-    TorqueHistory,
+    evaluate,
     hold,
-    torque_at,
-    torque_history,
+    join_phases,
 )
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.simulation import jaw_force
 from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
 from tests.helpers.responses import random_samples
@@ -32,19 +31,13 @@ from tests.helpers.responses import random_samples
 # Slow arms, which an integrator can follow through contact and flight.
 SLOW = Arm(1e-14, 4e-8, 4.4e-7)
 OTHER = Arm(1e-14, 7e-8, 6.0e-7)
-THREE = torque_history((hold(20.0, 1.6e-9), hold(20.0, 0.2e-9), hold(20.0, 2.4e-9)))
-FALLING, RISING = Load(1.95e-9, -9.5e-10), Load(5e-11, 9.5e-10)
-RAMPS = torque_history(
-    (
-        hold(5.0, 1.6e-9),
-        *(Phase(2.0, each, each) for each in (FALLING, RISING) * 6),
-        Phase(10.0, Load(2e-9, -1.5e-10), Load(1e-9)),
-    )
-)
+THREE = join_phases((hold(20.0, 1.6e-9), hold(20.0, 0.2e-9), hold(20.0, 2.4e-9)))
+FALLING, RISING = Phase(2.0, 1.95e-9, -9.5e-10), Phase(2.0, 5e-11, 9.5e-10)
+RAMPS = join_phases((hold(5.0, 1.6e-9), *(FALLING, RISING) * 6, Phase(10.0, 2e-9, -1.5e-10)))
 
 
 def integrated(
-    gripper: Gripper, sample: Array, torque: TorqueHistory, time_s: Array
+    gripper: Gripper, sample: Array, torque: Course, time_s: Array
 ) -> tuple[Array, list[float]]:
     """phi_2, phi_4, delta, y and force by SciPy, regime by regime; and when they change."""
     k, k_p, c, c_p = (float(value) for value in sample)
@@ -55,8 +48,8 @@ def integrated(
     def touching_rates(t: float, z: Array) -> tuple[Array, float]:
         delta, spring = b * (z[0] + z[1]), 0.0
         spring = k_p * delta + k * (delta - z[3])
-        tau = [float(torque_at(torque, t, arm)) for arm in ("left", "right")]
-        free = (tau[0] - k_2 * z[0]) / c_2, (tau[1] - k_4 * z[1]) / c_4
+        tau = float(evaluate(torque, t))
+        free = (tau - k_2 * z[0]) / c_2, (tau - k_4 * z[1]) / c_4
         # phi_i' = free_i - b F/c_i and F = spring + c_p b (phi_2' + phi_4').
         force = (spring + c_p * b * sum(free)) / (1 + c_p * b * b * (1 / c_2 + 1 / c_4))
         rates = np.array([free[0] - b * force / c_2, free[1] - b * force / c_4, 0.0, 0.0])
@@ -64,11 +57,11 @@ def integrated(
         return rates, force
 
     def apart_rates(t: float, z: Array) -> Array:
-        tau = [float(torque_at(torque, t, arm)) for arm in ("left", "right")]
+        tau = float(evaluate(torque, t))
         damper_rate = k / c * (z[2] - z[3])
         delta_rate = -(k_p * z[2] + k * (z[2] - z[3])) / c_p if c_p else k / (k + k_p) * damper_rate
         return np.array(
-            [(tau[0] - k_2 * z[0]) / c_2, (tau[1] - k_4 * z[1]) / c_4, delta_rate, damper_rate]
+            [(tau - k_2 * z[0]) / c_2, (tau - k_4 * z[1]) / c_4, delta_rate, damper_rate]
         )
 
     def lets_go(t: float, z: Array) -> float:
@@ -123,9 +116,7 @@ def integrated(
         (0.0, 0.04, RAMPS, OTHER),
     ],
 )
-def test_against_lsoda_with_events(
-    k_p: float, c_p: float, torque: TorqueHistory, right: Arm
-) -> None:
+def test_against_lsoda_with_events(k_p: float, c_p: float, torque: Course, right: Arm) -> None:
     gripper = Gripper(1.5e-3, 75.0, SLOW, right)
     sample = np.array([0.5, k_p, 1.5, c_p])
     time_s = np.linspace(0, torque.end_s, 401)[:-1] + 1e-3
@@ -143,7 +134,7 @@ def test_against_lsoda_with_events(
 
 
 def test_over_the_whole_search_range_the_jaws_never_pull(
-    either_gripper: Gripper, steps: TorqueHistory
+    either_gripper: Gripper, steps: Course
 ) -> None:
     """Up to the first loss of contact it is the bilateral response."""
     time_s = np.concatenate((np.geomspace(1e-3, 200, 40), 200 + np.geomspace(1e-3, 200, 40)))
@@ -158,14 +149,14 @@ def test_over_the_whole_search_range_the_jaws_never_pull(
         assert np.max(np.abs(found.jaw_force_N - both)[until]) < 1e-6 * both.max()
         response = step_response(either_gripper, network, inertia=False)
         for arm in (0, 1):
-            expected = rotation(response, steps, time_s, arm)[0]
+            expected = superpose(response, steps, time_s, arm)[0]
             away = np.abs(found.rotation[arm] - expected)
             # And to rounding of arms that nothing is between.
             assert np.max(away[until]) < 1e-10 * expected.max() + 1e-14 * 1.6e-9 / 4.4e-7
         assert bool(found.parted_s) == bool(both.min() < -1e-9 * both.max())
 
 
-def test_samples_that_lack_elements(gripper: Gripper, steps: TorqueHistory) -> None:
+def test_samples_that_lack_elements(gripper: Gripper, steps: Course) -> None:
     time_s = np.array([199.9, 200.1, 400.0])
     for network in (maxwell([1.0, 10.0]), damper([10.0]), liquid_drop([1.0, 0.0, 10.0])):
         found = unilateral_response(gripper, network, steps, time_s)

@@ -8,9 +8,8 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.judging.likelihood import headlines
-from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.maxwell_models import generalized_maxwell
-from biogrip.physics.models import MODELS
+from biogrip.physics.models import MODELS, generalized_maxwell
+from biogrip.physics.response import step_response, superpose
 from biogrip.records.identifications import columns
 from biogrip.records.rows import write_rows
 from biogrip.stages import sweeps as stage
@@ -72,7 +71,7 @@ def judged(study: Study, identifications: list[Path], tmp_path: Path) -> Path:
 
 
 def _response(parameters: Array) -> Array:
-    return rotation(step_response(GRIPPER, generalized_maxwell(parameters)), TORQUE, TIME_S)[0]
+    return superpose(step_response(GRIPPER, generalized_maxwell(parameters)), TORQUE, TIME_S)[0]
 
 
 def _resolution() -> float:

@@ -9,7 +9,7 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import Sample
-from biogrip.physics.protocol import Phase, Sampling, hold, torque_history
+from biogrip.physics.protocol import Phase, Sampling, hold, join_phases
 from biogrip.records.traces import read_target
 from biogrip.stages import identification as identifications
 from biogrip.stages import judgement, recording
@@ -23,7 +23,7 @@ def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
         name="Drop",
         instrument=GRIPPER,
         gripper=STUDY.gripper,
-        torque=torque_history((hold(100.0, torque_Nm), *more)),
+        torque=join_phases((hold(100.0, torque_Nm), *more)),
         sampling=Sampling(rate_Hz=1.0),
         sample=Sample("maxwell"),
         network=Sample("maxwell").model.sample({"k": 1.0, "c": 1.0}),

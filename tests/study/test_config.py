@@ -125,7 +125,7 @@ def test_cases_in_volts_and_in_torque_share_a_study(tmp_path: Path) -> None:
     study = load(tmp_path, f"cases: {{endothelial_cell: {{{volts}}}, my_drop: {{{DROP}}}}}")
     (phase,) = study.cases["endothelial_cell"].problem.phases
     assert phase.duration_s == 100.0
-    assert phase.left.value_Nm == pytest.approx(float(torque(study.actuator, 10.0)))
+    assert phase.level == pytest.approx(float(torque(study.actuator, 10.0)))
 
 
 @pytest.mark.parametrize(

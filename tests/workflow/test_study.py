@@ -9,8 +9,8 @@ import pytest
 from matplotlib.image import imread
 
 from biogrip.figures.style import COLUMN_IN
-from biogrip.physics.linear import rotation, step_response
-from biogrip.physics.maxwell_models import generalized_maxwell
+from biogrip.physics.models import generalized_maxwell
+from biogrip.physics.response import step_response, superpose
 from tests.helpers.problems import GRIPPER, TORQUE
 from tests.helpers.runs import TINY, snakemake
 
@@ -38,7 +38,7 @@ def test_the_last_row_is_what_its_own_trace_gives(tiny: Path) -> None:
     measured = np.load(results / "measurements" / CASE / "seeds_0-1.npz")
     target, trace = measured["target"], measured["traces"][1]
     response = step_response(GRIPPER, generalized_maxwell(found[PARAMETERS].to_numpy(float)))
-    fitted = rotation(response, TORQUE, measured["time_s"])[0]
+    fitted = superpose(response, TORQUE, measured["time_s"])[0]
     misfit = np.sqrt(np.mean((fitted - trace) ** 2))
     assert misfit == pytest.approx(found["misfit"], rel=1e-6)
     noise = trace - target

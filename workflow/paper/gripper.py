@@ -30,9 +30,8 @@ from biogrip.figures.style import (
     styled,
 )
 from biogrip.physics import gripper as actuator
-from biogrip.physics.contact import LARGEST_M, SMALLEST_M, contact
-from biogrip.physics.gripper import CombDrive, Gripper
-from biogrip.physics.protocol import torque_at, torque_history
+from biogrip.physics.gripper import LARGEST_M, SMALLEST_M, CombDrive, Gripper, contact
+from biogrip.physics.protocol import evaluate, join_phases
 from biogrip.physics.simulation import simulated_response
 from biogrip.stages.job import job_study, logged
 from biogrip.study.study import Study
@@ -43,7 +42,7 @@ if TYPE_CHECKING:
 
 def draw_comb(study: Study) -> Figure:
     """Draw all fingers, the first few enlarged, and eq. (9) with the operating points."""
-    comb, steps = study.actuator, torque_history(study.phases)
+    comb, steps = study.actuator, join_phases(study.phases)
     drawn = figure(PAGE_IN, 4.4)
     places = drawn.add_gridspec(2, 2, height_ratios=[1.0, 1.3], width_ratios=[1.1, 1.0])
     whole = drawn.add_subplot(places[0, :])
@@ -60,7 +59,7 @@ def draw_comb(study: Study) -> Figure:
     _dimensions(detail, comb)
     detail.set_ylim(1e6 * comb.first_radius_m - 9, 1e6 * comb.first_radius_m + 14 * shown + 4)
 
-    torques = np.unique(torque_at(steps, steps.time_s))
+    torques = np.unique(evaluate(steps, steps.time_s))
     torques = torques[torques > 0]
     volts = actuator.voltage(comb, torques)
     grid = np.linspace(0, 1.25 * volts.max(), 200)
@@ -123,28 +122,24 @@ def _dimensions(axes: Axes, comb: CombDrive) -> None:
 def draw_torque(study: Study) -> Figure:
     """Draw torque and voltage of both arms against time."""
     comb = study.actuator
-    history = torque_history(study.phases)
+    history = join_phases(study.phases)
     # Include both sides of every jump, and enough points for ramps.
     grid = np.linspace(0, history.end_s, 4001)
     time_s = np.sort(np.concatenate((grid, history.time_s, np.nextafter(history.time_s, -1))))
-    arms = [np.maximum(torque_at(history, time_s, arm), 0) for arm in ("left", "right")]
+    torque = np.maximum(evaluate(history, time_s), 0)
     ends = np.append(history.time_s, history.end_s)
     drawn = figure(COLUMN_IN, 3.0)
     upper, lower = drawn.subplots(2, 1, sharex=True, height_ratios=[1, 1.6])
-    _curve(upper, time_s, ends, [1e9 * torque for torque in arms], "nN m", BLUE, "")
-    most = 1e9 * max(float(torque.max()) for torque in arms)
-    upper.set_ylim(0, 1.4 * most)
+    _curve(upper, time_s, ends, 1e9 * torque, "nN m", BLUE, "")
+    upper.set_ylim(0, 1.4e9 * float(torque.max()))
 
     highest = 0.0
     for touching_Nm, colour, label in _touching(study):
-        volts = [actuator.voltage(comb, touching_Nm + torque) for torque in arms]
+        volts = actuator.voltage(comb, touching_Nm + torque)
         _curve(lower, time_s, ends, volts, "V", colour, label)
-        highest = max(highest, *(float(v.max()) for v in volts))
+        highest = max(highest, float(volts.max()))
     lower.set_ylim(0, 1.5 * highest)
     lower.legend(loc="upper center", ncols=3, columnspacing=1.0)
-    if not history.symmetric:
-        upper.plot([], [], "--", color=BLUE, linewidth=1, label="right arm")
-        upper.legend()
     upper.set_ylabel("torque (nN m)")
     lower.set(ylabel="voltage (V)", xlabel="time (s)")
     drawn.align_ylabels()
@@ -164,16 +159,13 @@ def _touching(study: Study) -> Iterator[tuple[float, str, str]]:
 
 
 def _curve(
-    axes: Axes, time_s: Array, ends: Array, arms: list[Array], unit: str, colour: str, label: str
+    axes: Axes, time_s: Array, ends: Array, values: Array, unit: str, colour: str, label: str
 ) -> None:
-    """Draw the values of both arms, and annotate held values."""
-    left, right = arms
-    axes.plot(time_s, left, color=colour, linewidth=1.4, label=label)
-    if not np.array_equal(left, right):
-        axes.plot(time_s, right, "--", color=colour, linewidth=1)
+    """Draw values, and annotate those that are held."""
+    axes.plot(time_s, values, color=colour, linewidth=1.4, label=label)
     for start, end in pairwise(ends):
-        here = left[(time_s >= start) & (time_s < end)]
-        if np.ptp(here) < 1e-9 * left.max():
+        here = values[(time_s >= start) & (time_s < end)]
+        if np.ptp(here) < 1e-9 * values.max():
             text, place = f"{here[0]:.3g} {unit}", (0.5 * (start + end), here[0])
             style: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "fontsize": 7}
             axes.annotate(text, place, (0, 2), **style)

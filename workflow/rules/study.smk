@@ -11,7 +11,7 @@ rule target:
     params:
         **settings_of(
             *"instrument gripper actuator protocol sample fixed contact models".split(),
-            *(f"measurement.{key}" for key in ("rate_Hz", "bursts", "file")),
+            *(f"measurement.{key}" for key in ("rate_Hz", "file")),
         ),
     message:
         "Simulating the response of {wildcards.case}"

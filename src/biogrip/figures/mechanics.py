@@ -19,8 +19,8 @@ from biogrip.figures.style import (
     figure,
     panel,
 )
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.nonlinear import correction
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.simulation import jaw_force
 from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
 from biogrip.records.identifications import DIFFERENCES
@@ -122,8 +122,8 @@ def _difference(axes: Axes, case: Case) -> None:
     """Draw the nonlinear minus the linear rotation, as the curves themselves look the same."""
     gripper, network, torque = case.gripper, case.network, case.torque.times(_SHOWN_FACTOR)
     time_s = np.linspace(0, torque.end_s, 1001)
-    response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
-    linear = rotation(response, torque, time_s)[0]
+    response = step_response(gripper, network, inertia=False)
+    linear = superpose(response, torque, time_s)[0]
     difference = correction(gripper, network, torque).at(time_s)[0]
     axes.plot(time_s, 1e3 * difference, color=BLUE)
     axes.axhline(0, color=TARGET, linewidth=0.6)

@@ -11,7 +11,7 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import ALL, basins
 from biogrip.fit.problem import CaseProblem
-from biogrip.physics.instruments import ROTATION, Quantity
+from biogrip.physics.instruments import ROTATION, Channel
 from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import within
 from biogrip.records.identifications import read_histories, read_identifications
@@ -37,7 +37,7 @@ class Fit:
     """Fitted rotation, (n_samples,)."""
     sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
-    read: Quantity = ROTATION
+    read: Channel = ROTATION
     """What is read."""
 
 

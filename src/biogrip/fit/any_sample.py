@@ -18,7 +18,7 @@ from scipy.optimize import nnls
 
 from biogrip.arrays import Array
 from biogrip.fit.problem import CaseProblem
-from biogrip.physics.modes import lagged_torques
+from biogrip.physics.modes import lag_course
 
 # Retardation times a decade; shortest over the sampling interval, longest over the protocol, and
 # that of what does not relax.
@@ -38,20 +38,12 @@ def extreme_responses(problem: CaseProblem, lags: Sequence[float]) -> Callable[[
     """Return a function of times, (n_rows,), that computes extreme responses, (n, n_rows).
 
     All samples' are non-negative combinations of them. A sample turns the left arm by
-    phi_2 = tau_2/k_2 - x (tau_2/k_2 - (tau_2 - tau_4)/(k_2 + k_4)), where x is the sample's
-    rigidity and decreases, as it relaxes, from at most 1 to at least 0. The extremes are: no
-    sample, rigid ones that relax with one of the lags, and a rigid one. Lags are shares of the
-    protocol; the shortest is negligible.
+    (1 - x) tau/k_2, where x is the sample's rigidity and decreases, as it relaxes, from at most 1
+    to at least 0. The extremes are: no sample, and rigid ones that relax with one of the lags. Lags
+    are shares of the protocol; the shortest is negligible.
     """
-    lagged, gripper = lagged_torques(problem.torque, lags), problem.gripper
-    k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
-
-    def responses(time_s: Array) -> Array:
-        torques = lagged(time_s)
-        alone, pushed = torques[: len(lags)] / k_2, torques[len(lags) :] / (k_2 + k_4)
-        return np.vstack((alone - pushed + pushed[0], pushed[0])) if len(pushed) else alone
-
-    return responses
+    lagged, stiffness = lag_course(problem.torque, lags), problem.gripper.left
+    return lambda time_s: lagged(time_s) / stiffness.stiffness_Nm_per_rad
 
 
 def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:

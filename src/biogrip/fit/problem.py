@@ -16,7 +16,7 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
-from biogrip.physics.protocol import Phase, TorqueHistory, torque_history
+from biogrip.physics.protocol import Course, Phase, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.physics.whitening import (
@@ -178,9 +178,9 @@ class CaseProblem:
     """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
 
     @cached_property
-    def torque(self) -> TorqueHistory:
+    def torque(self) -> Course:
         """Torque of both arms, or what else is held, against time."""
-        return torque_history(self.phases, deforms=self.instrument.deforms)
+        return join_phases(self.phases, deforms=self.instrument.deforms)
 
     @cached_property
     def model(self) -> SampleModel:

@@ -11,7 +11,7 @@ from biogrip import __version__
 from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_path, write_text
-from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Quantity
+from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
 from biogrip.records.rows import write_rows
 from biogrip.terminal import visible, visible_lines
 
@@ -71,7 +71,7 @@ def check_output(output: Path) -> None:
     raise BiogripError(f"{visible(output)}: {text}")
 
 
-def in_own_units(data: Any, read: Quantity) -> Any:
+def in_own_units(data: Any, read: Channel) -> Any:
     """Return data whose keys end with the unit of what is read, instead of radians."""
     if isinstance(data, list):
         return [in_own_units(each, read) for each in data]
@@ -80,7 +80,7 @@ def in_own_units(data: Any, read: Quantity) -> Any:
     return {_in_units(key, read): in_own_units(each, read) for key, each in data.items()}
 
 
-def _in_units(name: str, read: Quantity) -> str:
+def _in_units(name: str, read: Channel) -> str:
     return _RADIANS.sub(read.suffix, name)
 
 

@@ -36,7 +36,7 @@ from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.verdicts import Finding
-from biogrip.physics.protocol import Load, Phase
+from biogrip.physics.protocol import Phase, ramp
 from biogrip.physics.whitening import estimate_noise
 
 # So that correlated noise does not look like a late onset; and level of other tests.
@@ -201,11 +201,14 @@ def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramp: tuple[Phase, ...]) 
 def _with_ramp(case_problem: CaseProblem, time_s: Array) -> tuple[Phase, ...]:
     """Return phases with a ramp up to the first reading, none but for a hold until after that."""
     first, *rest = case_problem.phases
-    loads, delay_s = (first.left, first.right), float(time_s[0])
-    if not 0 < delay_s < first.duration_s or any(own != Load(own.value_Nm) for own in loads):
+    delay_s = float(time_s[0])
+    if not 0 < delay_s < first.duration_s or first.slope or first.curvature:
         return ()
-    ramp = Phase(delay_s, *(Load(0.0, own.value_Nm / delay_s) for own in loads))
-    return ramp, replace(first, duration_s=first.duration_s - delay_s), *rest
+    return (
+        ramp(delay_s, 0.0, first.level),
+        replace(first, duration_s=first.duration_s - delay_s),
+        *rest,
+    )
 
 
 def onset_limits(best: Likelihood, time_s: Array) -> tuple[float, float]:

@@ -1,14 +1,14 @@
 """Condensed least squares: a few rows with the sum of squares of all readings.
 
 First, nodes replace dense readings in sums of products of smooth functions (`DenseSamples`). After
-a change of torque, modes of all rates respond; later, only slow ones remain. On a piece of time
+a change of the load, modes of all rates respond; later, only slow ones remain. On a piece of time
 twice as far from the last change at its end as at its start, a response is a polynomial of degree
 19 to 1e-15 of its peak, whatever the rate: with e^(-rho (3 + s)), |s| <= 1, Chebyshev coefficients
 fall like 5.8^-n [1]_. Earlier changes are further away. So a piece with thousands of readings needs
 twenty nodes, and sums of products over its readings follow from one small matrix, which is summed
 up block by block. If readings are few, they are the nodes.
 
-Second, a few times replace the nodes (`Condensed`). The linear rotation of any sample is a weighted
+Second, a few times replace the nodes (`Condensed`). The linear response of any sample is a weighted
 sum of the responses of modes to the protocol, g(t; r). Over all rates r these nearly span a space
 of some fifty dimensions only, in which a function is determined by its values at as many
 well-chosen times [2]_, [3]_. So a response is simulated at those times, and a square matrix turns
@@ -35,7 +35,7 @@ from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array, IntArray
 from biogrip.physics.modes import mode_responses
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import ModeRows
 from biogrip.physics.whitening import Whitening, without
 
@@ -46,18 +46,18 @@ _PLACES = chebyshev.chebpts1(_NODES)
 # over readings that are dense all over a piece.
 _TO_SERIES = np.linalg.inv(legendre.legvander(_PLACES, _DEGREE))
 # Fewer readings are their own nodes; so are those whose matrix is worse conditioned.
-_FEWEST, _LARGEST_CONDITION = 256, 100.0
+_FEWEST_READINGS, _LARGEST_CONDITION = 256, 100.0
 # Readings whose polynomials are formed at once.
-_AT_ONCE = 16_384
+_READINGS_AT_ONCE = 16_384
 # Most readings whose polynomials are kept for the next trace.
-_MOST_KEPT = 100_000
+_MOST_READINGS_KEPT = 100_000
 
 # Spacing of rates in log(1 - T r), T the last time: far closer than modes can be resolved.
-_SPACING = 0.25
+_SPACING_OF_RATES = 0.25
 # Slowest rate times T, and fastest rate times the shortest sampling interval.
-_SLOWEST, _FASTEST = 1e-6, 1e3
+_SLOWEST_RATE, _FASTEST_RATE = 1e-6, 1e3
 # Directions with a smaller relative singular value are rounding errors.
-_RANK = 1e-14
+_LEAST_SINGULAR_VALUE = 1e-14
 
 
 @dataclass(frozen=True)
@@ -75,14 +75,14 @@ class _Piece:
 class DenseSamples:
     """Rows with the products of all readings, for any smooth functions of time.
 
-    Functions are smooth between changes of the torque. Sampling times, (n_samples,), ascend. Only
+    Functions are smooth between changes of the load. Sampling times, (n_samples,), ascend. Only
     if `dense` may nodes replace readings; otherwise each reading is a node.
     """
 
-    def __init__(self, torque: TorqueHistory, time_s: Array, *, dense: bool = True) -> None:
+    def __init__(self, course: Course, time_s: Array, *, dense: bool = True) -> None:
         self._all_s = time_s
         self._kept: dict[tuple[int, int], list[tuple[slice, Array]]] = {}
-        starts = torque.changes_s
+        starts = course.changes_s
         self._starts_s = np.append(-np.inf, starts)
         bounds = np.unique(np.concatenate(([0], time_s.searchsorted(starts), [len(time_s)])))
         self._pieces = [_Piece(0, len(time_s), time_s)]
@@ -141,7 +141,7 @@ class DenseSamples:
 
     def _divided(self, first: int, stop: int) -> Iterator[_Piece]:
         """Halve pieces that are not smooth, or not dense all over, down to few readings."""
-        if stop - first < _FEWEST:
+        if stop - first < _FEWEST_READINGS:
             yield _Piece(first, stop, self._all_s[first:stop])
             return
         start, end = self._all_s[first], self._all_s[stop - 1]
@@ -162,7 +162,7 @@ class DenseSamples:
 
     def _blocks(self, first: int, stop: int) -> Iterator[tuple[slice, Array]]:
         """Yield Legendre polynomials at a piece's readings, (n_samples, n_nodes), by blocks."""
-        if len(self._all_s) > _MOST_KEPT:
+        if len(self._all_s) > _MOST_READINGS_KEPT:
             return self._formed(first, stop)
         if (first, stop) not in self._kept:
             self._kept[first, stop] = list(self._formed(first, stop))
@@ -170,8 +170,8 @@ class DenseSamples:
 
     def _formed(self, first: int, stop: int) -> Iterator[tuple[slice, Array]]:
         start, end = self._all_s[first], self._all_s[stop - 1]
-        for here in range(first, stop, _AT_ONCE):
-            block = slice(here, min(here + _AT_ONCE, stop))
+        for here in range(first, stop, _READINGS_AT_ONCE):
+            block = slice(here, min(here + _READINGS_AT_ONCE, stop))
             place = (2 * self._all_s[block] - start - end) / (end - start)
             yield block, legendre.legvander(place, _DEGREE)
 
@@ -180,7 +180,7 @@ class DenseSamples:
 class Condensed:
     """Condensed rows that replace the readings of any trace of a protocol in least squares."""
 
-    torque: TorqueHistory
+    course: Course
     """The protocol."""
     all_s: Array
     """Ascending sampling times, (n_samples,)."""
@@ -237,16 +237,16 @@ class Condensed:
     @cached_property
     def of_modes(self) -> ModeRows:
         """Function from modes of many samples to rows of their responses."""
-        elapsed = np.subtract.outer(self.time_s, self.torque.changes_s)
+        elapsed = np.subtract.outer(self.time_s, self.course.changes_s)
         shortest_s = float(np.min(elapsed, where=elapsed > 0, initial=self.time_s[-1]))
-        return ModeRows(self.torque, self.time_s, self.to_rows, shortest_s)
+        return ModeRows(self.course, self.time_s, self.to_rows, shortest_s)
 
     @cached_property
     def dense(self) -> DenseSamples:
         """Nodes that replace the readings."""
         # Whitened functions are not smooth: each reading is a node.
         dense = self.whitening is None
-        return DenseSamples(self.torque, self.all_s, dense=dense)
+        return DenseSamples(self.course, self.all_s, dense=dense)
 
     @cached_property
     def _nuisance_rows(self) -> Array:
@@ -259,18 +259,23 @@ class Condensed:
         """Orthonormal rows of the nodes that span all responses, (n_nodes, n_rows)."""
         end_s, time_s = self.all_s[-1], self.dense.time_s
         shortest_s = np.diff(self.all_s).min()
-        last = np.log1p(_FASTEST * end_s / shortest_s)
-        rates = -np.expm1(np.append(_SLOWEST, np.arange(_SPACING, last, _SPACING))) / end_s
+        last = np.log1p(_FASTEST_RATE * end_s / shortest_s)
+        rates = (
+            -np.expm1(
+                np.append(_SLOWEST_RATE, np.arange(_SPACING_OF_RATES, last, _SPACING_OF_RATES))
+            )
+            / end_s
+        )
         growth, slope = (
             self.dense.rows_of_values(of[0])
-            for of in mode_responses(rates[None], self.torque, time_s)
+            for of in mode_responses(rates[None], self.course, time_s)
         )
-        size = np.linalg.norm(growth, axis=2, keepdims=True)
+        size = np.linalg.norm(growth, axis=1, keepdims=True)
         size[size == 0] = 1.0
         family = np.concatenate((growth / size, rates[:, None] * slope / size))
         basis, triangle = np.linalg.qr(family.reshape(-1, len(time_s)).T)
         turned, share, _ = np.linalg.svd(triangle)
-        return basis @ turned[:, share > _RANK * share[0]]
+        return basis @ turned[:, share > _LEAST_SINGULAR_VALUE * share[0]]
 
     @cached_property
     def _chosen(self) -> IntArray:

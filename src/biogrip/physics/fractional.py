@@ -75,11 +75,11 @@ from biogrip.physics.sample_model import C_P, K_P, C, K, Network, Parameter, Sam
 SHORTEST_S, LONGEST_S = 1e-5, 1e5
 """Range of times, and of reciprocal rates, in which the ladder is a springpot to 1e-6."""
 
-_STEP, _WHOLE = 0.6, 45
+_STEP, _COUNT = 0.6, 45
 _SLOWEST_PER_S = 0.5e-5
 _NODES = 3
 
-_RATES = _SLOWEST_PER_S * np.exp(_STEP * np.arange(_WHOLE))
+_RATES = _SLOWEST_PER_S * np.exp(_STEP * np.arange(_COUNT))
 # The first rate left out is e^-h times the last one kept; the nodes go a little beyond.
 _PLACES = np.exp(-_STEP / 2) * (np.sin(np.pi * np.arange(_NODES + 1) / (2 * _NODES + 1)) ** 2)
 
@@ -102,11 +102,11 @@ def _interpolation(places: Array) -> Array:
 _TO_WEIGHTS = _interpolation(_PLACES)
 
 
-_ROUNDING = 2.0**-44
+_LEAST_EXPONENT = 2.0**-44
 # Spring of a branch that equal ladders in series do not have, in N/m: no response shows it.
-_GONE = 1e-30
+_SPRING_OF_NO_BRANCH = 1e-30
 # Least relative distance of the rates of two springpots in series.
-_APART = 2e-6
+_LEAST_GAP_OF_RATES = 2e-6
 
 
 @dataclass(frozen=True)
@@ -173,10 +173,10 @@ def series(first: Ladder, second: Ladder) -> Network:
     springs = ((1 - share) * of_first - share * of_second) ** 2 / steepness
     rates = zeros.values
     if np.all(product := first.springs * second.springs):
-        springs = np.where(springs == 0, _GONE, springs)
+        springs = np.where(springs == 0, _SPRING_OF_NO_BRANCH, springs)
         shared, own = product / both.springs, springs[1:]
         # Rates that are nearly equal cost digits: apart, with the same mean, they do not.
-        lack = np.maximum(_APART * poles[1:] - (rates[1:] - poles[1:]).real, 0)
+        lack = np.maximum(_LEAST_GAP_OF_RATES * poles[1:] - (rates[1:] - poles[1:]).real, 0)
         share = shared / (shared + own)
         rates[1:] += lack * share
         rates = np.concatenate((rates, poles[1:] - lack * (1 - share)))
@@ -196,8 +196,8 @@ def ladder(modulus_N_per_m: NDArray[Any], exponent: NDArray[Any]) -> Ladder:
     analytic function.
     """
     # At 0 and 1, where tails would be infinite, the next exponent gives the same response.
-    exponent = np.where(exponent == 0, _ROUNDING, exponent)
-    exponent = np.where(exponent == 1, 1 - _ROUNDING, exponent)
+    exponent = np.where(exponent == 0, _LEAST_EXPONENT, exponent)
+    exponent = np.where(exponent == 1, 1 - _LEAST_EXPONENT, exponent)
     # sin(pi alpha), with all digits near one, too.
     near = np.where(np.real(exponent) > 0.5, 1 - exponent, exponent)
     density = modulus_N_per_m * _STEP * np.sin(np.pi * near) / np.pi

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Channel:
     """A quantity that an instrument controls or reads."""
 
     name: str
@@ -47,9 +47,9 @@ class Instrument:
 
     kind: str
     """`gripper`, `creep` or `relaxation`."""
-    controlled: Quantity
+    controlled: Channel
     """What the protocol sets."""
-    read: Quantity
+    read: Channel
     """What a trace is of."""
     per_area: bool = False
     """True if stiffness is a modulus, in Pa."""
@@ -73,10 +73,10 @@ class Instrument:
         return self.kind == "gripper"
 
 
-TORQUE = Quantity(
+TORQUE = Channel(
     "torque", "N m", {"N m": 1.0, "mN m": 1e-3, "uN m": 1e-6, "nN m": 1e-9, "pN m": 1e-12}
 )
-ROTATION = Quantity(
+ROTATION = Channel(
     "rotation",
     "rad",
     {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180},
@@ -89,18 +89,18 @@ STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "mPa": 1e-3}
 """Units of stresses and moduli."""
 
 _FORCES = {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "pN": 1e-12, "kN": 1e3, "MN": 1e6}
-FORCE = Quantity("force", "N", _FORCES | {"gf": 9.80665e-3, "kgf": 9.80665})
-DISPLACEMENT = Quantity(
+FORCE = Channel("force", "N", _FORCES | {"gf": 9.80665e-3, "kgf": 9.80665})
+DISPLACEMENT = Channel(
     "displacement", "m", {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 )
-STRESS = Quantity("stress", "Pa", STRESS_UNITS)
-STRAIN = Quantity("strain", "", {"1": 1.0, "%": 1e-2, "‰": 1e-3, "ppm": 1e-6})
+STRESS = Channel("stress", "Pa", STRESS_UNITS)
+STRAIN = Channel("strain", "", {"1": 1.0, "%": 1e-2, "‰": 1e-3, "ppm": 1e-6})
 
-COMPLIANCE = Quantity(
+COMPLIANCE = Channel(
     "compliance", "1/Pa", {f"1/{unit}": 1 / size for unit, size in STRESS_UNITS.items()}
 )
 
-MODULUS = Quantity("modulus", "Pa", STRESS_UNITS)
+MODULUS = Channel("modulus", "Pa", STRESS_UNITS)
 
 INSTRUMENTS: dict[str, Instrument] = {
     instrument.read.name: instrument

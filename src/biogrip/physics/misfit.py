@@ -6,7 +6,7 @@ the samples y_n expands into geometric series in z_i z_j, and into the projectio
 the response of each mode. These projections are long sums, but functions of the mode's rate alone:
 computed once at some hundred rates, they are interpolated for all others. No response is formed.
 Other samples, grippers, protocols and samplings, and noise that is not white, need the condensed
-rows of `biogrip.physics.residuals`, which take two to seven times as long.
+rows of `biogrip.physics.residuals`, which take three to ten times as long.
 
 The misfit of an individual is computed element by element, in a fixed order, without reductions of
 arrays: it does not depend, to the last bit, on the rest of the population or on the number of
@@ -20,15 +20,14 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray, parts
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.linear import is_symmetric
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import DecayTable
 from biogrip.physics.residuals import Residuals
-from biogrip.physics.roots import real_quadratic_roots
+from biogrip.physics.roots import zeros_of_one_branch
 from biogrip.physics.sample_model import Network, SampleModel
 
 # Individuals computed together: many enough for few calls, few enough for the cache.
-_AT_ONCE = 7000
+_INDIVIDUALS_AT_ONCE = 7000
 
 Misfit = Callable[[Array], Array]
 """Function from parameters, (n, n_parameters), to RMS misfits in the unit of the readings, (n,)."""
@@ -41,20 +40,20 @@ def make_misfit(residuals: Residuals) -> Misfit:
     """Return the RMS misfit to the trace of residuals.
 
     That of residuals serves any protocol, sampling, noise, sample and gripper. `SeriesMisfit` is
-    the paper's: of a sample with one Maxwell branch between equal arms that steps of a torque drive
-    alike, sampled uniformly from the start on, with a reading at each step, in white noise alone.
+    the paper's: of a sample with one Maxwell branch between equal arms under steps of a torque,
+    sampled uniformly from the start on, with a reading at each step, in white noise alone.
     """
-    torque, trace = residuals.torque, residuals.trace
+    course, trace = residuals.course, residuals.trace
     intervals, end_s = max(residuals.samples - 1, 1), residuals.duration_s
-    steps = torque.time_s * intervals / end_s
+    steps = course.time_s * intervals / end_s
     even = np.allclose(trace.time_s * intervals / end_s, np.arange(residuals.samples), rtol=1e-9)
     if (
         (even and np.allclose(steps, np.rint(steps), rtol=0, atol=1e-9))
-        and (torque.only_steps and not torque.deforms and residuals.plain)
-        and is_symmetric(residuals.gripper, torque)
+        and (course.only_steps and not course.deforms and residuals.plain)
+        and residuals.gripper.left == residuals.gripper.right
         and residuals.model.network([residuals.model.example]).k.shape[1] == 1
     ):
-        given = residuals.gripper, residuals.model, torque, end_s / intervals
+        given = residuals.gripper, residuals.model, course, end_s / intervals
         return SeriesMisfit(*given, trace.readings)
     return residuals.misfit
 
@@ -77,27 +76,27 @@ def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:
 
 
 class SeriesMisfit:
-    """RMS difference between the model's rotation and uniformly sampled traces.
+    """RMS difference between the model's response and uniformly sampled traces.
 
-    For torque steps, by the linear model without inertia; the first sample is at t = 0, and one is
-    at every step. Traces of the left arm are (n_samples,) or (n_traces, n_samples).
+    For steps, by the linear model without inertia; the first sample is at t = 0, and one is
+    at every step. Traces are (n_samples,) or (n_traces, n_samples).
     """
 
     def __init__(
         self,
         gripper: Gripper,
         model: SampleModel,
-        torque: TorqueHistory,
+        course: Course,
         interval_s: float,
         readings: Array,
     ) -> None:
-        self._simulated = (gripper, model, torque, interval_s)
+        self._simulated = (gripper, model, course, interval_s)
         self._traces = np.atleast_2d(readings)
         self._samples = self._traces.shape[1]
         # Change of the torque at the start of each phase, and level after it.
-        self._heights = torque.left[:, 0, None, None]
-        self._levels = np.cumsum(torque.left[:, 0])[:, None, None]
-        starts = np.rint(torque.time_s / interval_s).astype(np.int64)
+        self._heights = course.changes[:, 0, None, None]
+        self._levels = np.cumsum(course.changes[:, 0])[:, None, None]
+        starts = np.rint(course.time_s / interval_s).astype(np.int64)
         self._first_samples = np.minimum(starts, self._samples)
         # Numbers of readings: one, and those of each phase.
         lengths = np.concatenate(([1], np.diff(self._first_samples, append=self._samples)))
@@ -111,9 +110,9 @@ class SeriesMisfit:
 
     def joins(self, other: "SeriesMisfit") -> bool:
         """Return True if only the traces of both may differ."""
-        gripper, model, torque, interval_s = self._simulated
-        others, others_model, others_torque, others_interval_s = other._simulated
-        same = model is others_model and torque is others_torque and gripper == others
+        gripper, model, course, interval_s = self._simulated
+        others, others_model, others_course, others_interval_s = other._simulated
+        same = model is others_model and course is others_course and gripper == others
         return same and (interval_s, self._samples) == (others_interval_s, other._samples)
 
     @cached_property
@@ -132,7 +131,7 @@ class SeriesMisfit:
         are given by their indices, (n_populations,).
         """
         populations, size = parameters.shape[:2]
-        some = max(1, _AT_ONCE // size)
+        some = max(1, _INDIVIDUALS_AT_ONCE // size)
         misfit = np.empty((populations, size))
         for these in parts(populations, some):
             misfit[these] = self._of_some(parameters[these], traces[these])
@@ -209,10 +208,10 @@ class SeriesMisfit:
 
 
 def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array, Array]:
-    """Compute the response of either of two equal arms to a unit step of both torques.
+    """Compute the response of either of two equal arms to a unit step of the torque.
 
     A sample with one Maxwell branch has two modes without inertia. This special case of
-    `biogrip.physics.linear` is written out for speed: populations are small, and most time goes
+    `biogrip.physics.response` is written out for speed: populations are small, and most time goes
     into calls.
 
     Returns
@@ -224,22 +223,15 @@ def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array,
     weights : (2, n)
         Weights of the exponentials, in rad per N m.
     """
-    k_p, c_p, c = network.k_p, network.c_p, network.c[:, 0]
-    relaxation_s = c / network.k[:, 0]
-    coupling = 2 * lever_m**2
-    stiffness, damping = arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad
-    # The denominator Z Q + 2 b^2 P, ascending powers.
-    denominator = np.empty((3, len(k_p)))
-    denominator[0] = coupling * k_p + stiffness
-    denominator[1] = coupling * (k_p * relaxation_s + c_p + c) + (
-        stiffness * relaxation_s + damping
-    )
-    denominator[2] = (coupling * c_p + damping) * relaxation_s
-    rates = real_quadratic_roots(denominator.T).T
-    slope = denominator[2] * (rates[0] - rates[1])
-    weights = (1 + relaxation_s * rates) / (rates * slope)
-    np.negative(weights[1], out=weights[1])
-    return 1 / denominator[0], rates, weights
+    squared_lever = lever_m**2
+    rate = network.k[:, 0] / network.c[:, 0]
+    spring = squared_lever * network.k_p + 0.5 * arm.stiffness_Nm_per_rad
+    branch = squared_lever * network.k[:, 0]
+    damper = squared_lever * network.c_p + 0.5 * arm.damping_Nms_per_rad
+    zeros = zeros_of_one_branch((spring, branch), rate, damper)
+    x = zeros.values
+    share = x / zeros.from_pole(rate)
+    return 0.5 / spring, -x, -0.5 / (spring + branch * share * share)
 
 
 def _sum(terms: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Noise that is added to simulated rotations: white, autocorrelated, a drift, and outliers."""
+"""Noise that is added to simulated traces: white, autocorrelated, a drift, and outliers."""
 
 import hashlib
 from collections.abc import Callable, Iterator
@@ -13,9 +13,9 @@ from biogrip.keys import Block, OneOf, Problem
 
 # Relaxation times of flicker noise are so many e-folds apart, or less: its spectrum is 1/f to
 # within 2 exp(-pi^2 / 1.5) = 0.3 %, as Poisson's summation has it.
-_EFOLDS = 1.5
+_EFOLDS_APART = 1.5
 # Longest relaxation time over the length of the trace: slower processes are offsets.
-_SLOWEST = 3.0
+_LONGEST_TIME = 3.0
 
 _HALF_WIDTH = np.sqrt(3.0)
 
@@ -65,15 +65,15 @@ class Outliers(Block):
 
 @dataclass(frozen=True)
 class Noise(Block):
-    """Noise added to the noise-free rotation; components beside white noise can be combined."""
+    """Noise added to the noise-free trace; components beside white noise can be combined."""
 
     kind: Annotated[str, OneOf(KINDS)]
     """Distribution of what is white of the noise."""
     level: Annotated[float, Field(ge=0, le=10)]
     """Standard deviation of the noise, as a share of the reference."""
     reference: Annotated[str, OneOf(("peak", "signal"))]
-    """Reference of `level`. `peak`: the largest rotation of the noise-free trace, the same noise
-    everywhere; `signal`: the noise-free rotation at each instant."""
+    """Reference of `level`. `peak`: the largest reading of the noise-free trace, the same noise
+    everywhere; `signal`: the noise-free reading at each instant."""
     level_rad: Annotated[float | None, Field(ge=0, le=1e12)] = None
     """Standard deviation of the noise as an instrument has it, the same whatever the sample, e.g.
     3.0e-6. Where it is given, `level` does not count."""
@@ -197,9 +197,9 @@ def flicker_rates(time_s: Array) -> Array:
     .. [1] E. Milotti, 1/f noise: a pedagogical review, arXiv:physics/0204033, 2002, section 3:
        a superposition of relaxation processes.
     """
-    slowest = 1 / (_SLOWEST * (time_s[-1] - time_s[0]))
+    slowest = 1 / (_LONGEST_TIME * (time_s[-1] - time_s[0]))
     fastest = 1 / float(np.diff(time_s).min())
-    count = 2 + int(np.log(fastest / slowest) / _EFOLDS)
+    count = 2 + int(np.log(fastest / slowest) / _EFOLDS_APART)
     return np.geomspace(slowest, fastest, count)
 
 

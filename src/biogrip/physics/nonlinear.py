@@ -31,14 +31,8 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
-from biogrip.physics.linear import (
-    LEFT,
-    StepResponse,
-    is_symmetric,
-    rotation,
-    step_response,
-)
-from biogrip.physics.protocol import TorqueHistory, drives, torque_at
+from biogrip.physics.protocol import Course, evaluate
+from biogrip.physics.response import LEFT, step_response, superpose, weights_of_loads
 from biogrip.physics.sample_model import Network
 
 _STAGES = 5
@@ -48,7 +42,7 @@ _STAGES = 5
 # length to the one before: the error was below 1e-7 of the peak in all tests.
 _FIRST_S, _GROWTH = 1e-8, 1.3
 # Largest change in the last sweep, relative to the peak, and limit of sweeps.
-_TOLERANCE, _MOST_SWEEPS = 1e-13, 200
+_LARGEST_CHANGE, _MOST_SWEEPS = 1e-13, 200
 
 
 @dataclass(frozen=True)
@@ -100,7 +94,7 @@ class Correction:
 
 
 def nonlinear_rotation(
-    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, arm: int = LEFT
+    gripper: Gripper, network: Network, torque: Course, time_s: Array, arm: int = LEFT
 ) -> Array:
     """Compute the closing rotation of an arm in rad, (n, n_times), by the nonlinear model.
 
@@ -110,12 +104,12 @@ def nonlinear_rotation(
         If the torque closes the arms beyond what the model describes.
     """
     found = correction(gripper, network, torque).checked()
-    linear = step_response(gripper, network, symmetric=torque.symmetric)
-    return rotation(linear, torque, time_s, arm) + found.at(time_s, arm)
+    linear = step_response(gripper, network)
+    return superpose(linear, torque, time_s, arm) + found.at(time_s, arm)
 
 
 def correction(
-    gripper: Gripper, network: Network, torque: TorqueHistory, factors: Array | None = None
+    gripper: Gripper, network: Network, torque: Course, factors: Array | None = None
 ) -> Correction:
     """Compute nonlinear minus linear rotation, without inertia.
 
@@ -126,23 +120,20 @@ def correction(
     factors : (n,)
         Factors on the torque of each sample, if any.
     """
-    symmetric = is_symmetric(gripper, torque)
-    arms = [gripper.left] if symmetric else [gripper.left, gripper.right]
-    response = step_response(gripper, network, symmetric=symmetric, inertia=False)
+    arms = [gripper.left] if gripper.left == gripper.right else [gripper.left, gripper.right]
+    response = step_response(gripper, network, inertia=False)
     edges = _mesh(torque)
-    modes = _Modes(response, np.diff(edges))
+    modes = _Modes(response.rates, weights_of_loads(gripper, network), np.diff(edges))
     nodes = _nodes(edges)
     before_jumps = np.minimum(nodes, np.nextafter(edges[1:, None], 0)).ravel()
     shape = (len(network.k_p), len(arms), *nodes.shape)
     b_0 = gripper.lever_m
-    linear, linear_rate, tau = np.empty(shape), np.empty(shape), np.empty(shape[1:])
-    for index, name in enumerate(("left", "right")[: len(arms)]):
-        phi = rotation(response, torque, nodes.ravel(), index)
-        rate = rotation(response, torque, before_jumps, index, rate=True)
-        linear[:, index], linear_rate[:, index] = (
-            of.reshape(-1, *nodes.shape) for of in (phi, rate)
-        )
-        tau[index] = torque_at(torque, before_jumps, name).reshape(nodes.shape)
+    linear, linear_rate = np.empty(shape), np.empty(shape)
+    for arm in range(len(arms)):
+        phi = superpose(response, torque, nodes.ravel(), arm)
+        rate = superpose(response, torque, before_jumps, arm, rate=True)
+        linear[:, arm], linear_rate[:, arm] = (of.reshape(-1, *nodes.shape) for of in (phi, rate))
+    tau = evaluate(torque, before_jumps).reshape(nodes.shape)
     times = np.ones(shape[0]) if factors is None else factors
     linear, linear_rate, tau = (
         times[:, None, None, None] * each for each in (linear, linear_rate, tau)
@@ -156,11 +147,12 @@ def correction(
         u = b_0 * (linear[left] + extra[left])
         u_rate = b_0 * (linear_rate[left] + extra_rate[left])
         loads[left] = load = b_0 * _load(gripper, arms, tau[left], u, u_rate)
-        as_drives = np.moveaxis(drives(load[:, 0], load[:, -1], symmetric), 0, 1)
-        found, extra_rate[left] = modes.respond(as_drives, left)
+        # That of both arms, and what that of the left one exceeds that of the right one by.
+        load[:, 1:] = load[:, :1] - load[:, 1:]
+        found, extra_rate[left] = modes.respond(load, left)
         change = np.abs(found - extra[left]).max(axis=(1, 2, 3))
         extra[left] = found
-        converged[left] = change <= _TOLERANCE * peak[left]
+        converged[left] = change <= _LARGEST_CHANGE * peak[left]
         left = left[~converged[left] & np.isfinite(change)]
         if not len(left):
             break
@@ -168,12 +160,12 @@ def correction(
     at_nodes = phi - linear
     values = np.concatenate((np.zeros((*shape[:3], 1)), at_nodes), axis=3)
     values[:, :, 1:, 0] = at_nodes[:, :, :-1, -1]
-    arm = gripper.left
-    force = loads - arm.damping_Nms_per_rad * extra_rate - arm.stiffness_Nm_per_rad * extra
-    return Correction(edges, values, _from_starts(force[:, 0] / b_0, edges, torque), converged)
+    held = gripper.left.stiffness_Nm_per_rad * extra + gripper.left.damping_Nms_per_rad * extra_rate
+    force = (loads - held)[:, 0] / b_0
+    return Correction(edges, values, _from_starts(force, edges, torque), converged)
 
 
-def _from_starts(force: Array, edges_s: Array, torque: TorqueHistory) -> Array:
+def _from_starts(force: Array, edges_s: Array, torque: Course) -> Array:
     """Complete values at the nodes by those at the starts of the elements.
 
     The force is continuous, but for jumps of the torque. The element that follows a jump
@@ -185,7 +177,7 @@ def _from_starts(force: Array, edges_s: Array, torque: TorqueHistory) -> Array:
     return np.concatenate((starts[..., None], force), axis=2)
 
 
-def _mesh(torque: TorqueHistory) -> Array:
+def _mesh(torque: Course) -> Array:
     """Return element edges from 0 to the end, graded towards every change of torque."""
     edges = [0.0]
     for start, end in pairwise([*torque.time_s.tolist(), torque.end_s]):
@@ -207,7 +199,7 @@ def _load(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array
     load = np.empty_like(u)
     for i, arm in enumerate(arms):
         stiffness, damping = arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad
-        load[:, i] = tau[:, i] * (1 / b[:, i] - 1 / b_0)
+        load[:, i] = tau[:, 0] * (1 / b[:, i] - 1 / b_0)
         load[:, i] -= stiffness * (phi[:, i] / b[:, i] - u[:, i] / b_0**2)
         load[:, i] -= damping * u_rate[:, i] * (1 / b[:, i] ** 2 - 1 / b_0**2)
     return load
@@ -216,9 +208,9 @@ def _load(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array
 class _Modes:
     """Computes the response of linear modes to loads given at the nodes of a mesh."""
 
-    def __init__(self, response: StepResponse, lengths_s: Array) -> None:
+    def __init__(self, rates: Array, weights: Array, lengths_s: Array) -> None:
         a, ones = _radau()[1], np.ones(_STAGES)
-        z = response.rates[:, :, None] * lengths_s
+        z = rates[:, :, None] * lengths_s
         # (1 - z A)^-1 through the eigenvectors of A: one scalar inverse each.
         eigenvalues, vectors = np.linalg.eig(a)
         products = np.einsum("ik,kj->kij", vectors, np.linalg.inv(vectors)).reshape(_STAGES, -1)
@@ -226,15 +218,13 @@ class _Modes:
         self._inverse = inverse.real.reshape(*z.shape, _STAGES, _STAGES)
         self._carry = self._inverse @ ones
         self._gain = lengths_s[:, None, None] * (self._inverse @ a)
-        self._rates = response.rates[:, None, :, None, None]
-        # Of one drive, one arm stands for both.
-        alone = response.weights[:, : response.weights.shape[2]]
-        self._residues = alone * response.rates[:, None, None, :]
+        self._rates = rates[:, None, :, None, None]
+        self._residues = weights * rates[:, None, None, :]
 
     def respond(self, load: Array, which: IntArray) -> tuple[Array, Array]:
         """Compute rotations and rates of arms at nodes, (n, n_arms, n_elements, _STAGES) each.
 
-        The loads there are (n, n_drives, n_elements, _STAGES), on samples with indices `which`.
+        The loads there are (n, n_loads, n_elements, _STAGES), on samples with indices `which`.
         """
         forced = np.einsum("nmeij,ndej->ndmei", self._gain[which], load)
         start = np.zeros(forced.shape[:4])

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from biogrip.arrays import Array, IntArray
 from biogrip.physics.modes import Modes, mode_responses
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 
 # Width and degree of wide pieces, and number of short pieces in one for sums and for rows.
 _WIDTH, _DEGREE = 0.25, 11
@@ -116,26 +116,24 @@ class ModeRows:
     the places within pieces, times the pieces' coefficients.
 
     A matrix, (n_times, n_rows), turns values at ascending times, multiplied from their right, into
-    rows; `shortest_s` is the shortest of these times after a change of torque.
+    rows; `shortest_s` is the shortest of these times after a change of the load.
     """
 
-    def __init__(
-        self, torque: TorqueHistory, time_s: Array, to_rows: Array, shortest_s: float
-    ) -> None:
-        self._end_s, self._deforms = float(time_s[-1]), torque.deforms
-        self._drives, self._rows = 1 if torque.symmetric else 2, to_rows.shape[1]
-        decayed = _DECAYED if torque.only_steps else _DECAYED_UNDER_RAMPS
+    def __init__(self, course: Course, time_s: Array, to_rows: Array, shortest_s: float) -> None:
+        self._end_s, self._deforms = float(time_s[-1]), course.deforms
+        self._rows = to_rows.shape[1]
+        decayed = _DECAYED if course.only_steps else _DECAYED_UNDER_RAMPS
         wide = int(np.ceil(np.log1p(decayed * self._end_s / shortest_s) / _WIDTH))
         self._last = wide * _SHORTER_OF_ROWS
-        # (n_pieces, n_drives, degree + 1, n_rows).
-        self._table = np.empty((self._last, self._drives, len(_ORDERS), self._rows))
+        # (n_pieces, degree + 1, n_rows).
+        self._table = np.empty((self._last, len(_ORDERS), self._rows))
         for piece in range(wide):
             u = _WIDTH * (piece + _NODES)
-            responses, _ = mode_responses(-np.expm1(u)[None] / self._end_s, torque, time_s)
+            responses, _ = mode_responses(-np.expm1(u)[None] / self._end_s, course, time_s)
             values = (responses[0] / self._scale(np.expm1(u))[:, None]) @ to_rows
-            powers = _in_short_pieces(values.swapaxes(1, 2), _SHORTER_OF_ROWS)
+            powers = _in_short_pieces(values.T, _SHORTER_OF_ROWS)
             here = slice(piece * _SHORTER_OF_ROWS, (piece + 1) * _SHORTER_OF_ROWS)
-            self._table[here] = powers.transpose(2, 0, 3, 1)
+            self._table[here] = powers.transpose(1, 2, 0)
 
     def __call__(self, modes: Modes) -> Array:
         """Return rows of responses with derivatives, (n, 1 + n_parameters, n_rows)."""
@@ -155,14 +153,11 @@ class ModeRows:
             # What a fast mode has not forgotten falls with its rate.
             scale = self._scale(scaled)
             scale_slopes = (self._end_s * scale * scale)[:, None] * modes.rate_slopes
-        # Now (n, n_modes, n_drives), and (n, n_parameters, n_modes, n_drives).
-        weights = modes.weights.swapaxes(-1, -2)
-        weight_slopes = modes.weight_slopes.swapaxes(-1, -2)
-        amplitudes = weights * scale[..., None]
-        amplitude_slopes = weight_slopes * scale[:, None, :, None]
-        amplitude_slopes += weights[:, None] * scale_slopes[..., None]
-        moved = amplitudes[:, None] * place_slopes[..., None]
-        mixed = np.empty((count, 1 + parameters, n_modes, self._drives, len(_ORDERS)))
+        amplitudes = modes.weights * scale
+        amplitude_slopes = modes.weight_slopes * scale[:, None]
+        amplitude_slopes += modes.weights[:, None] * scale_slopes
+        moved = amplitudes[:, None] * place_slopes
+        mixed = np.empty((count, 1 + parameters, n_modes, len(_ORDERS)))
         np.multiply(amplitudes[..., None], powers, out=mixed[:, 0])
         np.multiply(amplitude_slopes[..., None], powers[:, None], out=mixed[:, 1:])
         mixed[:, 1:] += moved[..., None] * power_slopes[:, None]
@@ -176,10 +171,10 @@ class ModeRows:
 
 
 def _powers(place: Array) -> tuple[Array, Array]:
-    """Return powers, and their derivatives, of shape (..., 1, degree + 1)."""
-    powers = np.ones((*place.shape, 1, len(_ORDERS)))
+    """Return powers, and their derivatives, of shape (..., degree + 1)."""
+    powers = np.ones((*place.shape, len(_ORDERS)))
     for order in _ORDERS[1:]:
-        powers[..., 0, order] = powers[..., 0, order - 1] * place
+        powers[..., order] = powers[..., order - 1] * place
     slopes = np.zeros_like(powers)
     slopes[..., 1:] = _ORDERS[1:] * powers[..., :-1]
     return powers, slopes

@@ -11,13 +11,13 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.modes import compute_modes, linear_responses
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 from biogrip.physics.sample_model import Network, SampleModel
 from biogrip.physics.simulation import Grip, Ring, compute_grip, find_ring
 from biogrip.physics.whitening import estimate_noise, measure_rounding, taken_out
 
 # Most numbers in the rows that are formed at once.
-_AT_ONCE = 100_000
+_NUMBERS_AT_ONCE = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class Residuals:
     """Arms."""
     model: SampleModel
     """Sample model."""
-    torque: TorqueHistory
+    course: Course
     """Protocol."""
     trace: Trace
     """The trace."""
@@ -187,7 +187,7 @@ class Residuals:
         n, parameters = log_parameters.shape
         condensed, sums = self.trace.condensed, np.empty((n, 1 + parameters))
         nodes_s = condensed.dense.time_s
-        for some in parts(n, max(1, _AT_ONCE // (len(nodes_s) * (1 + parameters)))):
+        for some in parts(n, max(1, _NUMBERS_AT_ONCE // (len(nodes_s) * (1 + parameters)))):
             rows = condensed.rows_of_nodes(self._simulated(log_parameters[some], nodes_s))
             measured, rest = zip(*(other.trace.at_nodes for other in others[some]), strict=True)
             rows[:, 0] -= measured
@@ -209,10 +209,10 @@ class Residuals:
         Returns
         -------
         (n, 1 + n_parameters, n_rows)
-            In rad; first the response, then its derivatives by the log-parameters. Without
+            First the response, then its derivatives by the log-parameters. Without
             `slopes`, (n, 1, n_rows).
         """
-        given = self.gripper, self.model, self.torque
+        given = self.gripper, self.model, self.course
         parameters, condensed = np.exp(log_parameters), self.trace.condensed
         return condensed.of_modes(compute_modes(*given, parameters, slopes=slopes))
 
@@ -225,7 +225,7 @@ class Residuals:
             Sample parameters in the model's order, SI units.
         """
         misfit = np.empty(len(parameters))
-        for some in parts(len(parameters), max(1, _AT_ONCE // len(self.trace.rows))):
+        for some in parts(len(parameters), max(1, _NUMBERS_AT_ONCE // len(self.trace.rows))):
             responses = self.condensed_responses(np.log(parameters[some]), slopes=False)[:, 0]
             rows = responses - self.trace.rows
             misfit[some] = np.sqrt(np.einsum("nr,nr->n", rows, rows) / self.samples)
@@ -236,14 +236,14 @@ class Residuals:
         if not self.instrument.has_jaws:
             return None
         network = self.model.network(np.exp(log_parameters))
-        return compute_grip(self.gripper, network, self.torque, nonlinear=False)
+        return compute_grip(self.gripper, network, self.course, nonlinear=False)
 
     def ring(self, network: Network, noise_sd: float) -> Ring | None:
         """Return what noise of this size lets be seen of the arms' ringing on a sample, if any."""
         trace = self.trace
-        given = self.gripper, network, self.torque, trace.time_s
+        given = self.gripper, network, self.course, trace.time_s
         return find_ring(*given, lambda change: trace.condensed.cleared(change) / noise_sd)
 
     def _simulated(self, log_parameters: Array, time_s: Array) -> Array:
         parameters = np.exp(log_parameters)
-        return linear_responses(self.gripper, self.model, self.torque, time_s, parameters)
+        return linear_responses(self.gripper, self.model, self.course, time_s, parameters)

@@ -1,8 +1,8 @@
-"""Roots of polynomials with positive coefficients, and zeros of sums of simple poles, many at once.
+"""Roots of functions of the rate, many at once.
 
 The coefficients of a gripper-sample polynomial span dozens of decades. An eigenvalue solver loses
-the small roots there; iterating on the polynomial itself [1]_, [2]_, from starting radii read off
-its Newton polygon [3]_, keeps every root to full relative accuracy.
+the small roots there; iterating on the function itself [1]_, [2]_, from starting radii read off
+the Newton polygon of its arms [3]_, keeps every root to full relative accuracy.
 
 A network of springs and dampers with parallel Maxwell branches has as many modes as branches, or
 one more. With branch rates p_0 < p_1 < ... the rates of the modes are the zeros of
@@ -25,11 +25,13 @@ References
    (1994): both neighbouring poles matched in value and slope, the middle way.
 .. [5] J. R. Bunch, C. P. Nielsen and D. C. Sorensen, Rank-one modification of the symmetric
    eigenproblem, Numerische Mathematik 31 (1978), 31-48.
+.. [6] N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM, 2002, section
+   1.8: the quadratic formula without cancellation.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,103 +46,18 @@ double root symmetrically apart by g changes the response by g^2. Both stay
 below 1e-9 here.
 """
 
-_Root = TypeVar("_Root", np.float64, np.complex128)
-
-# Most sweeps over the roots of polynomials, and over the zeros of sums of poles.
-_SWEEPS, _MOST_SWEEPS = 80, 60
+# Most sweeps over roots that iterations find together, and over zeros of sums of poles.
+_MOST_SWEEPS_OF_ROOTS, _MOST_SWEEPS_OF_ZEROS = 80, 60
 # Share of a sum of poles below which it is zero, and of a distance below which a step is the last.
-_ROUNDING, _SHORT = 4e-16, 1e-9
+_LEAST_SHARE, _SHORTEST_STEP = 4e-16, 1e-9
 
 
-def real_quadratic_roots(coefficients: Array) -> Array:
-    """Compute the roots, (n, 2), of a + b s + c s^2 that are known to be real and negative.
+def spread_starts(coefficients: Array) -> ComplexArray:
+    """Return starts for the roots of polynomials with positive coefficients, (n, degree).
 
-    Coefficients are positive, (n, 3). The fast root comes first; the two are never closer together
-    than `SMALLEST_GAP`.
-
-    References
-    ----------
-    .. [1] N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM, 2002,
-       section 1.8: the quadratic formula without cancellation.
+    Coefficients are in ascending powers, (n, degree + 1). Moduli are slopes of the concave hull of
+    log(coefficient) over power, the Newton polygon [3]_.
     """
-    a, b, c = coefficients.T
-    discriminant = np.maximum(b * b - 4 * a * c, (SMALLEST_GAP * b) ** 2)
-    q = -0.5 * (b + np.sqrt(discriminant))
-    return np.array((q / c, a / q)).T
-
-
-def roots(coefficients: Array) -> ComplexArray:
-    """Compute the roots of polynomials with positive coefficients (Ehrlich-Aberth iteration).
-
-    Coefficients are in ascending powers, (n, degree + 1); roots, (n, degree), are pairwise at least
-    `SMALLEST_GAP` apart.
-    """
-    degree = coefficients.shape[1] - 1
-    radii = _newton_polygon_radii(coefficients)
-    # No symmetry, so that no two starting points can move in step.
-    angles = np.pi + np.array([0.4, -0.9, 1.1, -0.25, 0.7, -1.3, 0.15])[np.arange(degree) % 7]
-    z = radii * np.exp(1j * (angles + 0.05 * np.arange(degree)))
-    return separate(find_zeros(z, lambda z: _newton_step(coefficients, z)))
-
-
-def find_zeros(
-    z: ComplexArray,
-    newton_step: Callable[[ComplexArray], ComplexArray],
-    between: Array | None = None,
-) -> ComplexArray:
-    """Move points onto the zeros of functions, all zeros of each at once (Ehrlich-Aberth).
-
-    Starts are (n, n_points), for each function as many as it has zeros; a Newton step is the
-    function divided by its derivative. If each point is counted from an origin of its own, the
-    differences of origins, (n, n_points, n_points), are added to differences of points.
-    """
-    off_diagonal = ~np.eye(z.shape[1], dtype=bool)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        converged = resting = np.zeros((len(z), 1), dtype=bool)
-        for _ in range(_SWEEPS):
-            newton = newton_step(z)
-            distance = z[:, :, None] - z[:, None, :]
-            if between is not None:
-                distance = between + distance
-            repulsion = np.where(off_diagonal, 1 / distance, 0).sum(axis=2)
-            step = newton / (1 - newton * repulsion)
-            # Converged points rest, so that their last bits do not depend on other functions.
-            step = np.where(np.isfinite(step) & ~resting, step, 0)
-            z = z - step
-            if np.all(converged):
-                break
-            # The error is cubed in a sweep, so one more takes it below rounding.
-            resting = converged
-            converged = np.all(np.abs(step) <= 1e-8 * np.abs(z), axis=1, keepdims=True)
-    return z
-
-
-def separate(z: NDArray[_Root]) -> NDArray[_Root]:
-    """Move roots that (nearly) coincide symmetrically apart to `SMALLEST_GAP`."""
-    z = z.copy()
-    first, second = np.triu_indices(z.shape[1], 1)
-    if not np.any(np.abs(z[:, first] - z[:, second]) < SMALLEST_GAP * np.abs(z[:, first])):
-        return z
-    for i, j in zip(first, second, strict=True):
-        close = np.abs(z[:, i] - z[:, j]) < SMALLEST_GAP * np.abs(z[:, i])
-        middle = 0.5 * (z[:, i] + z[:, j])
-        z[:, i] = np.where(close, middle * (1 + SMALLEST_GAP / 2), z[:, i])
-        z[:, j] = np.where(close, middle * (1 - SMALLEST_GAP / 2), z[:, j])
-    return z
-
-
-def _newton_step(coefficients: Array, z: ComplexArray) -> ComplexArray:
-    highest, *others = coefficients.T[::-1, :, None]
-    slope = highest + np.zeros_like(z)
-    value = slope * z + others[0]
-    for coefficient in others[1:]:
-        slope = slope * z + value
-        value = value * z + coefficient
-    return value / slope
-
-
-def _newton_polygon_radii(coefficients: Array) -> Array:
-    """Return moduli of the roots: slopes of the concave hull of log(coefficient) over power."""
     degree = coefficients.shape[1] - 1
     log = np.log(coefficients)
     hull = log.copy()
@@ -149,7 +66,60 @@ def _newton_polygon_radii(coefficients: Array) -> Array:
             for j in range(k + 1, degree + 1):
                 chord = log[:, i] + (log[:, j] - log[:, i]) * (k - i) / (j - i)
                 hull[:, k] = np.maximum(hull[:, k], chord)
-    return np.exp(hull[:, :-1] - hull[:, 1:])
+    # No symmetry, so that no two points can move in step.
+    angles = np.pi + np.array([0.4, -0.9, 1.1, -0.25])[:degree] + 0.05 * np.arange(degree)
+    return np.exp(hull[:, :-1] - hull[:, 1:]) * np.exp(1j * angles)
+
+
+def find_zeros(
+    beyond: ComplexArray,
+    newton_step: Callable[[ComplexArray], ComplexArray],
+    origin: Array,
+) -> ComplexArray:
+    """Move points onto the zeros of functions, all zeros of each at once (Ehrlich-Aberth).
+
+    Points are at -origin + beyond, (n, n_points), for each function as many as it has zeros; a
+    Newton step is the function divided by its derivative. The result is what zeros, pairwise at
+    least `SMALLEST_GAP` apart, are beyond the origins.
+    """
+    off_diagonal = ~np.eye(beyond.shape[1], dtype=bool)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        converged = resting = np.zeros((len(beyond), 1), dtype=bool)
+        for _ in range(_MOST_SWEEPS_OF_ROOTS):
+            newton = newton_step(beyond)
+            distance = distances(beyond, origin)
+            repulsion = np.where(off_diagonal, 1 / distance, 0).sum(axis=2)
+            step = newton / (1 - newton * repulsion)
+            # Converged points rest, so that their last bits do not depend on other functions.
+            step = np.where(np.isfinite(step) & ~resting, step, 0)
+            beyond = beyond - step
+            if np.all(converged):
+                break
+            # The error is cubed in a sweep, so one more takes it below rounding.
+            resting = converged
+            converged = np.all(np.abs(step) <= 1e-8 * np.abs(beyond), axis=1, keepdims=True)
+    return separate(beyond, origin)
+
+
+def distances(beyond: ComplexArray, origin: Array) -> ComplexArray:
+    """Return the differences of points at -origin + beyond, (n, n_points, n_points)."""
+    return (origin[:, None] - origin[..., None]) + (beyond[..., None] - beyond[:, None])
+
+
+def separate(beyond: ComplexArray, origin: Array) -> ComplexArray:
+    """Move points at -origin + beyond that (nearly) coincide apart to `SMALLEST_GAP`."""
+    first, second = np.triu_indices(beyond.shape[1], 1)
+    size = SMALLEST_GAP * np.abs(beyond - origin)
+    if not np.any(np.abs(distances(beyond, origin)[:, first, second]) < size[:, first]):
+        return beyond
+    beyond = beyond.copy()
+    for i, j in zip(first, second, strict=True):
+        distance = (origin[:, j] - origin[:, i]) + (beyond[:, i] - beyond[:, j])
+        gap = SMALLEST_GAP * (beyond[:, i] - origin[:, i])
+        lack = np.where(np.abs(distance) < np.abs(gap), 0.5 * (gap - distance), 0)
+        beyond[:, i] += lack
+        beyond[:, j] -= lack
+    return beyond
 
 
 @dataclass(frozen=True)
@@ -177,7 +147,7 @@ def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -
 
     The zeros of a function are bitwise independent of the other functions. Weights and poles are
     (n_poles, n), levels (n,). Weights and levels are positive; an imaginary part, far smaller than
-    the real one, carries a derivative. Poles are ascending and real.
+    the real one, carries a derivative. Poles are real and ascend from zero.
     """
     if not (np.iscomplexobj(weights) or np.iscomplexobj(level)):
         return _real_zeros(weights, poles, level)
@@ -207,19 +177,41 @@ class _Sides:
     above_slope: Array
 
 
+def zeros_of_one_branch(weights: Sequence[Array], rate: Array, level: Array) -> Zeros:
+    """Return the zeros of w_0/x + w_1/(x - p) - b; weights, the rate p and the level b are (n,).
+
+    Both are roots of quadratic equations, for x and for x - p, without cancellation [6]_.
+    """
+    (first, second), scaled = weights, level * rate
+    half, product = 0.5 * (second + (first - scaled)), second * scaled
+    larger = np.abs(half) + np.sqrt(half * half + product)
+    beyond = np.where(half > 0, larger, product / larger) / level
+    fast = rate + beyond
+    slow = first * rate / (level * fast)
+    near_zero = slow < 0.5 * rate
+    return Zeros(
+        np.array((np.where(near_zero, 0.0, rate), rate)),
+        np.array((np.where(near_zero, slow, -second * rate / (level * beyond)), beyond)),
+    )
+
+
 def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
+    if len(poles) == 1:
+        return Zeros(poles, weights / level)
+    if len(poles) == 2:
+        return zeros_of_one_branch(tuple(weights), poles[1], level)
     pole, side, gap, start = _intervals(weights, poles, level)
     found = start.copy()
     # State of the search for each unfinished zero: its pole, the side of it, the gap to the next
     # one, bounds of the distance, and the distance.
     search = np.array([pole, side, gap, np.zeros_like(pole), 0.5 * gap, start]).reshape(6, -1)
     left = np.arange(pole.size)
-    for _ in range(_MOST_SWEEPS):
+    for _ in range(_MOST_SWEEPS_OF_ZEROS):
         zero, which = np.divmod(left, len(level))
         origin, sign, whole, low, high, at = search
         sides = _sides(weights, poles, zero, which, Zeros(origin, sign * at))
         value = sides.below + sides.above - level[which]
-        converged = np.abs(value) <= _ROUNDING * (sides.below - sides.above + level[which])
+        converged = np.abs(value) <= _LEAST_SHARE * (sides.below - sides.above + level[which])
         np.copyto(low, at, where=sign * value > 0)
         np.copyto(high, at, where=sign * value < 0)
         last = int(np.searchsorted(zero, len(poles) - 1))
@@ -228,7 +220,7 @@ def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
         np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * at)), where=outside)
         np.copyto(moved, at, where=converged)
         # Convergence is quadratic, so after a short step the error is below rounding.
-        converged |= np.abs(moved - at) <= _SHORT * moved
+        converged |= np.abs(moved - at) <= _SHORTEST_STEP * moved
         at[:] = found.flat[left] = moved
         left, search = left[~converged], search[:, ~converged]
         if not len(left):

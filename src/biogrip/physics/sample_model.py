@@ -59,7 +59,7 @@ def complex_modulus(network: Network, omega: Array) -> tuple[Array, Array]:
 
 
 MOST_BRANCHES = 8
-"""Most branches for which polynomials are used; springpots have more of them."""
+"""Most Maxwell branches of a generalized model."""
 
 
 # Units of kinds of parameters, and where a sample is under stress, and strained.

@@ -1,15 +1,5 @@
 """Simulated rotation and shortening of samples, and the force on them, linear or nonlinear.
 
-The jaws exert on the sample the force F = G delta, positive while they press. In the linear model
-it is a rational function of the torques like the rotations,
-
-    F = [b P (Z_2 + Z_4) tau_2 - b P Z_2 (tau_2 - tau_4)] / D
-
-(with equal arms and torques 2 b P tau / (Z Q + 2 b^2 P)), so its modes have the rates of the
-rotations and weights of their own. The arm's equation gives it too, b F = tau - Z phi, but where a
-liquid has given way that is a difference of nearly equal torques; here the constant and every mode
-are products of what is positive, and late in a phase only what is left of the slow modes is summed.
-
 In the nonlinear model, the arm's equation, divided by its lever, gives
 F - F_linear = g - (c u' + k u)/b_0^2 with g the load and u the correction of
 `biogrip.physics.nonlinear`. All of them are of second order: again no large terms cancel.
@@ -21,79 +11,29 @@ of the ring shows in a trace is found here, too.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import factorial
 
 import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper, displacement_of_tip
-from biogrip.physics.linear import (
-    LEFT,
-    RIGHT,
-    StepResponse,
-    add,
-    arm_polynomial,
-    multiply,
-    partial_fractions,
-    phi_function,
-    rotation,
-    sample_polynomials,
-    step_response,
-    transfer_functions,
-)
-from biogrip.physics.many_branches import modes_of_many
 from biogrip.physics.modes import relaxation
 from biogrip.physics.nonlinear import correction, nonlinear_rotation
-from biogrip.physics.protocol import TorqueHistory
-from biogrip.physics.sample_model import MOST_BRANCHES, Network
-
-
-def jaw_force_response(
-    gripper: Gripper, network: Network, *, symmetric: bool = True, inertia: bool = True
-) -> StepResponse:
-    """Compute the jaw force of n samples after unit torque steps, in N per N m.
-
-    The force takes the place of an arm. Arguments are those of `step_response`; without inertia a
-    parallel damper makes the force jump with the torque.
-    """
-    if network.k.shape[1] > MOST_BRANCHES:
-        return StepResponse(
-            *modes_of_many(gripper, network, symmetric=symmetric, inertia=inertia, force=True)
-        )
-    _, denominator = transfer_functions(gripper, network, symmetric=symmetric, inertia=inertia)
-    p = gripper.lever_m * sample_polynomials(network)[0]
-    z_2 = arm_polynomial(gripper.left, inertia)
-    if symmetric and gripper.left == gripper.right:
-        numerators = [2 * p]
-    else:
-        both = add(z_2, arm_polynomial(gripper.right, inertia))
-        numerators = [multiply(p, both), -multiply(p, z_2)][: 1 if symmetric else 2]
-    return partial_fractions(np.array([numerators]).swapaxes(2, 3), denominator, real=not inertia)
-
-
-def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Array) -> Array:
-    """Compute the jaw force of the linear model in N, (n, n_times), at any times.
-
-    The response is that of `jaw_force_response`; at the instant of a step: what follows it.
-    """
-    force = np.zeros((len(response.rates), len(time_s)))
-    rates = response.rates[:, :, None]
-    static, weights = response.static[:, 0], response.weights[:, 0]
-    for start, order, heights in torque.jumps:
-        after = time_s >= start
-        elapsed = time_s[after] - start
-        constant, amplitude = static @ heights, np.einsum("ndj,d->nj", weights, heights)
-        z = rates * elapsed
-        growth = elapsed**order * (phi_function(order, z) if order else np.exp(z))
-        rest = constant[:, None] * elapsed**order / factorial(order)
-        force[:, after] += rest + np.einsum("nj,njt->nt", amplitude, growth).real
-    return force
+from biogrip.physics.protocol import Course
+from biogrip.physics.response import (
+    LEFT,
+    RIGHT,
+    jaw_force_response,
+    linear_jaw_force,
+    step_response,
+    superpose,
+)
+from biogrip.physics.sample_model import Network
 
 
 def jaw_force(
     gripper: Gripper,
     network: Network,
-    torque: TorqueHistory,
+    course: Course,
     time_s: Array,
     *,
     nonlinear: bool,
@@ -104,19 +44,19 @@ def jaw_force(
     By either model, as in `simulated_response`; at the instant of a step: what follows it. Without
     inertia, the force may jump.
     """
-    response = jaw_force_response(gripper, network, symmetric=torque.symmetric, inertia=inertia)
-    force = linear_jaw_force(response, torque, time_s)
+    response = jaw_force_response(gripper, network, inertia=inertia)
+    force = linear_jaw_force(response, course, time_s)
     if nonlinear:
         # Arms with inertia have not moved yet at the instant of a step.
         instants = np.nextafter(time_s, -np.inf) if inertia else time_s
-        more = correction(gripper, network, torque).checked().force_at(instants)
+        more = correction(gripper, network, course).checked().force_at(instants)
         force += np.where(instants < 0, 0, more)
     return force
 
 
 # Forces below this share of the largest one are rounding errors.
-_NOTHING = 1e-9
-_A_PHASE = 200
+_LEAST_FORCE = 1e-9
+_TIMES_OF_PHASE = 200
 
 
 @dataclass(frozen=True)
@@ -143,16 +83,14 @@ class Grip:
         )
 
 
-def compute_grip(
-    gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlinear: bool
-) -> Grip:
+def compute_grip(gripper: Gripper, network: Network, course: Course, *, nonlinear: bool) -> Grip:
     """Compute the extreme forces of the jaws on the first sample, without inertia.
 
     By either model, as in `simulated_response`.
     """
-    time_s = _instants(torque)
-    force = jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear, inertia=False)[0]
-    least_shown = _NOTHING * float(np.abs(force).max()) or 1.0
+    time_s = _instants(course)
+    force = jaw_force(gripper, network, course, time_s, nonlinear=nonlinear, inertia=False)[0]
+    least_shown = _LEAST_FORCE * float(np.abs(force).max()) or 1.0
     shown = np.round(force / least_shown)
     most, negative = int(np.argmax(shown)), np.flatnonzero(shown < 0)
     first = 0 if len(negative) else most
@@ -165,16 +103,16 @@ def compute_grip(
     )
 
 
-def _instants(torque: TorqueHistory) -> Array:
-    """Return times that are dense after every change of torque."""
-    lengths = np.diff(torque.time_s, append=torque.end_s)
-    share = np.geomspace(1e-9, 1.0, _A_PHASE)[:-1]
-    pieces = [start + length * share for start, length in zip(torque.time_s, lengths, strict=True)]
-    return np.unique(np.append(np.concatenate(pieces), torque.end_s))
+def _instants(course: Course) -> Array:
+    """Return times that are dense after every change of the load."""
+    lengths = np.diff(course.time_s, append=course.end_s)
+    share = np.geomspace(1e-9, 1.0, _TIMES_OF_PHASE)[:-1]
+    pieces = [start + length * share for start, length in zip(course.time_s, lengths, strict=True)]
+    return np.unique(np.append(np.concatenate(pieces), course.end_s))
 
 
 def simulated_response(
-    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, *, nonlinear: bool
+    gripper: Gripper, network: Network, course: Course, time_s: Array, *, nonlinear: bool
 ) -> Array:
     """Simulate the closing rotation of the left arm in rad, with inertia, (n, n_times).
 
@@ -182,30 +120,28 @@ def simulated_response(
     or the linear one, (4)-(6), at ascending times.
     """
     if nonlinear:
-        return nonlinear_rotation(gripper, network, torque, time_s)
-    if torque.deforms:
-        return relaxation(network, torque, time_s)
-    response = step_response(
-        gripper, network, symmetric=torque.symmetric, inertia=gripper.has_inertia
-    )
-    return rotation(response, torque, time_s)
+        return nonlinear_rotation(gripper, network, course, time_s)
+    if course.deforms:
+        return relaxation(network, course, time_s)
+    response = step_response(gripper, network, inertia=gripper.has_inertia)
+    return superpose(response, course, time_s)
 
 
 def simulated_shortening(
-    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, *, nonlinear: bool
+    gripper: Gripper, network: Network, course: Course, time_s: Array, *, nonlinear: bool
 ) -> Array:
     """Simulate the shortening of samples in m, (n, n_times); see `simulated_response`."""
     if nonlinear:
-        turns = (nonlinear_rotation(gripper, network, torque, time_s, a) for a in (LEFT, RIGHT))
+        turns = (nonlinear_rotation(gripper, network, course, time_s, a) for a in (LEFT, RIGHT))
         left, right = (displacement_of_tip(gripper, turn) for turn in turns)
         return left + right
-    response = step_response(gripper, network, symmetric=torque.symmetric)
-    both = rotation(response, torque, time_s, LEFT) + rotation(response, torque, time_s, RIGHT)
+    response = step_response(gripper, network)
+    both = superpose(response, course, time_s, LEFT) + superpose(response, course, time_s, RIGHT)
     return gripper.lever_m * both
 
 
 # A ring of exp(-36) is lost in rounding.
-_DECAYED = 36.0
+_EFOLDS_OF_RING = 36.0
 
 VISIBLE = 0.2
 """Norm of a ring in standard deviations of the noise from which it counts as visible.
@@ -228,7 +164,7 @@ class Ring:
 def find_ring(
     gripper: Gripper,
     network: Network,
-    torque: TorqueHistory,
+    course: Course,
     time_s: Array,
     in_noise: Callable[[Array], Array],
 ) -> Ring | None:
@@ -239,7 +175,7 @@ def find_ring(
 
     Parameters
     ----------
-    gripper, network, torque
+    gripper, network, course
         Arms, sample and protocol.
     time_s : (n_samples,)
         Sampling times.
@@ -251,10 +187,10 @@ def find_ring(
     springs = network.k_p + network.k.sum(axis=1) + gripper.jaw_stiffness_N_per_m
     is_seen = network.c_p > ringing_s(gripper) * springs
     network = replace(network, c_p=np.where(is_seen, network.c_p, 0.0))
-    elapsed = elapsed_s(torque, time_s)
+    elapsed = elapsed_s(course, time_s)
     ringing = elapsed <= ringing_s(gripper)
     change = np.zeros(len(time_s))
-    change[ringing] = ring(gripper, network, torque, time_s[ringing])[0]
+    change[ringing] = ring(gripper, network, course, time_s[ringing])[0]
     shown = in_noise(change)
     latest_first = np.argsort(-elapsed, kind="stable")
     norms = np.sqrt(np.cumsum(shown[latest_first] ** 2))
@@ -271,20 +207,17 @@ def ringing_s(gripper: Gripper) -> float:
     falls at least like exp(-c t / (2 I)).
     """
     arms = gripper.left, gripper.right
-    return _DECAYED * max(2 * arm.inertia_kgm2 / arm.damping_Nms_per_rad for arm in arms)
+    return _EFOLDS_OF_RING * max(2 * arm.inertia_kgm2 / arm.damping_Nms_per_rad for arm in arms)
 
 
-def elapsed_s(torque: TorqueHistory, time_s: Array) -> Array:
+def elapsed_s(course: Course, time_s: Array) -> Array:
     """Return the times since the last change of the torque, (n_times,)."""
-    last = np.maximum(torque.changes_s.searchsorted(time_s, side="right") - 1, 0)
-    return time_s - torque.changes_s[last]
+    last = np.maximum(course.changes_s.searchsorted(time_s, side="right") - 1, 0)
+    return time_s - course.changes_s[last]
 
 
-def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array) -> Array:
+def ring(gripper: Gripper, network: Network, course: Course, time_s: Array) -> Array:
     """Compute the change of the left arm's rotation by inertia, (n, n_times) in rad."""
-    responses = (
-        step_response(gripper, network, symmetric=torque.symmetric, inertia=inertia)
-        for inertia in (True, False)
-    )
-    with_it, without = (rotation(response, torque, time_s) for response in responses)
+    responses = (step_response(gripper, network, inertia=inertia) for inertia in (True, False))
+    with_it, without = (superpose(response, course, time_s) for response in responses)
     return with_it - without

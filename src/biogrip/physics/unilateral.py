@@ -26,13 +26,13 @@ from numpy.typing import NDArray
 from biogrip.arrays import Array, BoolArray
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.linear import phi_function
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
+from biogrip.physics.response import phi_function
 from biogrip.physics.sample_model import Network
 
 _MOST_EVENTS = 100_000
 # Share of the largest force and closing below which a change of contact is rounding.
-_NOTHING = 1e-11
+_LEAST_SHARE = 1e-11
 # Growth of the distances in the grid on which the end of a stretch is bracketed.
 _GROWTH = 1.1
 
@@ -58,7 +58,7 @@ class UnilateralResponse:
 
 
 def unilateral_response(
-    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array
+    gripper: Gripper, network: Network, torque: Course, time_s: Array
 ) -> UnilateralResponse:
     """Simulate the first sample in unilateral contact with the jaws, without inertia.
 
@@ -75,8 +75,8 @@ def unilateral_response(
     )
     softest = min(arm.stiffness_Nm_per_rad for arm in (gripper.left, gripper.right))
     least = {
-        True: _NOTHING * most_torque / gripper.lever_m,
-        False: _NOTHING * 2 * gripper.lever_m * most_torque / softest,
+        True: _LEAST_SHARE * most_torque / gripper.lever_m,
+        False: _LEAST_SHARE * 2 * gripper.lever_m * most_torque / softest,
     }
     branches = network.k.shape[1]
     states = np.zeros((3 + branches, len(time_s)))
@@ -136,11 +136,11 @@ class _Forcing:
         return _Forcing(self.powers @ shift)
 
 
-def _pieces(torque: TorqueHistory) -> Iterator[tuple[float, float, _Forcing]]:
+def _pieces(torque: Course) -> Iterator[tuple[float, float, _Forcing]]:
     """Yield start and length of each phase, and the torques of both arms in it."""
     lengths = np.diff(torque.time_s, append=torque.end_s)
-    for start, length, own in zip(torque.time_s, lengths, torque.of_arms, strict=True):
-        yield float(start), float(length), _Forcing(own)
+    for start, length, powers in zip(torque.time_s, lengths, torque.within_phases, strict=True):
+        yield float(start), float(length), _Forcing(np.stack((powers, powers)))
 
 
 class _Modes:

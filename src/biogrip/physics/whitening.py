@@ -1,4 +1,4 @@
-"""What an instrument adds to the rotation: offset, drift and noise.
+"""What an instrument adds to its readings: offset, drift and noise.
 
 An offset and a linear drift are nuisance functions. Their amplitudes are linear parameters and are
 not searched: their span is projected out of trace and responses alike, which is the same as fitting
@@ -8,7 +8,7 @@ projected out in part [2]_.
 The size of the noise is estimated without a model, and its colour is whitened. The autocorrelation
 is that of white noise plus exponentials of the time between two readings (Ornstein-Uhlenbeck
 processes): one of any relaxation time, and a geometric series of them for 1/f noise. White noise
-may have a part that grows with the rotation. The Cholesky factor L of its matrix C is computed, and
+may have a part that grows with the reading. The Cholesky factor L of its matrix C is computed, and
 solved with, in linear time [3]_. Residuals r become L^-1 r, which are white and on average as large
 as r. Least squares of these are generalised least squares [4]_.
 
@@ -31,12 +31,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.physics.modes import lagged_torques
+from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import flicker_rates
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 
 # Least squared norm of a function that is projected out completely, up to rounding.
-_WHOLE = 1 - 1e-9
+_LEAST_NORM = 1 - 1e-9
 
 
 def nuisance_basis(time_s: Array, *, offset: bool, drift: bool) -> Array:
@@ -88,34 +88,34 @@ def with_uncertain(basis: Array, functions: Array) -> Array:
 
 def taken_out(basis: Array) -> int:
     """Count the functions of a basis that are projected out completely."""
-    return int(np.count_nonzero(np.sum(np.square(basis), axis=1) > _WHOLE))
+    return int(np.count_nonzero(np.sum(np.square(basis), axis=1) > _LEAST_NORM))
 
 
-# A lag of so many protocols is an integral of the torque.
+# A lag of so many protocols is an integral of the load.
 _LAG = 1e6
 # Share of a drift's variance that must be no flow: below it, lines differ by less than a tenth.
-_TELLING = 0.01
+_LEAST_SHARE_OF_DRIFT = 0.01
 
 
-def drift_is_flow(torque: TorqueHistory, time_s: Array) -> bool:
+def drift_is_flow(course: Course, time_s: Array) -> bool:
     """Return True if a drift looks like the flow of a damper without a spring.
 
     Under a constant load both are the same line. Under a deformation nothing flows on.
 
     Parameters
     ----------
-    torque
+    course
         The protocol.
     time_s : (n_samples,)
         Sampling times.
     """
-    if torque.deforms:
+    if course.deforms:
         return False
     constant = nuisance_basis(time_s, offset=True, drift=False)
-    flows = without(constant, _LAG * lagged_torques(torque, (_LAG,))(time_s))
-    drift = without(constant, time_s / torque.end_s)
+    flows = without(constant, _LAG * lag_course(course, (_LAG,))(time_s))
+    drift = without(constant, time_s / course.end_s)
     basis = np.linalg.qr(flows.T)[0].T
-    return bool(np.sum(without(basis, drift) ** 2) < _TELLING * np.sum(drift**2))
+    return bool(np.sum(without(basis, drift) ** 2) < _LEAST_SHARE_OF_DRIFT * np.sum(drift**2))
 
 
 ROOT_12 = np.sqrt(12.0)
@@ -123,7 +123,7 @@ ROOT_12 = np.sqrt(12.0)
 
 # Shares of equal neighbours from which on readings are rounded, and of second differences that are
 # none of jumps; the error of the written digits, in steps.
-_OFTEN, _ALL_BUT_JUMPS, _MULTIPLE = 0.05, 0.98, 0.05
+_LEAST_EQUAL, _ALL_BUT_JUMPS, _LARGEST_REST = 0.05, 0.98, 0.05
 
 
 def estimate_noise(readings: Array, rounding: float | None = None) -> float:
@@ -159,12 +159,12 @@ def measure_rounding(readings: Array) -> float:
     noise.
     """
     same = np.count_nonzero(readings[1:] == readings[:-1])
-    if same < max(1.0, _OFTEN * len(readings)):
+    if same < max(1.0, _LEAST_EQUAL * len(readings)):
         return 0.0
     apart = np.diff(np.unique(readings))
     step = float(apart.min()) if len(apart) else 0.0
     multiples = apart / step if step else apart
-    return step if np.all(np.abs(multiples - np.rint(multiples)) < _MULTIPLE) else 0.0
+    return step if np.all(np.abs(multiples - np.rint(multiples)) < _LARGEST_REST) else 0.0
 
 
 MOST_SAMPLES = 50_000
@@ -182,7 +182,7 @@ class NoiseModel:
     flicker: float
     """Share of noise with spectrum 1/f."""
     proportional: float = 0.0
-    """Share of white noise whose standard deviation is proportional to the rotation, on average
+    """Share of white noise whose standard deviation is proportional to the reading, on average
     over the readings. The rest is white noise that is the same everywhere."""
 
     @property

@@ -12,7 +12,7 @@ from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.fitted_onset import OnsetFits, estimate_onset
 from biogrip.fit.problem import CaseProblem
-from biogrip.physics.protocol import TorqueHistory
+from biogrip.physics.protocol import Course
 from biogrip.physics.whitening import MOST_SAMPLES
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.study.study import Case
@@ -80,7 +80,7 @@ def read_checked(
 
 
 def without_steps(
-    trace: Recording, protocol: TorqueHistory, onset_s: float
+    trace: Recording, protocol: Course, onset_s: float
 ) -> tuple[Recording, tuple[float, ...]]:
     """Leave out readings at the very instant of a step, and return their times by the file's clock.
 

@@ -18,10 +18,10 @@ from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.physics.calibration import FreeMotion, calibrate, calibration_yaml, free_motion
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.linear import rotation, step_response
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.nonlinear import correction
-from biogrip.physics.protocol import TorqueHistory, sample_times, torque_at
+from biogrip.physics.protocol import Course, evaluate, sample_times
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import compute_grip, jaw_force, simulated_response
 from biogrip.physics.unilateral import unilateral_response
@@ -43,7 +43,7 @@ def simulate(case: Case, target: Path) -> None:
     A response that is not finite, or turns the arms beyond the combs' stroke, is an error.
     """
     time_s = case.sampling.over(case.torque.end_s)
-    controlled = torque_at(case.torque, time_s)
+    controlled = evaluate(case.torque, time_s)
     if not case.instrument.has_jaws:
         device = case.gripper, case.network, case.torque
         read = simulated_response(*device, time_s, nonlinear=False)[0]
@@ -144,7 +144,7 @@ def _rows(study: Study) -> Iterator[tuple[str, ...]]:
 
 
 def difference_over_peak(
-    gripper: Gripper, network: Network, torque: TorqueHistory, factors: Array
+    gripper: Gripper, network: Network, torque: Course, factors: Array
 ) -> Array:
     """Return the largest difference of the models as a share of the nonlinear peak rotation, (n,).
 
@@ -153,14 +153,14 @@ def difference_over_peak(
     """
     time_s = _times(torque)
     found = correction(gripper, network, torque, factors)
-    response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
+    response = step_response(gripper, network, inertia=False)
     difference = found.at(time_s)
-    nonlinear = factors[:, None] * rotation(response, torque, time_s) + difference
+    nonlinear = factors[:, None] * superpose(response, torque, time_s) + difference
     share = np.max(np.abs(difference), axis=1) / np.max(np.abs(nonlinear), axis=1)
     return np.where(found.converged, share, np.nan)
 
 
-def _times(torque: TorqueHistory) -> Array:
+def _times(torque: Course) -> Array:
     """Return times that are dense after every jump and reach up to the next."""
     ends = np.append(torque.time_s[1:], torque.end_s)
     lasting = zip(torque.time_s, ends - torque.time_s, strict=True)

@@ -6,7 +6,7 @@ deformation. The sample is a constitutive model with the true values of its para
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import BaseModel, Field
@@ -14,11 +14,18 @@ from pydantic import BaseModel, Field
 from biogrip.errors import nearest
 from biogrip.keys import OPEN, Block, Checked, OneOf, Problem
 from biogrip.physics.calibration import ARM_KEYS
-from biogrip.physics.contact import LARGEST_M, SMALLEST_M, Contact, contact
-from biogrip.physics.gripper import CombDrive, Gripper, capacitance_slope
+from biogrip.physics.gripper import (
+    LARGEST_M,
+    SMALLEST_M,
+    CombDrive,
+    Contact,
+    Gripper,
+    capacitance_slope,
+    contact,
+)
 from biogrip.physics.instruments import CONTROLLED, Instrument
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.protocol import Phase, largest_load, load
+from biogrip.physics.protocol import Phase, hold, largest_load, ramp
 from biogrip.physics.sample_model import MOST_BRANCHES, SampleModel
 
 LARGEST_PARAMETER = 1e12
@@ -101,16 +108,12 @@ class PhaseBlock(Block):
     """Closing torque of both arms, held or, with to_torque_Nm, at the start of a ramp."""
     to_torque_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
     """Torque at the end of a ramp."""
-    torque_right_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
-    """Held torque of the right arm, where it differs."""
     voltage_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
     """Voltage on both comb drives, instead of torque_Nm. As in the paper, eq. (9) converts it to
     grip torque, counted from contact; the voltage that closes the jaws onto a sample comes on
     top."""
     to_voltage_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
     """Voltage at the end of a ramp of the voltage."""
-    voltage_right_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
-    """Held voltage of the right arm, where it differs."""
     force_N: _Signed = None
     """Force on the sample, instead of torque_Nm, where the instrument is `creep`; so is stress_Pa.
     Where it is `relaxation`, displacement_m or strain."""
@@ -142,13 +145,10 @@ class PhaseBlock(Block):
     def phase(self, per_square_volt: float) -> Phase:
         """Return the phase in torques; a voltage's torque is `per_square_volt` V^2 (eq. 9)."""
         (base,) = self.bases
-        left = right = load(self.duration_s, getattr(self, base), getattr(self, f"to_{base}"))
-        of_right = getattr(self, base.replace("_", "_right_")) if base in _PULLS else None
-        if of_right is not None:
-            right = replace(left, value_Nm=of_right)
-        if base == _VOLTAGE:
-            left, right = left.squared(per_square_volt), right.squared(per_square_volt)
-        return Phase(self.duration_s, left, right)
+        level, to_level = getattr(self, base), getattr(self, f"to_{base}")
+        held = to_level is None
+        phase = hold(self.duration_s, level) if held else ramp(self.duration_s, level, to_level)
+        return phase.squared(per_square_volt) if base == _VOLTAGE else phase
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that are in conflict."""
@@ -159,12 +159,8 @@ class PhaseBlock(Block):
             yield (), f"{text}instrument of {others}."
             return
         by = self.bases[0]
-        ramp = f"to_{by}"
-        right = by.replace("_", "_right_") if by in _PULLS else ""
-        for key in sorted(given.keys() - {"duration_s", by, right, ramp}):
+        for key in sorted(given.keys() - {"duration_s", by, f"to_{by}"}):
             yield (key,), f"does not go with {by}."
-        if right in given and ramp in given:
-            yield (right,), "does not go with a ramp; allowed is a held torque."
 
 
 @dataclass(frozen=True)
@@ -185,10 +181,7 @@ class ProtocolBlock(Block):
         phases = tuple(phase.phase(per_square_volt) for phase in self.phases)
         if not instrument.relative:
             return phases
-        divided = [phase.left.divided(largest_load(phases)) for phase in phases]
-        return tuple(
-            Phase(phase.duration_s, it, it) for phase, it in zip(phases, divided, strict=True)
-        )
+        return tuple(phase.divided(largest_load(phases)) for phase in phases)
 
     def problems(self) -> Iterator[Problem]:
         """Refuse a protocol that is too long, or in which all torques are zero."""

@@ -1,6 +1,6 @@
 """Config block of the measurement: sampling, noise, and the file of a recorded trace.
 
-A simulated trace has a rate or bursts, and a noise. A recorded one has a file, the names of
+A simulated trace has a rate and a noise. A recorded one has a file, the names of
 its columns with their units, and what is known of its noise; what identifications fit along
 with the sample is the same for both.
 """
@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, Tag
 from biogrip.keys import BY_KIND, Block, OneOf, Problem
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION
 from biogrip.physics.noise import Noise
-from biogrip.physics.protocol import Burst, Sampling
+from biogrip.physics.protocol import Sampling
 from biogrip.traces.columns import TIME_UNITS, Columns, known_unit, trace_file_problem
 
 COLOURED = "coloured"
@@ -50,9 +50,6 @@ class MeasurementBlock(Block):
 
     rate_Hz: Annotated[float, Field(ge=1e-9, le=1e9)]
     """Sampling rate; the first sample is at t = 0."""
-    bursts: Annotated[tuple[Burst, ...], Field(min_length=1, max_length=20_000)] = ()
-    """Successive bursts of samples instead of a uniform rate, as of a camera that is fast after
-    every step; of one sample each they are single times."""
     file: _Name = None
     """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. See
     "Your own measurement"."""
@@ -171,7 +168,7 @@ class MeasurementBlock(Block):
     @property
     def sampling(self) -> Sampling:
         """Sampling of the rotation."""
-        return Sampling(self.rate_Hz, self.bursts)
+        return Sampling(self.rate_Hz)
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that are in conflict, and what a recorded trace lacks."""

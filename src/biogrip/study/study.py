@@ -11,11 +11,10 @@ from biogrip.fit.genome import GeneRange
 from biogrip.fit.methods import METHODS, Method
 from biogrip.fit.problem import CaseProblem
 from biogrip.keys import built, plain
-from biogrip.physics.contact import Contact
-from biogrip.physics.gripper import NO_ARMS, Gripper
+from biogrip.physics.gripper import NO_ARMS, Contact, Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import CANDIDATES, UNPUBLISHED, Sample
-from biogrip.physics.protocol import Phase, torque_history
+from biogrip.physics.protocol import Phase, join_phases
 from biogrip.physics.sample_model import with_fixed
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
@@ -78,7 +77,7 @@ class Case:
     """Parameters that are not identified, by name."""
     searched = _of_case(lambda case: case.problem.searched)
     """Sample model without fixed parameters."""
-    torque = _of_case(lambda it: torque_history(it.phases, deforms=it.instrument.deforms))
+    torque = _of_case(lambda it: join_phases(it.phases, deforms=it.instrument.deforms))
     """What the instrument holds over time."""
     network = _of_case(lambda case: case.sample.model.sample(case.parameters))
     """Springs and dampers of the simulated sample."""

@@ -15,7 +15,7 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.fit.least_squares import identify_many
 from biogrip.physics import gripper as actuator
-from biogrip.physics.contact import (
+from biogrip.physics.gripper import (
     LARGEST_M,
     SMALLEST_M,
     apparent_modulus,

@@ -11,7 +11,7 @@ from pathlib import Path
 from unicodedata import normalize
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Quantity
+from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
 from biogrip.terminal import visible
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86_400.0}
@@ -83,7 +83,7 @@ class Columns:
     """True if command-line options set them, false for config keys; used in messages."""
     sd: str | None = None
     """Name of the column of the readings' standard deviations, in their unit, if there is one."""
-    quantity: Quantity = ROTATION
+    quantity: Channel = ROTATION
     """What is read."""
     block: int | None = None
     """Number of the table to read, from 1, where a file has several; None for the only one."""
@@ -113,7 +113,7 @@ class Columns:
         return names | {key: name for key, name in more.items() if name is not None}
 
     @property
-    def controlled(self) -> Quantity:
+    def controlled(self) -> Channel:
         """What was controlled."""
         return INSTRUMENTS[self.quantity.name].controlled
 

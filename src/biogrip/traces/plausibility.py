@@ -16,7 +16,7 @@ from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import extreme_responses, fit_responses
 from biogrip.fit.problem import CaseProblem
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.protocol import TorqueHistory, torque_at
+from biogrip.physics.protocol import Course, evaluate
 from biogrip.physics.whitening import nuisance_basis, without
 from biogrip.traces.columns import TIME_UNITS, place
 from biogrip.traces.reader import Recording
@@ -136,22 +136,19 @@ def _responds(trace: Array, nuisance: Array, rest: float, unknowns: int) -> bool
     return bool(explained > unknowns * fdtri(unknowns, freedom, 1 - _FALSE_ALARM) * rest / freedom)
 
 
-def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
+def free_rotation(gripper: Gripper, torque: Course) -> float:
     """Return the largest static rotation of the left arm in rad that any sample allows.
 
-    Statically phi_2 = (1 - x) tau_2/k_2 + x (tau_2 - tau_4)/(k_2 + k_4), where x
-    goes from 0 without a sample to 1 with a rigid one.
+    Statically phi_2 = (1 - x) tau/k_2, where x goes from 0 without a sample to 1 with a rigid one.
     """
     # Within a phase nothing turns round: its start and its end will do.
     ends_s = np.append(torque.time_s[1:], torque.end_s)
     times = np.concatenate((torque.time_s, np.nextafter(ends_s, 0)))
-    left, right = (torque_at(torque, times, arm) for arm in ("left", "right"))
-    k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
-    alone, pushed = np.abs(left) / k_2, np.abs(left - right) / (k_2 + k_4)
-    return float(max(alone.max(), pushed.max()))
+    largest = np.abs(evaluate(torque, times)).max()
+    return float(largest / gripper.left.stiffness_Nm_per_rad)
 
 
-def _check_times(recording: Recording, torque: TorqueHistory, onset_s: float | None) -> None:
+def _check_times(recording: Recording, torque: Course, onset_s: float | None) -> None:
     columns, end_s, slack = recording.read, torque.end_s, _TIME_SLACK * torque.end_s
     begins = onset_s or 0.0
     time_s, earliest = recording.time_s, -slack if onset_s is None else -np.inf

@@ -1,0 +1,291 @@
+"""The corrected linear model, eqs. (4)-(6), solved exactly for any protocol.
+
+With Z_i(s) = I_i s^2 + c_i s + k_i the impedance of an arm, G(s) that of the sample,
+b = l sin(hat-theta_2) the lever and tau the torque of both arms, the closing rotations are
+
+    phi_2 = Z_4 tau / E    phi_4 = Z_2 tau / E    E = Z_2 Z_4 + b^2 G (Z_2 + Z_4)
+
+and of equal arms, after Z cancels, phi = tau / (Z + 2 b^2 G). The jaws exert the force F = G delta
+on the sample, positive while they press:
+
+    F = b G (Z_2 + Z_4) tau / E
+
+or 2 b G tau / (Z + 2 b^2 G). The arm's equation gives it too, b F = tau - Z phi, but where a liquid
+has given way that is a difference of nearly equal torques; here the constant and every mode are
+products of what is positive, and late in a phase only what is left of the slow modes is summed.
+
+Without inertia the arms, seen from the sample, have the impedance Z = Z_2 Z_4 / (Z_2 + Z_4), which
+is that of a spring, a damper and one Maxwell branch. So with the sample's
+
+    H = Z + b^2 G = A + B s + sum_j K_j s / (s + r_j)
+
+is a sum of poles, and the rates x of the modes interlace with the r_j (`biogrip.physics.roots`).
+Where H is zero, b^2 G is -Z, so the numerators N of phi_2 = Z_4/(Z_2 + Z_4) tau / H, of phi_4 and
+of F follow from the arms alone. A mode of N/H has the weight -N/S with
+S = A + sum_j K_j x^2/(x - r_j)^2, a sum of positive terms. Equal arms need no branch of theirs:
+then 2 phi = tau/H. With inertia, see `biogrip.physics.inertia`.
+"""
+
+from dataclasses import dataclass
+from math import factorial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biogrip.arrays import Array
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.inertia import Ringing, ascending, ascending_branches
+from biogrip.physics.protocol import Course
+from biogrip.physics.roots import Zeros, interlaced_zeros
+from biogrip.physics.sample_model import Network
+
+LEFT, RIGHT = 0, 1
+
+# Least difference of the arms: the branch of equal arms has no effect, but a mode.
+_LEAST_DIFFERENCE = 1e-30
+
+
+@dataclass(frozen=True)
+class StepResponse:
+    """Response of n samples to a unit step of the load, as a constant plus exponentials.
+
+    A unit torque on both arms at time 0 turns arm a (`LEFT`, `RIGHT`) by
+    ``static[:, a] + sum_j weights[:, a, j] exp(rates[:, j] t)``.
+    """
+
+    static: Array
+    """Final rotation in rad per N m, (n, n_arms)."""
+    rates: NDArray[Any]
+    """Exponents in 1/s, (n, n_modes), real without inertia, complex with it."""
+    weights: NDArray[Any]
+    """In rad per N m, (n, n_arms, n_modes)."""
+
+
+def step_response(gripper: Gripper, network: Network, *, inertia: bool = True) -> StepResponse:
+    """Solve the linear model for n samples at once (corrected eqs. 4-6).
+
+    With `inertia`, arms ring for milliseconds. Without, all rates are real and negative.
+    """
+    return _solve(gripper, network, inertia=inertia, force=False)
+
+
+def jaw_force_response(gripper: Gripper, network: Network, *, inertia: bool = True) -> StepResponse:
+    """Compute the jaw force of n samples after unit torque steps, in N per N m.
+
+    The force takes the place of an arm. Without inertia a parallel damper makes the force jump with
+    the torque.
+    """
+    return _solve(gripper, network, inertia=inertia, force=True)
+
+
+def _solve(gripper: Gripper, network: Network, *, inertia: bool, force: bool) -> StepResponse:
+    arms = Arms(gripper)
+    impedance = arms.with_sample(network)
+    zeros = impedance.zeros()
+    static = arms.force_at_rest(network) if force else arms.rotations_at_rest(network)
+    if inertia:
+        ringing = Ringing(gripper, network, zeros)
+        rates: NDArray[Any] = ringing.rates
+        weights: NDArray[Any] = ringing.force() if force else ringing.rotations()
+    else:
+        rates = -zeros.values.T
+        numerators = arms.force(zeros) if force else arms.rotations(zeros)[0]
+        weights = -numerators / impedance.steepness(zeros)
+    static, rates, weights = (
+        np.ascontiguousarray(of) for of in (static.T, rates, np.moveaxis(weights, -1, 0))
+    )
+    return StepResponse(static, rates, weights)
+
+
+def weights_of_loads(gripper: Gripper, network: Network) -> Array:
+    """Compute weights of the modes without inertia under steps of either arm's load.
+
+    Returns
+    -------
+    (n, n_arms, n_loads, n_modes)
+        In rad per N m; loads are that of both arms and, where these differ, what that of the left
+        arm exceeds that of the right one by. Of equal arms, only that of both, and one stands for
+        both.
+    """
+    arms = Arms(gripper)
+    impedance = arms.with_sample(network)
+    zeros = impedance.zeros()
+    numerators = arms.rotations(zeros)[0][:, None]
+    if arms.alike:
+        numerators = numerators[:1]
+    else:
+        numerators = np.concatenate((numerators, arms.rotations_apart(zeros)[:, None]), axis=1)
+    return np.ascontiguousarray(np.moveaxis(-numerators / impedance.steepness(zeros), -1, 0))
+
+
+def superpose(
+    response: StepResponse,
+    course: Course,
+    time_s: Array,
+    arm: int = LEFT,
+    *,
+    rate: bool = False,
+) -> Array:
+    """Compute the response to a protocol, or its rate, (n, n_times), at any times.
+
+    Of a gripper, it is the closing rotation of an arm in rad. Responses to changes superpose. A
+    step response starts at zero, so h(t) = sum_j w_j (e^(p_j t) - 1), which loses no digits to the
+    constant if a sample creeps far from its rest. Ramps and parabolas are its integrals.
+    """
+    total = np.zeros((len(response.static), len(time_s)))
+    weights, rates = response.weights[:, arm], response.rates[:, :, None]
+    for start, order, height in course.jumps:
+        after = time_s >= start
+        growth = _growth(order - rate, rates, time_s[after] - start)
+        total[:, after] += np.einsum("nj,njt->nt", height * weights, growth).real
+    return total
+
+
+def linear_jaw_force(response: StepResponse, course: Course, time_s: Array) -> Array:
+    """Compute the jaw force of the linear model in N, (n, n_times), at any times.
+
+    The response is that of `jaw_force_response`; at the instant of a step: what follows it.
+    """
+    force = np.zeros((len(response.rates), len(time_s)))
+    rates = response.rates[:, :, None]
+    static, weights = response.static[:, 0], response.weights[:, 0]
+    for start, order, height in course.jumps:
+        after = time_s >= start
+        elapsed = time_s[after] - start
+        z = rates * elapsed
+        growth = elapsed**order * (phi_function(order, z) if order else np.exp(z))
+        rest = height * static[:, None] * elapsed**order / factorial(order)
+        force[:, after] += rest + np.einsum("nj,njt->nt", height * weights, growth).real
+    return force
+
+
+def _growth(order: int, rates: NDArray[Any], elapsed: Array) -> NDArray[Any]:
+    """Return a mode's response over its weight to t^order/order!; for order -1, to an impulse."""
+    z = rates * elapsed
+    if order < 0:
+        return rates * np.exp(z)
+    if order == 0:
+        return np.expm1(z)
+    return rates * elapsed ** (order + 1) * phi_function(order + 1, z)
+
+
+def phi_function(order: int, z: NDArray[Any]) -> NDArray[Any]:
+    """Compute phi_n(z) = (e^z - sum_{k<n} z^k/k!) / z^n without cancellation near zero.
+
+    References
+    ----------
+    .. [1] M. Hochbruck and A. Ostermann, Exponential integrators, Acta Numerica 19 (2010),
+       209-286.
+    """
+    small = np.abs(z) < 1.0
+    near = np.where(small, z, 0)
+    series = np.zeros_like(near)
+    for k in range(18, -1, -1):
+        series = series * near + 1 / factorial(k + order)
+    far = np.where(small, 1, z)
+    value = np.expm1(far) / far
+    for n in range(1, order):
+        value = (value - 1 / factorial(n)) / far
+    return np.where(small, series, value)
+
+
+@dataclass(frozen=True)
+class Impedance:
+    """Impedance H = Z + b^2 G of n samples between the arms."""
+
+    weights: NDArray[Any]
+    """A and the K_j, (1 + n_rates, n); complex if the samples' elements are."""
+    rates: NDArray[Any]
+    """Zero and the r_j, ascending, (1 + n_rates, n)."""
+    level: NDArray[Any]
+    """B, (n,)."""
+
+    def zeros(self) -> Zeros:
+        """Return the rates of modes without inertia."""
+        return interlaced_zeros(self.weights, self.rates, self.level)
+
+    def steepness(self, zeros: Zeros) -> Array:
+        """Return S at rates of modes, (n_modes, n)."""
+        x, steepness = zeros.values, np.zeros_like(zeros.pole)
+        for weight, rate in zip(self.weights, self.rates, strict=True):
+            steepness += weight * (x / zeros.from_pole(rate)) ** 2
+        return steepness
+
+
+class Arms:
+    """Impedance of both arms as seen from the sample between them."""
+
+    def __init__(self, gripper: Gripper) -> None:
+        self._lever_m = gripper.lever_m
+        self.alike = gripper.left == gripper.right
+        arms = gripper.left, gripper.right
+        self._c = np.array([arm.damping_Nms_per_rad for arm in arms])
+        self._k = np.array([arm.stiffness_Nm_per_rad for arm in arms])
+        (c_2, c_4), (k_2, k_4) = self._c, self._k
+        self._rate = (k_2 + k_4) / (c_2 + c_4)
+        # At a distance d from that rate Z_2 = -chi - c_2 d and Z_4 = chi - c_4 d.
+        difference, least = k_4 * c_2 - k_2 * c_4, _LEAST_DIFFERENCE * k_4 * c_2
+        self._chi = (difference if abs(difference) > least else least) / (c_2 + c_4)
+
+    def with_sample(self, network: Network) -> Impedance:
+        """Return the impedance with a sample between the arms."""
+        b_2, c = self._lever_m**2, self._c
+        springs, rates = ascending_branches(network)
+        weights = b_2 * springs
+        nothing = np.zeros((1, weights.shape[1]))
+        if not self.alike:
+            weights = np.concatenate((weights, nothing + self._chi**2 / self._k.sum()))
+            rates = np.concatenate((rates, nothing + self._rate))
+            weights, rates = ascending(weights, rates)
+        return Impedance(
+            np.concatenate((self._spring(network)[None], weights)),
+            np.concatenate((nothing, rates)),
+            c.prod() / c.sum() + b_2 * network.c_p,
+        )
+
+    def rotations(self, zeros: Zeros) -> tuple[Array, Array]:
+        """Return N of the rotations of modes, (n_arms, n_modes, n), and dN/dx."""
+        if self.alike:
+            half = np.full((2, *zeros.pole.shape), 0.5)
+            return half, np.zeros_like(half)
+        left, right = self._c / self._c.sum()
+        away = zeros.from_pole(np.asarray(self._rate))
+        share = self._chi / self._c.sum() / away
+        slope = share / away
+        return np.array([right - share, left + share]), np.array([slope, -slope])
+
+    def rotations_apart(self, zeros: Zeros) -> Array:
+        """Return N of the rotations under what the left load exceeds the right one by.
+
+        With these loads phi_2 = [Z_4/(Z_2 + Z_4) tau_2 + b^2 G/(Z_2 + Z_4) (tau_2 - tau_4)] / H.
+        The result is (n_arms, n_modes, n).
+        """
+        of_right, of_left = self.rotations(zeros)[0]
+        through = -of_left * of_right
+        return np.array([through, -of_left - through])
+
+    def force(self, zeros: Zeros) -> Array:
+        """Return N of the jaw force of modes, (1, n_modes, n)."""
+        (c_2, c_4), b = self._c, self._lever_m
+        if self.alike:
+            return 0.5 / b * (c_2 * zeros.values - self._k[0])[None]
+        away = zeros.from_pole(np.asarray(self._rate))
+        z_2, z_4 = -self._chi - c_2 * away, self._chi - c_4 * away
+        return (z_2 * z_4 / ((c_2 + c_4) * away) / b)[None]
+
+    def rotations_at_rest(self, network: Network) -> Array:
+        """Return the final rotations under a unit torque, (n_arms, n)."""
+        spring = self._spring(network)
+        if self.alike:
+            return np.array([0.5 / spring] * 2)
+        k_2, k_4 = self._k / self._k.sum()
+        return np.array([k_4 / spring, k_2 / spring])
+
+    def force_at_rest(self, network: Network) -> Array:
+        """Return the final jaw force under a unit torque, (1, n)."""
+        return (self._lever_m * network.k_p / self._spring(network))[None]
+
+    def _spring(self, network: Network) -> NDArray[Any]:
+        """Return A, (n,)."""
+        return self._k.prod() / self._k.sum() + self._lever_m**2 * network.k_p
