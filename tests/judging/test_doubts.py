@@ -5,7 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
+from scipy.stats import chi2
 
+from biogrip.arrays import Array
 from biogrip.identify.notebook import identify_trace
 from biogrip.judging.doubts import (
     DOUBT,
@@ -14,11 +17,14 @@ from biogrip.judging.doubts import (
     REJECTION,
     examine_residuals,
     find_slow_misfit,
+    has_fast_noise,
 )
+from biogrip.judging.likelihood import make_likelihood
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.noise import AR1, Noise, Outliers, add_noise
 from biogrip.physics.whitening import NoiseModel
-from tests.helpers.problems import MODEL, clean, likelihood_of, posed_for
+from tests.helpers.default import seen
+from tests.helpers.problems import MODEL, case_problem, clean, likelihood_of, posed_for
 
 
 def examined(parts: dict[str, Any], place: int | None = None) -> str:
@@ -53,6 +59,51 @@ def test_what_is_not_white_is_said(parts: dict[str, Any], said: str) -> None:
 def test_one_outlier_is_named_by_its_time(place: int) -> None:
     times = clean("endothelial_cell")[0]
     assert examined({}, place).startswith(f"1 outlier, at {times[place]:g} s of the protocol")
+
+
+@pytest.mark.parametrize(("neighbours", "named"), [(1, True), (3, False)])
+def test_what_a_misfit_has_in_a_row_is_no_outlier(neighbours: int, named: bool) -> None:
+    """A slow misfit of twice the noise, and readings that are off by twenty times the noise."""
+    times, response = clean("endothelial_cell")
+    noise = 0.005 * float(response.max())
+    trace = response + noise * np.random.default_rng(0).standard_normal(len(times))
+    trace += 2 * noise * np.sin(2 * np.pi * times / 100)
+    trace[100 : 100 + neighbours] += 20 * noise
+    notes = examine_residuals(likelihood_of(posed_for(MODEL, times, trace))).notes
+    assert "is not noise" in notes[0].text
+    assert any(", at 100 s" in note.text for note in notes) == named
+
+
+@pytest.mark.parametrize(("beyond", "said"), [(0.98, False), (1.02, True)])
+def test_a_given_noise_is_held_against_what_parameters_leave(beyond: float, said: bool) -> None:
+    """Of eleven readings and four parameters: chi-squared of seven, once in 333 traces more."""
+    times, response = (values[::40] for values in clean("liquid_drop_2"))
+    (problem,) = case_problem(times, response, 1)
+    fit = likelihood_of(problem)
+    noise_sd = fit.misfit * np.sqrt(len(times) / (beyond * chi2.isf(0.003, 7)))
+    held = make_likelihood(problem, fit.best, fit.misfit, confidence=0.95, noise_sd=noise_sd)
+    notes = examine_residuals(held).notes
+    assert any(note.text.startswith("The noise that was given") for note in notes) == said
+
+
+def left_by(noise: str) -> Array:
+    """Four hundred residuals: of fast noise, with a burst of it, or of a smooth misfit."""
+    time_s, rng = np.arange(400.0), np.random.default_rng(0)
+    if noise == "smooth":
+        return 20 * np.sin(2 * np.pi * time_s / 10) + rng.standard_normal(400)
+    fast = lfilter([1.0], [1.0, -0.6], rng.standard_normal(500))[100:]
+    if noise == "burst":
+        # Then 45 % of all squares are those of a twentieth.
+        fast[:20] *= np.sqrt(0.45 / 0.55 * np.sum(fast[20:] ** 2) / np.sum(fast[:20] ** 2))
+    return fast
+
+
+@pytest.mark.parametrize(("noise", "fast"), [("fast", True), ("burst", False), ("smooth", False)])
+def test_fast_noise_is_neither_smooth_nor_in_one_place(noise: str, fast: bool) -> None:
+    """Neighbours of the smooth misfit differ by 1, and all of it scatters by 14."""
+    time_s = np.arange(400.0)
+    residuals = seen(trace=seen(time_s=time_s), coloured=False, duration_s=399.0, noise_scale=1.0)
+    assert has_fast_noise(residuals, left_by(noise), np.ones((1, 400))) == fast
 
 
 @pytest.mark.parametrize(
@@ -91,7 +142,11 @@ def test_noise_that_grows_over_decades_is_weighed_and_its_share_advised() -> Non
     assert np.all((limits["low"] < [1.0, 5.0]) & (limits["high"] > [1.0, 5.0]))
 
 
-@pytest.mark.parametrize(("lacking", "of_peak"), [(0.012, 0.1), (0.06, 0.4)])
+@pytest.mark.parametrize(
+    # The smallest is 1.3 times the noise with it: sqrt(1.3^2 - 1) times 0.05 % without.
+    ("lacking", "of_peak"),
+    [(0.005, 0.042), (0.012, 0.1), (0.06, 0.4)],
+)
 def test_a_quiet_trace_has_limits_that_allow_for_a_slightly_wrong_model(
     lacking: float, of_peak: float
 ) -> None:

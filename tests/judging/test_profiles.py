@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm, t
 
-from biogrip.judging.constrained_fits import QuantityConstraint
+from biogrip.arrays import Array, IntArray
+from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.limits import find_limits
 from biogrip.judging.onset import profile_over_onset
-from biogrip.judging.profiles import compute_profiles
+from biogrip.judging.profiles import Points, _limits, compute_profiles, find_gaps
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
 from biogrip.library import set_up, simulate
 from biogrip.physics.models import MODELS, Sample
@@ -167,3 +168,37 @@ def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
         assert [finding.low is not None for finding in diagnosis.findings] == low_of
         at_the_end = [finding.profile.increases[0] for finding in diagnosis.findings]
         assert [increase > certainty for increase in at_the_end] == low_of
+
+
+class TwoBasins:
+    """Fits of two quantities, each its own profile, in two basins that are never left by chance.
+
+    In the first basin chi^2 rises as the square of what is held; in the second it jumps, from 1 up
+    to 9, where 3 is exceeded. Only the second profile, beyond 4, leads into the second basin.
+    """
+
+    best, at_best = np.zeros((2, 1)), np.zeros(2)
+    threshold, certainty, trace = np.full(2, 4.0), np.full(2, 8.0), np.zeros(2, dtype=np.int64)
+    likelihoods = (None,)
+
+    def at(self, profile: IntArray, targets: Array, near: Array, _: float) -> tuple[Array, Array]:
+        second = (near[:, 0] > 0.9) | (profile == 1) & (targets > 4)
+        rises = np.where(second, np.where(targets > 3, 9.0, 1.0), targets**2)
+        return rises, second[:, None].astype(float)
+
+    from_each = ConstrainedFits.from_each
+
+
+def test_a_limit_is_in_the_deepest_basin_that_any_profile_knows() -> None:
+    """Not where the first is left, at -2 and 2: at the jump at 3, and nowhere."""
+    points = Points(TwoBasins(), [np.linspace(-5.0, 5.0, 11)] * 2)  # type: ignore[arg-type]
+    points.from_optimum()
+    points.from_neighbours(points.profile == 0)
+    assert _limits(points)[:, 0] == pytest.approx([np.nan, 3.0], abs=1e-6, nan_ok=True)
+
+
+def test_a_gap_is_clear_by_a_hundredth_of_the_threshold() -> None:
+    values = np.linspace(-3.0, 3.0, 61)
+    for bump, gaps in ((1.1, 1), (1.005, 0)):
+        rises = np.where(np.abs(values) < 1, bump, 0.5)
+        assert len(find_gaps(values, rises, 1.0)) == gaps

@@ -9,6 +9,7 @@ from scipy.stats import t as student
 from biogrip.arrays import Array
 from biogrip.fit.noise_model_fit import absorbed, outliers_of
 from biogrip.judging.whiteness import (
+    _restricted,
     as_correlated,
     by_leverage,
     correlated,
@@ -100,6 +101,38 @@ def test_a_reading_that_the_fit_follows_is_no_outlier(place: int) -> None:
     residual[:2] = 0.0, 1e-9
     assert not outliers_of(by_leverage(residual, basis))[place]
     assert far_out(residual, np.arange(20) == place, basis) == 1.0
+
+
+def test_residuals_are_over_the_share_that_the_fit_leaves() -> None:
+    """Of the second reading a tenth of the variance is left; the first is followed, as it is."""
+    basis = np.array([[0.99, 0.0, 0.0], [0.0, np.sqrt(0.9), 0.0]])
+    found = by_leverage(np.ones(3), basis)
+    assert found == pytest.approx([1.0, 1 / np.sqrt(0.1), 1.0])
+
+
+@pytest.mark.parametrize("directions", [1, 5])
+def test_white_residuals_count_as_what_the_fit_leaves_of_them(directions: int) -> None:
+    """A correlation costs two parameters more: by chance one trace in seven is worth that."""
+    basis = absorbed(np.vander(np.linspace(-1, 1, 40), directions, increasing=True).T)
+    noise = np.random.default_rng(0).standard_normal((30, 40))
+    found = [as_correlated(residual - residual @ basis.T @ basis, basis) for residual in noise]
+    left = 40 - directions
+    assert np.mean([each == pytest.approx((left, left)) for each in found]) > 0.6
+
+
+def test_the_restricted_likelihood_is_that_of_dense_matrices() -> None:
+    rng = np.random.default_rng(0)
+    left, taken = rng.standard_normal(30), np.linalg.qr(rng.standard_normal((30, 5)))[0]
+    apart = np.abs(np.subtract.outer(np.arange(30), np.arange(30)))
+    covariance = 0.8 * np.exp(-apart / 6) + 0.2 * np.eye(30)
+    inverse = np.linalg.inv(covariance)
+    information = taken.T @ inverse @ taken
+    rest = inverse - inverse @ taken @ np.linalg.solve(information, taken.T @ inverse)
+    size = left @ rest @ left / 25
+    determinants = np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(information)[1]
+    assert _restricted(covariance, left, taken) == pytest.approx(
+        (25 * np.log(size) + determinants, size)
+    )
 
 
 def test_independent_residuals_are_counted() -> None:

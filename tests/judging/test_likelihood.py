@@ -1,0 +1,44 @@
+"""Noise, thresholds and covariance by hand."""
+
+import numpy as np
+import pytest
+
+from biogrip.judging.likelihood import Likelihood, covariance, make_likelihood
+from tests.helpers.default import seen
+
+
+def likelihood_with(freedom: float) -> Likelihood:
+    """Of 100 readings, three parameters and a noise model that is known with some freedom."""
+    residuals = seen(samples=100, free=100, freedom=freedom)
+    return make_likelihood(seen(residuals=residuals), np.zeros(3), 2.0, confidence=0.95)
+
+
+@pytest.mark.parametrize(
+    # Student's t at 97.5 %, from tables.
+    ("freedom", "student"),
+    [(8.0, 2.306), (np.inf, 1.985)],
+)
+def test_a_noise_model_that_is_hardly_known_widens_limits(freedom: float, student: float) -> None:
+    found = likelihood_with(freedom)
+    assert found.threshold == pytest.approx(student**2, rel=1e-3)
+    assert found.noise_sd == pytest.approx(2.0 * np.sqrt(100 / 97))
+
+
+def test_a_misfit_has_the_thresholds_of_its_own_freedom() -> None:
+    """A limit takes as many times the threshold as of known noise: 3.2905^2 over 1.96^2."""
+    found = likelihood_with(np.inf).as_misfit(independent=25.0, freedom=8.0)
+    assert found.noise_sd == pytest.approx(4.0)
+    assert found.threshold == pytest.approx(2.306**2, rel=1e-3)
+    assert found.certainty / found.threshold == pytest.approx(3.2905**2 / 1.96**2, rel=1e-4)
+
+
+def test_a_parameter_that_is_told_to_less_than_an_e_fold_counts() -> None:
+    """J J^T is 2 1, 1 2: each has a standard deviation of 0.7 with the other known."""
+    found = covariance(np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]]), 1.0)
+    assert found == pytest.approx(np.array([[2.0, -1.0], [-1.0, 2.0]]) / 3)
+
+
+def test_noise_that_grows_has_the_covariance_of_unweighted_fits() -> None:
+    """Of a slope from readings at 10 and 20: (10^2 + 20^2 3^2) / (10^2 + 20^2)^2."""
+    found = covariance(np.array([[10.0, 20.0]]), np.array([1.0, 3.0]))
+    assert found[0, 0] == pytest.approx(3700 / 500**2)
