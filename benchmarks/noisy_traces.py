@@ -16,7 +16,7 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.misfit import Misfit, make_misfit
 from biogrip.physics.noise import add_noise, rms
-from biogrip.physics.protocol import Course, join_phases, sample_times
+from biogrip.physics.protocol import Course, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
@@ -45,7 +45,7 @@ def _posed() -> CaseProblem:
 @cache
 def _clean() -> tuple[Course, Array, Array]:
     steps = join_phases(case().phases)
-    time_s = sample_times(steps.end_s, case().sampling.rate_Hz)
+    time_s = case().times_s
     model = case().sample.model
     truth = np.array([case().parameters[name] for name in model.names])
     response = step_response(case().gripper, model.network(truth))

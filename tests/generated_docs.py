@@ -179,7 +179,7 @@ def slow_branch() -> str:
         for fixed in ("{}", f"{{c: {_SLOW}}}")
     )
     posed = case.problem.to_identify(), slow.problem.to_identify()
-    time_s = case.sampling.over(case.torque.end_s)
+    time_s = case.times_s
     given = case.gripper, case.network, case.torque, time_s
     (target,) = simulated_response(*given, nonlinear=False)
     seeds = range(case.seeds)

@@ -12,7 +12,7 @@ from biogrip.cli import main
 from biogrip.design import NO_BOUND, Limits, Specimen, decode, rated, search, set_up
 from biogrip.fit.problem import CaseProblem
 from biogrip.library import simulate
-from biogrip.physics.protocol import Sampling
+from biogrip.physics.protocol import sample_times
 from biogrip.physics.simulation import compute_grip
 from tests.helpers.default import study_of
 
@@ -60,7 +60,7 @@ def test_a_design_is_better_keeps_its_limits_and_runs(
     (case,) = study_of(output.read_text()).cases.values()
     assert max(phase.level for phase in case.phases) <= 1.6e-9 * (1 + 1e-12)
     assert case.problem.torque.end_s == pytest.approx(400.0)
-    assert len(case.sampling.over(400.0)) == 4001
+    assert len(case.times_s) == 4001
     # The same command gives the same bytes.
     before = output.read_bytes()
     assert designed(tmp_path, alone).read_bytes() == before
@@ -71,12 +71,12 @@ def test_the_search_knows_the_bounds_of_a_train() -> None:
     limits, specimens = set_up_of()
     train, step = search(specimens, limits, 20)[0], 1e-4
     for one in specimens:
-        found = rated(one, train.phases, Sampling(limits.rate_Hz))
+        found = rated(one, train.phases, limits.rate_Hz)
         problem = replace(one.case.problem, phases=train.phases)
 
         def read(shift: Array, one: Specimen = one, problem: CaseProblem = problem) -> Array:
             values = dict(zip(problem.searched.names, one.parameters * np.exp(shift), strict=True))
-            times_s = Sampling(limits.rate_Hz).over(problem.torque.end_s)
+            times_s = sample_times(problem.torque.end_s, limits.rate_Hz)
             return simulate(problem, {**problem.fixed, **values}, times_s)
 
         shifts = step * np.eye(len(found.bounds))
@@ -121,7 +121,7 @@ def test_trains_keep_their_limits(rate_Hz: float) -> None:
 def test_parameters_that_trade_have_no_bound() -> None:
     """All four of the paper's drop under its own protocol: c and c_p show as their sum alone."""
     _, (one,) = set_up_of("only: [liquid_drop_2]\nmeasurement: {noise: {level_rad: 3.0e-6}}")
-    found = rated(one, one.case.phases, one.case.sampling)
+    found = rated(one, one.case.phases, one.case.block.measurement.rate_Hz)
     by_name = dict(zip(one.case.searched.names, found.bounds, strict=True))
     assert by_name["c"] == by_name["c_p"] == NO_BOUND
     assert by_name["k_p"] < 0.1

@@ -128,7 +128,7 @@ def test_ranges_hold_samples_beyond_those_of_the_paper_and_given_ones_stay(
 def test_elements_at_the_ends_of_ranges_do_not_show(case: str) -> None:
     """A spring or damper beyond either end is as good as absent, or rigid: less than the noise."""
     chosen = STUDY.cases[case]
-    problem, time_s = chosen.problem, chosen.sampling.over(chosen.problem.torque.end_s)
+    problem, time_s = chosen.problem, chosen.times_s
 
     def response(**changes: float) -> Array:
         return simulate(problem, {**chosen.parameters, **changes}, time_s)

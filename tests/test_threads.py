@@ -25,21 +25,32 @@ import numpy as np
 from threadpoolctl import threadpool_info
 
 import biogrip
+from biogrip import library
 from biogrip.identify import notebook
 
 def threads():
     return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
 
-def tell(*given):
+def tell(*given, **more):
     raise biogrip.BiogripError(f"threads: {threads()}")
 
-before, notebook.identify_alike = threads(), tell
-time_s = np.arange(1, 30.0)
-try:
-    biogrip.identify_trace(time_s, 2 - np.exp(-time_s), reads="strain", hold=1.0)
-except biogrip.BiogripError as error:
-    assert str(error) == "threads: {1}", error
-assert threads() == before
+before, time_s = threads(), np.arange(1, 30.0)
+trace = time_s, 2 - np.exp(-time_s)
+notebook.read_trace = library.identify_many = library.diagnose = tell
+held, model = (biogrip.hold(30.0, 1.0),), biogrip.Sample("liquid_drop")
+creep = biogrip.set_up(biogrip.INSTRUMENTS["strain"], held, model)
+for use in (
+    lambda: biogrip.identify_trace(*trace, reads="strain", hold=1.0),
+    lambda: biogrip.identify_sample(creep, *trace),
+    lambda: biogrip.judge(creep, *trace, None),
+):
+    try:
+        use()
+    except biogrip.BiogripError as error:
+        assert str(error) == "threads: {1}", error
+    else:
+        raise AssertionError
+    assert threads() == before
 """
 
 

@@ -22,7 +22,7 @@ from biogrip.files import refuse_inputs, write_text
 from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import standard_deviation
-from biogrip.physics.protocol import Phase, Sampling, hold, join_phases, largest_load
+from biogrip.physics.protocol import Phase, hold, join_phases, largest_load, sample_times
 from biogrip.physics.response import jaw_force_response, linear_jaw_force
 from biogrip.physics.simulation import compute_grip, simulated_response
 from biogrip.study.config import DesignBlock
@@ -157,8 +157,8 @@ def design(config: Path, output: Path | None) -> None:
     study = load_study(read_configs(files), files)
     limits, specimens = set_up(list(study.cases.values()), study.config.design)
     train, reached = search(specimens, limits)
-    before = [rated(one, one.case.phases, one.case.sampling) for one in specimens]
-    after = [rated(one, train.phases, Sampling(limits.rate_Hz)) for one in specimens]
+    before = [rated(one, one.case.phases, one.case.block.measurement.rate_Hz) for one in specimens]
+    after = [rated(one, train.phases, limits.rate_Hz) for one in specimens]
     write_text(output, as_config(read_config(config), specimens, after, limits.rate_Hz))
     then = f"snakemake -j2 --configfile {output} simulates and fits it"
     said = [*_said(specimens, before, after, reached), f"Written to {output}; {then}."]
@@ -211,8 +211,7 @@ def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
     problem, model, network = case.problem, case.searched, case.sample.model.sample(case.parameters)
     required = np.array([name in (block.parameters or model.names) for name in model.names])
     # The noise of an instrument: that of its own sample under its own protocol.
-    times_s = case.sampling.over(problem.torque.end_s)
-    read = simulated_response(case.gripper, network, problem.torque, times_s, nonlinear=False)
+    read = simulated_response(case.gripper, network, problem.torque, case.times_s, nonlinear=False)
     noise = float(standard_deviation(read[0], case.noise)[0])
     elapsed_s = limits.elapsed_s
     step = join_phases((hold(elapsed_s[-1], 1.0),), deforms=case.instrument.deforms)
@@ -280,13 +279,13 @@ def decode(unknowns: Array, limits: Limits) -> Train:
     return Train(limits.largest * np.ceil(_FINE * heights) / _FINE, starts, limits)
 
 
-def rated(specimen: Specimen, phases: tuple[Phase, ...], sampling: Sampling) -> Experiment:
+def rated(specimen: Specimen, phases: tuple[Phase, ...], rate_Hz: float) -> Experiment:
     """Compute what an experiment tells of a sample.
 
     If it turns the arms further than the comb drives can, it is a `BiogripError`.
     """
     case, problem = specimen.case, replace(specimen.case.problem, phases=phases)
-    times_s, model = sampling.over(problem.torque.end_s), problem.searched
+    times_s, model = sample_times(problem.torque.end_s, rate_Hz), problem.searched
     given = problem.gripper, model, problem.torque, times_s, specimen.parameters[None]
     read, *slopes = linear_responses(*given)[0]
     bounds = relative_bounds(np.array(slopes), specimen.noise)

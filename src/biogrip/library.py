@@ -15,7 +15,7 @@ from biogrip.errors import BiogripError
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.problem import CaseProblem, Identification, silent
-from biogrip.identify.notebook import TraceResult, identify_trace
+from biogrip.identify.notebook import TraceResult, identify_trace, one_blas_thread
 from biogrip.judging.diagnosis import Diagnosis, diagnose, with_times
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
@@ -103,6 +103,7 @@ def simulate(
     return simulated_response(experiment.gripper, network, torque, times, nonlinear=nonlinear)[0]
 
 
+@one_blas_thread
 def identify_sample(
     experiment: CaseProblem, time_s: ArrayLike, readings: ArrayLike, seed: int = 0
 ) -> Identification:
@@ -121,6 +122,7 @@ def identify_sample(
     return identify_many([problem], _BUDGET, [np.random.default_rng(seed)], silent)[0]
 
 
+@one_blas_thread
 def judge(
     experiment: CaseProblem,
     time_s: ArrayLike,

@@ -9,7 +9,7 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import Sample
-from biogrip.physics.protocol import Phase, Sampling, hold, join_phases
+from biogrip.physics.protocol import Phase, hold, join_phases, sample_times
 from biogrip.records.traces import read_target
 from biogrip.stages import identification as identifications
 from biogrip.stages import judgement, recording
@@ -19,12 +19,13 @@ from tests.helpers.places import EXAMPLE
 
 
 def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
+    torque = join_phases((hold(100.0, torque_Nm), *more))
     return seen(
         name="Drop",
         instrument=GRIPPER,
         gripper=STUDY.gripper,
-        torque=join_phases((hold(100.0, torque_Nm), *more)),
-        sampling=Sampling(rate_Hz=1.0),
+        torque=torque,
+        times_s=sample_times(torque.end_s, 1.0),
         sample=Sample("maxwell"),
         network=Sample("maxwell").model.sample({"k": 1.0, "c": 1.0}),
         nonlinear_target=False,

@@ -63,7 +63,7 @@ def proportional_deviations(problem: CaseProblem, time_s: Array, readings: Array
     """Compute standard deviations of readings in proportion to the smooth rotation, (n_samples,).
 
     The problem has that share, and the standard deviation of further noise. If it is not known, no
-    deviation is less than that of the median of the smallest rotations, nor than they scatter: of
+    deviation is less than that of the median of the smallest readings, nor than they scatter: of
     a rotation of zero, no instrument is certain.
 
     Parameters
@@ -93,7 +93,7 @@ def proportional_deviations(problem: CaseProblem, time_s: Array, readings: Array
 
 
 def _least(sizes: Array, rest: Array, share: float) -> float:
-    """Return the least standard deviation, from the readings with the smallest rotations."""
+    """Return the least standard deviation, from the smallest readings."""
     few = max(_FEWEST, int(_SMALL * len(sizes)))
     smallest = np.argsort(sizes, kind="stable")[:few]
     scatter, size = (np.sqrt(np.mean(own[smallest] ** 2)) for own in (rest, sizes))

@@ -31,7 +31,7 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 
 _LEAST_DAMPING = 1e-9
-# In e-folds. Linearised rotations are wrong for longer steps, which would waste starts.
+# In e-folds. Linearised responses are wrong for longer steps, which would waste starts.
 _LONGEST_STEP = 3.0
 _MOST_STEPS = 300
 _STANDSTILL = 1e-8

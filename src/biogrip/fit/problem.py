@@ -166,7 +166,7 @@ class CaseProblem:
     noise_sd: float | None = None
     """Standard deviation of the noise, if it is known."""
     noise_share: float | None = None
-    """Standard deviation of the noise as a share of the rotation; read by `read_checked`."""
+    """Standard deviation of the noise as a share of the readings; read by `read_checked`."""
     sd: Array | None = field(default=None, compare=False)
     """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
     coloured: bool = False

@@ -26,7 +26,7 @@ _SECOND_ORDER = 9.0
 def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Array) -> Array:
     """Compute the changes of a rotation by the uncertainties of the gripper's properties.
 
-    To the first order it is half the difference between rotations with the property a standard
+    To the first order it is half the difference between responses with the property a standard
     uncertainty above and below its value, as is recommended for nonlinear models [1]_. The mean
     of both, less the rotation itself, is its second order: it grows with the square of the error,
     and has the amplitude of an error of three standard uncertainties. Without it limits would be
@@ -138,7 +138,7 @@ def fit_traces(
     component of the noise.
 
     `find` finds the global optima of the problems of given traces. A trace is its ascending times
-    and rotations, (n_samples,), and has assumptions of its own. Too many readings for a coloured
+    and readings, (n_samples,), and has assumptions of its own. Too many readings for a coloured
     noise model are a `BiogripError`.
     """
     plain = [trace for trace, case_problem in enumerate(case_problems) if case_problem.plain]

@@ -1,11 +1,11 @@
 """A trace in a notebook: identified and told as by the command, from arrays or pandas columns."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +24,13 @@ from biogrip.terminal import Progress
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+one_blas_thread: Callable[[_Function], _Function] = threadpool_limits.wrap(
+    limits=1, user_api="blas"
+)
+"""Decorator of what fits: its matrices are small, and BLAS threads cost more than they bring."""
 
 # Options of the command in what it says, and the arguments and keys that they are here.
 _ARGUMENTS = (
@@ -90,6 +97,7 @@ class TraceResult(Identified):
         return in_words(self.data)
 
 
+@one_blas_thread
 def identify_trace(
     time_s: ArrayLike,
     readings: ArrayLike,
@@ -169,11 +177,7 @@ def identify_trace(
         asked = Asked(file, None, tuple(settings), file.name)
         try:
             trace = read_trace(asked)
-            # Matrices are small: BLAS threads cost more than they bring.
-            with (
-                threadpool_limits(1, user_api="blas"),
-                Progress("", 5, live=False, quiet=True) as progress,
-            ):
+            with Progress("", 5, live=False, quiet=True) as progress:
                 (result,) = identify_alike([Path(file.name)], [trace], progress)
         except BiogripError as error:
             said = _with_arguments(str(error).replace(str(file), file.name))

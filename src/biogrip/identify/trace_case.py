@@ -61,7 +61,7 @@ class TraceCase:
 
     @property
     def readings(self) -> tuple[Array, Array]:
-        """Times and rotations, (n_samples,) each."""
+        """Times and readings, (n_samples,) each."""
         return self.recorded.time_s, self.recorded.readings[0]
 
     @property

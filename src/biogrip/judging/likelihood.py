@@ -168,7 +168,7 @@ def covariance(sensitivity: Array, noise_sd: float | Array) -> Array:
     carries no information. It is fixed for the others' covariance: near zero on a
     logarithmic scale, the linear approximation of its effect fails.
 
-    J is d rotation / d log parameter, (n_parameters, n_samples), sigma a number or
+    J is d response / d log parameter, (n_parameters, n_samples), sigma a number or
     (n_samples,). The covariance, (n_parameters, n_parameters), is infinite on the diagonal for
     parameters without information, and zero without noise.
     """

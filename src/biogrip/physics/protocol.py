@@ -159,14 +159,3 @@ def sample_times(duration_s: float, rate_Hz: float) -> Array:
     """Return uniform sampling times in s from 0, including the end if it falls on one."""
     count = int(np.floor(duration_s * rate_Hz * (1 + 1e-12))) + 1
     return np.arange(count) / rate_Hz
-
-
-@dataclass(frozen=True)
-class Sampling:
-    """Uniform sampling, from 0 to the end of the protocol."""
-
-    rate_Hz: float
-
-    def over(self, end_s: float) -> Array:
-        """Return the sampling times in s, (n_samples,), of a protocol that ends at `end_s`."""
-        return sample_times(end_s, self.rate_Hz)

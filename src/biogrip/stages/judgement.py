@@ -40,7 +40,7 @@ def fits_judged(
 ) -> list[TraceFit]:
     """Return the least-squares fits of traces that their judgements are based on.
 
-    Traces are pairs of times and rotations, (n_samples,) each, one of each case; the cases have
+    Traces are pairs of times and readings, (n_samples,) each, one of each case; the cases have
     the same budget of least squares.
     """
     least_squares = identifier("least_squares", cases[0].least_squares)

@@ -76,8 +76,7 @@ def _rows(
     for point in points:
         case = study.points[point.name]
         problem = case.problem.calibrated(calibrations.get(point.name, []))
-        time_s = case.sampling.over(problem.torque.end_s)
-        bounds[point.name] = bounds_percent(problem, case.noise, true, time_s)
+        bounds[point.name] = bounds_percent(problem, case.noise, true, case.times_s)
     heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
     for point in points:
         case = study.points[point.name]
@@ -135,7 +134,7 @@ def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
 def _resolution(point: Case, true: Mapping[str, float]) -> float:
     """Return the noise-free RMS misfit of the encodable parameters nearest to the truth."""
     problem = point.problem
-    time_s = point.sampling.over(problem.torque.end_s)
+    time_s = point.times_s
     truth = [true[p.name] for p in problem.model.parameters]
     rounded = [
         problem.fixed.get(p.name, nearest_encodable(value, problem.ranges[p.range_name]))

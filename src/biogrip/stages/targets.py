@@ -42,7 +42,7 @@ def simulate(case: Case, target: Path) -> None:
 
     A response that is not finite, or turns the arms beyond the combs' stroke, is an error.
     """
-    time_s = case.sampling.over(case.torque.end_s)
+    time_s = case.times_s
     controlled = evaluate(case.torque, time_s)
     if not case.instrument.has_jaws:
         device = case.gripper, case.network, case.torque

@@ -14,7 +14,6 @@ from pydantic import BeforeValidator, Field, Tag
 from biogrip.keys import BY_KIND, Block, OneOf, Problem
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION
 from biogrip.physics.noise import Noise
-from biogrip.physics.protocol import Sampling
 from biogrip.traces.columns import TIME_UNITS, Columns, known_unit, trace_file_problem
 
 COLOURED = "coloured"
@@ -164,11 +163,6 @@ class MeasurementBlock(Block):
     def fits_drift(self) -> bool:
         """True if a linear drift is fitted along."""
         return self.coloured if self.drift is None else self.drift
-
-    @property
-    def sampling(self) -> Sampling:
-        """Sampling of the rotation."""
-        return Sampling(self.rate_Hz)
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that are in conflict, and what a recorded trace lacks."""

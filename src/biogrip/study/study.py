@@ -14,7 +14,7 @@ from biogrip.keys import built, plain
 from biogrip.physics.gripper import NO_ARMS, Contact, Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import CANDIDATES, UNPUBLISHED, Sample
-from biogrip.physics.protocol import Phase, join_phases
+from biogrip.physics.protocol import Phase, join_phases, sample_times
 from biogrip.physics.sample_model import with_fixed
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
@@ -53,7 +53,6 @@ class Case:
     size_m = _of_case(lambda case: case.block.sample.size_m)
     published = _of_case(lambda case: case.block.published or UNPUBLISHED)
     noise = _of_case(lambda case: case.block.measurement.noise)
-    sampling = _of_case(lambda case: case.block.measurement.sampling)
     nonlinear_target = _of_case(lambda case: case.block.models.target == "nonlinear")
     unilateral = _of_case(lambda case: case.block.contact == "unilateral")
     file = _of_case(lambda case: case.block.measurement.file or "")
@@ -81,7 +80,9 @@ class Case:
     """What the instrument holds over time."""
     network = _of_case(lambda case: case.sample.model.sample(case.parameters))
     """Springs and dampers of the simulated sample."""
-    samples = _of_case(lambda case: len(case.sampling.over(case.torque.end_s)))
+    times_s = _of_case(lambda it: sample_times(it.torque.end_s, it.block.measurement.rate_Hz))
+    """Times of a simulated trace, (n_samples,)."""
+    samples = _of_case(lambda case: len(case.times_s))
     """Number of samples in a simulated trace."""
     methods = _of_case(lambda case: {it: case.method(it) for it in case.study.config.methods})
     """Settings of the study's identification methods by name."""

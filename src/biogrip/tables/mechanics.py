@@ -289,7 +289,7 @@ def _loss_of(study_seed: int, case: Case) -> list[Row]:
     device = case.gripper, case.network, case.torque
     if compute_grip(*device, nonlinear=False).pulls_from_s is None:
         return []
-    time_s = case.sampling.over(case.torque.end_s)
+    time_s = case.times_s
     free = unilateral_response(*device, time_s)
     if not free.parted_s:
         return []

@@ -63,7 +63,7 @@ def check_recording(
         Trace, its times counted from the start of the protocol.
     problem
         What it was recorded with.
-    noise_rad
+    noise_sd
         Typical standard deviation of the noise, if it is given: a small rotation passes if that is
         far smaller still.
     onset_s
