@@ -11,7 +11,7 @@ from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.limits import find_limits
-from biogrip.judging.onset import profile_over_onset
+from biogrip.judging.onset import _at, profile_over_onset
 from biogrip.judging.profiles import Points, _limits, compute_profiles, find_gaps
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
 from biogrip.library import set_up, simulate
@@ -163,6 +163,12 @@ def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
     found = run("least_squares", problem)
     alone = diagnose(problem, experiment.model, found, confidence=0.95)
     merged, _ = profile_over_onset(alone, times)
+    # What a later onset costs is taken off the threshold, and off what a limit takes.
+    later, best = _at(alone.likelihood, 0.2), alone.likelihood
+    cost = best.increase(later.misfit)
+    assert cost > 0.1
+    assert later.threshold == pytest.approx(best.threshold - cost)
+    assert later.certainty == pytest.approx(best.certainty - cost)
     certainty = alone.likelihood.certainty
     for low_of, diagnosis in (([True, True], alone), ([True, False], merged)):
         assert [finding.low is not None for finding in diagnosis.findings] == low_of
