@@ -189,6 +189,12 @@ def correlation(time_s: Array, noise_model: NoiseModel, growing: Array | None = 
     return matrix
 
 
+def test_rates_of_flicker_noise_are_as_far_apart_as_allowed() -> None:
+    """1.5 e-folds at most; a rate fewer would be further."""
+    steps = np.diff(np.log(flicker_rates(np.arange(200.0))))
+    assert steps.max() <= 1.5 < steps.sum() / (len(steps) - 1)
+
+
 @pytest.mark.parametrize("noise_model", COLOURS)
 def test_noise_of_the_colour_becomes_white(noise_model: NoiseModel) -> None:
     """Also what grows; matrices are of condition 1e5 at most, so that ten digits are left."""
