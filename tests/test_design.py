@@ -9,7 +9,16 @@ import yaml
 
 from biogrip.arrays import Array
 from biogrip.cli import main
-from biogrip.design import NO_BOUND, Limits, Specimen, decode, rated, search, set_up
+from biogrip.design import (
+    NO_BOUND,
+    Limits,
+    Specimen,
+    decode,
+    rated,
+    relative_bounds,
+    search,
+    set_up,
+)
 from biogrip.fit.problem import CaseProblem
 from biogrip.library import simulate
 from biogrip.physics.protocol import sample_times
@@ -66,6 +75,11 @@ def test_a_design_is_better_keeps_its_limits_and_runs(
     assert designed(tmp_path, alone).read_bytes() == before
 
 
+def test_a_parameter_that_is_told_to_less_than_an_e_fold_has_no_bound() -> None:
+    found = relative_bounds(np.array([[0.3, 0.0], [0.0, 4.0]]), 1.0)
+    assert found == pytest.approx([NO_BOUND, 0.25])
+
+
 def test_the_search_knows_the_bounds_of_a_train() -> None:
     """By central differences of simulated readings; the truncation of 1e-4 is some 1e-8."""
     limits, specimens = set_up_of()
@@ -113,6 +127,8 @@ def test_trains_keep_their_limits(rate_Hz: float) -> None:
     for each in np.random.default_rng(1).random((20, 24)):
         train = decode(each, limits)
         assert np.all((train.levels > 0) & (train.levels <= 1.0e-9 * (1 + 1e-12)))
+        # Steps start between readings.
+        assert np.all(train.starts[1:] % 2 == 1)
         durations_s = [phase.duration_s for phase in train.phases]
         assert min(durations_s) >= 4.5 / rate_Hz * (1 - 1e-9)
         assert 100.0 - 1 / rate_Hz < sum(durations_s) <= 100.0 * (1 + 1e-9)
@@ -142,15 +158,16 @@ def test_creep_and_relaxation_are_designed(
 @pytest.mark.parametrize(
     ("block", "words"),
     [
-        ("{stepps: 4}", "Did you mean 'steps'?"),
-        ("{duration_s: 0.1}", "found room for 1 readings"),
+        ("design: {stepps: 4}", "Did you mean 'steps'?"),
+        ("design: {duration_s: 0.1}", "found room for 1 readings"),
+        ("measurement: {noise: {level: 0.1, reference: signal}}", "noise: allowed is white noise"),
     ],
 )
 def test_what_cannot_be_designed_is_said(
     tmp_path: Path, block: str, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = tmp_path / "my.yaml"
-    config.write_text(f"only: [endothelial_cell]\ndesign: {block}\n")
+    config.write_text(f"only: [endothelial_cell]\n{block}\n")
     assert main(["design", str(config)]) == 1
     said = capsys.readouterr().err
     assert words in said

@@ -71,13 +71,17 @@ def test_strange_readings_are_answered_and_saturated_ones_told(
     assert "generalized_maxwell_5" not in str(found.data["models"])
 
 
-def test_readings_of_a_rounded_clock_are_averaged_and_counted() -> None:
+def test_readings_that_are_averaged_or_left_out_are_counted() -> None:
+    """Of a rounded clock, up to a last second."""
     clock = np.floor(SINCE)[20:]
-    config = {"measurement": {"average_repeated": True}}
+    config = {"measurement": {"average_repeated": True, "until_s": 15}}
     found = modulus(clock, NOISY[20:], "zener_maxwell", config=config)
-    text = f"Averaged at repeated times: {np.sum(clock < 20)} readings."
-    assert {"weight": "harmless", "text": text} in found.data["notes"]
-    assert found.data["samples"] == len(np.unique(clock))
+    for text in (
+        f"Averaged at repeated times: {np.sum(clock < 20)} readings.",
+        f"Left out by from_s and until_s: {np.sum(np.unique(clock) > 15)} readings.",
+    ):
+        assert {"weight": "harmless", "text": text} in found.data["notes"]
+    assert found.data["samples"] == 15
 
 
 @pytest.mark.nightly

@@ -36,12 +36,19 @@ def test_no_reading_is_certain() -> None:
     assert deviations(CLEAN).min() == pytest.approx(0.05 * np.median(smallest), rel=0.01)
 
 
-def test_other_noise_shows_where_the_rotation_is_small() -> None:
+@pytest.mark.parametrize(("share", "of_peak"), [(1e-3, 0.3), (0.02, 0.02)])
+def test_other_noise_shows_where_the_rotation_is_small(share: float, of_peak: float) -> None:
+    """Far above the share, and by so much that chance does not explain it."""
     rng = np.random.default_rng(1)
-    floor = 0.3 * float(CLEAN.max())
-    found = deviations(CLEAN + floor * rng.standard_normal(len(CLEAN_S)), 1e-3)
+    floor = of_peak * float(CLEAN.max())
+    proportional = CLEAN * (1 + share * rng.standard_normal(len(CLEAN_S)))
+    found = deviations(proportional + floor * rng.standard_normal(len(CLEAN_S)), share)
     # Some eighty readings tell the scatter.
     assert found.min() == pytest.approx(floor, rel=0.3)
+
+
+def test_other_noise_that_is_given_is_added() -> None:
+    floor = 0.3 * float(CLEAN.max())
     given = deviations(CLEAN, noise_sd=floor)
     np.testing.assert_allclose(given, np.hypot(0.05 * CLEAN, floor), rtol=1e-3)
 

@@ -7,11 +7,11 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit.least_squares import LeastSquaresSettings
-from biogrip.fit.nested_fits import advice, fit_models, is_within, ranked
+from biogrip.fit.nested_fits import _is_noticeably_lower, advice, fit_models, is_within, ranked
 from biogrip.fit.problem import CaseProblem, Identification, Problem
 from biogrip.physics.models import CANDIDATES, MODELS, contained
 from biogrip.physics.response import step_response, superpose
-from tests.helpers.default import study_of
+from tests.helpers.default import seen, study_of
 from tests.helpers.problems import GRIPPER, SAMPLES, TORQUE, case_problem, clean
 
 TRIED = (*MODELS, "generalized_maxwell_2")
@@ -104,6 +104,16 @@ def test_the_sentence_is_that_of_the_numbers(gained: dict[str, float], said: str
     misfits = [float(np.exp(-gain / (2 * READINGS))) for gain in gained.values()]
     tried = ranked(list(gained), misfits, READINGS)
     assert said in advice(tried, "generalized_maxwell")
+
+
+@pytest.mark.parametrize(("gained", "taken"), [(0.005, False), (0.02, True), (5.0, True)])
+def test_a_branch_is_taken_that_lowers_chi_squared_by_a_hundredth(
+    gained: float, taken: bool
+) -> None:
+    """Far less than the 1 that a standard error changes it by."""
+    problem = seen(residuals=seen(samples=READINGS))
+    before = float(np.sqrt(1 + gained / READINGS))
+    assert _is_noticeably_lower(1.0, before, problem) == taken
 
 
 TIMES, RESPONSE = clean("liquid_drop_2")

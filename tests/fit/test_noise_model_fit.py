@@ -7,13 +7,15 @@ from biogrip.arrays import Array
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
     _logarithms,
+    _noise_model,
     compute_growth,
     outliers_of,
 )
 from biogrip.physics.noise import AR1, Noise, add_noise
-from biogrip.physics.whitening import NoiseModel, Whitening
+from biogrip.physics.whitening import NoiseModel
 from tests.physics.test_noise import correlation
 
+SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 TIMES = np.cumsum(np.random.default_rng(0).exponential(1.0, 200))
 DIRECTIONS = np.stack((np.ones(200), TIMES, np.exp(-TIMES / 40)))
 
@@ -59,27 +61,42 @@ def test_the_likelihood_is_that_of_dense_matrices(
     np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-8)
 
 
-def test_degrees_of_freedom_are_those_of_the_least_known_variance() -> None:
-    """The logarithm of a chi-squared variable with f degrees of freedom has a variance of some 2/f.
+def test_degrees_of_freedom_are_those_of_satterthwaite() -> None:
+    """2 over the variance of the logarithm that the noise model leaves uncertain.
 
-    Of the variance of a slope in noise that relaxes, over twelve traces; beside it is that of what
-    alternates, which tells of white noise alone and is known far better. The variance of
-    logarithms is known to 41 %, and Satterthwaite's formula is of first order.
+    Its information is that of dense matrices and of a prior of three e-folds. Both sides have the
+    errors of their finite differences.
     """
-    times, constant = np.arange(400.0), np.ones((1, 400)) / 20
     noise = Noise("gaussian", 1.0, "peak", ar1=AR1(0.6, 8.0))
-    directions = np.stack((times / 400, np.resize([1.0, -1.0], 400)))
-    logs, freedoms = [], []
-    for seed in range(12):
-        trace = add_noise(np.ones(400), noise, np.random.default_rng([seed, 6]), times)
-        likelihood = NoiseModelLikelihood(times, trace, np.vstack((directions, constant)))
-        noise_model = likelihood.best()
-        x = _logarithms(noise_model)
-        white = Whitening(times, noise_model, constant)(directions[:1])
-        logs.append(2 * likelihood._log_scale(x) - np.log(float(white[0] @ white[0])))
-        scaled = directions / np.exp(likelihood._log_scale(x))
-        freedoms.append(likelihood.freedom(noise_model, scaled, constant))
-    assert 0.4 < np.median(freedoms) / (2 / np.var(logs)) < 2.5
+    left = add_noise(np.ones(200), noise, np.random.default_rng(1), TIMES)
+    likelihood = NoiseModelLikelihood(TIMES, left, DIRECTIONS)
+    noise_model = likelihood.best()
+    # Beside an offset, and so well known that their prior of one e-fold counts for nothing.
+    nuisance, sensitivity = DIRECTIONS[:1] / np.sqrt(200), 1e4 * DIRECTIONS[1:]
+    rows = np.vstack((sensitivity, nuisance))
+
+    def deviance(x: Array) -> float:
+        return restricted(TIMES, DIRECTIONS, left, _noise_model(x))
+
+    def log_variances(x: Array) -> Array:
+        matrix = correlation(TIMES, _noise_model(x))
+        inverse = np.linalg.inv(matrix)
+        covariance = np.linalg.inv(rows @ inverse @ rows.T)[:2, :2]
+        dense = matrix, DIRECTIONS @ inverse @ DIRECTIONS.T
+        determinants = sum(np.linalg.slogdet(each)[1] for each in dense)
+        scale = np.exp((deviance(x) - determinants) / 197) / 197
+        return np.log(np.diagonal(covariance) * scale)
+
+    x, steps = _logarithms(noise_model), 0.1 * np.eye(3)
+    second = [
+        [sum(i * j * deviance(x + i * a + j * b) for i, j in SIGNS) / 0.04 for a in steps]
+        for b in steps
+    ]
+    information = 0.5 * np.array(second) + np.eye(3) / 9
+    slopes = np.array([log_variances(x + a) - log_variances(x - a) for a in steps]) / 0.2
+    spread = np.diagonal(slopes.T @ np.linalg.solve(information, slopes))
+    found = likelihood.freedom(noise_model, sensitivity, nuisance)
+    assert found == pytest.approx(2 / spread.max(), rel=0.05)
 
 
 ROTATION = np.geomspace(0.004, 1.0, 400)
@@ -134,6 +151,14 @@ def test_outliers_are_as_rare_as_gaussian_noise_has_them() -> None:
     slow[struck] += np.array([-50.0, 9.0, 9.0, 50.0])
     np.testing.assert_array_equal(np.flatnonzero(outliers_of(slow)), struck)
     assert not outliers_of(np.zeros(100)).any()
+
+
+def test_what_rounding_hides_does_not_grow() -> None:
+    """Readings that are on the next step here and there, but for the smallest."""
+    step, residual = 1e-3, np.zeros(400)
+    residual[200::5] = 1e-3
+    assert np.ptp(compute_growth(residual, ROTATION)) > 0
+    np.testing.assert_array_equal(compute_growth(residual, ROTATION, step), 1.0)
 
 
 def test_what_does_not_vary_does_not_grow() -> None:

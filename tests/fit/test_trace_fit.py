@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from biogrip.fit.least_squares import identify_from
 from biogrip.fit.noise_model_fit import FAR
 from biogrip.fit.problem import CaseProblem, Identification, Problem
 from biogrip.fit.trace_fit import TraceFit, fit_traces, gripper_functions
+from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, Outliers, add_noise
 from biogrip.physics.simulation import simulated_response
@@ -99,6 +101,27 @@ def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
     assert np.all(own > 1.2 * alone)
     moved = (np.log(fit.found.parameters) - both.x[:4])[told]
     assert np.all(np.abs(moved) < 0.05 * expected + 1e-3)
+
+
+def test_an_uncertain_gripper_is_held_against_what_parameters_leave(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of ten readings and four parameters, six: the noise is the misfit times sqrt(10 / 6)."""
+    uncertainty = {"left": {"stiffness_Nm_per_rad": 1e-8}}
+    case_problem, condense = replace(POSED, uncertainty=uncertainty), CaseProblem.in_noise
+    times, trace = TIMES[40::80], noisy(Noise("gaussian", 0.02, "peak"))[40::80]
+    plain = find(POSED.of(times, trace))
+    over_noise: list[Array] = []
+
+    def condensed(self: CaseProblem, *given: Any, **more: Any) -> Condensed:
+        over_noise.append(given[2])
+        return condense(self, *given, **more)
+
+    monkeypatch.setattr(CaseProblem, "in_noise", condensed)
+    fitted(case_problem, trace, times)
+    changes = gripper_functions(case_problem, times, plain.parameters)
+    first = next(each for each in over_noise if len(each))
+    np.testing.assert_allclose(first, changes / (plain.misfit * np.sqrt(10 / 6)), rtol=1e-9)
 
 
 def test_noise_is_found_and_said() -> None:

@@ -11,7 +11,7 @@ from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.limits import find_limits
-from biogrip.judging.onset import profile_over_onset
+from biogrip.judging.onset import _at, profile_over_onset
 from biogrip.judging.profiles import Points, _limits, compute_profiles, find_gaps
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
 from biogrip.library import set_up, simulate
@@ -28,7 +28,7 @@ from tests.helpers.problems import (
     posed_for,
     run,
 )
-from tests.helpers.scipy_fits import rise_with_held, scipy_fit
+from tests.helpers.scipy_fits import rise_with_held
 
 PARAMETERS = parameters_and_sum(MODEL)
 
@@ -141,15 +141,13 @@ def test_noise_and_threshold_are_those_of_a_regression(taken_out: dict[str, bool
 
     Of known noise it is the normal distribution.
     """
-    model, times = MODELS["maxwell"], np.arange(0.0, 400.0, 40.0)
-    response = superpose(step_response(GRIPPER, model.network([[1.0, 10.0]])), TORQUE, times)[0]
-    (problem,) = case_problem(times, response, 1, model, **taken_out)
-    best = scipy_fit(problem, np.log([1.0, 10.0]))
+    times = np.arange(0.0, 400.0, 40.0)
+    (problem,) = case_problem(times, 1e-6 * times, 1, MODELS["maxwell"], **taken_out)
     left = len(times) - 2 - len(taken_out)
-    found = make_likelihood(problem, best.log_parameters, best.misfit, confidence=0.95)
-    assert found.noise_sd**2 == pytest.approx(len(times) * best.misfit**2 / left)
+    found = make_likelihood(problem, np.zeros(2), 1e-6, confidence=0.95)
+    assert found.noise_sd**2 == pytest.approx(len(times) * 1e-12 / left)
     assert found.threshold == pytest.approx(t.ppf(0.975, left) ** 2)
-    known = make_likelihood(problem, found.best, best.misfit, confidence=0.95, noise_sd=1e-6)
+    known = make_likelihood(problem, np.zeros(2), 1e-6, confidence=0.95, noise_sd=1e-6)
     assert known.threshold == pytest.approx(norm.ppf(0.975) ** 2)
 
 
@@ -163,6 +161,12 @@ def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
     found = run("least_squares", problem)
     alone = diagnose(problem, experiment.model, found, confidence=0.95)
     merged, _ = profile_over_onset(alone, times)
+    # What a later onset costs is taken off the threshold, and off what a limit takes.
+    later, best = _at(alone.likelihood, 0.2), alone.likelihood
+    cost = best.increase(later.misfit)
+    assert cost > 0.1
+    assert later.threshold == pytest.approx(best.threshold - cost)
+    assert later.certainty == pytest.approx(best.certainty - cost)
     certainty = alone.likelihood.certainty
     for low_of, diagnosis in (([True, True], alone), ([True, False], merged)):
         assert [finding.low is not None for finding in diagnosis.findings] == low_of

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.calibration import (
     FreeMotion,
@@ -43,11 +44,11 @@ def test_free_motion_against_radau(damping: float) -> None:
         assert np.max(np.abs(record - solved.y[0])) < 1e-8 * np.abs(record).max()
 
 
-def noisy(arm: Arm, level: float, seed: int) -> FreeMotion:
-    motion = free_motion(arm, TIME_S, *CAUSES)
+def noisy(arm: Arm, level: float, seed: int, time_s: Array = TIME_S) -> FreeMotion:
+    motion = free_motion(arm, time_s, *CAUSES)
     rng, noise = np.random.default_rng(seed), Noise("gaussian", level, "peak")
     return FreeMotion(
-        TIME_S, add_noise(motion.step, noise, rng), add_noise(motion.impulse, noise, rng)
+        time_s, add_noise(motion.step, noise, rng), add_noise(motion.impulse, noise, rng)
     )
 
 
@@ -58,11 +59,12 @@ def test_without_noise_the_arm_itself_is_found(scale: float) -> None:
     np.testing.assert_allclose(dataclasses.astuple(found), dataclasses.astuple(arm), rtol=1e-7)
 
 
-def test_uncertainties_are_honest() -> None:
+@pytest.mark.parametrize("time_s", [TIME_S, TIME_S[:320:5]], ids=["many", "few"])
+def test_uncertainties_are_honest(time_s: Array) -> None:
     """Over 40 records the errors have the spread that each record's own uncertainty says."""
     pulls = []
     for seed in range(40):
-        found = calibrate(noisy(ARM, 0.05, seed), *CAUSES)
+        found = calibrate(noisy(ARM, 0.05, seed, time_s), *CAUSES)
         error = np.subtract(dataclasses.astuple(found.arm), dataclasses.astuple(ARM))
         pulls.append(error / dataclasses.astuple(found.uncertainty))
     # The standard deviation of 40 draws is known to 11 %, three times that is allowed.

@@ -8,7 +8,6 @@ from scipy.signal import lfilter, periodogram
 
 from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import (
     AR1,
     KINDS,
@@ -31,7 +30,8 @@ from biogrip.physics.whitening import (
     estimate_noise,
     nuisance_basis,
 )
-from tests.helpers.problems import MODEL, SAMPLES, TORQUE, posed_for
+from tests.helpers.problems import CASE_PROBLEM, MODEL, SAMPLES, TORQUE
+from tests.physics.test_condensed import assert_alike
 
 CLEAN = np.concatenate((np.zeros(100_000), np.full(100_000, 2.0)))
 
@@ -189,6 +189,12 @@ def correlation(time_s: Array, noise_model: NoiseModel, growing: Array | None = 
     return matrix
 
 
+def test_rates_of_flicker_noise_are_as_far_apart_as_allowed() -> None:
+    """1.5 e-folds at most; a rate fewer would be further."""
+    steps = np.diff(np.log(flicker_rates(np.arange(200.0))))
+    assert steps.max() <= 1.5 < steps.sum() / (len(steps) - 1)
+
+
 @pytest.mark.parametrize("noise_model", COLOURS)
 def test_noise_of_the_colour_becomes_white(noise_model: NoiseModel) -> None:
     """Also what grows; matrices are of condition 1e5 at most, so that ten digits are left."""
@@ -233,18 +239,12 @@ def test_few_rows_stand_for_all_whitened_samples(rate_Hz: float) -> None:
     whitening = Whitening(time_s, COLOURS[0], nuisance)
     condensed = Condensed(TORQUE, time_s, nuisance, whitening=whitening)
     trace = np.random.default_rng(6).standard_normal(len(time_s))
-    plain = posed_for(MODEL, time_s, trace).residuals
+    residuals = CASE_PROBLEM.of(time_s, trace, MODEL, condensed=condensed).residuals
     sample = SAMPLES["endothelial_cell"]
     x = np.log([sample[name] for name in MODEL.names])
-    residual, slopes = plain(x)
-    residual, slopes = whitening(residual), whitening(slopes)
-    simulated = linear_responses(plain.gripper, MODEL, TORQUE, condensed.time_s, np.exp(x)[None])[0]
-    response, sensitivity = simulated[0], simulated[1:]
-    rows = response @ condensed.to_rows - condensed.of_trace(whitening(trace))
-    of_slopes = sensitivity @ condensed.to_rows
-    assert rows @ rows == pytest.approx(residual @ residual, rel=1e-10)
-    np.testing.assert_allclose(of_slopes @ rows, slopes @ residual, rtol=1e-7, atol=1e-12)
-    np.testing.assert_allclose(of_slopes @ of_slopes.T, slopes @ slopes.T, rtol=1e-9)
+    white = whitening(residuals.response(x) - trace)
+    np.testing.assert_allclose(residuals(x)[0], white, atol=1e-12)
+    assert_alike(residuals, x)
 
 
 def test_a_drift_is_flow_only_under_a_constant_torque() -> None:

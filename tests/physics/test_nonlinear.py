@@ -178,11 +178,19 @@ CELL = np.array([[35.0, 12.3, 299.9, 1e-3]])
 
 
 @pytest.mark.parametrize("inertia", [False, True])
+@pytest.mark.parametrize(
+    "samples",
+    [
+        np.concatenate((DROPS, CELL, random_samples(20, 5))),
+        np.array([[2.0, 5.0, 1.0, 0.2, 30.0, 1e3, 0.3, 0.5]]),
+    ],
+    ids=["one branch", "three branches"],
+)
 def test_the_arms_equation_closes_under_ramps_and_parabolas(
-    gripper: Gripper, inertia: bool
+    either_gripper: Gripper, samples: Array, inertia: bool
 ) -> None:
     """b F = tau - k phi - c phi' (- I phi'', which is nothing beside these a moment later)."""
-    network = generalized_maxwell(np.concatenate((DROPS, CELL, random_samples(20, 5))))
+    gripper, network = either_gripper, generalized_maxwell(samples)
     time_s, arm = np.linspace(0.3, TORQUE.end_s - 0.2, 301), gripper.left
     response = step_response(gripper, network, inertia=False)
     rest = evaluate(TORQUE, time_s) - arm.stiffness_Nm_per_rad * superpose(response, TORQUE, time_s)

@@ -7,12 +7,10 @@ import pytest
 
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS, generalized_maxwell
-from biogrip.physics.protocol import Course, evaluate, hold, join_phases
+from biogrip.physics.protocol import Course, hold, join_phases
 from biogrip.physics.response import (
     LEFT,
     RIGHT,
-    jaw_force_response,
-    linear_jaw_force,
     step_response,
     superpose,
 )
@@ -74,22 +72,6 @@ def test_three_branches_against_inversion(
     for arm in (LEFT, RIGHT):
         ours = superpose(response, steps, NEAR, arm)[0]
         np.testing.assert_allclose(ours, exact[arm], rtol=0, atol=1e-10 * exact[arm].max())
-
-
-@pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
-def test_the_jaw_force_of_three_branches_balances_the_arm(
-    request: pytest.FixtureRequest, steps: Course, arms: str
-) -> None:
-    """b F = tau - k phi - c phi', without inertia; of the torque, 1e-12 is lost in differences."""
-    given: Gripper = request.getfixturevalue(arms)
-    network = generalized_maxwell([2.0, 5.0, 1.0, 0.2, 30.0, 1e3, 0.3, 0.5])
-    response = step_response(given, network, inertia=False)
-    turned, rate = (superpose(response, steps, NEAR, rate=of)[0] for of in (False, True))
-    arm = given.left
-    moved = arm.stiffness_Nm_per_rad * turned + arm.damping_Nms_per_rad * rate
-    expected = (evaluate(steps, NEAR) - moved) / given.lever_m
-    force = linear_jaw_force(jaw_force_response(given, network, inertia=False), steps, NEAR)[0]
-    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-12 * TAU / given.lever_m)
 
 
 @pytest.mark.parametrize(("copies", "rtol"), [(2, 1e-10), (6, 1e-9)])

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from biogrip.physics.protocol import (
     evaluate,
     hold,
     join_phases,
+    largest_load,
     ramp,
     sample_times,
 )
@@ -118,9 +120,21 @@ def test_no_response_is_needed_of_steps_that_are_sampled_evenly(
 
 
 def test_rounding_does_not_lose_the_last_sample() -> None:
-    """0.3 s at 10 Hz: 0.3 * 10 is 2.9999999999999996 in doubles."""
-    assert len(sample_times(0.1 + 0.2, 10.0)) == 4
-    assert len(sample_times(0.3, 10.0)) == 4
+    """4.35 * 100 is 434.99999999999994 in doubles."""
+    assert len(sample_times(4.35, 100.0)) == 436
+    assert len(sample_times(4.349, 100.0)) == 435
+
+
+@pytest.mark.parametrize("lasts_s", [3.0, 5.0])
+def test_rounding_makes_no_step_between_ramps(lasts_s: float) -> None:
+    """The second ends at 0.3 but for 6e-17."""
+    course = join_phases(tuple(ramp(lasts_s, *ends) for ends in pairwise((0.0, 0.1, 0.3, 0.7))))
+    assert [order for _, order, _ in course.jumps] == [1, 1, 1]
+
+
+def test_the_largest_load_is_that_of_the_largest_magnitude() -> None:
+    assert largest_load((hold(1.0, -5.0), hold(1.0, 1.0))) == -5.0
+    assert largest_load((ramp(1.0, 0.0, -2.0), hold(1.0, 1.0))) == -2.0
 
 
 # From 0.1 s after the start to the end, close to the step and far from it.

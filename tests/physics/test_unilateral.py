@@ -25,7 +25,7 @@ from biogrip.physics.protocol import (
 )
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.simulation import jaw_force
-from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
+from biogrip.physics.unilateral import UnilateralResponse, _Forcing, unilateral_response
 from tests.helpers.responses import random_samples
 
 # Slow arms, which an integrator can follow through contact and flight.
@@ -154,6 +154,13 @@ def test_over_the_whole_search_range_the_jaws_never_pull(
             # And to rounding of arms that nothing is between.
             assert np.max(away[until]) < 1e-10 * expected.max() + 1e-14 * 1.6e-9 / 4.4e-7
         assert bool(found.parted_s) == bool(both.min() < -1e-9 * both.max())
+
+
+def test_loads_go_on_from_a_later_instant() -> None:
+    """1 + 2 t + 3 t^2 / 2 from t = 4 on: 33 + 14 s + 3 s^2 / 2."""
+    later = _Forcing(np.array([[1.0, 2.0, 3.0]])).later(4.0)
+    assert later.powers.tolist() == [[33.0, 14.0, 3.0]]
+    assert later.at(np.array([2.0])).tolist() == [[67.0]]
 
 
 def test_samples_that_lack_elements(gripper: Gripper, steps: Course) -> None:

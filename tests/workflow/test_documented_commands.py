@@ -78,6 +78,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_howto_is_followed() -> None:
     howtos = {f"howto/{file.name}" for file in (ROOT / "docs" / "howto").glob("*.md")}
+    # That one runs in test_instruments.py, where its numbers and words are looked at.
+    howtos.remove("howto/instrument.md")
     assert howtos | {"tutorial.md", "groups.md", "design.md"} == set(LEFT)
 
 

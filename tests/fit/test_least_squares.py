@@ -1,0 +1,62 @@
+"""What decides which fits are continued, and whether one has converged."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array, IntArray
+from biogrip.fit import least_squares
+from biogrip.fit.least_squares import _convex, _finished, fit_from, refine_optima
+from biogrip.fit.levenberg_marquardt import Minima, Normal
+from biogrip.fit.local_fits import ROUGH, LocalFits
+from tests.helpers.default import seen
+from tests.helpers.problems import problem
+
+
+def test_four_rough_fits_are_continued() -> None:
+    """Of six basins that with the fourth best of the rough fits is the deepest."""
+    fine = np.array([3.0, 3.0, 3.0, 1.0, 0.5, 3.0])
+
+    def fitted(starts: Array, trace: IntArray, tolerance: float = 0.0) -> Minima:
+        basins = starts[:, 0].astype(int)
+        misfit = starts[:, 0] + 4 if tolerance == ROUGH else fine[basins]
+        return Minima(starts, misfit, np.ones_like(trace), np.ones(len(trace), dtype=bool))
+
+    fits: Any = seen(fitted=fitted)
+    _, _, finished, trace = _finished(fits, [np.array([[5.0], [3.0], [1.0], [0.0], [4.0], [2.0]])])
+    assert sorted(finished.x[:, 0]) == [0.0, 1.0, 2.0, 3.0]
+    assert finished.misfit.min() == 1.0
+    assert trace.tolist() == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize(("rise", "converged"), [(1e-4, True), (0.1, False)])
+def test_a_fit_that_stops_short_has_converged_if_no_data_tell(
+    rise: float, converged: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After one step from where chi^2 is by so much higher; limits are where it is by 4."""
+    posed, one = problem("endothelial_cell", 0), np.zeros(1, dtype=np.int64)
+    best = fit_from([posed], np.log([35.0, 12.3, 299.9, 1e-3])).x
+    fits = LocalFits([posed])
+    curvature = fits.curved(best, one).information[0, 0, 0]
+    start = best + np.sqrt(rise / curvature) * np.eye(4)[:1]
+    short = Minima(start, np.full(1, np.inf), one, np.ones(1, dtype=bool))
+    monkeypatch.setattr(least_squares, "minimize", lambda *_: short)
+    monkeypatch.setattr(least_squares, "_MOST_STEPS", 1)
+    assert refine_optima(fits, short, one).converged == [converged]
+
+
+@pytest.mark.parametrize(
+    ("x", "gradient", "held"),
+    [(-1.0, 1.0, True), (-1.0, -1.0, False), (1.0, -1.0, True), (1.0, 1.0, False), (0, 1.0, False)],
+)
+def test_what_is_pushed_against_a_bound_has_no_curvature(
+    x: float, gradient: float, held: bool
+) -> None:
+    """Bounds are -1 and 1; a gradient is uphill."""
+    information = np.array([[[2.0, 1.0], [1.0, 2.0]]])
+    normal = Normal(np.ones(1), np.array([[gradient, 0.5]]), information, np.ones(1))
+    bounds = {"low": np.full((1, 2), -1.0), "high": np.full((1, 2), 1.0)}
+    fits: Any = seen(curved=lambda x, trace: normal, **bounds)
+    found = _convex(fits, np.array([[x, 0.0]]), np.zeros(1, dtype=np.int64)).information[0]
+    assert found.tolist() == ([[1.0, 0.0], [0.0, 2.0]] if held else [[2.0, 1.0], [1.0, 2.0]])
