@@ -66,8 +66,8 @@ def test_all_keys_give_the_study_and_its_cases_back() -> None:
         for known in ("title", "sample", "noise", "sampling", "problem", "parameters", "seeds"):
             assert getattr(case, known) == getattr(was, known)
         assert case.study.study_seed == study.study_seed
-        for method in study.methods:
-            assert case.method(method) == was.method(method)
+        for method in study.config.methods:
+            assert case.block.method(method) == was.block.method(method)
 
 
 def test_the_log_has_what_a_user_can_correct_alone_and_else_a_traceback(tmp_path: Path) -> None:

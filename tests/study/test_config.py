@@ -172,7 +172,7 @@ def test_numbers_of_the_command_line_are_numbers() -> None:
     study = load_study(overlaid(read_config(CONFIG), TYPED), [CONFIG], TYPED)
     assert study.near_noise_tolerance == 0.03
     case = study.cases["liquid_drop_1"]
-    assert case.ranges["k"].exponent == (-2, 3)
+    assert case.problem.ranges["k"].exponent == (-2, 3)
     assert (case.sampling.rate_Hz, case.block.measurement.drift) == (10.0, False)
     assert [phase.duration_s for phase in case.phases] == [200.0]
     assert (case.title, case.parameters["k"]) == ("5", 9.0)

@@ -66,7 +66,7 @@ def files(pattern, cases):
     return [
         pattern.format(case=case, method=method, batch=batch)
         for case in cases
-        for method in (STUDY.methods if "{method}" in pattern else [""])
+        for method in (STUDY.config.methods if "{method}" in pattern else [""])
         for batch in (batches(case, stage) if "{batch}" in pattern else [""])
     ]
 
@@ -91,7 +91,6 @@ SIMULATED = [*STUDY.simulated, *STUDY.points]
 CALIBRATED = [n for n in [*STUDY.cases, *STUDY.points] if STUDY.case(n).is_calibrated]
 SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
 ANSWERED = [name for name in STUDY.gripped if STUDY.case(name).has_valley][-1:]
-COUNTED = [name for name in STUDY.covered if STUDY.case(name).verdicts_every == 1]
 calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 
 # Tables and figures of the study, of what there is in it, and those of a case.
@@ -102,7 +101,7 @@ TABLES += ["methods"] if STUDY.simulated else []
 TABLES += ["coverage"] if STUDY.covered else []
 TABLES += ["models"] if SELECTING else []
 TABLES += ["evidence", "printed_values", "sampling_evidence"] if STUDY.published else []
-TABLES += ["verdict_counts"] if COUNTED else []
+TABLES += ["verdict_counts"] if STUDY.counted else []
 OTHER_TABLES = ["contact_loss"] if STUDY.gripped else []
 OTHER_TABLES += ["claims"] if STUDY.published else []
 OTHER_TABLES += ["interpretations", "interpretations_jointly"] * bool(STUDY.config.interpretations)
@@ -124,7 +123,7 @@ SHOWN = {
     "tables": [
         *((name, "") for name in [*TABLES, *OTHER_TABLES]),
         *((name, case) for case in STUDY.cases for name in ("errors", "verdicts")),
-        *(("robustness", sweep) for sweep in STUDY.sweeps),
+        *(("robustness", sweep) for sweep in STUDY.config.sweeps),
     ],
     "figures": [
         *((name, "") for name in FIGURES),
@@ -133,7 +132,7 @@ SHOWN = {
             for case, its in STUDY.cases.items()
             for name in case_figure_names(not its.recorded, its.has_valley)
         ),
-        *(("robustness", sweep) for sweep in STUDY.sweeps),
+        *(("robustness", sweep) for sweep in STUDY.config.sweeps),
     ],
 }
 
@@ -172,4 +171,4 @@ wildcard_constraints:
     case="[^/]+",
     batch=r"seeds_\d+-\d+",
     method="|".join(METHODS),
-    sweep=names(STUDY.sweeps),
+    sweep=names(STUDY.config.sweeps),

@@ -39,7 +39,7 @@ rule measurement:
 
 rule recording:
     input:
-        recorded=lambda wildcards: STUDY.case(wildcards.case).file,
+        recorded=lambda wildcards: STUDY.case(wildcards.case).block.measurement.file,
     output:
         measurements="results/measurements/{case}/seeds_0-0.npz",
     log:

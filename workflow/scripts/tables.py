@@ -11,7 +11,7 @@ with logged(snakemake):
     given = {name: paths(files) for name, files in snakemake.input.items()}
     gripped, simulated = study.of(study.gripped), study.of(study.simulated)
     published, covered = study.of(study.published), study.of(study.covered)
-    counted = study.of(n for n in study.covered if study.case(n).verdicts_every == 1)
+    counted = study.of(study.counted)
     axes = [name for name in study.published if study.cases[name].published.axis_rad]
 
     def of(study, name):

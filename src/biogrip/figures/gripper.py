@@ -27,7 +27,7 @@ from biogrip.figures.style import (
     panel,
 )
 from biogrip.physics import gripper as actuator
-from biogrip.physics.contact import LARGEST_M, SMALLEST_M, contact
+from biogrip.physics.contact import LARGEST_M, SMALLEST_M
 from biogrip.physics.gripper import CombDrive, Gripper
 from biogrip.physics.protocol import torque_at, torque_history
 from biogrip.physics.simulation import simulated_response
@@ -148,7 +148,7 @@ def _touching(study: Study) -> Iterator[tuple[float, str, str]]:
     """Yield torques that hold the jaws at the extreme sample sizes, and zero, as in the paper."""
     for size_m, colour in ((SMALLEST_M, PURPLE), (LARGEST_M, GREEN)):
         try:
-            found = contact(study.gripper, study.jaw_gap_m, study.actuator, size_m)
+            found = study.config.gripper.contact(study.actuator, size_m)
         except BiogripError:
             # This gripper does not reach such a sample.
             continue

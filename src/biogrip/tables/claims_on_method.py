@@ -111,7 +111,7 @@ def _percents(low: float, high: float) -> str:
 @claim("section 2", "determined considering a standard impulse or a step response")
 def judge_free_arm(results: Results) -> Judged:
     case = next(iter(results.study.cases.values()))
-    test, arm = case.calibration, case.gripper.left
+    test, arm = case.block.calibration, case.gripper.left
     time_s = sample_times(test.duration_s, test.rate_Hz)
     causes = test.step_torque_Nm, test.impulse_Nms
     motion = free_motion(arm, time_s, *causes)

@@ -28,7 +28,7 @@ from biogrip.tables.layout import Column, Row, Table
 def axis_title(study: Study, axis: AxisBlock) -> str:
     """Return the title of an axis with its unit, marked if the paper does not give the values."""
     keys = {f"{key}." for value in axis.levels for key in value.overrides}
-    reconstructed = tuple(f"{name}." for name in study.reconstructed)
+    reconstructed = tuple(f"{name}." for name in study.config.reconstructed)
     return axis.title + ", reconstructed" * any(key.startswith(reconstructed) for key in keys)
 
 
@@ -56,7 +56,7 @@ _BY_METHOD = {
 
 def robustness(study: Study, name: str, points: Path) -> Table:
     """Join the points of a sweep over all its cases."""
-    sweep, methods = study.sweeps[name], study.identifiers
+    sweep, methods = study.config.sweeps[name], study.identifiers
     rows: list[Row] = []
     for case in sweep.cases:
         found = read_points(points, name, case)
@@ -100,7 +100,7 @@ def robustness(study: Study, name: str, points: Path) -> Table:
         "error of an estimator that attains it is 0.67 of that. Without noise, the misfit of the "
         "truth rounded to two digits stands for the noise."
     )
-    marked = [key for key in study.reconstructed if key.split(".")[0] == "gripper"]
+    marked = [key for key in study.config.reconstructed if key.split(".")[0] == "gripper"]
     if marked:
         caption += f" Reconstructed, as the paper does not give them: {', '.join(marked)}."
     return Table(caption, columns, rows)
@@ -149,7 +149,7 @@ def interpretations(study: Study, found: list[Path]) -> Table:
     rows: list[Row] = []
     for path, case in zip(found, study.cases.values(), strict=True):
         of_case = INTERPRETATIONS.read(path)
-        for name, reading in study.interpretations.items():
+        for name, reading in study.config.interpretations.items():
             mine = of_case[of_case["interpretation"] == name]
             row = {
                 "case": case.name,
@@ -221,7 +221,7 @@ def interpretations_jointly(study: Study, found: list[Path]) -> Table:
     ]
     rows = [
         {"interpretation": reading.title, **row}
-        for name, reading in study.interpretations.items()
+        for name, reading in study.config.interpretations.items()
         for row in _joint_rows(
             [(case, rows[rows["interpretation"] == name]) for case, rows in cases]
         )
