@@ -274,10 +274,8 @@ class Study:
     @property
     def counted(self) -> list[str]:
         """Names of those of which every trace gets the verdicts that users are shown."""
-        every = {
-            name: self.cases[name].block.identifiability.verdicts_every for name in self.covered
-        }
-        return [name for name in self.covered if every[name] == 1]
+        cases = {name: self.cases[name].block for name in self.covered}
+        return [name for name, it in cases.items() if it.identifiability.verdicts_every == 1]
 
     @property
     def published(self) -> list[str]:
