@@ -100,7 +100,7 @@ class Block(Checked):
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(**STRICT)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OneOf:
     """Annotation of text that is one of the names in a registry, as `Literal` is of given ones."""
 
