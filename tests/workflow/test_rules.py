@@ -26,6 +26,9 @@ def test_a_rule_says_what_it_does_and_depends_on(name: str) -> None:
     if name not in TARGETS:
         assert "output:" in body
         assert "settings_of(" in body or name == "traces"
+    # Of one name with the log.
+    logs = re.findall(r'"results/logs/(.+)\.log"', body)
+    assert {*re.findall(r'"results/benchmarks/(.+)\.tsv"', body)} <= {*logs}
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda file: file.stem)
@@ -38,7 +41,8 @@ def test_a_job_reads_no_config_but_its_params(script: Path) -> None:
 
 def test_no_private_name_of_snakemake_is_used() -> None:
     code = [*RULES, *SCRIPTS, *(ROOT / "src").rglob("*.py"), ROOT / "workflow" / "Snakefile"]
-    private = re.compile(r"(snakemake|workflow|rules|checkpoints)(\.\w+)*\._\w+")
+    inner = "overwrite_configfiles|config_settings|main_snakefile"
+    private = re.compile(rf"(snakemake|workflow|rules|checkpoints)(\.\w+)*\.(_\w+|{inner})")
     used = {file.name: found[0] for file in code if (found := private.search(file.read_text()))}
     assert used == {}
 

@@ -4,16 +4,23 @@ from dataclasses import fields
 from functools import cache
 from pathlib import Path
 
+import yaml
 from snakemake.exceptions import WorkflowError
 
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
-from biogrip.stages.job import batch_names, keys_of_cases, settings, software
-from biogrip.study.case_blocks import CaseBlock
-from biogrip.study.config import StudyConfig
-from biogrip.study.load import load_study, read_configs
+from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.stages.job import (
+    CASE_KEYS,
+    STUDY_KEYS,
+    batch_names,
+    keys_of_cases,
+    settings,
+    software,
+)
+from biogrip.study.load import load_given_study
 from biogrip.study.measurement_block import MeasurementBlock
-from biogrip.study.source import default_config, overlaid, shipped
+from biogrip.study.source import default_config, shipped
 
 
 def usable(read, *given):
@@ -24,23 +31,27 @@ def usable(read, *given):
         raise WorkflowError(str(error))
 
 
-# What is given is laid over the default study, in a run of its own and in a module alike.
-STUDY = usable(
-    load_study,
-    overlaid(read_configs([default_config()]), config),
-    [default_config(), *workflow.overwrite_configfiles],
-    workflow.config_settings.config,
-)
+# What is given is laid over the default study, in a run of its own and in a module alike. A file
+# of which nothing is in the config is that of a workflow which has this one as a module.
+CONFIGS = [
+    Path(file)
+    for file in workflow.configfiles
+    if config.keys() & (yaml.safe_load(Path(file).read_text("utf-8")) or {})
+]
+STUDY = usable(load_given_study, config, CONFIGS)
 SOFTWARE = software()
-MEASUREMENT = [f"measurement.{field.name}" for field in fields(MeasurementBlock)]
-# Keys that say what a fit assumes of the instrument and of the sample.
-PROBLEM = "instrument gripper actuator assumed_gripper protocol sample fixed search_range models"
-PROBLEM = [*PROBLEM.split(), *(key for key in MEASUREMENT if key != "measurement.noise")]
-# Keys that verdicts on a trace, and on its expectation, use.
-JUDGED = [*PROBLEM, "measurement.noise", "identifiability.confidence", "least_squares"]
-# Keys that tables and figures of the whole study use.
-WHOLE = "study_seed seeds methods gripper actuator protocol search_range".split()
-WHOLE += ["evaluation", "reconstructed", *keys_of_cases(STUDY)]
+# Config keys, of which each rule names those that its jobs use: what is controlled and read, and
+# of which sample; what a fit assumes besides; when a simulated trace is sampled; its noise; and
+# columns of a recorded trace.
+SAMPLE = ["instrument", "protocol", "sample", "fixed", "measurement.file"]
+SAMPLE += [f"measurement.{name}" for name in INSTRUMENTS]
+FIT = [*SAMPLE, "gripper", "assumed_gripper", "search_range"]
+FIT += "measurement.noise_rad measurement.noise_share measurement.noise_model".split()
+FIT += "measurement.offset measurement.drift measurement.fit_start".split()
+SAMPLING = ["measurement.rate_Hz", "measurement.bursts"]
+NOISE = "measurement.noise"
+OF_FILE = [f"measurement.{field.name}" for field in fields(MeasurementBlock)]
+OF_FILE = [key for key in OF_FILE if key not in (*FIT, *SAMPLING, NOISE)]
 
 
 def settings_of(*keys):

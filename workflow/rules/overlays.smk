@@ -5,7 +5,6 @@ from biogrip.identify.settings import Setting, check_settings, read_table
 
 # Simulated cases whose model has the paper's parameters, and what is read of each.
 OURS = {parameter.name for parameter in SINGLE_BRANCH}
-INTERPRETED_CASE = ["actuator", *(field.name for field in fields(CaseBlock))]
 INTERPRETED = [n for n in STUDY.simulated if set(STUDY.case(n).sample.model.names) <= OURS]
 
 
@@ -30,8 +29,14 @@ rule sweep:
         figure=figure("robustness", "{sweep}"),
     log:
         "results/logs/sweep/{sweep}.log",
+    benchmark:
+        "results/benchmarks/sweep/{sweep}.tsv"
     params:
-        **settings_of("sweeps", *WHOLE),
+        **settings_of(
+            *"sweeps methods evaluation reconstructed actuator".split(),
+            # All, for points are cases with some keys changed.
+            *keys_of_cases(STUDY, *CASE_KEYS),
+        ),
     message:
         "Judging and drawing the sweep {wildcards.sweep}"
     script:
@@ -45,10 +50,15 @@ rule interpretations_of_case:
         rows="results/interpretations/{case}.csv",
     log:
         "results/logs/interpretations_of_case/{case}.log",
+    benchmark:
+        "results/benchmarks/interpretations_of_case/{case}.tsv"
     resources:
         runtime=120,
     params:
-        **settings_of("study_seed", "seeds", "interpretations", *INTERPRETED_CASE),
+        **settings_of(
+            # Of the case all, for an interpretation may change any.
+            *("study_seed", "seeds", "actuator", "interpretations", *CASE_KEYS),
+        ),
     message:
         "Identifying {wildcards.case} under every interpretation of the paper"
     script:
@@ -64,7 +74,10 @@ rule interpretations:
     log:
         "results/logs/interpretations.log",
     params:
-        **settings_of("interpretations", "evaluation", *keys_of_cases(STUDY)),
+        **settings_of(
+            *("interpretations", "evaluation"),
+            *keys_of_cases(STUDY, "published", *SAMPLE),
+        ),
     message:
         "Comparing the interpretations of the paper"
     script:
@@ -93,6 +106,8 @@ if STUDY.config.traces:
             found="results/traces/batches/{rows}.csv",
         log:
             "results/logs/traces_batch/{rows}.log",
+        benchmark:
+            "results/benchmarks/traces_batch/{rows}.tsv"
         wildcard_constraints:
             rows=r"\d+-\d+",
         resources:

@@ -26,7 +26,10 @@ from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.study import Case, Study
 
 _BATCH = re.compile(r"seeds_(\d+)-(\d+)")
-_OF_CASE = [field.name for field in fields(CaseBlock)]
+STUDY_KEYS = tuple(field.name for field in fields(StudyConfig))
+"""All keys of a study."""
+CASE_KEYS = tuple(field.name for field in fields(CaseBlock))
+"""All keys of a case."""
 
 
 class _Named:
@@ -76,7 +79,7 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
     blocks = study.plain
     if case:
         # What the case leaves at its default is not the study's: it has all of its blocks.
-        blocks = {key: value for key, value in blocks.items() if key not in _OF_CASE}
+        blocks = {key: value for key, value in blocks.items() if key not in CASE_KEYS}
         blocks |= study.case(case).plain
     blocks = blocks | {"cases": {name: it.plain for name, it in study.cases.items()}}
 
@@ -89,8 +92,8 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
 
 
 def keys_of_cases(study: Study, *keys: str) -> list[str]:
-    """Return keys of every case, by default all, as ``cases.NAME.KEY``."""
-    return [f"cases.{name}.{key}" for name in study.cases for key in keys or _OF_CASE]
+    """Return keys of every case, as ``cases.NAME.KEY``."""
+    return [f"cases.{name}.{key}" for name in study.cases for key in keys]
 
 
 def case_of(name: str, given: Mapping[str, Any]) -> Case:
