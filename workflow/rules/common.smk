@@ -10,14 +10,8 @@ from snakemake.exceptions import WorkflowError
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
 from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.stages.job import (
-    CASE_KEYS,
-    STUDY_KEYS,
-    batch_names,
-    keys_of_cases,
-    settings,
-    software,
-)
+from biogrip.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases
+from biogrip.stages.job import settings, software
 from biogrip.study.load import load_given_study
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.source import default_config, shipped
@@ -33,11 +27,8 @@ def usable(read, *given):
 
 # What is given is laid over the default study, in a run of its own and in a module alike. A file
 # of which nothing is in the config is that of a workflow which has this one as a module.
-CONFIGS = [
-    Path(file)
-    for file in workflow.configfiles
-    if config.keys() & (yaml.safe_load(Path(file).read_text("utf-8")) or {})
-]
+CONFIGS = [Path(file) for file in workflow.configfiles]
+CONFIGS = [it for it in CONFIGS if config.keys() & yaml.safe_load(it.read_text("utf-8"))]
 STUDY = usable(load_given_study, config, CONFIGS)
 SOFTWARE = software()
 # Config keys, of which each rule names those that its jobs use: what is controlled and read, and

@@ -9,9 +9,7 @@ rule target:
     wildcard_constraints:
         case=names(SIMULATED),
     params:
-        **settings_of(
-            *("actuator", "gripper", "contact", "models", *SAMPLE, *SAMPLING),
-        ),
+        **settings_of("actuator", "gripper", "contact", "models", *SAMPLE, *SAMPLING),
     message:
         "Simulating the response of {wildcards.case}"
     script:
@@ -62,9 +60,7 @@ rule calibration:
     wildcard_constraints:
         case=names(CALIBRATED),
     params:
-        **settings_of(
-            *("study_seed", "actuator", "gripper", "calibration", *SAMPLE),
-        ),
+        **settings_of("study_seed", "actuator", "gripper", "calibration", *SAMPLE),
     message:
         "Calibrating the gripper of {wildcards.case} without a sample"
     script:
