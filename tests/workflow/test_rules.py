@@ -1,11 +1,13 @@
 """The rules as they are written: what every one has, and what none may use."""
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
 from tests.helpers.places import ROOT
+from tests.helpers.runs import ran
 
 RULES = sorted((ROOT / "workflow").rglob("*.smk"))
 SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
@@ -51,3 +53,16 @@ def test_the_library_does_not_import_snakemake() -> None:
     """So that a trace can be identified without it."""
     for file in (ROOT / "src").rglob("*.py"):
         assert not re.search(r"^\s*(import|from) snakemake", file.read_text("utf-8"), re.MULTILINE)
+
+
+@pytest.mark.nightly
+def test_the_picture_of_the_rules_is_the_same_whenever_it_is_drawn(tmp_path: Path) -> None:
+    pictures = []
+    for seed in ("1", "2"):
+        folder = tmp_path / seed
+        command = (sys.executable, "-m", "snakemake", "-j1", "-s", ROOT / "Snakefile")
+        asked = ("--directory", folder, "--", "docs/rules.png")
+        run = ran(tmp_path, *command, *asked, PYTHONHASHSEED=seed)
+        assert run.status == 0, run.output
+        pictures.append((folder / "docs/rules.png").read_bytes())
+    assert pictures[0] == pictures[1]
