@@ -41,7 +41,11 @@ counted = $$(grep -o '^[a-z][^=]*' $(1) | sort -u | wc -l)
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) $(addprefix tests/workflow/,test_module.py test_rules.py test_study.py)
 
-.PHONY: study test test-nightly test-lowest test-pythons check check-overlays publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
+# A signal within a minute: of config, files, tables, jobs and rules.
+FAST := $(addprefix tests/,study records tables traces stages/test_job.py stages/test_stages.py workflow/test_rules.py \
+  test_digits.py test_groups.py test_terminal.py test_table_of_traces.py)
+
+.PHONY: quick study test test-nightly test-lowest test-pythons check check-overlays publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
 
 study: $(READY)
 	$(BIN)/snakemake -j$(JOBS)
@@ -49,6 +53,9 @@ study: $(READY)
 # One worker more than there are processors: some wait for the programs that they have started.
 test: $(TEST_READY)
 	$(BIN)/python -m pytest -n $$(($(JOBS) + 1)) --dist worksteal
+
+quick: $(TEST_READY)
+	$(BIN)/python -m pytest -q -x -n $(JOBS) $(FAST)
 
 # What takes longer than a change should wait; nightly, on a machine with Slurm.
 test-nightly: $(TEST_READY)

@@ -43,7 +43,7 @@ def started(seed: int) -> Started:
 
 
 def _settings() -> Any:
-    return case().method("least_squares")
+    return case().block.least_squares
 
 
 def by_biogrip(traces: Sequence[Started]) -> Array:

@@ -86,8 +86,7 @@ def noisy_trace(seed: int = 0) -> NoisyTrace:
     """Return the cell's trace with the noise of a seed."""
     steps, time_s, clean = _clean()
     trace_rad = add_noise(clean, case().noise, np.random.default_rng(seed))
-    model, genetic = case().sample.model, case().method("genetic")
-    assert isinstance(genetic, GeneticSettings)
+    model, genetic = case().sample.model, case().block.genetic_algorithm
     return NoisyTrace(
         case().gripper,
         model,
@@ -95,6 +94,6 @@ def noisy_trace(seed: int = 0) -> NoisyTrace:
         time_s,
         trace_rad,
         rms(trace_rad - clean),
-        make_genome(model, case().ranges),
+        make_genome(model, case().problem.ranges),
         genetic,
     )

@@ -185,7 +185,7 @@ def slow_branch() -> str:
     seeds = range(case.seeds)
     rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in seeds]
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
-    identify = identifier("least_squares", case.least_squares)
+    identify = identifier("least_squares", case.block.least_squares)
     free, held = (
         np.array(
             [each.misfit for each in identify([it.of(time_s, t) for t in traces], rngs, silent)]

@@ -110,7 +110,7 @@ def test_the_search_knows_the_force_of_the_jaws() -> None:
     for unknowns in np.random.default_rng(0).random((30, 2 * limits.steps)):
         train = decode(unknowns, limits)
         torque = replace(one.case.problem, phases=train.phases).torque
-        network = one.case.searched.network(one.parameters[None])
+        network = one.case.problem.searched.network(one.parameters[None])
         grip = compute_grip(one.case.gripper, network, torque, nonlinear=False)
         pressed.append(grip.lowest_N > 0)
         share = one.told(train)[1]
@@ -138,7 +138,7 @@ def test_parameters_that_trade_have_no_bound() -> None:
     """All four of the paper's drop under its own protocol: c and c_p show as their sum alone."""
     _, (one,) = set_up_of("only: [liquid_drop_2]\nmeasurement: {noise: {level_rad: 3.0e-6}}")
     found = rated(one, one.case.phases, one.case.block.measurement.rate_Hz)
-    by_name = dict(zip(one.case.searched.names, found.bounds, strict=True))
+    by_name = dict(zip(one.case.problem.searched.names, found.bounds, strict=True))
     assert by_name["c"] == by_name["c_p"] == NO_BOUND
     assert by_name["k_p"] < 0.1
 

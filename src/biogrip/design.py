@@ -100,7 +100,7 @@ class Specimen:
     @property
     def parameters(self) -> Array:
         """Values of the searched parameters, (n_parameters,)."""
-        return np.array([self.case.parameters[name] for name in self.case.searched.names])
+        return np.array([self.case.parameters[name] for name in self.case.problem.searched.names])
 
     def told(self, train: Train) -> tuple[Array, float]:
         """Return relative bounds under a train, (n_parameters,), and the jaws' least force.
@@ -191,7 +191,7 @@ def _problem(case: Case, first: Case) -> str | None:
     measured, controlled = case.block.measurement, case.instrument.controlled
     if case.recorded:
         return "found a recorded trace, allowed is a sample with values."
-    for name in case.searched.names:
+    for name in case.problem.searched.names:
         if not case.parameters[name]:
             return f"found {name} = 0, allowed is a value above 0, or the 0 under `fixed`, too."
     if controlled != first.instrument.controlled:
@@ -208,7 +208,7 @@ def _problem(case: Case, first: Case) -> str | None:
 
 
 def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
-    problem, model, network = case.problem, case.searched, case.sample.model.sample(case.parameters)
+    problem, model, network = case.problem, case.problem.searched, case.network
     required = np.array([name in (block.parameters or model.names) for name in model.names])
     # The noise of an instrument: that of its own sample under its own protocol.
     read = simulated_response(case.gripper, network, problem.torque, case.times_s, nonlinear=False)
@@ -333,7 +333,7 @@ def _said(
     for one, within, *both in zip(specimens, reached, before, after, strict=True):
         name, instrument = one.case.name, one.case.instrument
         controlled, read = instrument.controlled, instrument.read
-        for index, parameter in enumerate(one.case.searched.names):
+        for index, parameter in enumerate(one.case.problem.searched.names):
             percents = (_percent(each.bounds[index]) for each in both)
             rows.append((name, f"{parameter}: bound (%)", *percents))
             if one.required[index] and not within[index]:

@@ -2,7 +2,8 @@
 
 Bounds are pydantic's `Field`, and a docstring below each field says what the key means. Checks,
 messages, the JSON Schema and the documentation follow from them. Added to pydantic are names from a
-registry (`OneOf`), lists without twins (`Distinct`), and conflicts of keys (`problems` of a block).
+registry (`OneOf`), lists without twins (`Distinct`), and what is wrong with keys together
+(`complaints` of a block).
 `built` and `plain` convert between plain values, as in YAML and JSON, and blocks.
 """
 
@@ -29,7 +30,7 @@ from pydantic_core.core_schema import literal_schema, no_info_after_validator_fu
 
 T = TypeVar("T")
 
-Problem = tuple[tuple[Hashable, ...], str]
+Complaint = tuple[tuple[Hashable, ...], str]
 """Path of a key, relative to its block, and a message: what was found and what is allowed."""
 
 CONFLICT, TWICE = "conflict", "twice"
@@ -55,9 +56,9 @@ OPEN = ConfigDict(strict=True, extra="allow", allow_inf_nan=False, frozen=True, 
 """Configuration of models that collect the keys that they do not name."""
 
 
-def below(path: tuple[Hashable, ...], problems: Iterable[Problem]) -> Iterator[Problem]:
-    """Yield problems of a block as those of one that has it, at a path."""
-    return (((*path, *inner), text) for inner, text in problems)
+def below(path: tuple[Hashable, ...], complaints: Iterable[Complaint]) -> Iterator[Complaint]:
+    """Yield complaints of a block as those of one that has it, at a path."""
+    return (((*path, *inner), text) for inner, text in complaints)
 
 
 def kind_of(value: Any) -> str | None:
@@ -78,7 +79,7 @@ BY_KIND = Discriminator(kind_of)
 class Checked:
     """Base class of models that find conflicts between their keys, where the context is true."""
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Find keys that conflict."""
         return iter(())
 
@@ -86,7 +87,7 @@ class Checked:
     def _refuse_conflicts(self, info: ValidationInfo) -> Self:
         found: list[Any] = [
             {"type": PydanticCustomError(CONFLICT, text), "loc": path, "input": None}
-            for path, text in (self.problems() if info.context else ())
+            for path, text in (self.complaints() if info.context else ())
         ]
         if found:
             raise ValidationError.from_exception_data(CONFLICT, found)
@@ -100,7 +101,7 @@ class Block(Checked):
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(**STRICT)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OneOf:
     """Annotation of text that is one of the names in a registry, as `Literal` is of given ones."""
 

@@ -49,7 +49,7 @@ RECORDED = "_mine"
 def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Points of a sweep, of all sizes of numbers and without a bound here and there."""
     folder = tmp_path_factory.mktemp("points")
-    sweep = study_of(SWEEP).sweeps["level"]
+    sweep = study_of(SWEEP).config.sweeps["level"]
     rows = []
     for n, case in enumerate(sweep.cases):
         grid = list(all_pairs(sweep.rows.levels, sweep.columns.levels))

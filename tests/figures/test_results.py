@@ -126,7 +126,8 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     history["method"] = np.repeat(["genetic", "least_squares"], 2 * seeds)
     write_arrays(tmp_path / "history.npz", history)
     study = seen(shown_method=METHODS["genetic"], near_noise_tolerance=0.02)
-    case = seen(title="A cell", mutation_start=20, study=study)
+    block = seen(genetic_algorithm=seen(mutation_start=20))
+    case = seen(title="A cell", block=block, study=study)
     drawn = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.npz")
     (axes,), (legend,) = drawn.axes, drawn.legends
     colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]

@@ -123,13 +123,13 @@ def planned(folder: Path, *targets: str, config: dict[str, Any]) -> dict[str, in
 
 
 def results_of(folder: Path) -> dict[str, bytes]:
-    """Return every result by name, but for logs."""
+    """Return every result by name, but for logs and benchmarks."""
     results = folder / "results"
     files = {file.relative_to(results): file for file in sorted(results.rglob("*.*"))}
     return {
         str(name): file.read_bytes()
         for name, file in files.items()
-        if file.is_file() and name.parts[0] != "logs"
+        if file.is_file() and name.parts[0] not in ("logs", "benchmarks")
     }
 
 

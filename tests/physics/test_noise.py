@@ -128,7 +128,7 @@ def test_outliers_are_few_and_far() -> None:
 
 def test_parts_are_no_more_than_the_whole() -> None:
     noise = Noise("gaussian", 0.1, "peak", ar1=AR1(0.7, 1.0), flicker=Flicker(0.4))
-    ((path, text),) = noise.problems()
+    ((path, text),) = noise.complaints()
     assert path == ("flicker", "share")
     assert "found 1.1" in text
 

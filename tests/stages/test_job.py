@@ -1,7 +1,6 @@
 """What a job is told: the keys of the config that its rule names, and a batch of seeds."""
 
 import json
-from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,6 +10,8 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.stages.job import (
+    CASE_KEYS,
+    STUDY_KEYS,
     batch_names,
     case_of,
     keys_of_cases,
@@ -19,8 +20,6 @@ from biogrip.stages.job import (
     settings,
     study_of,
 )
-from biogrip.study.case_blocks import CaseBlock
-from biogrip.study.config import StudyConfig
 from tests.helpers import default
 from tests.helpers.default import STUDY
 
@@ -36,7 +35,6 @@ sweeps:
     rows: {label: level, key: measurement.noise.level, values: [0, 0.2]}
     columns: {label: rate, key: measurement.rate_Hz, values: [1, 10]}
 """
-WHOLE = [field.name for field in fields(StudyConfig) if field.name != "cases"]
 
 
 def told(given: dict[str, Any]) -> dict[str, Any]:
@@ -57,19 +55,19 @@ def test_what_the_rule_does_not_name_cannot_be_read(key: str) -> None:
 def test_all_keys_give_the_study_and_its_cases_back() -> None:
     """The points of sweeps are cases, too; what the study gives is the study's."""
     study = default.study_of(SWEPT)
-    again = study_of(told(settings(study, [*WHOLE, *keys_of_cases(study)])))
+    whole = [key for key in STUDY_KEYS if key != "cases"]
+    again = study_of(told(settings(study, [*whole, *keys_of_cases(study, *CASE_KEYS)])))
     assert again.plain == study.plain
     assert (list(again.cases), list(again.points)) == (list(study.cases), list(study.points))
-    keys = [field.name for field in fields(CaseBlock)]
-    keys += ["study_seed", "seeds", "methods", "actuator"]
+    keys = [*CASE_KEYS, "study_seed", "seeds", "methods", "actuator"]
     for name in (*study.cases, *study.points):
         was, case = study.case(name), case_of(name, told(settings(study, keys, name)))
         for known in ("title", "sample", "noise", "problem", "parameters", "seeds"):
             assert getattr(case, known) == getattr(was, known)
         np.testing.assert_array_equal(case.times_s, was.times_s)
         assert case.study.study_seed == study.study_seed
-        for method in study.methods:
-            assert case.method(method) == was.method(method)
+        for method in study.config.methods:
+            assert case.block.method(method) == was.block.method(method)
 
 
 def test_the_log_has_what_a_user_can_correct_alone_and_else_a_traceback(tmp_path: Path) -> None:

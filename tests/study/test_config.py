@@ -13,7 +13,7 @@ from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
 from biogrip.physics.gripper import torque
 from biogrip.study.case_blocks import OVERRIDABLE
-from biogrip.study.load import load_study
+from biogrip.study.load import load_given_study, load_study
 from biogrip.study.source import LARGEST_BYTES, overlaid, read_config, read_source
 from biogrip.study.study import Study
 from tests.helpers.key_reference import STUDY, file_schema, leaves
@@ -169,10 +169,10 @@ TYPED: dict[str, Any] = {
 
 
 def test_numbers_of_the_command_line_are_numbers() -> None:
-    study = load_study(overlaid(read_config(CONFIG), TYPED), [CONFIG], TYPED)
+    study = load_given_study(TYPED, [])
     assert study.near_noise_tolerance == 0.03
     case = study.cases["liquid_drop_1"]
-    assert case.ranges["k"].exponent == (-2, 3)
+    assert case.problem.ranges["k"].exponent == (-2, 3)
     assert (case.block.measurement.rate_Hz, case.block.measurement.drift) == (10.0, False)
     assert [phase.duration_s for phase in case.phases] == [200.0]
     assert (case.title, case.parameters["k"]) == ("5", 9.0)

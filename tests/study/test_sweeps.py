@@ -73,7 +73,7 @@ def test_a_whole_number_is_the_same_point_however_it_is_written(tmp_path: Path) 
 
 def test_values_are_shown_in_the_axis_unit(tmp_path: Path) -> None:
     text = SWEEP.replace("{label: level,", '{label: level, unit: "%", unit_in_si: 0.01,')
-    axis = load(tmp_path, text).sweeps["noise"].rows
+    axis = load(tmp_path, text).config.sweeps["noise"].rows
     assert axis.title == "level (%)"
     assert [it.shown for it in axis.levels] == ["10", "2"]
 

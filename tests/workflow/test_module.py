@@ -40,7 +40,9 @@ def test_without_config_it_is_the_papers_study(tmp_path: Path) -> None:
 
 def test_rules_are_changed_under_a_prefix_and_the_host_is_as_it_was(tmp_path: Path) -> None:
     """With a config of the host's, and resources and outputs of its own."""
+    (tmp_path / "host.yaml").write_text("samples: {1: a, 2: b}\n")
     text = f"""
+configfile: "host.yaml"
 config["lab"] = {{"seeds": 1}}
 BEFORE = dict(config)
 {MODULE}
@@ -64,7 +66,7 @@ rule mine:
     assert run.status == 0, run.output
     assert "Measuring with 4321 MB" in run.output
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        *(".snakemake", "Snakefile", "elsewhere", "mine.txt", "sub")
+        *(".snakemake", "Snakefile", "elsewhere", "host.yaml", "mine.txt", "sub")
     ]
     assert (tmp_path / "sub/results/targets/liquid_drop_2.csv").is_file()
     # The host's rules find what they found before.

@@ -41,7 +41,17 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     "seeds": (
         {"seeds": 7},
         {"measurement": 3, "identification": 6, "model_fits": 3, "model_errors": 1}
-        | RECORDED
+        | {"case_tables": 1, "case_figures": 1}
+        | STUDY,
+    ),
+    "a title": (
+        {"cases": {"mine": {"title": "Mine"}}},
+        {"case_tables": 1, "recorded_case_figures": 1} | STUDY,
+    ),
+    "what is read of a recorded trace": (
+        {"cases": {"mine": {"measurement": {"until_s": 300.0}}}},
+        {"recording": 1, "identification": 2, "model_fits": 1, "recorded_judgement": 1}
+        | {"case_tables": 1, "recorded_case_figures": 1}
         | STUDY,
     ),
     # Whose points have no figures of their own.

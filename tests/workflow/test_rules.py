@@ -1,11 +1,13 @@
 """The rules as they are written: what every one has, and what none may use."""
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
 from tests.helpers.places import ROOT
+from tests.helpers.runs import ran
 
 RULES = sorted((ROOT / "workflow").rglob("*.smk"))
 SCRIPTS = sorted((ROOT / "workflow").glob("[ps]*/*.py"))
@@ -27,6 +29,9 @@ def test_a_rule_says_what_it_does_and_depends_on(name: str) -> None:
     if name not in TARGETS:
         assert "output:" in body
         assert "settings_of(" in body or name == "traces"
+    # Of one name with the log.
+    logs = re.findall(r'"results/logs/(.+)\.log"', body)
+    assert {*re.findall(r'"results/benchmarks/(.+)\.tsv"', body)} <= {*logs}
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda file: file.stem)
@@ -41,7 +46,8 @@ def test_a_job_reads_no_config_but_its_params(script: Path) -> None:
 
 def test_no_private_name_of_snakemake_is_used() -> None:
     code = [*RULES, *SCRIPTS, *(ROOT / "src").rglob("*.py"), ROOT / "workflow" / "Snakefile"]
-    private = re.compile(r"(snakemake|workflow|rules|checkpoints)(\.\w+)*\._\w+")
+    inner = "overwrite_configfiles|config_settings|main_snakefile"
+    private = re.compile(rf"(snakemake|workflow|rules|checkpoints)(\.\w+)*\.(_\w+|{inner})")
     used = {file.name: found[0] for file in code if (found := private.search(file.read_text()))}
     assert used == {}
 
@@ -50,3 +56,16 @@ def test_the_library_does_not_import_snakemake() -> None:
     """So that a trace can be identified without it."""
     for file in (ROOT / "src").rglob("*.py"):
         assert not re.search(r"^\s*(import|from) snakemake", file.read_text("utf-8"), re.MULTILINE)
+
+
+@pytest.mark.nightly
+def test_the_picture_of_the_rules_is_the_same_whenever_it_is_drawn(tmp_path: Path) -> None:
+    pictures = []
+    for seed in ("1", "2"):
+        folder = tmp_path / seed
+        command = (sys.executable, "-m", "snakemake", "-j1", "-s", ROOT / "Snakefile")
+        asked = ("--directory", folder, "--", "docs/rules.png")
+        run = ran(tmp_path, *command, *asked, PYTHONHASHSEED=seed)
+        assert run.status == 0, run.output
+        pictures.append((folder / "docs/rules.png").read_bytes())
+    assert pictures[0] == pictures[1]

@@ -175,7 +175,7 @@ def judge_jaw_gap(results: Results, evidence: str) -> list[Judged]:
 def judge_free_arm(results: Results, evidence: str) -> list[Judged]:
     """Judge by a calibration from a free arm's simulated responses to a step and an impulse."""
     case = next(iter(results.study.cases.values()))
-    test, arm = case.calibration, case.gripper.left
+    test, arm = case.block.calibration, case.gripper.left
     time_s = sample_times(test.duration_s, test.rate_Hz)
     causes = test.step_torque_Nm, test.impulse_Nms
     motion = free_motion(arm, time_s, *causes)

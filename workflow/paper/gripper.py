@@ -30,7 +30,7 @@ from biogrip.figures.style import (
     styled,
 )
 from biogrip.physics import gripper as actuator
-from biogrip.physics.gripper import LARGEST_M, SMALLEST_M, CombDrive, Gripper, contact
+from biogrip.physics.gripper import LARGEST_M, SMALLEST_M, CombDrive, Gripper
 from biogrip.physics.protocol import evaluate, join_phases
 from biogrip.physics.simulation import simulated_response
 from biogrip.stages.job import job_study, logged
@@ -150,7 +150,7 @@ def _touching(study: Study) -> Iterator[tuple[float, str, str]]:
     """Yield torques that hold the jaws at the extreme sample sizes, and zero, as in the paper."""
     for size_m, colour in ((SMALLEST_M, PURPLE), (LARGEST_M, GREEN)):
         try:
-            found = contact(study.gripper, study.jaw_gap_m, study.actuator, size_m)
+            found = study.config.gripper.contact(study.actuator, size_m)
         except BiogripError:
             # This gripper does not reach such a sample.
             continue

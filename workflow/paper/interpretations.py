@@ -63,7 +63,7 @@ def interpretations(study: Study, found: list[Path]) -> ShownTable:
     rows: list[Row] = []
     for path, case in zip(found, study.cases.values(), strict=True):
         of_case = INTERPRETATIONS.read(path)
-        for name, reading in study.interpretations.items():
+        for name, reading in study.config.interpretations.items():
             mine = of_case[of_case["interpretation"] == name]
             row = {
                 "case": case.name,
@@ -135,7 +135,7 @@ def interpretations_jointly(study: Study, found: list[Path]) -> ShownTable:
     ]
     rows = [
         {"interpretation": reading.title, **row}
-        for name, reading in study.interpretations.items()
+        for name, reading in study.config.interpretations.items()
         for row in _joint_rows(
             [(case, rows[rows["interpretation"] == name]) for case, rows in cases]
         )

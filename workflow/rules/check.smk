@@ -3,7 +3,7 @@
 # A config of the same name has its published results in a folder of its own. What has no name, on
 # the command line or of a module, has nothing published; the size of batches changes no result.
 UNNAMED = "unnamed" if config.keys() - {"batch_size"} else ""
-OVERLAYS = [UNNAMED, *(Path(it).stem for it in workflow.overwrite_configfiles)]
+OVERLAYS = [UNNAMED, *(file.stem for file in CONFIGS)]
 OVERLAY = OVERLAYS[-1]
 PUBLISHED = shipped("results/published") / OVERLAY
 
@@ -55,7 +55,7 @@ rule rulegraph:
         "results/logs/rulegraph.log",
     localrule: True
     params:
-        snakefile=workflow.main_snakefile,
+        snakefile=str(shipped("Snakefile")),
         target="results/report.html",
     message:
         "Drawing the graph of the rules"

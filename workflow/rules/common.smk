@@ -4,16 +4,17 @@ from dataclasses import fields
 from functools import cache
 from pathlib import Path
 
+import yaml
 from snakemake.exceptions import WorkflowError
 
 from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
-from biogrip.stages.job import batch_names, keys_of_cases, settings, software
-from biogrip.study.case_blocks import CaseBlock
-from biogrip.study.config import StudyConfig
-from biogrip.study.load import load_study, read_configs
+from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases
+from biogrip.stages.job import settings, software
+from biogrip.study.load import load_given_study
 from biogrip.study.measurement_block import MeasurementBlock
-from biogrip.study.source import default_config, overlaid, shipped
+from biogrip.study.source import default_config, shipped
 
 
 def usable(read, *given):
@@ -24,23 +25,24 @@ def usable(read, *given):
         raise WorkflowError(str(error))
 
 
-# What is given is laid over the default study, in a run of its own and in a module alike.
-STUDY = usable(
-    load_study,
-    overlaid(read_configs([default_config()]), config),
-    [default_config(), *workflow.overwrite_configfiles],
-    workflow.config_settings.config,
-)
+# What is given is laid over the default study, in a run of its own and in a module alike. A file
+# of which nothing is in the config is that of a workflow which has this one as a module.
+CONFIGS = [Path(file) for file in workflow.configfiles]
+CONFIGS = [it for it in CONFIGS if config.keys() & yaml.safe_load(it.read_text("utf-8"))]
+STUDY = usable(load_given_study, config, CONFIGS)
 SOFTWARE = software()
-MEASUREMENT = [f"measurement.{field.name}" for field in fields(MeasurementBlock)]
-# Keys that say what a fit assumes of the instrument and of the sample.
-PROBLEM = "instrument gripper actuator assumed_gripper protocol sample fixed search_range models"
-PROBLEM = [*PROBLEM.split(), *(key for key in MEASUREMENT if key != "measurement.noise")]
-# Keys that verdicts on a trace, and on its expectation, use.
-JUDGED = [*PROBLEM, "measurement.noise", "identifiability.confidence", "least_squares"]
-# Keys that tables and figures of the whole study use.
-WHOLE = "study_seed seeds methods gripper actuator protocol search_range".split()
-WHOLE += ["evaluation", "reconstructed", *keys_of_cases(STUDY)]
+# Config keys, of which each rule names those that its jobs use: what is controlled and read, and
+# of which sample; what a fit assumes besides; when a simulated trace is sampled; its noise; and
+# columns of a recorded trace.
+SAMPLE = ["instrument", "protocol", "sample", "fixed", "measurement.file"]
+SAMPLE += [f"measurement.{name}" for name in INSTRUMENTS]
+FIT = [*SAMPLE, "gripper", "assumed_gripper", "search_range"]
+FIT += "measurement.noise_rad measurement.noise_share measurement.noise_model".split()
+FIT += "measurement.offset measurement.drift measurement.fit_start".split()
+SAMPLING = ["measurement.rate_Hz"]
+NOISE = "measurement.noise"
+OF_FILE = [f"measurement.{field.name}" for field in fields(MeasurementBlock)]
+OF_FILE = [key for key in OF_FILE if key not in (*FIT, *SAMPLING, NOISE)]
 
 
 def settings_of(*keys):
@@ -66,7 +68,7 @@ def files(pattern, cases):
     return [
         pattern.format(case=case, method=method, batch=batch)
         for case in cases
-        for method in (STUDY.methods if "{method}" in pattern else [""])
+        for method in (STUDY.config.methods if "{method}" in pattern else [""])
         for batch in (batches(case, stage) if "{batch}" in pattern else [""])
     ]
 
@@ -91,7 +93,6 @@ SIMULATED = [*STUDY.simulated, *STUDY.points]
 CALIBRATED = [n for n in [*STUDY.cases, *STUDY.points] if STUDY.case(n).is_calibrated]
 SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
 ANSWERED = [name for name in STUDY.gripped if STUDY.case(name).has_valley][-1:]
-COUNTED = [name for name in STUDY.covered if STUDY.case(name).verdicts_every == 1]
 calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 
 # Tables and figures of the study, of what there is in it, and those of a case.
@@ -101,7 +102,7 @@ TABLES += ["linearisation", "mechanics"] if STUDY.gripped else []
 TABLES += ["methods"] if STUDY.simulated else []
 TABLES += ["coverage"] if STUDY.covered else []
 TABLES += ["models"] if SELECTING else []
-TABLES += ["verdict_counts"] if COUNTED else []
+TABLES += ["verdict_counts"] if STUDY.counted else []
 EVIDENCE = ["evidence", "printed_values", "sampling_evidence"]
 OTHER_TABLES = ["contact_loss"] if STUDY.gripped else []
 OTHER_TABLES += ["claims", *EVIDENCE] if STUDY.published else []
@@ -124,7 +125,7 @@ SHOWN = {
     "tables": [
         *((name, "") for name in [*TABLES, *OTHER_TABLES]),
         *((name, case) for case in STUDY.cases for name in ("errors", "verdicts")),
-        *(("robustness", sweep) for sweep in STUDY.sweeps),
+        *(("robustness", sweep) for sweep in STUDY.config.sweeps),
     ],
     "figures": [
         *((name, "") for name in [*GRIPPER_FIGURES, *FIGURES]),
@@ -133,7 +134,7 @@ SHOWN = {
             for case, its in STUDY.cases.items()
             for name in case_figure_names(not its.recorded, its.has_valley)
         ),
-        *(("robustness", sweep) for sweep in STUDY.sweeps),
+        *(("robustness", sweep) for sweep in STUDY.config.sweeps),
     ],
 }
 
@@ -169,4 +170,4 @@ wildcard_constraints:
     case="[^/]+",
     batch=r"seeds_\d+-\d+",
     method="|".join(METHODS),
-    sweep=names(STUDY.sweeps),
+    sweep=names(STUDY.config.sweeps),

@@ -23,12 +23,14 @@ rule case_figures:
         *case_figures(simulated=True, valley=True),
     log:
         "results/logs/case_figures/{case}.log",
+    benchmark:
+        "results/benchmarks/case_figures/{case}.tsv"
     wildcard_constraints:
         case=names(case for case in STUDY.simulated if STUDY.case(case).has_valley),
     params:
         **settings_of(
-            *"title methods seeds published evaluation contact genetic_algorithm".split(),
-            *("identifiability.confidence", "measurement.noise", *PROBLEM),
+            *"actuator methods evaluation title published contact models".split(),
+            *("genetic_algorithm", "identifiability.confidence", *FIT, *SAMPLING, NOISE),
         ),
     message:
         "Drawing {wildcards.case}"
@@ -71,8 +73,13 @@ rule figures:
         prints=expand("results/figures/{name}.pdf", name=FIGURES),
     log:
         "results/logs/figures.log",
+    benchmark:
+        "results/benchmarks/figures.tsv"
     params:
-        **settings_of(*WHOLE),
+        **settings_of(
+            *"methods evaluation actuator gripper protocol".split(),
+            *keys_of_cases(STUDY, *FIT, "title", "published", NOISE),
+        ),
     message:
         "Drawing the figures of the study"
     script:
@@ -97,10 +104,13 @@ rule page:
         page=shown("results/report.html", "pages", "report", ""),
     log:
         "results/logs/page.log",
+    benchmark:
+        "results/benchmarks/page.tsv"
     params:
         **settings_of(
-            *(field.name for field in fields(StudyConfig) if field.name != "cases"),
-            *keys_of_cases(STUDY),
+            # All, for it shows the config.
+            *(key for key in STUDY_KEYS if key != "cases"),
+            *keys_of_cases(STUDY, *CASE_KEYS),
         ),
     message:
         "Writing the page of the study"

@@ -5,7 +5,7 @@ from biogrip.identify.settings import Setting, check_settings, read_table
 
 def points(sweep):
     """The names of the points of a sweep, cases of their own that the rules of the study identify."""
-    block = STUDY.sweeps[sweep]
+    block = STUDY.config.sweeps[sweep]
     return [point.name for case in block.cases for point in block.points(sweep, case)]
 
 
@@ -26,18 +26,24 @@ rule sweep:
         print="results/figures/robustness_{sweep}.pdf",
     log:
         "results/logs/sweep/{sweep}.log",
+    benchmark:
+        "results/benchmarks/sweep/{sweep}.tsv"
     params:
-        **settings_of("sweeps", *WHOLE),
+        **settings_of(
+            *"sweeps methods evaluation reconstructed actuator".split(),
+            # All, for points are cases with some keys changed.
+            *keys_of_cases(STUDY, *CASE_KEYS),
+        ),
     message:
         "Judging and drawing the sweep {wildcards.sweep}"
     script:
         "../scripts/sweep.py"
 
 
-if STUDY.traces:
-    MODEL = Setting("traces.model", ("sample", "model"), STUDY.traces.model)
-    CONFIG = Path(STUDY.traces.config) if STUDY.traces.config else None
-    ROWS = usable(read_table, Path(STUDY.traces.table), CONFIG, [MODEL])
+if STUDY.config.traces:
+    MODEL = Setting("traces.model", ("sample", "model"), STUDY.config.traces.model)
+    CONFIG = Path(STUDY.config.traces.config) if STUDY.config.traces.config else None
+    ROWS = usable(read_table, Path(STUDY.config.traces.table), CONFIG, [MODEL])
     usable(check_settings, [row for row in ROWS if row.trace.is_file()])
 
     def rows_of(wildcards):
@@ -49,20 +55,22 @@ if STUDY.traces:
     rule traces_batch:
         input:
             lambda wildcards: [str(row.trace) for row in rows_of(wildcards) if row.trace.is_file()],
-            config=STUDY.traces.config or [],
+            config=STUDY.config.traces.config or [],
             default=str(default_config()),
-            table=ancient(STUDY.traces.table),
+            table=ancient(STUDY.config.traces.table),
         output:
             found="results/traces/batches/{rows}.csv",
         log:
             "results/logs/traces_batch/{rows}.log",
+        benchmark:
+            "results/benchmarks/traces_batch/{rows}.tsv"
         wildcard_constraints:
             rows=r"\d+-\d+",
         resources:
             runtime=120,
         params:
             **settings_of(),
-            model=STUDY.traces.model,
+            model=STUDY.config.traces.model,
             rows=lambda wildcards: [
                 [str(row.trace), [[s.path, s.value] for s in row.settings], row.copied]
                 for row in rows_of(wildcards)
@@ -75,8 +83,8 @@ if STUDY.traces:
     rule traces:
         input:
             batches=[
-                f"results/traces/batches/{first}-{first + STUDY.traces.rows_a_batch - 1}.csv"
-                for first in range(0, len(ROWS), STUDY.traces.rows_a_batch)
+                f"results/traces/batches/{first}-{first + STUDY.config.traces.rows_a_batch - 1}.csv"
+                for first in range(0, len(ROWS), STUDY.config.traces.rows_a_batch)
             ],
         output:
             table="results/tables/traces.csv",

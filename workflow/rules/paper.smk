@@ -4,7 +4,6 @@ from biogrip.physics.models import SINGLE_BRANCH
 
 # Simulated cases whose model has the paper's parameters, and what is read of each.
 OURS = {parameter.name for parameter in SINGLE_BRANCH}
-INTERPRETED_CASE = ["actuator", *(field.name for field in fields(CaseBlock))]
 INTERPRETED = [n for n in STUDY.simulated if set(STUDY.case(n).sample.model.names) <= OURS]
 
 
@@ -16,12 +15,14 @@ rule gripper_figures:
         prints=expand("results/figures/{name}.pdf", name=GRIPPER_FIGURES),
     log:
         "results/logs/gripper_figures.log",
+    benchmark:
+        "results/benchmarks/gripper_figures.tsv"
     params:
         **settings_of(
             *("gripper", "actuator", "protocol"),
             *keys_of_cases(
                 STUDY,
-                *"instrument gripper actuator protocol sample fixed measurement.file".split(),
+                *("gripper", *SAMPLE),
             ),
         ),
     message:
@@ -45,8 +46,13 @@ rule evidence:
         pages=[page_of_table(name) for name in EVIDENCE],
     log:
         "results/logs/evidence.log",
+    benchmark:
+        "results/benchmarks/evidence.tsv"
     params:
-        **settings_of(*WHOLE),
+        **settings_of(
+            *"methods evaluation actuator gripper search_range".split(),
+            *keys_of_cases(STUDY, *FIT, "title", "published", "models", *SAMPLING, NOISE),
+        ),
     message:
         "Holding the paper's numbers against each other"
     script:
@@ -60,10 +66,15 @@ rule interpretations_of_case:
         rows="results/interpretations/{case}.csv",
     log:
         "results/logs/interpretations_of_case/{case}.log",
+    benchmark:
+        "results/benchmarks/interpretations_of_case/{case}.tsv"
     resources:
         runtime=120,
     params:
-        **settings_of("study_seed", "seeds", "interpretations", *INTERPRETED_CASE),
+        **settings_of(
+            # Of the case all, for an interpretation may change any.
+            *("study_seed", "seeds", "actuator", "interpretations", *CASE_KEYS),
+        ),
     message:
         "Identifying {wildcards.case} under every interpretation of the paper"
     script:
@@ -81,7 +92,10 @@ rule interpretations:
     log:
         "results/logs/interpretations.log",
     params:
-        **settings_of("interpretations", "evaluation", *keys_of_cases(STUDY)),
+        **settings_of(
+            *("interpretations", "evaluation"),
+            *keys_of_cases(STUDY, "published", *SAMPLE),
+        ),
     message:
         "Comparing the interpretations of the paper"
     script:
@@ -101,8 +115,13 @@ rule claims:
         page=page_of_table("claims"),
     log:
         "results/logs/claims.log",
+    benchmark:
+        "results/benchmarks/claims.tsv"
     params:
-        **settings_of(*WHOLE),
+        **settings_of(
+            *"study_seed methods evaluation actuator gripper".split(),
+            *keys_of_cases(STUDY, "title", "published", "gripper", "calibration", *SAMPLE, NOISE),
+        ),
     message:
         "Judging the claims of the paper"
     script:

@@ -9,10 +9,7 @@ rule target:
     wildcard_constraints:
         case=names(SIMULATED),
     params:
-        **settings_of(
-            *"instrument gripper actuator protocol sample fixed contact models".split(),
-            *(f"measurement.{key}" for key in ("rate_Hz", "file")),
-        ),
+        **settings_of("actuator", "gripper", "contact", "models", *SAMPLE, *SAMPLING),
     message:
         "Simulating the response of {wildcards.case}"
     script:
@@ -30,7 +27,7 @@ rule measurement:
     wildcard_constraints:
         case=names(SIMULATED),
     params:
-        **settings_of("study_seed", "measurement.noise"),
+        **settings_of("study_seed", NOISE),
     message:
         "Adding noise to {wildcards.case}, {wildcards.batch}"
     script:
@@ -39,7 +36,7 @@ rule measurement:
 
 rule recording:
     input:
-        recorded=lambda wildcards: STUDY.case(wildcards.case).file,
+        recorded=lambda wildcards: STUDY.case(wildcards.case).block.measurement.file,
     output:
         measurements="results/measurements/{case}/seeds_0-0.npz",
     log:
@@ -47,7 +44,7 @@ rule recording:
     wildcard_constraints:
         case=names(STUDY.recorded),
     params:
-        **settings_of(*PROBLEM),
+        **settings_of("actuator", *FIT, *OF_FILE),
     message:
         "Reading the recorded trace of {wildcards.case}"
     script:
@@ -63,10 +60,7 @@ rule calibration:
     wildcard_constraints:
         case=names(CALIBRATED),
     params:
-        **settings_of(
-            *"study_seed calibration instrument gripper actuator protocol sample".split(),
-            "measurement.file",
-        ),
+        **settings_of("study_seed", "actuator", "gripper", "calibration", *SAMPLE),
     message:
         "Calibrating the gripper of {wildcards.case} without a sample"
     script:
@@ -82,10 +76,12 @@ rule identification:
         history="results/histories/{case}/{method}/{batch}.npz",
     log:
         "results/logs/identification/{case}/{method}/{batch}.log",
+    benchmark:
+        "results/benchmarks/identification/{case}/{method}/{batch}.tsv"
     resources:
         runtime=120,
     params:
-        **settings_of("study_seed", *PROBLEM),
+        **settings_of("study_seed", "actuator", *FIT),
         method=lambda wildcards: settings(STUDY, METHODS[wildcards.method].blocks, wildcards.case),
     message:
         "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
@@ -103,12 +99,17 @@ rule judgement:
         expected="results/identifiability/expected/{case}.json",
     log:
         "results/logs/judgement/{case}.log",
+    benchmark:
+        "results/benchmarks/judgement/{case}.tsv"
     wildcard_constraints:
         case=names(STUDY.simulated),
     resources:
         runtime=60,
     params:
-        **settings_of("study_seed", *JUDGED),
+        **settings_of(
+            *("study_seed", "actuator", *FIT, "measurement.start_s", NOISE),
+            *("identifiability.confidence", "least_squares"),
+        ),
     message:
         "Computing confidence limits for the first trace of {wildcards.case}"
     script:
@@ -132,12 +133,17 @@ rule intervals:
         intervals="results/coverage/{case}/{batch}.csv",
     log:
         "results/logs/intervals/{case}/{batch}.log",
+    benchmark:
+        "results/benchmarks/intervals/{case}/{batch}.tsv"
     wildcard_constraints:
         case=names(STUDY.covered),
     resources:
         runtime=120,
     params:
-        **settings_of("study_seed", *JUDGED, "identifiability.verdicts_every"),
+        **settings_of(
+            *("study_seed", "actuator", *FIT, NOISE, "least_squares"),
+            *("identifiability.confidence", "identifiability.verdicts_every"),
+        ),
     message:
         "Estimating intervals of {wildcards.case}, {wildcards.batch}"
     script:
@@ -152,10 +158,12 @@ rule model_fits:
         fits="results/selection/{case}/{batch}.csv",
     log:
         "results/logs/model_fits/{case}/{batch}.log",
+    benchmark:
+        "results/benchmarks/model_fits/{case}/{batch}.tsv"
     resources:
         runtime=60,
     params:
-        **settings_of("study_seed", *PROBLEM, "model_selection", "least_squares"),
+        **settings_of("study_seed", "actuator", *FIT, "model_selection", "least_squares"),
     message:
         "Fitting every sample model to {wildcards.case}, {wildcards.batch}"
     script:

@@ -18,10 +18,12 @@ rule case_tables:
         verdicts_page=page_of_table("verdicts", "{case}"),
     log:
         "results/logs/case_tables/{case}.log",
+    benchmark:
+        "results/benchmarks/case_tables/{case}.tsv"
     wildcard_constraints:
         case=names(STUDY.cases),
     params:
-        **settings_of("title", "seeds", "methods", "published", *PROBLEM, "evaluation"),
+        **settings_of("actuator", "methods", "evaluation", "title", "published", *FIT),
     message:
         "Writing the tables of {wildcards.case}"
     script:
@@ -35,10 +37,12 @@ rule model_errors:
         contact_loss_page=page_of_table("contact_loss"),
     log:
         "results/logs/model_errors.log",
+    benchmark:
+        "results/benchmarks/model_errors.tsv"
     params:
         **settings_of(
             *("study_seed", "seeds", "actuator"),
-            *keys_of_cases(STUDY, *PROBLEM, "measurement.noise", "contact", "least_squares"),
+            *keys_of_cases(STUDY, *FIT, "models", *SAMPLING, NOISE, "least_squares"),
         ),
     message:
         "Comparing the linear model with the nonlinear one, and with loss of contact"
@@ -59,8 +63,15 @@ rule tables:
         pages=[page_of_table(name) for name in TABLES],
     log:
         "results/logs/tables.log",
+    benchmark:
+        "results/benchmarks/tables.tsv"
     params:
-        **settings_of(*WHOLE, "model_selection"),
+        **settings_of(
+            *"methods evaluation actuator gripper protocol search_range".split(),
+            *("model_selection", "reconstructed"),
+            *keys_of_cases(STUDY, *FIT, "title", "published", "models", *SAMPLING, NOISE),
+            *keys_of_cases(STUDY, "identifiability"),
+        ),
     message:
         "Writing the tables of the study"
     script:

@@ -6,21 +6,41 @@ import sys
 from pathlib import Path
 
 import networkx as nx
-from grandalf.graphs import Edge, Graph, Vertex
-from grandalf.layouts import SugiyamaLayout, VertexViewer
-from grandalf.routing import EdgeViewer
+import numpy as np
 from matplotlib.figure import Figure
 
 from biogrip.figures.style import BLACK, GREY, save_png, styled
 from biogrip.stages.job import logged
 
+# Sweeps over the columns, after which no row changes any more.
+SWEEPS = 20
 
-class Bends(EdgeViewer):
-    """The points that a line passes."""
 
-    def setpath(self, points):
-        """Keep the points."""
-        self.points = points
+def lay_out(graph):
+    """Place rules in columns, each behind all that it reads from; lines have a point in each.
+
+    A point's row in its column is that of the mean of its neighbours. The same graph is always
+    laid out in the same way: what is equal is sorted by its name.
+    """
+    columns = [sorted(column) for column in nx.topological_generations(graph)]
+    column_of = {rule: index for index, column in enumerate(columns) for rule in column}
+    lines = []
+    for first, last in sorted(graph.edges):
+        passed = range(column_of[first] + 1, column_of[last])
+        points = {index: f"{first} {last} {index}" for index in passed}
+        for index, point in points.items():
+            columns[index].append(point)
+        lines.append([first, *points.values(), last])
+    beside = nx.Graph()
+    for line in lines:
+        nx.add_path(beside, line)
+    place = {}
+    for sweep in range(SWEEPS):
+        for index, column in list(enumerate(columns))[:: 1 if sweep % 2 == 0 else -1]:
+            means = {it: np.mean([place.get(o, (0, 0))[1] for o in beside[it]]) for it in column}
+            for row, point in enumerate(sorted(column, key=lambda it: (means[it], it))):
+                place[point] = index, row - (len(column) - 1) / 2
+    return place, lines
 
 
 with logged(snakemake):
@@ -28,30 +48,15 @@ with logged(snakemake):
     command = [sys.executable, "-m", "snakemake", "-s", params.snakefile, params.target]
     dot = subprocess.run([*command, "--rulegraph"], check=True, capture_output=True, text=True)
     names = dict(re.findall(r'(\d+)\[label = "(\w+)"', dot.stdout))
-    reads = sorted((names[a], names[b]) for a, b in re.findall(r"(\d+) -> (\d+)", dot.stdout))
-    rules = {name: Vertex(name) for name in sorted(names.values())}
-    for rule in rules.values():
-        # Turned: from left to right, as high as a line of text and as wide as the longest name.
-        rule.view = VertexViewer(w=14, h=80)
-    shown = sorted(nx.transitive_reduction(nx.DiGraph(reads)).edges)
-    edges = [Edge(rules[a], rules[b]) for a, b in shown]
-    for edge in edges:
-        edge.view = Bends()
-    graph = Graph(list(rules.values()), edges).C[0]
-    layout = SugiyamaLayout(graph)
-    layout.route_edge = lambda edge, points: None
-    layout.xspace, layout.yspace = 12, 20
-    layout.init_all()
-    layout.draw(10)
+    reads = [(names[a], names[b]) for a, b in re.findall(r"(\d+) -> (\d+)", dot.stdout)]
+    place, lines = lay_out(nx.transitive_reduction(nx.DiGraph(sorted(reads))))
     with styled():
         drawn = Figure((7.2, 2.0))
         axes = drawn.add_axes((0.05, 0.05, 0.9, 0.9))
         axes.axis("off")
-        for edge in edges:
-            across, along = zip(*edge.view.points, strict=True)
-            axes.plot(along, across, color=GREY, zorder=1)
+        for line in lines:
+            axes.plot(*zip(*(place[point] for point in line), strict=True), color=GREY, zorder=1)
         box = {"boxstyle": "round", "facecolor": "white", "edgecolor": BLACK}
-        for name, rule in rules.items():
-            across, along = rule.view.xy
-            axes.text(along, across, name, ha="center", va="center", bbox=box, fontsize=7)
+        for name in sorted(names.values()):
+            axes.text(*place[name], name, ha="center", va="center", bbox=box, fontsize=7)
         save_png(drawn, Path(snakemake.output[0]))

@@ -9,7 +9,7 @@ with logged(snakemake):
     given = {name: paths(files) for name, files in snakemake.input.items()}
     gripped, simulated = study.of(study.gripped), study.of(study.simulated)
     covered = study.of(study.covered)
-    counted = study.of(n for n in study.covered if study.case(n).verdicts_every == 1)
+    counted = study.of(study.counted)
 
     def of(study, name):
         return [file for file in given[name] if file.stem in study.cases]

@@ -70,8 +70,10 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
     last = int(history["generation"].max())
-    if case.mutation_start is not None and case.mutation_start <= last:
-        _mark_mutation(axes, case.mutation_start, last)
+    if "genetic_algorithm" in method.blocks:
+        mutation_start = case.block.genetic_algorithm.mutation_start
+        if mutation_start <= last:
+            _mark_mutation(axes, mutation_start, last)
     axes.set_yscale("symlog", linthresh=1, linscale=0.5)
     axes.set_ylim(bottom=-0.8)
     ticks = [tick for tick in _TICKS if tick < axes.get_ylim()[1]]

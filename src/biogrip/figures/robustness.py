@@ -34,7 +34,7 @@ def draw_robustness(study: Study, name: str, points: Path) -> Figure:
     Numbers in cells are for the first method; brackets hold the share of the second method, and
     the bound.
     """
-    sweep, methods = study.sweeps[name], study.identifiers
+    sweep, methods = study.config.sweeps[name], study.identifiers
     cases = list(sweep.cases)[:_MOST_CASES]
     rows = len(sweep.rows.levels)
     height = min(max(_CELL_IN * rows, 0.9), _TALLEST_IN)

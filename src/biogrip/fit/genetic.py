@@ -24,8 +24,7 @@ from biogrip.arrays import Array, IntArray
 from biogrip.digits import counted
 from biogrip.fit.genome import Chromosomes, Genome
 from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
-from biogrip.keys import Block
-from biogrip.keys import Problem as Complaint
+from biogrip.keys import Block, Complaint
 from biogrip.physics.misfit import combine_misfits, make_misfit
 
 _MOST = 1_000_000
@@ -65,7 +64,7 @@ class GeneticSettings(Block):
     mutants: Literal["children", "all"] = "children"
     """Individuals that may mutate: `children`; or `all`, survivors except the best, too."""
 
-    def problems(self) -> Iterator[Complaint]:
+    def complaints(self) -> Iterator[Complaint]:
         """Find settings that leave no children, or whose limits of generations conflict."""
         if self.survivors >= self.population:
             text = f"found {self.survivors}, allowed is less than population"
@@ -74,7 +73,7 @@ class GeneticSettings(Block):
             text = f"found {self.min_generations}, allowed is at most max_generations"
             yield ("min_generations",), f"{text}, which is {self.max_generations}."
 
-    def problems_of(self, genes: int) -> Iterator[Complaint]:
+    def complaints_of(self, genes: int) -> Iterator[Complaint]:
         """Find crossover cuts that a chromosome of `genes` genes cannot have."""
         last = self.last_cut if self.last_cut > 0 else genes + self.last_cut
         if genes and not 1 <= self.first_cut <= last:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from biogrip.arrays import Array, IntArray
-from biogrip.keys import Block, Problem
+from biogrip.keys import Block, Complaint
 from biogrip.physics.misfit import Misfit
 from biogrip.physics.sample_model import SampleModel
 
@@ -32,7 +32,7 @@ class GeneRange(Block):
     digits: Annotated[int, Field(ge=1, le=6)] = 2
     """Number of digits; in eq. (10) two."""
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Find bounds in the wrong order, and a range of a single value."""
         for gene, (low, high) in (("exponent", self.exponent), ("digit", self.digit)):
             if low > high:
@@ -85,7 +85,7 @@ class SearchRange(Block):
     c_p: GeneRange
     alpha: GeneRange
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Refuse a range that has exponents of springpots above 1."""
         highest = self.alpha.exponent[1]
         if highest > 0:

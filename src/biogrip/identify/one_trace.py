@@ -326,7 +326,7 @@ def _assumed(case: Case, tried: Sequence[str]) -> dict[str, Any]:
     return {
         "model": case.sample.candidate,
         **{name: plain(getattr(case.block, name)) for name in blocks},
-        **({"actuator": plain(case.actuator)} if case.instrument.has_jaws else {}),
+        **({"actuator": plain(case.study.actuator)} if case.instrument.has_jaws else {}),
         "fixed": case.fixed,
         "identifiability": {"confidence": case.confidence},
         "model_selection": {"models": list(tried)},

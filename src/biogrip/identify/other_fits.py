@@ -127,7 +127,7 @@ def models_tried(
 
     Best fits so far are among the starts.
     """
-    chosen, budget = traces[0].case.sample.candidate, traces[0].case.least_squares
+    chosen, budget = traces[0].case.sample.candidate, traces[0].case.block.least_squares
     candidates = [_candidates(*pair) for pair in zip(traces, fits, strict=True)]
     every = [FittedModels(chosen) for _ in traces]
     for names in filter(None, dict.fromkeys(candidates)):

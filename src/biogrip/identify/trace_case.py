@@ -72,7 +72,7 @@ class TraceCase:
     @property
     def budget(self) -> Hashable:
         """What traces that are fitted together have in common: model, fits and confidence."""
-        return self.problem.searched, self.case.least_squares, self.case.confidence
+        return self.problem.searched, self.case.block.least_squares, self.case.confidence
 
     def with_terms(self, *, drift: bool) -> "TraceCase":
         """Return the trace as if the user had declared an offset, or a drift, too."""

@@ -78,7 +78,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
         for path in files["captions"]
     }
     titles = {case.name: case.title for case in study.cases.values()}
-    owners = titles | {name: sweep.title or name for name, sweep in study.sweeps.items()}
+    owners = titles | {name: sweep.title or name for name, sweep in study.config.sweeps.items()}
     cases, methods = list(study.cases.values()), list(study.identifiers.values())
     traces, of_cases = [], (cases, files["identifications"], files["measurements"])
     for case, found, measured in zip(*of_cases, strict=True):
@@ -136,7 +136,7 @@ def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -
     """Write what the judged trace of a case tells, with figures, PNG."""
     text = _TEMPLATES.get_template("summary.html.j2").render(
         case=case,
-        trace=case.file or f"seed {TRACE} of the simulated traces",
+        trace=case.block.measurement.file or f"seed {TRACE} of the simulated traces",
         found=read_verdicts(verdicts),
         figures=[(path.stem, _url("image/png", path.read_bytes())) for path in figures],
     )

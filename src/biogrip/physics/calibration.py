@@ -21,7 +21,7 @@ from pydantic import Field
 from biogrip.arrays import Array
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
-from biogrip.keys import Block, Problem
+from biogrip.keys import Block, Complaint
 from biogrip.physics.gripper import Arm, Gripper
 
 ARM_KEYS = ("inertia_kgm2", "damping_Nms_per_rad", "stiffness_Nm_per_rad")
@@ -99,7 +99,7 @@ class CalibrationTest(Block):
     noise_level: Annotated[float, Field(ge=0, le=10)]
     """Standard deviation of the noise as a share of each record's peak."""
 
-    def problems_of(self, arms: Iterable[Arm]) -> Iterator[Problem]:
+    def complaints_of(self, arms: Iterable[Arm]) -> Iterator[Complaint]:
         """Find a test that samples the ringing of free arms too slowly or too briefly."""
         frequency = max(arm.natural_frequency_Hz for arm in arms)
         if self.rate_Hz < 10 * frequency:

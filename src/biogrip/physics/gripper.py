@@ -27,7 +27,7 @@ from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.keys import Block, Problem
+from biogrip.keys import Block, Complaint
 
 _LARGEST_QUALITY = 1e6
 
@@ -53,7 +53,7 @@ class Arm(Block):
         """Quality factor of the free arm."""
         return math.sqrt(self.inertia_kgm2 * self.stiffness_Nm_per_rad) / self.damping_Nms_per_rad
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Find a quality factor so large that the decay would be lost in rounding."""
         if self.quality_factor > _LARGEST_QUALITY:
             text = f"makes the arm's quality factor {self.quality_factor:.3g}, "

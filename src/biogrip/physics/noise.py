@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from biogrip.arrays import Array
-from biogrip.keys import Block, OneOf, Problem
+from biogrip.keys import Block, Complaint, OneOf
 
 # Relaxation times of flicker noise are so many e-folds apart, or less: its spectrum is 1/f to
 # within 2 exp(-pi^2 / 1.5) = 0.3 %, as Poisson's summation has it.
@@ -86,7 +86,7 @@ class Noise(Block):
     outliers: Outliers | None = None
     """Outliers in addition. By default none."""
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Find components whose shares exceed one together."""
         shares = [part.share for part in (self.ar1, self.flicker) if part is not None]
         if sum(shares) > 1:

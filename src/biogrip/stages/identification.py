@@ -51,7 +51,7 @@ def identify(
 ) -> None:
     """Identify a batch of seeds with one method."""
     case_problem = case.problem.to_identify().calibrated(calibrated)
-    identified = identifier(method, case.method(method))
+    identified = identifier(method, case.block.method(method))
     recorded = read_measurements(measurements, list(seeds))
     case_problem = case_problem.weighted(recorded.sd)
     progress = Progress(f"{case.name}, {method}", len(seeds))
@@ -124,7 +124,7 @@ def fit(
                 name: [problem.for_model(trace, model) for trace in traces]
                 for name, model in models.items()
             },
-            case.least_squares,
+            case.block.least_squares,
             {
                 name: [
                     stream(case.study.study_seed, case.name, seed, f"model {name}")

@@ -69,7 +69,7 @@ def _rows(
     rest_known, informed, truth = _rest_known(case, case_problem, time_s, rotation)
     progress = Progress(f"{case.name}, intervals", len(seeds))
     # Combine groups until they hold enough seeds with full verdicts.
-    for some in groups(seeds, case.verdicts_every):
+    for some in groups(seeds, case.block.identifiability.verdicts_every):
         estimates: dict[int, list[list[str]]] = {}
         in_full: dict[int, Likelihood] = {}
         for group in groups(some, _TIMES):
@@ -86,7 +86,7 @@ def _rows(
                 with_limits = dict(zip(selected, limits[index], strict=True))
                 best = likelihoods[index].best
                 estimates[seed] = _estimates(every, best, with_limits, known[index])
-                if seed % case.verdicts_every == 0:
+                if seed % case.block.identifiability.verdicts_every == 0:
                     in_full[seed] = likelihoods[index]
             progress.done(len(group))
         shown = shown_of(list(in_full.values()), every, case.confidence)
@@ -136,7 +136,7 @@ def _optima(
 ) -> list[tuple[Problem, Identification]]:
     """Return problems and fits of traces, fitted together if their noise is white."""
     rngs = [stream(case.study.study_seed, case.name, seed, "coverage") for seed in group]
-    identify = identifier("least_squares", case.least_squares)
+    identify = identifier("least_squares", case.block.least_squares)
 
     def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
         return identify(problems, [rngs[index] for index in which], silent)

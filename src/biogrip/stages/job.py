@@ -8,28 +8,66 @@ cannot give a result that Snakemake would not renew. Each job has a batch of the
 """
 
 import hashlib
-import json
 import re
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr
-from dataclasses import MISSING, fields
-from functools import cache
+from dataclasses import MISSING, Field, fields
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, get_type_hints
-
-from pydantic import TypeAdapter
+from typing import Any, ClassVar, get_type_hints
 
 import biogrip
 from biogrip.errors import BiogripError
-from biogrip.keys import STRICT
-from biogrip.study.case_blocks import CaseBlock
+from biogrip.keys import built
+from biogrip.study.case_blocks import CaseBlock, Identifiability
 from biogrip.study.config import StudyConfig
+from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.study import Case, Study
 
 _BATCH = re.compile(r"seeds_(\d+)-(\d+)")
-_OF_CASE = [field.name for field in fields(CaseBlock)]
+STUDY_KEYS = tuple(field.name for field in fields(StudyConfig))
+"""All keys of a study."""
+CASE_KEYS = tuple(field.name for field in fields(CaseBlock))
+"""All keys of a case."""
+
+
+class _Named:
+    """A config block with the keys that a rule names; to read another one is an error."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    def __init__(self, keys: Mapping[str, Any]) -> None:
+        vars(self).update(keys)
+
+    def __getattribute__(self, name: str) -> Any:
+        """Return a key, or what the block makes of its keys; not the default of another key."""
+        if name in type(self).__dataclass_fields__ and name not in vars(self):
+            raise AttributeError(f"{name} is not among the keys that the rule names.")
+        return super().__getattribute__(name)
+
+
+class _NamedOfStudy(_Named, StudyConfig):
+    pass
+
+
+class _NamedOfCase(_Named, CaseBlock):
+    pass
+
+
+class _NamedOfMeasurement(_Named, MeasurementBlock):
+    pass
+
+
+class _NamedOfIdentifiability(_Named, Identifiability):
+    pass
+
+
+# Blocks of which a rule may name single keys.
+_SPLIT: dict[str, tuple[type, type[_Named]]] = {
+    "measurement": (MeasurementBlock, _NamedOfMeasurement),
+    "identifiability": (Identifiability, _NamedOfIdentifiability),
+}
 
 
 def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any]:
@@ -41,7 +79,7 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
     blocks = study.plain
     if case:
         # What the case leaves at its default is not the study's: it has all of its blocks.
-        blocks = {key: value for key, value in blocks.items() if key not in _OF_CASE}
+        blocks = {key: value for key, value in blocks.items() if key not in CASE_KEYS}
         blocks |= study.case(case).plain
     blocks = blocks | {"cases": {name: it.plain for name, it in study.cases.items()}}
 
@@ -54,70 +92,44 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
 
 
 def keys_of_cases(study: Study, *keys: str) -> list[str]:
-    """Return keys of every case, by default all, as ``cases.NAME.KEY``."""
-    return [f"cases.{name}.{key}" for name in study.cases for key in keys or _OF_CASE]
+    """Return keys of every case, as ``cases.NAME.KEY``."""
+    return [f"cases.{name}.{key}" for name in study.cases for key in keys]
 
 
 def case_of(name: str, given: Mapping[str, Any]) -> Case:
     """Return a case of which some keys are given, by `settings`."""
-    return Case(name, _partial(CaseBlock, given), Study(_partial(StudyConfig, given)))
+    study = Study(_NamedOfStudy(_typed(StudyConfig, given)))
+    return Case(name, _NamedOfCase(_typed(CaseBlock, given)), study)
 
 
 def study_of(given: Mapping[str, Any]) -> Study:
     """Return a study of which, and of whose cases, some keys are given, by `settings`."""
-    own: dict[str, Any] = {"cases": None}
     cases: dict[str, dict[str, Any]] = {}
     for key, value in given.items():
         if key.startswith("cases."):
             _, name, inner = key.split(".", 2)
             cases.setdefault(name, {})[inner] = value
-        else:
-            own[key] = value
-    config = _partial(StudyConfig, own)
-    blocks = {name: _partial(CaseBlock, block) for name, block in cases.items()}
-    object.__setattr__(config, "cases", blocks)
-    return Study(config)
+    keys = _typed(StudyConfig, given)
+    keys["cases"] = {name: _NamedOfCase(_typed(CaseBlock, own)) for name, own in cases.items()}
+    return Study(_NamedOfStudy(keys))
 
 
-def _partial(kind: Any, given: Mapping[str, Any]) -> Any:
-    """Return a block with only the keys that are given; None stands for their default."""
-    parts: dict[str, dict[str, Any]] = {}
-    for key, value in given.items():
-        name, _, inner = key.partition(".")
-        parts.setdefault(name, {})[inner] = value
-    own = [field for field in fields(kind) if field.name in parts]
-    block = object.__new__(_with_only(kind, frozenset(field.name for field in own)))
-    for field in own:
-        part = parts[field.name]
-        if "" not in part:
-            value = _partial(get_type_hints(kind)[field.name], part)
-        elif part[""] is not None:
-            value = _adapter(kind, field.name).validate_json(json.dumps([part[""]]))[0]
-        else:
+def _typed(kind: Any, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those of the keys given that a block has; None stands for their default."""
+    hints = get_type_hints(kind, include_extras=True)
+    keys: dict[str, Any] = {}
+    for field in fields(kind):
+        above = f"{field.name}."
+        inner = {key.removeprefix(above): given[key] for key in given if key.startswith(above)}
+        if inner and field.name in _SPLIT:
+            block, named = _SPLIT[field.name]
+            keys[field.name] = named(_typed(block, inner))
+        elif given.get(field.name) is not None:
+            keys[field.name] = built(hints[field.name], given[field.name])
+        elif field.name in given:
             made = field.default_factory
-            value = field.default if made is MISSING else made()
-        object.__setattr__(block, field.name, value)
-    return block
-
-
-@cache
-def _adapter(kind: type, name: str) -> TypeAdapter[Any]:
-    hint = get_type_hints(kind, include_extras=True)[name]
-    return TypeAdapter(list[hint], config=STRICT)  # type: ignore[valid-type]
-
-
-@cache
-def _with_only(kind: Any, given: frozenset[str]) -> Any:
-    """Return a class like that of a block, in which all other fields are errors."""
-    absent = {field.name for field in fields(kind)} - given
-
-    class Part(kind):  # type: ignore[misc]
-        def __getattribute__(self, name: str) -> Any:
-            if name in absent:
-                raise AttributeError(f"{name} is not among the keys that the rule names.")
-            return super().__getattribute__(name)
-
-    return Part
+            keys[field.name] = field.default if made is MISSING else made()
+    return keys
 
 
 def software() -> dict[str, str]:

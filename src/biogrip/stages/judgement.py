@@ -43,7 +43,7 @@ def fits_judged(
     Traces are pairs of times and readings, (n_samples,) each, one of each case; the cases have
     the same budget of least squares.
     """
-    least_squares = identifier("least_squares", cases[0].least_squares)
+    least_squares = identifier("least_squares", cases[0].block.least_squares)
 
     def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
         names = [(cases[index].study.study_seed, cases[index].name) for index in which]

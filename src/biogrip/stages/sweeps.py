@@ -7,6 +7,7 @@ genetic algorithm under every interpretation of the paper.
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from biogrip.fit.genome import nearest_encodable
 from biogrip.fit.methods import near_noise
 from biogrip.judging.likelihood import bounds_percent, headlines
 from biogrip.judging.quantities import Quantity
+from biogrip.keys import built
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import simulated_response
@@ -25,6 +27,8 @@ from biogrip.records.identifications import INTERPRETATIONS, read_identification
 from biogrip.records.rows import RowFile
 from biogrip.records.traces import read_target
 from biogrip.stages.identification import groups
+from biogrip.study.case_blocks import CaseBlock
+from biogrip.study.source import overlaid
 from biogrip.study.study import Case, Study
 from biogrip.study.sweeps import Point
 from biogrip.terminal import Progress
@@ -59,7 +63,7 @@ def judge(
     for path in identifications:
         files.setdefault((path.parts[-3], path.parts[-2]), []).append(path)
     calibrations = {path.stem: [path] for path in calibrated}
-    block = study.sweeps[sweep]
+    block = study.config.sweeps[sweep]
     each = (_rows(study, block.points(sweep, case), files, calibrations) for case in block.cases)
     POINTS.write(points, (row for rows in each for row in rows))
 
@@ -80,7 +84,7 @@ def _rows(
     heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
     for point in points:
         case = study.points[point.name]
-        for method in study.methods:
+        for method in study.config.methods:
             batches = files[point.name, method]
             found = pd.concat([read_identifications(path, method) for path in batches])
             if case.noise.absent:
@@ -100,7 +104,7 @@ def _judged(
     near: float,
 ) -> Iterator[tuple[str | int, ...]]:
     """Yield what one method finds at a point, for every quantity."""
-    searched = point.searched.parameters
+    searched = point.problem.searched.parameters
     members = {q.label: [searched[index] for index in q.members] for q, _ in bounds}
     truths = {label: sum(true[p.name] for p in of) for label, of in members.items()}
     values = {
@@ -161,8 +165,11 @@ def identify_interpreted(case: Case, target: Path, rows: Path) -> None:
 
 def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
     time_s, _, rotation = read_target(target)
-    progress = Progress(f"{case.name}, interpretations", len(case.interpretations) * case.seeds)
-    for name, interpretation in case.interpretations.items():
+    readings = case.study.config.interpretations
+    progress = Progress(f"{case.name}, interpretations", len(readings) * case.seeds)
+    for name, reading in readings.items():
+        block = built(CaseBlock, overlaid(case.plain, reading.changes))
+        interpretation = replace(case, block=block)
         case_problem = interpretation.problem
         for seeds in groups(range(case.seeds)):
             noises, searches = (
@@ -171,7 +178,7 @@ def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, 
             )
             traces = [add_noise(rotation, interpretation.noise, rng, time_s) for rng in noises]
             problems = [case_problem.of(time_s, trace) for trace in traces]
-            answers = identify_many(problems, interpretation.genetic, searches)
+            answers = identify_many(problems, block.genetic_algorithm, searches)
             for seed, trace, answer in zip(seeds, traces, answers, strict=True):
                 names = case_problem.searched.names
                 values = {**case_problem.fixed, **dict(zip(names, answer.parameters, strict=True))}

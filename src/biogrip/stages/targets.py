@@ -103,7 +103,7 @@ def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) 
 
 def run(case: Case, gripper: Path, records: Path) -> None:
     """Simulate both arms' free motion with noise, and identify their properties."""
-    test = case.calibration
+    test = case.block.calibration
     time_s = sample_times(test.duration_s, test.rate_Hz)
     noise = Noise("gaussian", test.noise_level, "peak")
     causes = test.step_torque_Nm, test.impulse_Nms

@@ -20,7 +20,7 @@ from biogrip.fit.genetic_refined import Polishing
 from biogrip.fit.genome import GeneRange, SearchRange
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.methods import METHODS
-from biogrip.keys import BY_KIND, Block, OneOf, Printed, Problem, below, plain
+from biogrip.keys import BY_KIND, Block, Complaint, OneOf, Printed, below, plain
 from biogrip.physics.calibration import CalibrationTest
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.gripper import CombDrive, Gripper
@@ -33,7 +33,7 @@ from biogrip.study.experiment_blocks import (
     GripperBlock,
     ProtocolBlock,
     SampleBlock,
-    fixed_problems,
+    fixed_complaints,
 )
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.messages import checked
@@ -161,20 +161,20 @@ class CaseBlock(Shared):
         """Parameters that are identified."""
         return [p for p in self.sample.sample.model.parameters if p.name not in self.fixed]
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Find blocks that are in conflict."""
         model = self.sample.sample.model
-        yield from below(("fixed",), fixed_problems(model, self.fixed))
-        yield from self._instrument_problems()
+        yield from below(("fixed",), fixed_complaints(model, self.fixed))
+        yield from self._instrument_complaints()
         if model.power_law:
-            yield from self._band_problems()
+            yield from self._band_complaints()
         # A chromosome has the digits and the exponent of every parameter.
         ranges = [getattr(self.search_range, p.range_name) for p in self.searched]
         genes = sum(each.digits + 1 for each in ranges)
-        yield from below(("genetic_algorithm",), self.genetic_algorithm.problems_of(genes))
+        yield from below(("genetic_algorithm",), self.genetic_algorithm.complaints_of(genes))
         if self.assumed_gripper == CALIBRATED:
             arms = self.gripper.left, self.gripper.right
-            yield from below(("calibration",), self.calibration.problems_of(arms))
+            yield from below(("calibration",), self.calibration.complaints_of(arms))
         elif isinstance(self.assumed_gripper, str):
             text = f"found '{self.assumed_gripper}', allowed is '{CALIBRATED}'"
             yield ("assumed_gripper",), f"{text} or keys of a gripper block."
@@ -188,16 +188,16 @@ class CaseBlock(Shared):
                 yield ("contact",), "is only for a simulated case; leave it out of a recorded one."
             return
         yield from below(("sample",), self.sample.missing())
-        yield from self._unreachable_problems()
-        yield from below(("measurement",), self._sampling_problems())
+        yield from self._unreachable_complaints()
+        yield from below(("measurement",), self._sampling_complaints())
         if self.contact == "unilateral" and self.models.target != "linear":
             text = "found unilateral and a nonlinear target, allowed is models.target: linear"
             yield ("contact",), f"{text} with it."
 
-    def _instrument_problems(self) -> Iterator[Problem]:
+    def _instrument_complaints(self) -> Iterator[Complaint]:
         """Find a protocol, a reading and equations that are not of the kind of instrument."""
         kind, used = of_kind(self.instrument), self.instrument_used
-        yield from below(("protocol",), self.protocol.instrument_problems(kind))
+        yield from below(("protocol",), self.protocol.instrument_complaints(kind))
         for name in self.measurement.readings if self.recorded else ():
             if name != used.read.name:
                 text = f"is not what {self.instrument} reads where {used.controlled.name} is held; "
@@ -216,7 +216,7 @@ class CaseBlock(Shared):
             if given is not None:
                 yield path, f"is of the gripper; leave it out with {self.instrument}."
 
-    def comb_problems(self, comb: CombDrive) -> Iterator[Problem]:
+    def comb_complaints(self, comb: CombDrive) -> Iterator[Complaint]:
         """Find a sample that does not fit between the jaws."""
         if self.instrument_used.has_jaws and self.sample.size_m is not None:
             try:
@@ -224,7 +224,7 @@ class CaseBlock(Shared):
             except BiogripError as error:
                 yield ("sample", "size_m"), str(error)
 
-    def _unreachable_problems(self) -> Iterator[Problem]:
+    def _unreachable_complaints(self) -> Iterator[Complaint]:
         """Find true values outside the decades that are searched."""
         for parameter in self.searched:
             value = self.sample.parameters.get(parameter.name)
@@ -237,7 +237,7 @@ class CaseBlock(Shared):
                 text = f"found {value:g}, which is not searched for; allowed is {limits}"
                 yield ("sample", parameter.name), f"{text}, or another search_range."
 
-    def _band_problems(self) -> Iterator[Problem]:
+    def _band_complaints(self) -> Iterator[Complaint]:
         """Find times outside the validity of power laws."""
         end_s, rate_Hz, model = self.protocol.end_s, self.measurement.rate_Hz, self.sample.model
         if end_s > LONGEST_S:
@@ -247,7 +247,7 @@ class CaseBlock(Shared):
             text = f"found {rate_Hz:g}, allowed is at most {1 / SHORTEST_S:g} Hz with {model}."
             yield ("measurement", "rate_Hz"), text
 
-    def _sampling_problems(self) -> Iterator[Problem]:
+    def _sampling_complaints(self) -> Iterator[Complaint]:
         """Find too few or too many samples."""
         measured = self.measurement
         samples = self.protocol.end_s * measured.rate_Hz + 1

@@ -8,12 +8,12 @@ from pydantic import Field
 
 from biogrip.errors import nearest
 from biogrip.fit.methods import METHODS
-from biogrip.keys import Block, Distinct, OneOf, Printed, Problem, adapter, below
+from biogrip.keys import Block, Complaint, Distinct, OneOf, Printed, adapter, below
 from biogrip.physics.fractional import LONGEST_S
 from biogrip.physics.gripper import CombDrive
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
-from biogrip.study.sweeps import MOST_POINTS, SweepBlock, list_points, name_problems
+from biogrip.study.sweeps import MOST_POINTS, SweepBlock, list_points, name_complaints
 
 _MOST_CASES = 2000
 # Most names listed in a message.
@@ -152,7 +152,7 @@ class StudyConfig(Shared):
     """Interpretations of the paper, by name, each tried with the genetic algorithm on the noisy
     traces of every simulated case, for a table."""
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Find too many jobs, samples that do not fit, and names of nothing that there is."""
         if not self.cases:
             yield ("cases",), "found none, allowed is one or more."
@@ -162,7 +162,7 @@ class StudyConfig(Shared):
                 text = f"found {name} and a protocol of {longest:g} s, allowed are at most"
                 yield ("model_selection", "models", index), f"{text} {LONGEST_S:g} s with it."
         for name, case in self.cases.items():
-            yield from below(("cases", name), case.comb_problems(self.actuator))
+            yield from below(("cases", name), case.comb_complaints(self.actuator))
         known = adapter(StudyConfig).dump_python([self])[0] if self.reconstructed else {}
         for index, key in enumerate(self.reconstructed):
             block: Any = known
@@ -173,7 +173,7 @@ class StudyConfig(Shared):
         chosen = [name for name in self.cases if name in (self.only or self.cases)]
         if (points := len([*list_points(self.sweeps)])) > MOST_POINTS:
             yield ("sweeps",), f"found {points} points, allowed are {MOST_POINTS} together."
-        yield from below(("sweeps",), name_problems(self.sweeps, chosen))
+        yield from below(("sweeps",), name_complaints(self.sweeps, chosen))
         searched = [p.name for case in self.cases.values() for p in case.searched]
         lists: dict[tuple[str, ...], tuple[Iterable[str], Iterable[str]]] = {
             ("design", "parameters"): (self.design.parameters, dict.fromkeys(searched)),

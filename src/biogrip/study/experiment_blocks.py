@@ -12,7 +12,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field
 
 from biogrip.errors import nearest
-from biogrip.keys import OPEN, Block, Checked, OneOf, Problem
+from biogrip.keys import OPEN, Block, Checked, Complaint, OneOf
 from biogrip.physics.calibration import ARM_KEYS
 from biogrip.physics.gripper import (
     LARGEST_M,
@@ -77,7 +77,7 @@ class GripperBlock(Gripper):
     """Distance between the jaws in the neutral configuration."""
     uncertainty: Uncertainty | None = None
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Refuse uncertainties of half a property or more."""
         for part, known in self.uncertainty.by_part.items() if self.uncertainty else ():
             if part == "torque":
@@ -150,7 +150,7 @@ class PhaseBlock(Block):
         phase = hold(self.duration_s, level) if held else ramp(self.duration_s, level, to_level)
         return phase.squared(per_square_volt) if base == _VOLTAGE else phase
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Find keys that are in conflict."""
         given = {name: value for name, value in vars(self).items() if value is not None}
         if len(self.bases) != 1:
@@ -183,7 +183,7 @@ class ProtocolBlock(Block):
             return phases
         return tuple(phase.divided(largest_load(phases)) for phase in phases)
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Refuse a protocol that is too long, or in which all torques are zero."""
         if self.end_s > LONGEST_S:
             text = f"found {self.end_s:g} s in all phases together"
@@ -193,7 +193,7 @@ class ProtocolBlock(Block):
             text = f"no phase has a {name}, so nothing would move; allowed is at least one above 0."
             yield ("phases",), text
 
-    def instrument_problems(self, instruments: Sequence[Instrument]) -> Iterator[Problem]:
+    def instrument_complaints(self, instruments: Sequence[Instrument]) -> Iterator[Complaint]:
         """Find phases that control what none of some instruments, of one kind, does."""
         columns = list(dict.fromkeys(instrument.controlled.column for instrument in instruments))
         allowed = [*columns, _VOLTAGE] if _BASES[0] in columns else columns
@@ -255,15 +255,15 @@ class SampleBlock(Checked, BaseModel):
         """Constitutive model, with its number of branches."""
         return Sample(self.model, self.branches)
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Find parameters that the model does not have, or whose values it does not allow."""
         if self.branches != 1 and MODELS[self.model].branched is None:
             yield ("branches",), "only generalized_maxwell has a number of branches."
             return
         model = self.sample.model
-        yield from _parameter_problems(model, self.parameters, model.name)
+        yield from _parameter_complaints(model, self.parameters, model.name)
 
-    def missing(self) -> Iterator[Problem]:
+    def missing(self) -> Iterator[Complaint]:
         """Find parameters of the model without a true value."""
         model = self.sample.model
         for name in model.names:
@@ -271,16 +271,16 @@ class SampleBlock(Checked, BaseModel):
                 yield (name,), f"is missing: {model.name} needs {', '.join(model.names)}."
 
 
-def fixed_problems(model: SampleModel, values: Mapping[str, float]) -> Iterator[Problem]:
+def fixed_complaints(model: SampleModel, values: Mapping[str, float]) -> Iterator[Complaint]:
     """Find fixed parameters that the model does not have, or whose values it does not allow."""
-    yield from _parameter_problems(model, values, "the sample")
+    yield from _parameter_complaints(model, values, "the sample")
     if set(model.names) <= set(values):
         yield (), "leaves nothing to identify; allowed are fewer parameters."
 
 
-def _parameter_problems(
+def _parameter_complaints(
     model: SampleModel, values: Mapping[str, float], called: str
-) -> Iterator[Problem]:
+) -> Iterator[Complaint]:
     """Find unknown names, and values out of range; 0 is allowed for those that may vanish."""
     by_name = {parameter.name: parameter for parameter in model.parameters}
     for name, value in values.items():

@@ -10,19 +10,20 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.errors import BiogripError
-from biogrip.keys import Problem, below, plain
+from biogrip.keys import Complaint, below, plain
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.messages import checked, schema_of
 from biogrip.study.source import (
     KeyPath,
     Source,
+    default_config,
     dotted,
-    keys_in,
     overlaid,
     place,
     read_config,
     read_source,
+    values_in,
 )
 from biogrip.study.study import Study
 from biogrip.study.sweeps import list_points, point_blocks
@@ -38,32 +39,40 @@ def read_configs(files: Iterable[Path]) -> dict[str, Any]:
     return merged
 
 
-def load_study(
-    config: Mapping[str, Any],
-    files: Iterable[str | Path],
-    command_line: Mapping[str, Any] | None = None,
-    over: Iterable[Source] = (),
-) -> Study:
-    """Check and type a merged config, which came from files, the command line, and what is `over`.
+def load_given_study(given: Mapping[str, Any], files: Sequence[Path]) -> Study:
+    """Lay a config over the default study's, and check and type it, see `load_study`.
 
-    A `BiogripError` names file, line and key of the first few problems, with what was found and
+    What is not in the files as it is in the config, was given on Snakemake's command line.
+    """
+    read = dict(values_in(read_configs(files)))
+    typed = [path for path, value in values_in(given) if read.get(path) != value]
+    over = ("command line, --config", dict.fromkeys(typed))
+    config = overlaid(read_config(default_config()), given)
+    return load_study(config, [default_config(), *files], [over])
+
+
+def load_study(
+    config: Mapping[str, Any], files: Iterable[Path], over: Iterable[Source] = ()
+) -> Study:
+    """Check and type a merged config, which came from files, and from what is `over` them.
+
+    A `BiogripError` names file, line and key of the first few complaints, with what was found and
     what is allowed.
     """
-    typed = ("command line, --config", dict.fromkeys(keys_in(command_line or {})))
-    sources = [*(read_source(Path(file)) for file in files), typed, *over]
-    study, problems = checked(StudyConfig, _fill_in(schema_of(StudyConfig).with_numbers(config)))
-    _refuse(problems, sources)
+    sources = [*map(read_source, files), *over]
+    study, complaints = checked(StudyConfig, _fill_in(schema_of(StudyConfig).with_numbers(config)))
+    _refuse(complaints, sources)
     assert study is not None
     study = replace(study, cases={it: study.cases[it] for it in study.only or study.cases})
-    _refuse([*_point_problems(study), *_interpretation_problems(study)], sources)
+    _refuse([*_point_complaints(study), *_interpretation_complaints(study)], sources)
     return Study(study)
 
 
-def _refuse(problems: Iterable[Problem], sources: Sequence[Source]) -> None:
-    """Raise an error that lists the first few problems, if there are any."""
+def _refuse(complaints: Iterable[Complaint], sources: Sequence[Source]) -> None:
+    """Raise an error that lists the first few complaints, if there are any."""
     found: dict[str, None] = {}
-    for path, text in problems:
-        # A problem in a block that cases inherit is reported once, not once per case.
+    for path, text in complaints:
+        # A complaint in a block that cases inherit is reported once, not once per case.
         origin = _origin(path, sources)
         found[f"{place(origin, sources)}: {dotted(origin)}: {text}"] = None
     if found:
@@ -84,22 +93,22 @@ def _origin(path: KeyPath, sources: Sequence[Source]) -> KeyPath:
     return path[2:]
 
 
-def _point_problems(study: StudyConfig) -> Iterator[Problem]:
+def _point_complaints(study: StudyConfig) -> Iterator[Complaint]:
     """Check every point of every sweep as if it were a case of the config."""
     blocks = point_blocks(study.sweeps, study.cases)
     for name, point in list_points(study.sweeps):
         case, found = checked(CaseBlock, blocks[point.name])
-        for problem in case.comb_problems(study.actuator) if case else found:
-            yield from below(("sweeps", name), [study.sweeps[name].placed(point, problem)])
+        for complaint in case.comb_complaints(study.actuator) if case else found:
+            yield from below(("sweeps", name), [study.sweeps[name].placed(point, complaint)])
 
 
-def _interpretation_problems(study: StudyConfig) -> Iterator[Problem]:
+def _interpretation_complaints(study: StudyConfig) -> Iterator[Complaint]:
     """Check every simulated case under every interpretation as if it were a case of the config."""
     for name, block in study.interpretations.items():
         for case in study.cases.values():
             if not case.recorded:
-                problems = checked(CaseBlock, overlaid(plain(case), block.changes))[1]
-                yield from below(("interpretations", name, "changes"), problems)
+                complaints = checked(CaseBlock, overlaid(plain(case), block.changes))[1]
+                yield from below(("interpretations", name, "changes"), complaints)
 
 
 def _fill_in(config: Mapping[str, Any]) -> Mapping[str, Any]:

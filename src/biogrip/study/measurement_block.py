@@ -11,7 +11,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field, Tag
 
-from biogrip.keys import BY_KIND, Block, OneOf, Problem
+from biogrip.keys import BY_KIND, Block, Complaint, OneOf
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION
 from biogrip.physics.noise import Noise
 from biogrip.traces.columns import TIME_UNITS, Columns, known_unit, trace_file_problem
@@ -164,7 +164,7 @@ class MeasurementBlock(Block):
         """True if a linear drift is fitted along."""
         return self.coloured if self.drift is None else self.drift
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Find keys that are in conflict, and what a recorded trace lacks."""
         for key in (key for key in KNOWN_NOISE if getattr(self, key) is not None):
             if self.coloured:
@@ -184,11 +184,11 @@ class MeasurementBlock(Block):
             return
         if self.time is None:
             yield ("time",), "is missing: a recorded trace needs the name of its time column."
-        yield from self._reading_problems()
-        if problem := trace_file_problem(self.file):
-            yield ("file",), problem
+        yield from self._reading_complaints()
+        if complaint := trace_file_problem(self.file):
+            yield ("file",), complaint
 
-    def _reading_problems(self) -> Iterator[Problem]:
+    def _reading_complaints(self) -> Iterator[Complaint]:
         if not self.readings:
             text = "is missing: a recorded trace needs the name of its rotation column"
             yield (ROTATION.name,), f"{text}, or of another reading: {', '.join(READINGS[1:])}."

@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails
 
 from biogrip.digits import counted
 from biogrip.errors import nearest
-from biogrip.keys import CONFLICT, TWICE, Problem, adapter, built, kind_of
+from biogrip.keys import CONFLICT, TWICE, Complaint, adapter, built, kind_of
 from biogrip.physics.instruments import ROTATION
 from biogrip.traces.columns import TIME_UNITS
 
@@ -42,7 +42,7 @@ _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 _MOST_COUNTED = 2**53
 
 
-def checked(kind: Callable[..., T], block: Any) -> tuple[T | None, list[Problem]]:
+def checked(kind: Callable[..., T], block: Any) -> tuple[T | None, list[Complaint]]:
     """Build a config block from plain keys and values, or find what is not allowed in it."""
     try:
         return built(kind, block, check=True), []
@@ -63,7 +63,7 @@ def bound(limit: float) -> str:
     return f"{limit:g}" if isinstance(limit, float) else str(limit)
 
 
-def _explained(schema: "Schema", error: ErrorDetails) -> Problem:
+def _explained(schema: "Schema", error: ErrorDetails) -> Complaint:
     """Follow the path of an error, which names alternatives and keys, too, to what is allowed."""
     path: tuple[int | str, ...] = ()
     above = leaf = schema

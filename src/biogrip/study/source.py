@@ -43,23 +43,23 @@ def default_config() -> Path:
     return _TOP / "config" / "config.yaml"
 
 
-def snakefile() -> Path:
-    """Return the Snakefile that runs a study."""
-    return _TOP / "Snakefile"
-
-
 def shipped(name: str) -> Path:
     """Return another file that comes with the code, by its path in the repository."""
     return _TOP / name
 
 
-def keys_in(block: Any, above: KeyPath = ()) -> Iterator[KeyPath]:
-    """Yield the paths of all keys and list items of a block and of the blocks below."""
+def values_in(block: Any, above: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
+    """Yield all values of a block and of the blocks and lists below, with their paths."""
     if isinstance(block, list):
         block = dict(enumerate(block))
     for key, inner in block.items() if isinstance(block, Mapping) else ():
-        yield (*above, key)
-        yield from keys_in(inner, (*above, key))
+        yield (*above, key), inner
+        yield from values_in(inner, (*above, key))
+
+
+def keys_in(block: Any, above: KeyPath = ()) -> Iterator[KeyPath]:
+    """Yield the paths of all keys and list items of a block and of the blocks below."""
+    return (path for path, _ in values_in(block, above))
 
 
 def place(path: KeyPath, sources: Sequence[Source]) -> str:

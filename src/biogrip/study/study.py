@@ -4,36 +4,24 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any, cast
 
-from biogrip.fit.genetic import GeneticSettings
+from biogrip.arrays import Array
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.methods import METHODS, Method
 from biogrip.fit.problem import CaseProblem
 from biogrip.keys import built, plain
-from biogrip.physics.gripper import NO_ARMS, Contact, Gripper
-from biogrip.physics.instruments import GRIPPER
-from biogrip.physics.models import CANDIDATES, UNPUBLISHED, Sample
-from biogrip.physics.protocol import Phase, join_phases, sample_times
-from biogrip.physics.sample_model import with_fixed
+from biogrip.physics.gripper import NO_ARMS, CombDrive, Contact, Gripper
+from biogrip.physics.instruments import GRIPPER, Instrument
+from biogrip.physics.models import CANDIDATES, UNPUBLISHED, Published, Sample
+from biogrip.physics.noise import Noise
+from biogrip.physics.protocol import Course, Phase, join_phases, sample_times
+from biogrip.physics.sample_model import Network, with_fixed
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.source import overlaid
 from biogrip.study.sweeps import point_blocks
-
-if TYPE_CHECKING:
-    from biogrip.fit.least_squares import LeastSquaresSettings
-
-_Part = TypeVar("_Part")
-
-
-# Attributes, with the type of what the function returns.
-def _of_case(part: Callable[["Case"], _Part]) -> cached_property[_Part]:
-    return cached_property(part)
-
-
-def _of_study(part: Callable[["Study"], _Part]) -> cached_property[_Part]:
-    return cached_property(part)
+from biogrip.traces.columns import Columns
 
 
 @dataclass(frozen=True)
@@ -46,50 +34,61 @@ class Case:
     """Config block, with the study's blocks merged in."""
     study: "Study"
 
-    # What other modules need of the blocks, by the names that it has there.
-    recorded = _of_case(lambda case: case.block.recorded)
-    actuator = _of_case(lambda case: case.study.config.actuator)
-    instrument = _of_case(lambda case: case.block.instrument_used)
-    size_m = _of_case(lambda case: case.block.sample.size_m)
-    published = _of_case(lambda case: case.block.published or UNPUBLISHED)
-    noise = _of_case(lambda case: case.block.measurement.noise)
-    nonlinear_target = _of_case(lambda case: case.block.models.target == "nonlinear")
-    unilateral = _of_case(lambda case: case.block.contact == "unilateral")
-    file = _of_case(lambda case: case.block.measurement.file or "")
-    columns = _of_case(lambda case: case.block.measurement.columns)
-    is_calibrated = _of_case(lambda case: case.block.assumed_gripper == CALIBRATED)
-    calibration = _of_case(lambda case: case.block.calibration)
-    confidence = _of_case(lambda case: case.block.identifiability.confidence)
-    verdicts_every = _of_case(lambda case: case.block.identifiability.verdicts_every)
-    ranges = _of_case(lambda case: dict[str, GeneRange](vars(case.block.search_range)))
-    title = _of_case(lambda case: case.block.title or case.name)
-    method = _of_case(lambda case: case.block.method)
-    sample = _of_case(lambda c: replace(c.block.sample.sample, per_area=c.instrument.per_area))
-    """Constitutive model."""
-    phases = _of_case(lambda case: case.block.protocol.make_phases(case.instrument, case.actuator))
-    """Phases of the protocol, in torques or what else the instrument holds."""
-    plain = _of_case(lambda case: cast("dict[str, Any]", plain(case.block)))
-    """Config block as plain values, without keys that have their default."""
-    seeds = _of_case(lambda case: 1 if case.recorded else case.study.config.seeds)
-    """Number of traces; 1 for a recorded trace."""
-    fixed = _of_case(lambda case: {name: float(it) for name, it in case.block.fixed.items()})
-    """Parameters that are not identified, by name."""
-    searched = _of_case(lambda case: case.problem.searched)
-    """Sample model without fixed parameters."""
-    torque = _of_case(lambda it: join_phases(it.phases, deforms=it.instrument.deforms))
-    """What the instrument holds over time."""
-    network = _of_case(lambda case: case.sample.model.sample(case.parameters))
-    """Springs and dampers of the simulated sample."""
-    times_s = _of_case(lambda it: sample_times(it.torque.end_s, it.block.measurement.rate_Hz))
-    """Times of a simulated trace, (n_samples,)."""
-    samples = _of_case(lambda case: len(case.times_s))
-    """Number of samples in a simulated trace."""
-    methods = _of_case(lambda case: {it: case.method(it) for it in case.study.config.methods})
-    """Settings of the study's identification methods by name."""
-    least_squares = _of_case(lambda it: cast("LeastSquaresSettings", it.method("least_squares")))
-    """Settings of the least-squares fits that judgements are based on."""
-    genetic = _of_case(lambda case: cast("GeneticSettings", case.method("genetic")))
-    """Settings of the genetic algorithm."""
+    @cached_property
+    def plain(self) -> dict[str, Any]:
+        """Config block as plain values, without keys that have their default."""
+        return cast("dict[str, Any]", plain(self.block))
+
+    @property
+    def title(self) -> str:
+        """Name in print."""
+        return self.block.title or self.name
+
+    @property
+    def recorded(self) -> bool:
+        """True if the trace was recorded, not simulated."""
+        return self.block.recorded
+
+    @property
+    def published(self) -> Published:
+        """What the paper reports of the case."""
+        return self.block.published or UNPUBLISHED
+
+    @property
+    def seeds(self) -> int:
+        """Number of traces; 1 for a recorded trace."""
+        return 1 if self.recorded else self.study.config.seeds
+
+    @property
+    def confidence(self) -> float:
+        """Confidence level of all intervals."""
+        return self.block.identifiability.confidence
+
+    @property
+    def coverage_seeds(self) -> int:
+        """Number of seeds to test the coverage of intervals with; 0 without noise."""
+        tried = not self.recorded and not self.noise.absent
+        return self.block.identifiability.coverage_seeds if tried else 0
+
+    @property
+    def noise(self) -> Noise:
+        """Noise of simulated traces."""
+        return self.block.measurement.noise
+
+    @cached_property
+    def times_s(self) -> Array:
+        """Times of a simulated trace, (n_samples,)."""
+        return sample_times(self.torque.end_s, self.block.measurement.rate_Hz)
+
+    @property
+    def samples(self) -> int:
+        """Number of samples in a simulated trace."""
+        return len(self.times_s)
+
+    @property
+    def columns(self) -> Columns:
+        """Columns of a recorded trace's file."""
+        return self.block.measurement.columns
 
     @property
     def may_start_late(self) -> bool:
@@ -98,18 +97,25 @@ class Case:
         return self.recorded and measured.start_s is None and not measured.fit_start
 
     @property
-    def parameters(self) -> dict[str, float]:
-        """True parameters by name, SI units, branches by relaxation time; none if recorded."""
-        given, model = self.block.sample.parameters, self.sample.model
-        known = {name: float(given[name]) for name in model.names if name in given}
-        whole = len(known) == len(model.names)
-        return with_fixed(model, self.fixed).named_in_order(known) if whole else known
+    def instrument(self) -> Instrument:
+        """The instrument, by its kind, and by what the protocol holds and the trace is of."""
+        return self.block.instrument_used
+
+    @cached_property
+    def phases(self) -> tuple[Phase, ...]:
+        """Phases of the protocol, in torques or what else the instrument holds."""
+        return self.block.protocol.make_phases(self.instrument, self.study.actuator)
+
+    @cached_property
+    def torque(self) -> Course:
+        """What the instrument holds over time."""
+        return join_phases(self.phases, deforms=self.instrument.deforms)
 
     @cached_property
     def _contact(self) -> Contact | None:
         """State of the gripper when it is closed onto the sample, if its size is known."""
-        size_m = self.size_m
-        return None if size_m is None else self.block.gripper.contact(self.actuator, size_m)
+        size_m = self.block.sample.size_m
+        return None if size_m is None else self.block.gripper.contact(self.study.actuator, size_m)
 
     @cached_property
     def gripper(self) -> Gripper:
@@ -123,7 +129,45 @@ class Case:
     def stroke(self) -> float:
         """Rotation left for gripping: the comb drive's stroke minus closing onto the sample."""
         closing = self._contact.closing if self._contact else 0.0
-        return math.radians(self.actuator.stroke_deg) - closing
+        return math.radians(self.study.actuator.stroke_deg) - closing
+
+    @property
+    def is_calibrated(self) -> bool:
+        """True if the identification takes the gripper from a test without sample."""
+        return self.block.assumed_gripper == CALIBRATED
+
+    @cached_property
+    def sample(self) -> Sample:
+        """Constitutive model."""
+        return replace(self.block.sample.sample, per_area=self.instrument.per_area)
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """Parameters that are not identified, by name."""
+        return {name: float(value) for name, value in self.block.fixed.items()}
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """True parameters by name, SI units, branches by relaxation time; none if recorded."""
+        given, model = self.block.sample.parameters, self.sample.model
+        known = {name: float(given[name]) for name in model.names if name in given}
+        whole = len(known) == len(model.names)
+        return with_fixed(model, self.fixed).named_in_order(known) if whole else known
+
+    @cached_property
+    def network(self) -> Network:
+        """Springs and dampers of the simulated sample."""
+        return self.sample.model.sample(self.parameters)
+
+    @property
+    def nonlinear_target(self) -> bool:
+        """True if targets are simulated by the nonlinear equations."""
+        return self.block.models.target == "nonlinear"
+
+    @property
+    def unilateral(self) -> bool:
+        """True if the jaws of the simulation cannot pull the sample."""
+        return self.block.contact == "unilateral"
 
     @cached_property
     def problem(self) -> CaseProblem:
@@ -136,7 +180,7 @@ class Case:
         return CaseProblem(
             gripper,
             self.phases,
-            self.ranges,
+            dict[str, GeneRange](vars(self.block.search_range)),
             self.sample,
             self.fixed,
             self.instrument,
@@ -150,30 +194,11 @@ class Case:
         )
 
     @property
-    def mutation_start(self) -> int | None:
-        """First generation in which children mutate; None if the shown method has no mutation."""
-        mutates = "genetic_algorithm" in self.study.shown_method.blocks
-        return self.genetic.mutation_start if mutates else None
-
-    @property
-    def interpretations(self) -> dict[str, "Case"]:
-        """The case under each interpretation of the paper, by the interpretation's name."""
-        readings = self.study.interpretations.items()
-        blocks = {name: overlaid(self.plain, reading.changes) for name, reading in readings}
-        return {name: replace(self, block=built(CaseBlock, it)) for name, it in blocks.items()}
-
-    @property
     def models(self) -> dict[str, Sample]:
         """Sample models to fit to the case's traces by name, see `CANDIDATES`."""
         names = (*self.study.config.model_selection.models, self.sample.candidate)
         per_area = self.instrument.per_area
         return {name: replace(CANDIDATES[name], per_area=per_area) for name in names}
-
-    @property
-    def coverage_seeds(self) -> int:
-        """Number of seeds to test the coverage of intervals with; 0 without noise."""
-        tried = not self.recorded and not self.noise.absent
-        return self.block.identifiability.coverage_seeds if tried else 0
 
     @property
     def has_valley(self) -> bool:
@@ -192,74 +217,125 @@ class Study:
     only: tuple[str, ...] | None = None
     """Names of its cases; by default those of the config."""
 
-    sweeps = _of_study(lambda study: study.config.sweeps)
-    study_seed = _of_study(lambda study: study.config.study_seed)
-    near_noise_tolerance = _of_study(lambda study: study.config.evaluation.near_noise_tolerance)
-    optimum_tolerance = _of_study(lambda study: study.config.evaluation.optimum_tolerance)
-    gripper = _of_study(lambda study: study.config.gripper.neutral)
-    traces = _of_study(lambda study: study.config.traces)
-    jaw_gap_m = _of_study(lambda study: study.config.gripper.jaw_gap_m)
-    actuator = _of_study(lambda study: study.config.actuator)
-    reconstructed = _of_study(lambda study: study.config.reconstructed)
-    methods = _of_study(lambda study: list(study.config.methods))
-    ranges = _of_study(lambda study: dict[str, GeneRange](vars(study.config.search_range)))
-    plain = _of_study(lambda study: cast("dict[str, Any]", plain(study.config)))
-    """Config as plain values, without keys that have their default."""
+    @cached_property
+    def plain(self) -> dict[str, Any]:
+        """Config as plain values, without keys that have their default."""
+        return cast("dict[str, Any]", plain(self.config))
 
-    cases = _of_study(lambda study: study._cases(study.config.cases, study.only))
-    """Cases by name, in the order of the config."""
-    simulated = _of_study(lambda study: study._where(lambda case: not case.recorded))
-    """Names of cases that are simulated."""
-    recorded = _of_study(lambda study: study._where(lambda case: case.recorded))
-    """Names of cases with a recorded trace."""
-    gripped = _of_study(lambda it: it._where(lambda c: not c.recorded and c.instrument.has_jaws))
-    """Names of simulated cases whose sample the gripper holds."""
-    has_gripper = _of_study(lambda study: study._where(lambda it: it.instrument.has_jaws) != [])
-    """True if the gripper holds the sample of any case."""
-    covered = _of_study(lambda study: study._where(lambda case: case.coverage_seeds > 0))
-    """Names of cases whose intervals are tested for coverage."""
-    published = _of_study(lambda study: study._where(lambda case: case.published.table is not None))
-    """Names of cases that the paper reports results of."""
-    identifiers = _of_study(lambda study: {name: METHODS[name] for name in study.methods})
-    """Declarations of the methods, by name."""
-    interpretations = _of_study(lambda study: study.config.interpretations)
-    shown = _of_study(lambda study: study.methods[0])
-    """Method that tables and figures of a single method show."""
-    shown_method = _of_study(lambda study: METHODS[study.shown])
-    """Declaration of the shown method."""
+    @cached_property
+    def cases(self) -> dict[str, Case]:
+        """Cases by name, in the order of the config."""
+        blocks = self.config.cases
+        names = blocks if self.only is None else self.only
+        return {name: Case(name, blocks[name], self) for name in names}
 
     @cached_property
     def points(self) -> dict[str, Case]:
         """Cases of all points of the sweeps, by name."""
-        blocks = point_blocks(self.sweeps, self.config.cases)
-        return self._cases({name: built(CaseBlock, block) for name, block in blocks.items()})
-
-    def of(self, names: Iterable[str]) -> "Study":
-        """Return the study of some of its cases."""
-        return Study(self.config, tuple(names))
-
-    def _cases(
-        self, blocks: Mapping[str, CaseBlock], only: Iterable[str] | None = None
-    ) -> dict[str, Case]:
-        names = blocks if only is None else only
-        return {name: Case(name, blocks[name], self) for name in names}
+        blocks = point_blocks(self.config.sweeps, self.config.cases)
+        return {name: Case(name, built(CaseBlock, block), self) for name, block in blocks.items()}
 
     def case(self, name: str) -> Case:
         """Return a case of the study or of a sweep's point."""
         return self.cases[name] if name in self.cases else self.points[name]
 
+    def of(self, names: Iterable[str]) -> "Study":
+        """Return the study of some of its cases."""
+        return Study(self.config, tuple(names))
+
     def _where(self, holds: Callable[[Case], bool]) -> list[str]:
         return [name for name, case in self.cases.items() if holds(case)]
 
     @property
-    def fitting_method(self) -> Method:
-        """Least squares if the study has it, else the shown method."""
-        return METHODS["least_squares" if "least_squares" in self.methods else self.shown]
+    def simulated(self) -> list[str]:
+        """Names of cases that are simulated."""
+        return self._where(lambda case: not case.recorded)
+
+    @property
+    def recorded(self) -> list[str]:
+        """Names of cases with a recorded trace."""
+        return self._where(lambda case: case.recorded)
+
+    @property
+    def gripped(self) -> list[str]:
+        """Names of simulated cases whose sample the gripper holds."""
+        return self._where(lambda case: not case.recorded and case.instrument.has_jaws)
+
+    @property
+    def has_gripper(self) -> bool:
+        """True if the gripper holds the sample of any case."""
+        return any(case.instrument.has_jaws for case in self.cases.values())
+
+    @property
+    def covered(self) -> list[str]:
+        """Names of cases whose intervals are tested for coverage."""
+        return self._where(lambda case: case.coverage_seeds > 0)
+
+    @property
+    def counted(self) -> list[str]:
+        """Names of those of which every trace gets the verdicts that users are shown."""
+        cases = {name: self.cases[name].block for name in self.covered}
+        return [name for name, it in cases.items() if it.identifiability.verdicts_every == 1]
+
+    @property
+    def published(self) -> list[str]:
+        """Names of cases that the paper reports results of."""
+        return self._where(lambda case: case.published.table is not None)
+
+    @property
+    def study_seed(self) -> int:
+        """The seed that all random streams derive from."""
+        return self.config.study_seed
+
+    @property
+    def near_noise_tolerance(self) -> float:
+        """Share by which the misfit of a seed near the noise exceeds its noise at most."""
+        return self.config.evaluation.near_noise_tolerance
+
+    @property
+    def optimum_tolerance(self) -> float:
+        """Excess of χ² over that of the best encodable point, of runs that reach it, at most."""
+        return self.config.evaluation.optimum_tolerance
+
+    @property
+    def gripper(self) -> Gripper:
+        """The gripper in its neutral configuration."""
+        return self.config.gripper.neutral
+
+    @property
+    def actuator(self) -> CombDrive:
+        """The rotary comb drive."""
+        return self.config.actuator
 
     @property
     def phases(self) -> tuple[Phase, ...]:
         """Protocol of all cases if it is the same, else of the study."""
-        own = {case.phases for case in self.cases.values()}
-        if len(own) == 1:
-            return own.pop()
+        of_cases = {case.phases for case in self.cases.values()}
+        if len(of_cases) == 1:
+            return of_cases.pop()
         return self.config.protocol.make_phases(GRIPPER, self.actuator)
+
+    @property
+    def ranges(self) -> dict[str, GeneRange]:
+        """Search ranges of all parameters, by the name of the range."""
+        return dict[str, GeneRange](vars(self.config.search_range))
+
+    @property
+    def identifiers(self) -> dict[str, Method]:
+        """Declarations of the methods, by name."""
+        return {name: METHODS[name] for name in self.config.methods}
+
+    @property
+    def shown(self) -> str:
+        """Name of the method that tables and figures of a single method show."""
+        return self.config.methods[0]
+
+    @property
+    def shown_method(self) -> Method:
+        """Declaration of the shown method."""
+        return METHODS[self.shown]
+
+    @property
+    def fitting_method(self) -> Method:
+        """Least squares if the study has it, else the shown method."""
+        return self.identifiers.get("least_squares", self.shown_method)

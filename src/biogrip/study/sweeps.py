@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, Field, Tag
 
 from biogrip.errors import nearest
-from biogrip.keys import BY_KIND, OPEN, Block, Distinct, Printed, Problem, plain
+from biogrip.keys import BY_KIND, OPEN, Block, Complaint, Distinct, Printed, plain
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.source import overlaid
 
@@ -101,7 +101,7 @@ class AxisBlock(Block):
         shown = value if isinstance(value, str) else f"{value / self.unit_in_si:.4g}"
         return Value(_word(value), shown, dict.fromkeys(self.keys, value))
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Refuse values of one name, and keys that no case may change."""
         for key in self.keys:
             if key.partition(".")[0] not in OVERRIDABLE:
@@ -145,16 +145,16 @@ class SweepBlock(Block):
             for row, column in product(self.rows.levels, self.columns.levels)
         ]
 
-    def problems(self) -> Iterator[Problem]:
+    def complaints(self) -> Iterator[Complaint]:
         """Refuse keys that both axes set."""
         ours = {key for value in self.rows.levels for key in value.overrides}
         for index, changing in enumerate(self.columns.levels):
             for key in sorted(ours & changing.overrides.keys()):
                 yield ("columns", "values", index), f"sets {key}, which the rows do too."
 
-    def placed(self, point: Point, problem: Problem) -> Problem:
-        """Return a problem of a point's case as one of the value that causes it."""
-        path, text = problem
+    def placed(self, point: Point, complaint: Complaint) -> Complaint:
+        """Return a complaint of a point's case as one of the value that causes it."""
+        path, text = complaint
         key = ".".join(map(str, path))
         for axis, value in (("rows", point.row), ("columns", point.column)):
             if any(f"{key}.".startswith(f"{changed}.") for changed in value.overrides):
@@ -188,7 +188,7 @@ def point_blocks(
     return found
 
 
-def name_problems(sweeps: Mapping[str, SweepBlock], cases: Iterable[str]) -> Iterator[Problem]:
+def name_complaints(sweeps: Mapping[str, SweepBlock], cases: Iterable[str]) -> Iterator[Complaint]:
     """Find points that have the names of cases or of other points."""
     found = {*cases}
     for sweep, point in list_points(sweeps):

@@ -93,7 +93,7 @@ def coverage(
 
 def _judged_seeds(study: Study) -> str:
     """Return in words which seeds have verdicts."""
-    every = {case.verdicts_every for case in study.cases.values()}
+    every = {case.block.identifiability.verdicts_every for case in study.cases.values()}
     if len(every) > 1:
         return "some seeds"
     return "every seed" if 1 in every else f"every {every.pop()}th seed"

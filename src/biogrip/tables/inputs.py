@@ -112,5 +112,5 @@ def _quantities(
 
 
 def _source(study: Study, key: str) -> str:
-    marked = any(key == name or key.startswith(f"{name}.") for name in study.reconstructed)
+    marked = any(key == name or key.startswith(f"{name}.") for name in study.config.reconstructed)
     return "reconstructed" if marked else "stated"

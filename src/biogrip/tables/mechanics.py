@@ -19,7 +19,6 @@ from biogrip.physics.gripper import (
     LARGEST_M,
     SMALLEST_M,
     apparent_modulus,
-    contact,
     drag_of_arm,
     drag_of_sample,
     fringing_of_comb,
@@ -59,7 +58,7 @@ def contacts(study: Study) -> ShownTable:
     rows: list[Row] = []
     for size_um in np.arange(1e6 * SMALLEST_M, 1e6 * LARGEST_M + 1, 15.0):
         try:
-            found = contact(study.gripper, study.jaw_gap_m, study.actuator, 1e-6 * size_um)
+            found = study.config.gripper.contact(study.actuator, 1e-6 * size_um)
         except BiogripError as error:
             rows.append({"size_um": size_um, "remark": str(error)})
             continue
@@ -146,7 +145,8 @@ def _mechanics_of(case: Case) -> list[Row]:
             "stiffness_over_gripper": at_once / own,
         }
     rows: list[Row] = []
-    for size in (SMALLEST_M, LARGEST_M) if case.size_m is None else (case.size_m,):
+    size_m = case.block.sample.size_m
+    for size in (SMALLEST_M, LARGEST_M) if size_m is None else (size_m,):
         modulus = 1e-3 * apparent_modulus(force, shortening, size) if shortening > 0 else None
         of_size = {"size_um": 1e6 * size, "strain_percent": 100 * shortening / size}
         rows.append(of_all_sizes | of_size | {"apparent_modulus_kPa": modulus})
@@ -338,7 +338,7 @@ def _medians(
         return {}
     problems = [problem.of(time_s, trace) for trace in rotation[: len(time_s)] + noise]
     rngs = [stream(study_seed, case.name, seed, "contact_loss") for seed in range(len(noise))]
-    found = identify_many(problems, case.least_squares, rngs)
+    found = identify_many(problems, case.block.least_squares, rngs)
     values = pd.DataFrame([each.parameters for each in found], columns=searched.names)
     values = values.assign(**problem.fixed)
     medians = {

@@ -15,7 +15,7 @@ from biogrip.tables.layout import Column, Row, ShownTable
 def axis_title(study: Study, axis: AxisBlock) -> str:
     """Return the title of an axis with its unit, marked if the paper does not give the values."""
     keys = {f"{key}." for value in axis.levels for key in value.overrides}
-    reconstructed = tuple(f"{name}." for name in study.reconstructed)
+    reconstructed = tuple(f"{name}." for name in study.config.reconstructed)
     return axis.title + ", reconstructed" * any(key.startswith(reconstructed) for key in keys)
 
 
@@ -43,7 +43,7 @@ _BY_METHOD = {
 
 def robustness(study: Study, name: str, points: Path) -> ShownTable:
     """Join the points of a sweep over all its cases."""
-    sweep, methods = study.sweeps[name], study.identifiers
+    sweep, methods = study.config.sweeps[name], study.identifiers
     rows: list[Row] = []
     for case in sweep.cases:
         found = read_points(points, name, case)
@@ -87,7 +87,7 @@ def robustness(study: Study, name: str, points: Path) -> ShownTable:
         "error of an estimator that attains it is 0.67 of that. Without noise, the misfit of the "
         "truth rounded to two digits stands for the noise."
     )
-    marked = [key for key in study.reconstructed if key.split(".")[0] == "gripper"]
+    marked = [key for key in study.config.reconstructed if key.split(".")[0] == "gripper"]
     if marked:
         caption += f" Reconstructed, as the paper does not give them: {', '.join(marked)}."
     return ShownTable(caption, columns, rows)
