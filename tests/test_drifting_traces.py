@@ -75,11 +75,12 @@ def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(
     """With the noise that is known, or that with which each residual is likeliest."""
     residual = np.random.default_rng(4).standard_normal(50)
     fits = 2.0 * residual, 1.7 * residual
-    before, after = (float(np.sqrt(np.mean(fit**2))) for fit in fits)
-    before = norm.logpdf(fits[0], scale=known or before).sum()
-    after = norm.logpdf(fits[1], scale=known or after).sum()
-    found = compute_fall(50, before, after, known)
-    assert found == pytest.approx(2 * (after - before), rel=1e-12)
+    misfits = [float(np.sqrt(np.mean(fit**2))) for fit in fits]
+    before, after = (
+        norm.logpdf(fit, scale=known or misfit).sum()
+        for fit, misfit in zip(fits, misfits, strict=True)
+    )
+    assert compute_fall(50, *misfits, known) == pytest.approx(2 * (after - before), rel=1e-12)
 
 
 def test_an_offset_is_not_told_from_what_yields_at_once_under_a_constant_torque() -> None:

@@ -44,7 +44,7 @@ def test_a_damaged_target_is_explained(tmp_path: Path) -> None:
         read_target(path)
 
 
-@pytest.mark.parametrize("known", [{}, {"target_rad": TIMES - 1}, {"sd_rad": TIMES + 0.1}])
+@pytest.mark.parametrize("known", [{}, {"target": TIMES - 1}, {"sd": TIMES + 0.1}])
 def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> None:
     """All of them or some, with what is known, bit for bit."""
     path = tmp_path / "seeds_3-7.npz"
@@ -57,7 +57,7 @@ def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> No
         for seed, trace in read.readings.items():
             np.testing.assert_array_equal(trace, traces[seed])
             assert trace.flags.c_contiguous
-        for name in ("time_s", "target_rad", "sd_rad"):
+        for name in ("time_s", "target", "sd"):
             np.testing.assert_array_equal(getattr(read, name), getattr(given, name))
 
 

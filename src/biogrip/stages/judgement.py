@@ -13,15 +13,13 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.files import write_text
-from biogrip.fit.least_squares import fit_from, identify_from
+from biogrip.fit.least_squares import identify_from
 from biogrip.fit.methods import identifier
 from biogrip.fit.problem import CaseProblem, Identification, Problem, Progress, silent
 from biogrip.fit.trace_fit import TraceFit, fit_traces
-from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit
-from biogrip.judging.likelihood import MISSED
 from biogrip.judging.onset import notes_on_start, profile_over_onset
-from biogrip.judging.profiles import compute_valley
 from biogrip.physics.noise import rms, standard_deviation, stream
 from biogrip.records.identifications import diagnosis_data
 from biogrip.records.traces import read_measurements, read_target
@@ -59,14 +57,21 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
     case_problem = case.problem.calibrated(calibrated).weighted(recorded.sd)
     trace = recorded.readings[TRACE]
     (fit,) = fits_judged([case], [case_problem], [(recorded.time_s, trace)], TRACE)
-    diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
+    diagnosis = diagnose(
+        fit.problem,
+        case_problem.searched,
+        fit.found,
+        confidence=case.confidence,
+        noise_sd=case_problem.noise_sd,
+        valley=True,
+    )
     if case_problem.fit_start:
         diagnosis, _ = profile_over_onset(diagnosis, recorded.time_s)
     notes = notes_on_fit(fit)
     if case.may_start_late:
         notes += notes_on_start(case_problem, recorded.time_s, trace, diagnosis, may_be_late=True)
     said = diagnosis_data(diagnosis, notes)
-    _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": valley})
+    _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": diagnosis.valley})
 
 
 def notes_on_fit(fit: TraceFit) -> list[Note]:
@@ -79,21 +84,6 @@ def notes_on_fit(fit: TraceFit) -> list[Note]:
     share = float(fit.found.misfit * np.sqrt(fit.noise_model.ar1) / peak)
     misfit = find_slow_misfit(fit.noise_model, residuals.duration_s, share, residuals.instrument)
     return [misfit, *notes] if misfit else notes
-
-
-def _diagnosed(
-    problem: Problem, case_problem: CaseProblem, found: Identification, confidence: float
-) -> tuple[Diagnosis, dict[str, Any] | None]:
-    """Diagnose a trace, and again from a fit along its valley, if that has a lower chi^2."""
-    model, noise_sd = case_problem.searched, case_problem.noise_sd
-    diagnosis = diagnose(problem, model, found, confidence=confidence, noise_sd=noise_sd)
-    valley, missed = compute_valley(diagnosis.likelihood, model)
-    if missed is not None:
-        again = found.at(fit_from([problem], missed))
-        if diagnosis.likelihood.increase(again.misfit) < -MISSED:
-            diagnosis = diagnose(problem, model, again, confidence=confidence, noise_sd=noise_sd)
-            valley, _ = compute_valley(diagnosis.likelihood, model)
-    return diagnosis, valley
 
 
 def expect(case: Case, target: Path, calibrated: list[Path], verdicts: Path) -> None:
