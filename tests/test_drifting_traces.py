@@ -80,7 +80,9 @@ def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(
         norm.logpdf(fit, scale=known or misfit).sum()
         for fit, misfit in zip(fits, misfits, strict=True)
     )
-    assert compute_fall(50, *misfits, known) == pytest.approx(2 * (after - before), rel=1e-12)
+    assert compute_fall(50, misfits[0], misfits[1], known) == pytest.approx(
+        2 * (after - before), rel=1e-12
+    )
 
 
 def test_an_offset_is_not_told_from_what_yields_at_once_under_a_constant_torque() -> None:
