@@ -10,7 +10,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.design import NO_BOUND, Limits, Specimen, decode, rated, search, set_up
-from biogrip.fit.problem import CaseProblem
+from biogrip.fit.experiment import Experiment
 from biogrip.library import simulate
 from biogrip.physics.protocol import Sampling
 from biogrip.physics.simulation import compute_grip
@@ -74,7 +74,7 @@ def test_the_search_knows_the_bounds_of_a_train() -> None:
         found = rated(one, train.phases, Sampling(limits.rate_Hz))
         problem = replace(one.case.problem, phases=train.phases)
 
-        def read(shift: Array, one: Specimen = one, problem: CaseProblem = problem) -> Array:
+        def read(shift: Array, one: Specimen = one, problem: Experiment = problem) -> Array:
             values = dict(zip(problem.searched.names, one.parameters * np.exp(shift), strict=True))
             times_s = Sampling(limits.rate_Hz).over(problem.torque.end_s)
             return simulate(problem, {**problem.fixed, **values}, times_s)

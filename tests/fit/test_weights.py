@@ -9,7 +9,7 @@ from scipy.optimize import curve_fit
 
 from biogrip.arrays import Array
 from biogrip.fit.any_sample import proportional_deviations
-from biogrip.fit.problem import CaseProblem
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.trace_fit import TraceFit, fit_traces
 from biogrip.judging.diagnosis import diagnose
 from biogrip.library import set_up
@@ -46,7 +46,7 @@ def noisy(share: float, seed: int = 3) -> Array:
     return trace
 
 
-def fitted(problem: CaseProblem, trace: Array) -> TraceFit:
+def fitted(problem: Experiment, trace: Array) -> TraceFit:
     (fit,) = fit_traces(
         [problem], [(TIMES, trace)], lambda some, _: [run("least_squares", each) for each in some]
     )

@@ -44,15 +44,15 @@ def test_an_optimum_that_was_missed_is_judged_again() -> None:
     maxwell = MODELS["maxwell"]
     times, response = clean("liquid_drop_2")
     noise = 0.1 * response.max() * np.random.default_rng(2).standard_normal(len(times))
-    case_problem = posed_for(maxwell, times, response + noise)
-    found = run("least_squares", case_problem)
+    experiment = posed_for(maxwell, times, response + noise)
+    found = run("least_squares", experiment)
     elsewhere = found.parameters * np.array([1.1, 1.02])
-    misfit = float(case_problem.residuals.misfit(elsewhere[None])[0])
+    misfit = float(experiment.residuals.misfit(elsewhere[None])[0])
     missed = replace(found, parameters=elsewhere, misfit=misfit)
-    right, again = (diagnose(case_problem, maxwell, f, confidence=0.95) for f in (found, missed))
+    right, again = (diagnose(experiment, maxwell, f, confidence=0.95) for f in (found, missed))
     assert again.likelihood.misfit == pytest.approx(right.likelihood.misfit, rel=1e-9)
     # Coverage is tested with limits of the same fit.
-    (alike,) = judge_quantities([(case_problem, missed)], parameters_and_sum(maxwell), 0.95)
+    (alike,) = judge_quantities([(experiment, missed)], parameters_and_sum(maxwell), 0.95)
     assert alike.likelihood.misfit == again.likelihood.misfit
     for one, other in zip(alike.findings, again.findings, strict=True):
         assert (one.low, one.high) == (other.low, other.high)

@@ -20,8 +20,8 @@ from tests.helpers.problems import (
     GRIPPER,
     MODEL,
     TORQUE,
-    case_problem,
     clean,
+    experiment,
     likelihood_of,
     posed_for,
     run,
@@ -32,7 +32,7 @@ PARAMETERS = parameters_and_sum(MODEL)
 
 
 def likelihoods(case: str, count: int, **assumed: Any) -> list[Likelihood]:
-    return [likelihood_of(each) for each in case_problem(*clean(case), count, **assumed)]
+    return [likelihood_of(each) for each in experiment(*clean(case), count, **assumed)]
 
 
 def labelled(*labels: str) -> list[Quantity]:
@@ -141,7 +141,7 @@ def test_noise_and_threshold_are_those_of_a_regression(taken_out: dict[str, bool
     """
     model, times = MODELS["maxwell"], np.arange(0.0, 400.0, 40.0)
     response = rotation(step_response(GRIPPER, model.network([[1.0, 10.0]])), TORQUE, times)[0]
-    (problem,) = case_problem(times, response, 1, model, **taken_out)
+    (problem,) = experiment(times, response, 1, model, **taken_out)
     best = scipy_fit(problem, np.log([1.0, 10.0]))
     left = len(times) - 2 - len(taken_out)
     found = make_likelihood(problem, best.log_parameters, best.misfit, confidence=0.95)

@@ -20,7 +20,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.least_squares import fit_from
-from biogrip.fit.problem import Identification, Problem
+from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.judging.doubts import (
     DOUBT,
     HARMLESS,
@@ -76,9 +76,9 @@ class Diagnosis:
 
 
 def diagnose(
-    problem: Problem,
+    problem: TraceProblem,
     model: SampleModel,
-    found: Identification,
+    found: Fit,
     *,
     confidence: float,
     noise_sd: float | None = None,
@@ -92,9 +92,9 @@ def diagnose(
 
 
 def diagnose_all(
-    problems: Sequence[Problem],
+    problems: Sequence[TraceProblem],
     model: SampleModel,
-    found: Sequence[Identification],
+    found: Sequence[Fit],
     *,
     confidence: float,
     noise_sd: Sequence[float | None],
@@ -118,8 +118,8 @@ def diagnose_all(
 
 
 def settled(
-    problems: Sequence[Problem],
-    found: Sequence[Identification],
+    problems: Sequence[TraceProblem],
+    found: Sequence[Fit],
     profile: Callable[[Sequence[Likelihood]], list[Diagnosis]],
     *,
     confidence: float,
@@ -160,7 +160,7 @@ def settled(
     return [done[trace] for trace in range(len(problems))]
 
 
-def _lower_fit(judged: Diagnosis, found: Identification) -> Identification | None:
+def _lower_fit(judged: Diagnosis, found: Fit) -> Fit | None:
     """Return the fit from the lowest point of the profiles, if it is below the best fit."""
     if judged.lowest is None:
         return None

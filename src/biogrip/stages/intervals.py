@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from
 from biogrip.fit.methods import identifier
-from biogrip.fit.problem import CaseProblem, Identification, Problem, silent
+from biogrip.fit.problem import Fit, TraceProblem, silent
 from biogrip.fit.trace_fit import fit_traces
 from biogrip.judging.diagnosis import Diagnosis, profiled, settled
 from biogrip.judging.likelihood import Likelihood, covariance
@@ -47,32 +48,32 @@ def estimate(
 
     The noise of a seed is that of its measurement.
     """
-    case_problem = case.problem.calibrated(calibrated)
+    experiment = case.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     found = read_verdicts(expected)["quantities"]
     determined = {item["quantity"] for item in found if item["verdict"] == DETERMINED}
-    INTERVALS.write(intervals, _rows(case, case_problem, seeds, time_s, rotation, determined))
+    INTERVALS.write(intervals, _rows(case, experiment, seeds, time_s, rotation, determined))
 
 
 def _rows(
     case: Case,
-    case_problem: CaseProblem,
+    experiment: Experiment,
     seeds: Sequence[int],
     time_s: Array,
     rotation: Array,
     determined: set[str],
 ) -> Iterator[tuple[str | int, ...]]:
-    every = parameters_and_sum(case_problem.searched)
+    every = parameters_and_sum(experiment.searched)
     selected = [index for index, quantity in enumerate(every) if quantity.label in determined]
-    rest_known, informed, truth = _rest_known(case, case_problem, time_s, rotation)
+    rest_known, informed, truth = _rest_known(case, experiment, time_s, rotation)
     progress = Progress(f"{case.name}, intervals", len(seeds))
     for group in groups(seeds, _TIMES):
         rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in group]
         traces = [add_noise(rotation, case.noise, rng, time_s) for rng in rngs]
-        optima = _optima(case, case_problem, group, time_s, traces)
+        optima = _optima(case, experiment, group, time_s, traces)
         known = np.tile(truth, (len(group), 1))
         if len(informed):
-            simpler = [case_problem.of(time_s, trace, rest_known) for trace in traces]
+            simpler = experiment.of_each(time_s, traces, rest_known)
             known[:, informed] = fit_from(simpler, truth[informed]).x
         judged = _judged(optima, every, selected, group, case)
         for index, seed in enumerate(group):
@@ -88,39 +89,39 @@ def _rows(
 
 
 def _rest_known(
-    case: Case, case_problem: CaseProblem, time_s: Array, rotation: Array
+    case: Case, experiment: Experiment, time_s: Array, rotation: Array
 ) -> tuple[SampleModel, IntArray, Array]:
     """Return the model with uninformed parameters fixed, indices of the others, and the truth."""
-    truth = case_problem.logs(case.parameters)
-    _, sensitivity = case_problem.of(time_s, rotation).residuals(truth)
+    truth = experiment.logs(case.parameters)
+    _, sensitivity = experiment.of(time_s, rotation).residuals(truth)
     spread = np.diag(covariance(sensitivity, standard_deviation(rotation, case.noise)))
     informed = np.flatnonzero(np.isfinite(spread))
-    names = case_problem.searched.names
+    names = experiment.searched.names
     given = {name: case.parameters[name] for i, name in enumerate(names) if i not in informed}
-    return with_fixed(case_problem.searched, given), informed, truth
+    return with_fixed(experiment.searched, given), informed, truth
 
 
 def _optima(
     case: Case,
-    case_problem: CaseProblem,
+    experiment: Experiment,
     group: Sequence[int],
     time_s: Array,
     traces: list[Array],
-) -> list[tuple[Problem, Identification]]:
+) -> list[tuple[TraceProblem, Fit]]:
     """Return problems and fits of traces, fitted together if their noise is white."""
     rngs = [stream(case.study.study_seed, case.name, seed, "coverage") for seed in group]
     identify = identifier("least_squares", case.least_squares)
 
-    def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
+    def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
         return identify(problems, [rngs[index] for index in which], silent)
 
-    posed = [case_problem] * len(traces)
+    posed = [experiment] * len(traces)
     fits = fit_traces(posed, [(time_s, trace) for trace in traces], find)
     return [(fit.problem, fit.found) for fit in fits]
 
 
 def _judged(
-    optima: Sequence[tuple[Problem, Identification]],
+    optima: Sequence[tuple[TraceProblem, Fit]],
     every: Sequence[Quantity],
     selected: Sequence[int],
     group: Sequence[int],
@@ -137,7 +138,7 @@ def _judged(
 
 
 def judge_quantities(
-    optima: Sequence[tuple[Problem, Identification]],
+    optima: Sequence[tuple[TraceProblem, Fit]],
     quantities: Sequence[Quantity],
     confidence: float,
 ) -> list[Diagnosis]:

@@ -13,9 +13,10 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.files import write_text
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_from
 from biogrip.fit.methods import identifier
-from biogrip.fit.problem import CaseProblem, Identification, Problem, Progress, silent
+from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_traces
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit
@@ -31,7 +32,7 @@ TRACE = 0
 
 def fits_judged(
     cases: Sequence[Case],
-    case_problems: Sequence[CaseProblem],
+    experiments: Sequence[Experiment],
     traces: Sequence[tuple[Array, Array]],
     seed: int,
     progress: Progress = silent,
@@ -43,33 +44,33 @@ def fits_judged(
     """
     least_squares = identifier("least_squares", cases[0].least_squares)
 
-    def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
+    def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
         names = [(cases[index].study.study_seed, cases[index].name) for index in which]
         rngs = [stream(study_seed, name, seed, "identifiability") for study_seed, name in names]
         return least_squares(problems, rngs, progress)
 
-    return fit_traces(case_problems, traces, find)
+    return fit_traces(experiments, traces, find)
 
 
 def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
     """Fit the trace of seed 0 by least squares, and write verdicts, profiles and valley."""
     recorded = read_measurements(measurements, [TRACE])
-    case_problem = case.problem.calibrated(calibrated).weighted(recorded.sd)
+    experiment = case.problem.calibrated(calibrated).weighted(recorded.sd)
     trace = recorded.readings[TRACE]
-    (fit,) = fits_judged([case], [case_problem], [(recorded.time_s, trace)], TRACE)
+    (fit,) = fits_judged([case], [experiment], [(recorded.time_s, trace)], TRACE)
     diagnosis = diagnose(
         fit.problem,
-        case_problem.searched,
+        experiment.searched,
         fit.found,
         confidence=case.confidence,
-        noise_sd=case_problem.noise_sd,
+        noise_sd=experiment.noise_sd,
         valley=True,
     )
-    if case_problem.fit_start:
+    if experiment.fit_start:
         diagnosis, _ = profile_over_onset(diagnosis, recorded.time_s)
     notes = notes_on_fit(fit)
     if case.may_start_late:
-        notes += notes_on_start(case_problem, recorded.time_s, trace, diagnosis, may_be_late=True)
+        notes += notes_on_start(experiment, recorded.time_s, trace, diagnosis, may_be_late=True)
     said = diagnosis_data(diagnosis, notes)
     _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": diagnosis.valley})
 
@@ -92,13 +93,13 @@ def expect(case: Case, target: Path, calibrated: list[Path], verdicts: Path) -> 
     They are what to expect of any trace of the case. Without noise, the rounding of the
     target's digits takes its place.
     """
-    case_problem = case.problem.to_identify().calibrated(calibrated)
+    experiment = case.problem.to_identify().calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     noise_sd = rms(standard_deviation(rotation, case.noise)) or None
-    problem = case_problem.of(time_s, rotation, noise_sd=noise_sd)
-    found = identify_from(problem, case_problem.logs(case.parameters))
+    problem = experiment.of(time_s, rotation, noise_sd=noise_sd)
+    found = identify_from(problem, experiment.logs(case.parameters))
     diagnosis = diagnose(
-        problem, case_problem.searched, found, confidence=case.confidence, noise_sd=noise_sd
+        problem, experiment.searched, found, confidence=case.confidence, noise_sd=noise_sd
     )
     _write(verdicts, case, diagnosis_data(diagnosis))
 

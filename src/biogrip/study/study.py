@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.methods import METHODS, Method
-from biogrip.fit.problem import CaseProblem
 from biogrip.keys import built, plain
 from biogrip.physics.contact import Contact
 from biogrip.physics.gripper import NO_ARMS, Gripper
@@ -126,14 +126,14 @@ class Case:
         return math.radians(self.actuator.stroke_deg) - closing
 
     @cached_property
-    def problem(self) -> CaseProblem:
+    def problem(self) -> Experiment:
         """Assumptions of the identification; a calibration replaces the gripper's arms."""
         assumed, measurement = self.block.assumed_gripper, self.block.measurement
         gripper = self.gripper
         if isinstance(assumed, Mapping):
             gripper = built(Gripper, overlaid(plain(gripper), assumed))
         uncertainty = self.block.gripper.uncertainty if self.instrument.has_jaws else None
-        return CaseProblem(
+        return Experiment(
             gripper,
             self.phases,
             self.ranges,
