@@ -12,13 +12,13 @@ from scipy.optimize import least_squares
 from biogrip.arrays import Array
 from biogrip.fit.least_squares import FINISHED
 from biogrip.fit.local_fits import FINE, PRIOR_WIDTH, ROUGH
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import TraceProblem
 
 
 class Objective:
     """Rows of the residuals in units of the noise, and of the prior, for one point at a time."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: TraceProblem) -> None:
         self.low, self.high = problem.low, problem.high
         self._residuals = problem.residuals
         self._middle = 0.5 * (problem.low + problem.high)
@@ -49,7 +49,7 @@ class Objective:
         return self._last
 
 
-def by_scipy(problem: Problem, starts: Array) -> Array:
+def by_scipy(problem: TraceProblem, starts: Array) -> Array:
     """Fit by SciPy's bounded trust region from every start; log-parameters of the best."""
     objective = Objective(problem)
     bounds = objective.low, objective.high
@@ -58,7 +58,7 @@ def by_scipy(problem: Problem, starts: Array) -> Array:
     return best
 
 
-def by_scipy_in_two_turns(problem: Problem, starts: Array) -> Array:
+def by_scipy_in_two_turns(problem: TraceProblem, starts: Array) -> Array:
     """Fit by the same roughly from every start, and only the best of these to the end."""
     objective = Objective(problem)
     rough = [_local_fit(objective, start, ROUGH) for start in starts]
@@ -81,7 +81,7 @@ def _local_fit(objective: Objective, start: Array, tolerance: float) -> Array:
     return found
 
 
-def by_lmfit(problem: Problem, starts: Array) -> Array:
+def by_lmfit(problem: TraceProblem, starts: Array) -> Array:
     """Fit by lmfit's Levenberg-Marquardt from every start; log-parameters of the best."""
     objective = Objective(problem)
 

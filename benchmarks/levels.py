@@ -26,10 +26,11 @@ import pandas as pd
 from benchmarks.one_thread import keep_to_one_thread
 from biogrip.arrays import Array
 from biogrip.files import write_text
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.methods import share_in_words
-from biogrip.fit.problem import CaseProblem, Identification, Problem, silent
+from biogrip.fit.problem import Fit, TraceProblem, silent
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED, compute_status, examine_residuals
 from biogrip.judging.likelihood import make_likelihood
@@ -98,13 +99,13 @@ step that only changes the times found.
 """
 
 
-def _experiment(instrument: str, protocol: tuple[Phase, ...], model: str) -> CaseProblem:
+def _experiment(instrument: str, protocol: tuple[Phase, ...], model: str) -> Experiment:
     """Return the experiment of an instrument with a protocol and a model."""
     of = {"creep": INSTRUMENTS["strain"], "relaxation": INSTRUMENTS["modulus"]}
     its = of.get(instrument, GRIPPER)
     arms = _GRIPPER if its is GRIPPER else NO_ARMS
     sample = Sample(model, per_area=its.per_area)
-    return CaseProblem(arms, protocol, _RANGES, sample, {}, its)
+    return Experiment(arms, protocol, _RANGES, sample, {}, its)
 
 
 def _protocol(instrument: str, late_s: float = 0.0, ramp_s: float = 0.0) -> tuple[Phase, ...]:
@@ -263,7 +264,7 @@ def _cell(instrument: str, readings: int, decades: int, set_up: str, traces: int
     return row
 
 
-def _held(judged: Diagnosis, experiment: CaseProblem, truth: dict[str, float]) -> Iterator[bool]:
+def _held(judged: Diagnosis, experiment: Experiment, truth: dict[str, float]) -> Iterator[bool]:
     """Yield of the limits of every quantity that is determined whether they hold the truth."""
     names = experiment.searched.names
     for finding in judged.findings:
@@ -272,7 +273,7 @@ def _held(judged: Diagnosis, experiment: CaseProblem, truth: dict[str, float]) -
             yield finding.low <= value <= finding.high
 
 
-def _status_of(problem: Problem, found: Identification) -> str:
+def _status_of(problem: TraceProblem, found: Fit) -> str:
     """Return the status of a fit by what it leaves, without limits."""
     best = np.log(found.parameters)
     likelihood = make_likelihood(problem, best, found.misfit, confidence=_CONFIDENCE)

@@ -14,11 +14,11 @@ from benchmarks.report import Section, number, times_ours
 from benchmarks.timing import Timed, alternate
 from biogrip.arrays import Array
 from biogrip.fit.least_squares import FINISHED, best_of_starts, screened
-from biogrip.fit.problem import Problem, Row, silent
+from biogrip.fit.problem import Row, TraceProblem, silent
 
 _ROUNDS, _FEW = 5, 3
 
-PEERS: Mapping[str, Callable[[Problem, Array], Array]] = {
+PEERS: Mapping[str, Callable[[TraceProblem, Array], Array]] = {
     "SciPy least_squares": by_scipy,
     "SciPy least_squares, in two turns": by_scipy_in_two_turns,
     "lmfit": by_lmfit,
@@ -29,7 +29,7 @@ PEERS: Mapping[str, Callable[[Problem, Array], Array]] = {
 class Started:
     """A trace, and where its fits start."""
 
-    problem: Problem
+    problem: TraceProblem
     starts: Array
     """Log-parameters, (n_starts, n_parameters)."""
     before: Row
@@ -64,7 +64,7 @@ def measure() -> list[ReportRow]:
     def one_by_one(fitter: Callable[[Started], Array], some: Sequence[Started]) -> Array:
         return np.array([fitter(trace) for trace in some])
 
-    def theirs(fit: Callable[[Problem, Array], Array], trace: Started) -> Array:
+    def theirs(fit: Callable[[TraceProblem, Array], Array], trace: Started) -> Array:
         return fit(trace.problem, trace.starts)
 
     alone: dict[str, Callable[[Started], Array]] = {

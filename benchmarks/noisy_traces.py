@@ -8,9 +8,10 @@ import numpy as np
 import yaml
 
 from biogrip.arrays import Array
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import Genome, make_genome
-from biogrip.fit.problem import CaseProblem, Problem
+from biogrip.fit.problem import TraceProblem
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
@@ -38,7 +39,7 @@ def case() -> Case:
 
 
 @cache
-def _posed() -> CaseProblem:
+def _posed() -> Experiment:
     return case().problem.to_identify()
 
 
@@ -77,7 +78,7 @@ class NoisyTrace:
         residuals = Residuals(self.gripper, self.model, self.steps, trace, instrument=GRIPPER)
         return make_misfit(residuals)
 
-    def problem(self) -> Problem:
+    def problem(self) -> TraceProblem:
         """Pose the identification as the study does."""
         return _posed().of(self.time_s, self.trace_rad, condensed=_condensed())
 

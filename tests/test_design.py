@@ -19,7 +19,7 @@ from biogrip.design import (
     search,
     set_up,
 )
-from biogrip.fit.problem import CaseProblem
+from biogrip.fit.experiment import Experiment
 from biogrip.library import simulate
 from biogrip.physics.protocol import sample_times
 from biogrip.physics.simulation import compute_grip
@@ -88,7 +88,7 @@ def test_the_search_knows_the_bounds_of_a_train() -> None:
         found = rated(one, train.phases, limits.rate_Hz)
         problem = replace(one.case.problem, phases=train.phases)
 
-        def read(shift: Array, one: Specimen = one, problem: CaseProblem = problem) -> Array:
+        def read(shift: Array, one: Specimen = one, problem: Experiment = problem) -> Array:
             values = dict(zip(problem.searched.names, one.parameters * np.exp(shift), strict=True))
             times_s = sample_times(problem.torque.end_s, limits.rate_Hz)
             return simulate(problem, {**problem.fixed, **values}, times_s)

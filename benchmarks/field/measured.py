@@ -22,7 +22,8 @@ import numpy as np
 from benchmarks.report import Row, Section, number
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array, BoolArray
-from biogrip.fit.problem import CaseProblem, Identification
+from biogrip.fit.experiment import Experiment
+from biogrip.fit.problem import Fit
 from biogrip.identify.trace_case import ranges_of
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.library import Phase, Sample, hold, identify_sample, judge, simulate
@@ -90,13 +91,13 @@ class Task:
             return np.abs(self.data)
         return _recorded(self.name)[1].sd if measure == KNOWN else None
 
-    def experiment(self, measure: str) -> CaseProblem:
+    def experiment(self, measure: str) -> Experiment:
         """Return what biogrip is told, with the search ranges of `biogrip identify`."""
         given = _recorded(self.name)[0].problem
         phases: tuple[Phase, ...] = given.phases
         if self.load_s:
             phases = (hold(self.load_s[1] - self.load_s[0], 1.0),)
-        problem = CaseProblem(
+        problem = Experiment(
             given.gripper,
             phases,
             given.ranges,
@@ -177,7 +178,7 @@ def by_biogrip(task: Task, measure: str | None = None) -> Answer:
     return Answer(task.curve(value), value, partial(_judged, task, experiment, found))
 
 
-def _judged(task: Task, experiment: CaseProblem, found: Identification) -> Said:
+def _judged(task: Task, experiment: Experiment, found: Fit) -> Said:
     diagnosis = judge(experiment, task.time_s, task.data, found)
     return {
         f.quantity.label: (f.value if f.verdict == DETERMINED else None, f.low, f.high)

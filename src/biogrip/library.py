@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array, as_column
 from biogrip.errors import BiogripError
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
-from biogrip.fit.problem import CaseProblem, Identification, silent
+from biogrip.fit.problem import Fit, silent
 from biogrip.identify.notebook import TraceResult, identify_trace, one_blas_thread
 from biogrip.judging.diagnosis import Diagnosis, diagnose, with_times
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
@@ -45,7 +46,7 @@ def set_up(
     *,
     ranges: Mapping[str, GeneRange] | None = None,
     fixed: Mapping[str, float] | None = None,
-) -> CaseProblem:
+) -> Experiment:
     """Return an experiment: instrument, protocol and sample model, with search ranges.
 
     Parameters
@@ -63,7 +64,7 @@ def set_up(
         Fixed parameters by name, SI units.
     """
     instrument = gripper if isinstance(gripper, Instrument) else GRIPPER
-    return CaseProblem(
+    return Experiment(
         NO_ARMS if isinstance(gripper, Instrument) else gripper,
         protocol,
         ranges or _RANGES,
@@ -74,7 +75,7 @@ def set_up(
 
 
 def simulate(
-    experiment: CaseProblem,
+    experiment: Experiment,
     parameters: Mapping[str, float],
     time_s: ArrayLike,
     *,
@@ -105,8 +106,8 @@ def simulate(
 
 @one_blas_thread
 def identify_sample(
-    experiment: CaseProblem, time_s: ArrayLike, readings: ArrayLike, seed: int = 0
-) -> Identification:
+    experiment: Experiment, time_s: ArrayLike, readings: ArrayLike, seed: int = 0
+) -> Fit:
     """Identify the sample by least squares from many starts.
 
     Parameters
@@ -124,10 +125,10 @@ def identify_sample(
 
 @one_blas_thread
 def judge(
-    experiment: CaseProblem,
+    experiment: Experiment,
     time_s: ArrayLike,
     readings: ArrayLike,
-    found: Identification,
+    found: Fit,
     confidence: float = 0.95,
 ) -> Diagnosis:
     """Compute confidence limits and verdicts from profile likelihoods.
@@ -148,9 +149,7 @@ def judge(
     return with_times([diagnosis], experiment.searched)[0]
 
 
-def plot(
-    experiment: CaseProblem, time_s: ArrayLike, readings: ArrayLike, found: Identification
-) -> "Figure":
+def plot(experiment: Experiment, time_s: ArrayLike, readings: ArrayLike, found: Fit) -> "Figure":
     """Draw a trace, its fit and the residuals."""
     from biogrip.figures.fit import draw_fit
     from biogrip.figures.results import fit_of
@@ -169,11 +168,11 @@ __all__ = [
     "INSTRUMENTS",
     "Arm",
     "BiogripError",
-    "CaseProblem",
     "Diagnosis",
+    "Experiment",
+    "Fit",
     "GeneRange",
     "Gripper",
-    "Identification",
     "Noise",
     "Phase",
     "Sample",

@@ -6,14 +6,14 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.fit.local_fits import FINE
 from biogrip.fit.methods import METHODS, identifier
-from biogrip.fit.problem import Identification, Problem, silent
+from biogrip.fit.problem import Fit, TraceProblem, silent
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.physics.models import Sample
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import with_fixed
 from tests.helpers.default import STUDY, study_of
-from tests.helpers.problems import GRIPPER, TORQUE, case_problem, clean, likelihood_of
+from tests.helpers.problems import GRIPPER, TORQUE, clean, experiment, likelihood_of
 
 TIMES = clean("endothelial_cell")[0]
 TWO = Sample("generalized_maxwell", 2).model
@@ -21,15 +21,15 @@ TWO = Sample("generalized_maxwell", 2).model
 SAMPLE = {"k_1": 30.0, "k_2": 10.0, "k_p": 12.3, "c_1": 150.0, "c_2": 600.0, "c_p": 0.01}
 
 
-def problems(count: int, level: float) -> list[Problem]:
+def problems(count: int, level: float) -> list[TraceProblem]:
     response = step_response(GRIPPER, TWO.sample(SAMPLE), inertia=False)
-    return case_problem(TIMES, superpose(response, TORQUE, TIMES)[0], count, TWO, level)
+    return experiment(TIMES, superpose(response, TORQUE, TIMES)[0], count, TWO, level)
 
 
-def identified(method: str, case_problem: list[Problem]) -> list[Identification]:
-    rngs = [np.random.default_rng([seed, 3]) for seed in range(len(case_problem))]
+def identified(method: str, experiment: list[TraceProblem]) -> list[Fit]:
+    rngs = [np.random.default_rng([seed, 3]) for seed in range(len(experiment))]
     settings = STUDY.config.method(method)
-    return identifier(method, settings)(case_problem, rngs, silent)
+    return identifier(method, settings)(experiment, rngs, silent)
 
 
 def assert_in_order(parameters: Array) -> None:

@@ -12,12 +12,12 @@ from biogrip.arrays import Array
 from biogrip.fit import genetic, genetic_refined
 from biogrip.fit.genetic import GeneticSettings, select
 from biogrip.fit.genome import GeneRange, lowest_encodable, make_genome, nearest_encodable
-from biogrip.fit.problem import Identification, Problem
+from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.physics.misfit import make_misfit
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.sample_model import with_fixed
 from tests.helpers.plain_genetic import identified
-from tests.helpers.problems import case_problem, clean
+from tests.helpers.problems import clean, experiment
 
 SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)
 READINGS = {
@@ -63,15 +63,15 @@ def test_the_best_are_selected_and_the_lowest_genes_of_equals(digits: int) -> No
         np.testing.assert_array_equal(values[population], ranking[population, order])
 
 
-def posed(count: int, model: Any = MAXWELL, **assumed: Any) -> list[Problem]:
-    return case_problem(*clean("endothelial_cell"), count, model, **assumed)
+def posed(count: int, model: Any = MAXWELL, **assumed: Any) -> list[TraceProblem]:
+    return experiment(*clean("endothelial_cell"), count, model, **assumed)
 
 
 def rng_of(seed: int) -> np.random.Generator:
     return np.random.default_rng([seed, 5])
 
 
-def content(answer: Identification) -> tuple[bytes | float | str, ...]:
+def content(answer: Fit) -> tuple[bytes | float | str, ...]:
     history = answer.history
     return (
         answer.parameters.tobytes(),

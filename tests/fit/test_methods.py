@@ -19,7 +19,7 @@ from biogrip.fit.methods import (
     near_noise,
     near_noise_words,
 )
-from biogrip.fit.problem import Problem, silent
+from biogrip.fit.problem import TraceProblem, silent
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.noise import rms
 from biogrip.physics.residuals import Residuals
@@ -31,8 +31,8 @@ from tests.helpers.problems import (
     MODEL,
     SAMPLES,
     TORQUE,
-    case_problem,
     clean,
+    experiment,
     of_case,
     posed_for,
     problem,
@@ -47,13 +47,13 @@ SURE = [name for name, method in METHODS.items() if method.sure]
 
 @pytest.mark.parametrize("method", METHODS)
 def test_an_answer_is_what_it_says(method: str) -> None:
-    case_problem = problem("liquid_drop_2", 0)
+    experiment = problem("liquid_drop_2", 0)
     told: list[tuple[int, float]] = []
     identify = identifier(method, STUDY.config.method(method))
     rng = np.random.default_rng(0)
-    (answer,) = identify([case_problem], [rng], lambda n, misfit: told.append((n, misfit)))
+    (answer,) = identify([experiment], [rng], lambda n, misfit: told.append((n, misfit)))
     history = answer.history
-    assert case_problem.residuals.misfit(answer.parameters[None])[0] == pytest.approx(
+    assert experiment.residuals.misfit(answer.parameters[None])[0] == pytest.approx(
         answer.misfit, rel=1e-6
     )
     assert len(history.best_misfit) == answer.generations + 1
@@ -61,11 +61,11 @@ def test_an_answer_is_what_it_says(method: str) -> None:
     assert np.all(np.diff(history.best_misfit) <= 1e-7 * answer.misfit)
     assert np.all(np.diff(history.evaluations) >= 0)
     assert history.evaluations[-1] == answer.evaluations
-    assert np.all(np.log(answer.parameters) >= case_problem.low - 1e-9)
-    assert np.all(np.log(answer.parameters) <= case_problem.high + 1e-9)
+    assert np.all(np.log(answer.parameters) >= experiment.low - 1e-9)
+    assert np.all(np.log(answer.parameters) <= experiment.high + 1e-9)
     assert told
     assert told[-1][0] <= answer.evaluations
-    again = run(method, case_problem)
+    again = run(method, experiment)
     np.testing.assert_array_equal(again.parameters, answer.parameters)
 
 
@@ -103,31 +103,31 @@ def test_what_is_sure_of_it_reaches_the_global_optimum(case: str) -> None:
     In 100 seeds of each case neither missed once.
     """
     for seed in range(4):
-        case_problem = problem(case, seed, rate_Hz=10.0)
+        experiment = problem(case, seed, rate_Hz=10.0)
         truth = np.log([SAMPLES[case][name] for name in MODEL.names])
-        found = [run(method, case_problem, seed).misfit for method in SURE]
-        best = min(*found, scipy_fit(case_problem, truth).misfit)
-        increases = case_problem.residuals.samples * ((np.array(found) / best) ** 2 - 1)
+        found = [run(method, experiment, seed).misfit for method in SURE]
+        best = min(*found, scipy_fit(experiment, truth).misfit)
+        increases = experiment.residuals.samples * ((np.array(found) / best) ** 2 - 1)
         assert np.all(increases < 1)
 
 
 def test_what_a_trace_says_nothing_of_ends_in_the_middle_of_its_range() -> None:
     """A liquid's damper dominates: the range of k_p that fits is flat, and the prior decides."""
-    case_problem = problem("endothelial_cell", 2)
-    answer = run("least_squares", case_problem)
+    experiment = problem("endothelial_cell", 2)
+    answer = run("least_squares", experiment)
     c_p = np.log(answer.parameters[3])
-    assert case_problem.low[3] + 3 < c_p < case_problem.high[3] - 3
+    assert experiment.low[3] + 3 < c_p < experiment.high[3] - 3
 
 
 def test_offset_and_drift_are_fitted_along() -> None:
     times, response = clean("liquid_drop_2")
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     trace = response + 2e-3 - 4e-6 * times + noise
-    case_problem = posed_for(MODEL, times, trace, offset=True, drift=True)
+    experiment = posed_for(MODEL, times, trace, offset=True, drift=True)
     without = run("least_squares", posed_for(MODEL, times, trace)).misfit
     assert without > 10 * rms(noise)
     for method in EXACT:
-        answer = run(method, case_problem)
+        answer = run(method, experiment)
         assert answer.misfit < 1.1 * rms(noise)
         k, _, c, c_p = answer.parameters
         assert k == pytest.approx(1.0, rel=0.05)
@@ -156,7 +156,7 @@ def test_near_the_noise_is_a_share_of_it() -> None:
     assert near_noise_words(0.025) == "within 2.5 % of the noise"
 
 
-def starts_of(problem: Problem, count: int) -> Array:
+def starts_of(problem: TraceProblem, count: int) -> Array:
     rng = np.random.default_rng(11)
     found: Array = rng.uniform(problem.low, problem.high, (count, len(problem.low)))
     return found
@@ -188,7 +188,7 @@ def test_a_trace_without_noise_gives_every_model_back(name: str) -> None:
     response = superpose(
         step_response(GRIPPER, model.network([truth]), inertia=False), TORQUE, times
     )
-    (problem,) = case_problem(times, response[0], 1, model, level=0.0)
+    (problem,) = experiment(times, response[0], 1, model, level=0.0)
     near = np.log(truth) + 0.1 * np.random.default_rng(1).normal(size=(5, len(truth)))
     found = LocalFits([problem]).fitted(near, np.zeros(5, dtype=np.int64))
     assert np.min(found.misfit) < 1e-6 * np.abs(response).max()
@@ -201,8 +201,8 @@ def test_answers_do_not_depend_on_the_batch_byte_for_byte() -> None:
     """Fits share responses: of one model, at the same times; search ranges may differ."""
     times, response = clean("liquid_drop_2")
     linear = of_case("liquid_drop_2", 4)
-    (offset,) = case_problem(times, response, 1, offset=True)
-    (sparse,) = case_problem(times[::2], response[::2], 1)
+    (offset,) = experiment(times, response, 1, offset=True)
+    (sparse,) = experiment(times[::2], response[::2], 1)
     narrow = replace(linear[2], low=linear[2].low + 1)
     simple = posed_for(MODELS["liquid_drop"], times, response)
     problems = [linear[0], linear[1], sparse, offset, narrow, linear[3], simple]
@@ -229,7 +229,7 @@ MODELS_SETTLED = {
 TIMES = np.linspace(0.0, 400.0, 201)
 
 
-def noisy(model: SampleModel, count: int) -> list[tuple[Problem, Array]]:
+def noisy(model: SampleModel, count: int) -> list[tuple[TraceProblem, Array]]:
     """Traces of samples from the middle of the search range, with some noise."""
     low, high = np.array([LOG_RANGES[each.kind] for each in model.parameters]).T
     rng = np.random.default_rng(len(low))
@@ -244,7 +244,7 @@ def noisy(model: SampleModel, count: int) -> list[tuple[Problem, Array]]:
     return problems
 
 
-def gradient(posed: Problem, x: Array) -> Array:
+def gradient(posed: TraceProblem, x: Array) -> Array:
     """Half of that of what is minimized, on all samples."""
     residual, slopes = posed.residuals(x)
     away = (x - 0.5 * (posed.low + posed.high)) / PRIOR_WIDTH**2
@@ -274,9 +274,9 @@ def test_curvatures_are_those_of_what_is_minimized(name: str) -> None:
 
 def test_the_optimum_is_settled_to_the_last_digits() -> None:
     """Where the gradient on all samples vanishes, from wherever one comes."""
-    case_problem = problem("endothelial_cell", 3)
-    best = np.log(run("least_squares", case_problem).parameters)
+    experiment = problem("endothelial_cell", 3)
+    best = np.log(run("least_squares", experiment).parameters)
     rng = np.random.default_rng(0)
-    ends = [fit_from([case_problem], best + 0.01 * rng.standard_normal(4)).x[0] for _ in range(4)]
+    ends = [fit_from([experiment], best + 0.01 * rng.standard_normal(4)).x[0] for _ in range(4)]
     assert np.max(np.ptp(ends, axis=0)) < 1e-9
-    assert np.max(np.abs(gradient(case_problem, ends[0]))) < 1e-6
+    assert np.max(np.abs(gradient(experiment, ends[0]))) < 1e-6

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.nested_fits import _is_noticeably_lower, advice, fit_models, is_within, ranked
-from biogrip.fit.problem import CaseProblem, Identification, Problem
+from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.physics.models import CANDIDATES, MODELS, contained
 from biogrip.physics.response import step_response, superpose
 from tests.helpers.default import seen, study_of
-from tests.helpers.problems import GRIPPER, SAMPLES, TORQUE, case_problem, clean
+from tests.helpers.problems import GRIPPER, SAMPLES, TORQUE, clean, experiment
 
 TRIED = (*MODELS, "generalized_maxwell_2")
 LADDERS = [name for name in TRIED if not CANDIDATES[name].model.power_law]
@@ -21,16 +22,16 @@ FEW = LeastSquaresSettings(candidates=200, starts=4)
 
 def fitted(
     response: Array, times: Array, tried: Sequence[str], traces: int, level: float
-) -> tuple[dict[str, list[Problem]], dict[str, list[Identification]]]:
+) -> tuple[dict[str, list[TraceProblem]], dict[str, list[Fit]]]:
     problems = {
-        name: case_problem(times, response, traces, CANDIDATES[name].model, level) for name in tried
+        name: experiment(times, response, traces, CANDIDATES[name].model, level) for name in tried
     }
     rngs = {name: [np.random.default_rng(n) for n in range(traces)] for name in tried}
     return problems, fit_models(problems, FEW, rngs, lambda: None)
 
 
 def worse(
-    problems: dict[str, list[Problem]], found: dict[str, list[Identification]]
+    problems: dict[str, list[TraceProblem]], found: dict[str, list[Fit]]
 ) -> list[tuple[str, str, float]]:
     """Pairs the wrong way round, and by how much in chi^2."""
     increases = [
@@ -123,12 +124,12 @@ TRACE = RESPONSE * np.random.default_rng(3).normal(1.0, 0.1, len(TIMES))
 @pytest.mark.parametrize("name", CANDIDATES)
 @pytest.mark.parametrize("block", ["", "{offset: true}"])
 def test_it_is_the_same_to_the_last_bit(name: str, block: str) -> None:
-    case_problem: CaseProblem = (
+    experiment: Experiment = (
         study_of(block and f"measurement: {block}").case("liquid_drop_2").problem
     )
     model = CANDIDATES[name].model
-    first = case_problem.of(TIMES, TRACE)
-    ours, fresh = case_problem.for_model(first, model), case_problem.of(TIMES, TRACE, model)
+    first = experiment.of(TIMES, TRACE)
+    ours, fresh = experiment.for_model(first, model), experiment.of(TIMES, TRACE, model)
     low, high = fresh.low, fresh.high
     assert (ours.low.tolist(), ours.high.tolist()) == (low.tolist(), high.tolist())
     assert (ours.genome.low.tolist(), ours.genome.sizes) == (
@@ -141,6 +142,6 @@ def test_it_is_the_same_to_the_last_bit(name: str, block: str) -> None:
     for one, other in zip(ours.residuals(points[0]), fresh.residuals(points[0]), strict=True):
         np.testing.assert_array_equal(one, other)
     # And the first is what it was.
-    again = case_problem.of(TIMES, TRACE)
+    again = experiment.of(TIMES, TRACE)
     sample = np.exp(0.5 * (first.low + first.high))[None]
     assert first.residuals.misfit(sample) == again.residuals.misfit(sample)

@@ -10,9 +10,10 @@ from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_from
 from biogrip.fit.noise_model_fit import FAR
-from biogrip.fit.problem import CaseProblem, Identification, Problem
+from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit, fit_traces, gripper_functions
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
@@ -35,12 +36,12 @@ def simulated(gripper: Gripper, x: Array) -> Array:
 CLEAN = simulated(POSED.gripper, TRUTH)
 
 
-def find(problem: Problem) -> Identification:
+def find(problem: TraceProblem) -> Fit:
     return identify_from(problem, TRUTH)
 
 
-def fitted(case_problem: CaseProblem, trace: Array, times: Array = TIMES) -> TraceFit:
-    (fit,) = fit_traces([case_problem], [(times, trace)], lambda some, _: list(map(find, some)))
+def fitted(experiment: Experiment, trace: Array, times: Array = TIMES) -> TraceFit:
+    (fit,) = fit_traces([experiment], [(times, trace)], lambda some, _: list(map(find, some)))
     return fit
 
 
@@ -71,9 +72,9 @@ def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
         name: {"stiffness_Nm_per_rad": value}
         for name, value in zip(("left", "right"), known, strict=True)
     }
-    case_problem = replace(POSED, uncertainty=uncertainty, noise_sd=float(level))
+    experiment = replace(POSED, uncertainty=uncertainty, noise_sd=float(level))
     trace = noisy(Noise("gaussian", 0.02, "peak"))
-    fit = fitted(case_problem, trace)
+    fit = fitted(experiment, trace)
     _, slopes = fit.problem.residuals(np.log(fit.found.parameters))
     told = [0, 2]  # k and c: nothing is told of c_p, and next to nothing of k_p.
 
@@ -108,18 +109,18 @@ def test_an_uncertain_gripper_is_held_against_what_parameters_leave(
 ) -> None:
     """Of ten readings and four parameters, six: the noise is the misfit times sqrt(10 / 6)."""
     uncertainty = {"left": {"stiffness_Nm_per_rad": 1e-8}}
-    case_problem, condense = replace(POSED, uncertainty=uncertainty), CaseProblem.in_noise
+    experiment, condense = replace(POSED, uncertainty=uncertainty), Experiment.in_noise
     times, trace = TIMES[40::80], noisy(Noise("gaussian", 0.02, "peak"))[40::80]
     plain = find(POSED.of(times, trace))
     over_noise: list[Array] = []
 
-    def condensed(self: CaseProblem, *given: Any, **more: Any) -> Condensed:
+    def condensed(self: Experiment, *given: Any, **more: Any) -> Condensed:
         over_noise.append(given[2])
         return condense(self, *given, **more)
 
-    monkeypatch.setattr(CaseProblem, "in_noise", condensed)
-    fitted(case_problem, trace, times)
-    changes = gripper_functions(case_problem, times, plain.parameters)
+    monkeypatch.setattr(Experiment, "in_noise", condensed)
+    fitted(experiment, trace, times)
+    changes = gripper_functions(experiment, times, plain.parameters)
     first = next(each for each in over_noise if len(each))
     np.testing.assert_allclose(first, changes / (plain.misfit * np.sqrt(10 / 6)), rtol=1e-9)
 
@@ -127,8 +128,8 @@ def test_an_uncertain_gripper_is_held_against_what_parameters_leave(
 def test_noise_is_found_and_said() -> None:
     noise = Noise("gaussian", 0.02, "peak", ar1=AR1(0.5, 5.0), drift=Drift(2.0))
     noise = replace(noise, outliers=Outliers(0.01, 30.0))
-    case_problem = replace(POSED, coloured=True, offset=True, drift=True)
-    fit = fitted(case_problem, noisy(noise))
+    experiment = replace(POSED, coloured=True, offset=True, drift=True)
+    fit = fitted(experiment, noisy(noise))
     assert fit.noise_model is not None
     assert fit.noise_model.ar1 + fit.noise_model.flicker == pytest.approx(0.5, abs=0.25)
     away = np.abs(noisy(noise) - noisy(replace(noise, outliers=None))) / (0.02 * CLEAN.max())
@@ -139,19 +140,19 @@ def test_noise_is_found_and_said() -> None:
     assert "correlated over some" in model
     assert f"{np.count_nonzero(fit.outliers)} samples of 801" in outliers
     assert fit.problem.residuals.freedom < 1000
-    other = case_problem.for_model(fit.problem, POSED.searched)
+    other = experiment.for_model(fit.problem, POSED.searched)
     np.testing.assert_array_equal(other.residuals(TRUTH)[0], fit.problem.residuals(TRUTH)[0])
 
 
 def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
     """Three spikes are struck, each of fifteen times the noise of its sample."""
-    case_problem = replace(POSED, coloured=True, offset=True, drift=True)
+    experiment = replace(POSED, coloured=True, offset=True, drift=True)
     trace = noisy(Noise("gaussian", 0.05, "signal"))
     spikes = [200, 500, 700]
     spiked = trace.copy()
     spiked[spikes] += 15 * 0.05 * CLEAN[spikes]
-    assert not fitted(case_problem, trace).outliers.any()
-    fit = fitted(case_problem, spiked)
+    assert not fitted(experiment, trace).outliers.any()
+    fit = fitted(experiment, spiked)
     np.testing.assert_array_equal(np.flatnonzero(fit.outliers), spikes)
     assert fit.noise_model is not None
     assert fit.noise_model.proportional > 0.9
@@ -160,10 +161,10 @@ def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
 
 
 def test_too_many_samples_for_a_colour_are_refused() -> None:
-    case_problem: CaseProblem = replace(POSED, coloured=True, offset=True, drift=True)
+    experiment: Experiment = replace(POSED, coloured=True, offset=True, drift=True)
     times = np.linspace(0, 400, MOST_SAMPLES + 1)
     with pytest.raises(BiogripError, match="allowed are at most 50000 with a coloured"):
-        fitted(case_problem, times, times)
+        fitted(experiment, times, times)
 
 
 def functions(uncertainty: Mapping[str, Mapping[str, float]]) -> Array:

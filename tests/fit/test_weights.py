@@ -9,7 +9,7 @@ from scipy.optimize import curve_fit
 
 from biogrip.arrays import Array
 from biogrip.fit.any_sample import proportional_deviations
-from biogrip.fit.problem import CaseProblem
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.trace_fit import TraceFit, fit_traces
 from biogrip.judging.diagnosis import diagnose
 from biogrip.library import set_up
@@ -46,7 +46,7 @@ def noisy(share: float, seed: int = 3) -> Array:
     return trace
 
 
-def fitted(problem: CaseProblem, trace: Array) -> TraceFit:
+def fitted(problem: Experiment, trace: Array) -> TraceFit:
     (fit,) = fit_traces(
         [problem], [(TIMES, trace)], lambda some, _: [run("least_squares", each) for each in some]
     )
@@ -69,8 +69,8 @@ def test_weighted_fits_are_scipys() -> None:
         rotation, TIMES, trace, start, deviations, absolute_sigma=True, xtol=1e-13, ftol=1e-13
     )
     problem = POLYSTYRENE.weighted(deviations)
-    fit, known = fitted(problem, trace), {"noise_rad": problem.noise_sd}
-    diagnosis = diagnose(fit.problem, problem.searched, fit.found, confidence=0.95, **known)
+    fit, given = fitted(problem, trace), (problem.searched, problem.noise_sd)
+    diagnosis = diagnose(fit.problem, given[0], fit.found, confidence=0.95, noise_sd=given[1])
     best = diagnosis.likelihood.best
     assert [best[0], np.exp(best[1]), best[2]] == pytest.approx(expected, rel=2e-6)
     errors = np.sqrt(np.diagonal(covariance)) / [1.0, expected[1], 1.0]

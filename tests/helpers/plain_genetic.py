@@ -7,7 +7,7 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import Genome
-from biogrip.fit.problem import History, Identification
+from biogrip.fit.problem import Fit, History
 
 
 def decoded(genome: Genome, chromosomes: IntArray) -> Array:
@@ -25,7 +25,7 @@ def identified(
     genome: Genome,
     settings: GeneticSettings,
     rng: np.random.Generator,
-) -> Identification:
+) -> Fit:
     def ranked(everyone: IntArray) -> tuple[IntArray, Array]:
         ranking = misfit(decoded(genome, everyone)).astype(np.float32)
         order = np.lexsort((*everyone.T[::-1], ranking))[: settings.survivors]
@@ -55,7 +55,7 @@ def identified(
         rows.append((survivors[0], ranking[0], ranking[len(ranking) // 2]))
     fittest, lowest, median = map(np.array, zip(*rows, strict=True))
     history = History(lowest, median, decoded(genome, fittest), np.array(counts))
-    return Identification(
+    return Fit(
         history.best_parameters[-1], float(lowest[-1]), generation, counts[-1], reason, history
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.fit.methods import identifier
-from biogrip.fit.problem import Identification, Problem, silent
+from biogrip.fit.problem import Fit, TraceProblem, silent
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.models import MODELS
@@ -22,8 +22,8 @@ from tests.helpers.default import STUDY
 
 MODEL = MODELS["generalized_maxwell"]
 SAMPLES = {name: case.parameters for name, case in STUDY.cases.items()}
-CASE_PROBLEM = STUDY.cases["liquid_drop_2"].problem
-GRIPPER, TORQUE = CASE_PROBLEM.gripper, CASE_PROBLEM.torque
+EXPERIMENT = STUDY.cases["liquid_drop_2"].problem
+GRIPPER, TORQUE = EXPERIMENT.gripper, EXPERIMENT.torque
 
 
 @functools.cache
@@ -33,40 +33,40 @@ def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
     return times, superpose(step_response(GRIPPER, network), TORQUE, times)[0]
 
 
-def posed_for(model: SampleModel, times: Array, trace: Array, **assumed: Any) -> Problem:
-    """The default study's problem for any model and trace; assumed is as `CaseProblem`'s."""
-    return replace(CASE_PROBLEM, ranges=STUDY.ranges, **assumed).of(times, trace, model)
+def posed_for(model: SampleModel, times: Array, trace: Array, **assumed: Any) -> TraceProblem:
+    """The default study's problem for any model and trace; assumed is as `Experiment`'s."""
+    return replace(EXPERIMENT, ranges=STUDY.ranges, **assumed).of(times, trace, model)
 
 
-def case_problem(
+def experiment(
     times: Array,
     response: Array,
     count: int,
     model: SampleModel = MODEL,
     level: float = 0.1,
     **assumed: Any,
-) -> list[Problem]:
+) -> list[TraceProblem]:
     """Problems that share everything but the noise."""
     noise = Noise("gaussian", level, "peak")
     traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
     return [posed_for(model, times, trace, **assumed) for trace in traces]
 
 
-def of_case(case: str, count: int, level: float = 0.1) -> list[Problem]:
-    return case_problem(*clean(case), count, level=level)
+def of_case(case: str, count: int, level: float = 0.1) -> list[TraceProblem]:
+    return experiment(*clean(case), count, level=level)
 
 
-def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> Problem:
-    return case_problem(*clean(case, rate_Hz), seed + 1, level=level)[seed]
+def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> TraceProblem:
+    return experiment(*clean(case, rate_Hz), seed + 1, level=level)[seed]
 
 
-def run(method: str, case_problem: Problem, seed: int = 0) -> Identification:
+def run(method: str, experiment: TraceProblem, seed: int = 0) -> Fit:
     identify = identifier(method, STUDY.config.method(method))
-    (answer,) = identify([case_problem], [np.random.default_rng(seed)], silent)
+    (answer,) = identify([experiment], [np.random.default_rng(seed)], silent)
     return answer
 
 
-def likelihood_of(posed: Problem, seed: int = 0) -> Likelihood:
+def likelihood_of(posed: TraceProblem, seed: int = 0) -> Likelihood:
     """What is judged of a trace: its best fit by least squares."""
     found = run("least_squares", posed, seed)
     return make_likelihood(posed, np.log(found.parameters), found.misfit, confidence=0.95)

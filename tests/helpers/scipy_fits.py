@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import TraceProblem
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
 
@@ -31,7 +31,7 @@ class ScipyFit:
 
 
 def scipy_fit(
-    problem: Problem,
+    problem: TraceProblem,
     start: Array,
     more: Callable[[Array], tuple[Array, Array]] | None = None,
     noise_sd: float | None = None,

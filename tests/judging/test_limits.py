@@ -10,12 +10,11 @@ from biogrip.fit.local_fits import FINE
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.limits import find_limits
 from biogrip.judging.profiles import Profile, compute_profiles, find_gaps
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding
 from biogrip.physics.models import MODELS
-from biogrip.stages.intervals import refitted, shown_of
+from biogrip.stages.intervals import judge_quantities
 from tests.helpers.problems import MODEL, clean, likelihood_of, posed_for, problem, run
 from tests.helpers.scipy_fits import lowest_rise, rise_with_held
 
@@ -32,34 +31,31 @@ def likelihood_for(case: str, seed: int) -> Likelihood:
 )
 @pytest.mark.nightly
 def test_the_rise_at_a_limit_is_the_threshold(case: str, seed: int) -> None:
-    """The lowest from anywhere; at a fast limit, which is that of a basin, from the optimum or so.
-
-    Each to a hundredth of the threshold.
-    """
+    """The lowest from anywhere, to a hundredth of the threshold."""
     likelihood, rng = likelihood_for(case, seed), np.random.default_rng(0)
     (profiles,) = compute_profiles([likelihood], QUANTITIES)
-    (fast,) = find_limits([likelihood], QUANTITIES)[0]
-    for quantity, found, near in zip(QUANTITIES, profiles, fast, strict=True):
+    for quantity, found in zip(QUANTITIES, profiles, strict=True):
         for limit in (each for each in (found.low, found.high) if each is not None):
             lowest = lowest_rise(likelihood, quantity, limit, rng, 20)
             assert lowest == pytest.approx(likelihood.threshold, rel=0.01), quantity.label
-        for limit in near[np.isfinite(near)]:
-            held = likelihood, quantity, limit
-            rises = rise_with_held(*held, likelihood.best)[0], lowest_rise(*held, rng, 20)
-            assert likelihood.threshold in [pytest.approx(rise, rel=0.01) for rise in rises]
 
 
 def test_an_optimum_that_was_missed_is_judged_again() -> None:
     maxwell = MODELS["maxwell"]
     times, response = clean("liquid_drop_2")
     noise = 0.1 * response.max() * np.random.default_rng(2).standard_normal(len(times))
-    case_problem = posed_for(maxwell, times, response + noise)
-    found = run("least_squares", case_problem)
+    experiment = posed_for(maxwell, times, response + noise)
+    found = run("least_squares", experiment)
     elsewhere = found.parameters * np.array([1.1, 1.02])
-    misfit = float(case_problem.residuals.misfit(elsewhere[None])[0])
+    misfit = float(experiment.residuals.misfit(elsewhere[None])[0])
     missed = replace(found, parameters=elsewhere, misfit=misfit)
-    right, again = (diagnose(case_problem, maxwell, f, confidence=0.95) for f in (found, missed))
+    right, again = (diagnose(experiment, maxwell, f, confidence=0.95) for f in (found, missed))
     assert again.likelihood.misfit == pytest.approx(right.likelihood.misfit, rel=1e-9)
+    # Coverage is tested with limits of the same fit.
+    (alike,) = judge_quantities([(experiment, missed)], parameters_and_sum(maxwell), 0.95)
+    assert alike.likelihood.misfit == again.likelihood.misfit
+    for one, other in zip(alike.findings, again.findings, strict=True):
+        assert (one.low, one.high) == (other.low, other.high)
     for one, other in zip(right.findings, again.findings, strict=True):
         assert one.verdict == DETERMINED
         assert other.profile.low == pytest.approx(one.profile.low, abs=1e-6)
@@ -115,24 +111,3 @@ def test_no_limit_is_said_only_of_what_has_none() -> None:
     assert said[0] == "not determined: the trace sets no limit within the search range"
     assert said[1].startswith("not determined: towards an end of the search range the fit is worse")
     assert said[1].endswith("and a limit takes 10.8)")
-
-
-def test_limits_tell_of_an_optimum_that_was_missed() -> None:
-    right = likelihood_for("liquid_drop_2", 0)
-    away = right.best + np.array([0.1, 0.0, 0.02, 0.0])
-    misfit = float(right.problem.residuals.misfit(np.exp(away)[None])[0])
-    missed = replace(right, best=away, misfit=misfit)
-    quantities = [QUANTITIES[0], QUANTITIES[4]]
-    assert find_limits([right], quantities)[1] == {}
-    lower = find_limits([right, missed], quantities)[1]
-    assert list(lower) == [1]
-    again = refitted(missed, lower[1], 0.95)
-    assert again is not None
-    assert again.misfit == pytest.approx(right.misfit, rel=1e-9)
-    assert refitted(right, right.best, 0.95) is None
-    # What is shown of it is what is shown of the right one.
-    of_right, of_missed = shown_of([right, missed], quantities, 0.95)
-    for one, other in zip(of_right, of_missed, strict=True):
-        assert one.verdict == other.verdict == "determined"
-        assert one.low == pytest.approx(other.low, rel=1e-5)
-        assert one.high == pytest.approx(other.high, rel=1e-5)

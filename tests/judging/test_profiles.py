@@ -10,7 +10,6 @@ from biogrip.arrays import Array, IntArray
 from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
-from biogrip.judging.limits import find_limits
 from biogrip.judging.onset import _at, profile_over_onset
 from biogrip.judging.profiles import Points, _limits, compute_profiles, find_gaps
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
@@ -22,8 +21,8 @@ from tests.helpers.problems import (
     GRIPPER,
     MODEL,
     TORQUE,
-    case_problem,
     clean,
+    experiment,
     likelihood_of,
     posed_for,
     run,
@@ -34,7 +33,7 @@ PARAMETERS = parameters_and_sum(MODEL)
 
 
 def likelihoods(case: str, count: int, **assumed: Any) -> list[Likelihood]:
-    return [likelihood_of(each) for each in case_problem(*clean(case), count, **assumed)]
+    return [likelihood_of(each) for each in experiment(*clean(case), count, **assumed)]
 
 
 def labelled(*labels: str) -> list[Quantity]:
@@ -81,13 +80,13 @@ def test_limits_do_not_depend_on_the_batch() -> None:
     """Byte for byte, in any order, of one or several experiments."""
     each = [*likelihoods("endothelial_cell", 2), *likelihoods("liquid_drop_2", 1, offset=True)]
     quantities = labelled("k", "c + c_p")
-    together, profiles = find_limits(each, quantities)[0], compute_profiles(each, quantities)
+    together = compute_profiles(each, quantities)
     for chosen in ([2], [1, 0], [1, 2]):
-        some = [each[index] for index in chosen]
-        np.testing.assert_array_equal(find_limits(some, quantities)[0], together[chosen])
-    (alone,) = compute_profiles(each[2:], quantities)
-    for one, other in zip(alone, profiles[2], strict=True):
-        np.testing.assert_array_equal(one.increases, other.increases)
+        some = compute_profiles([each[index] for index in chosen], quantities)
+        for index, profiles in zip(chosen, some, strict=True):
+            for one, other in zip(profiles, together[index], strict=True):
+                assert (one.low, one.high) == (other.low, other.high)
+                np.testing.assert_array_equal(one.increases, other.increases)
 
 
 @pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1"])
@@ -142,7 +141,7 @@ def test_noise_and_threshold_are_those_of_a_regression(taken_out: dict[str, bool
     Of known noise it is the normal distribution.
     """
     times = np.arange(0.0, 400.0, 40.0)
-    (problem,) = case_problem(times, 1e-6 * times, 1, MODELS["maxwell"], **taken_out)
+    (problem,) = experiment(times, 1e-6 * times, 1, MODELS["maxwell"], **taken_out)
     left = len(times) - 2 - len(taken_out)
     found = make_likelihood(problem, np.zeros(2), 1e-6, confidence=0.95)
     assert found.noise_sd**2 == pytest.approx(len(times) * 1e-12 / left)

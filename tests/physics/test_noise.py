@@ -30,7 +30,7 @@ from biogrip.physics.whitening import (
     estimate_noise,
     nuisance_basis,
 )
-from tests.helpers.problems import CASE_PROBLEM, MODEL, SAMPLES, TORQUE
+from tests.helpers.problems import EXPERIMENT, MODEL, SAMPLES, TORQUE
 from tests.physics.test_condensed import assert_alike
 
 CLEAN = np.concatenate((np.zeros(100_000), np.full(100_000, 2.0)))
@@ -239,7 +239,7 @@ def test_few_rows_stand_for_all_whitened_samples(rate_Hz: float) -> None:
     whitening = Whitening(time_s, COLOURS[0], nuisance)
     condensed = Condensed(TORQUE, time_s, nuisance, whitening=whitening)
     trace = np.random.default_rng(6).standard_normal(len(time_s))
-    residuals = CASE_PROBLEM.of(time_s, trace, MODEL, condensed=condensed).residuals
+    residuals = EXPERIMENT.of(time_s, trace, MODEL, condensed=condensed).residuals
     sample = SAMPLES["endothelial_cell"]
     x = np.log([sample[name] for name in MODEL.names])
     white = whitening(residuals.response(x) - trace)

@@ -9,8 +9,8 @@ import pandas as pd
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.methods import ALL, basins
-from biogrip.fit.problem import CaseProblem
 from biogrip.physics.instruments import ROTATION, Channel
 from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import within
@@ -67,7 +67,7 @@ def fits_of_basins(
 
 
 def fit_of(
-    problem: CaseProblem, parameters: Mapping[str, float], recorded: Measurements, seed: int
+    problem: Experiment, parameters: Mapping[str, float], recorded: Measurements, seed: int
 ) -> Fit:
     """Return the trace of a seed, and the response of parameters with nuisance terms fitted."""
     network = problem.model.sample(parameters)

@@ -47,15 +47,15 @@ def draw_scatter(
     items = read_verdicts(expected)["quantities"]
     verdicts = {item["quantity"]: item["verdict"] for item in items}
     found = read_identifications(identifications)
-    case_problem = case.problem.calibrated(calibrated)
+    experiment = case.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
-    log_truth = case_problem.logs(case.parameters)
-    _, sensitivity = case_problem.of(time_s, rotation).residuals(log_truth)
+    log_truth = experiment.logs(case.parameters)
+    _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
     noise_sd = standard_deviation(rotation, case.noise)
-    quantities = parameters_and_sum(case_problem.searched)
+    quantities = parameters_and_sum(experiment.searched)
     drawn, grid = row_of_panels(len(quantities), 3.1)
     for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
-        names = [case_problem.searched.parameters[i] for i in quantity.members]
+        names = [experiment.searched.parameters[i] for i in quantity.members]
         value = sum(case.parameters[p.name] for p in names)
         if value == 0:
             axes.axis("off")

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from biogrip.arrays import Array
-from biogrip.fit.problem import CaseProblem
+from biogrip.fit.experiment import Experiment
 from biogrip.physics.modes import lag_course
 
 # Retardation times a decade; shortest over the sampling interval, longest over the protocol, and
@@ -34,7 +34,7 @@ _EXCESS = 2.03
 _ROUNDING = 1e-7
 
 
-def extreme_responses(problem: CaseProblem, lags: Sequence[float]) -> Callable[[Array], Array]:
+def extreme_responses(problem: Experiment, lags: Sequence[float]) -> Callable[[Array], Array]:
     """Return a function of times, (n_rows,), that computes extreme responses, (n, n_rows).
 
     All samples' are non-negative combinations of them. A sample turns the left arm by
@@ -59,7 +59,7 @@ def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:
     return amplitudes / sizes, float(norm**2)
 
 
-def proportional_deviations(problem: CaseProblem, time_s: Array, readings: Array) -> Array:
+def proportional_deviations(problem: Experiment, time_s: Array, readings: Array) -> Array:
     """Compute standard deviations of readings in proportion to the smooth rotation, (n_samples,).
 
     The problem has that share, and the standard deviation of further noise. If it is not known, no

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from biogrip.arrays import Array
-from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
+from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block
 
 if TYPE_CHECKING:
@@ -35,11 +35,11 @@ class DifferentialEvolutionSettings(Block):
 
 
 def identify_many(
-    problems: Sequence[Problem],
+    problems: Sequence[TraceProblem],
     settings: DifferentialEvolutionSettings,
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
-) -> list[Identification]:
+) -> list[Fit]:
     """Identify samples one after the other by SciPy's differential evolution.
 
     Individuals are ranked by their misfit in single precision, as in `biogrip.fit.genetic`.
@@ -50,11 +50,11 @@ def identify_many(
 
 
 def _identified(
-    problem: Problem,
+    problem: TraceProblem,
     settings: DifferentialEvolutionSettings,
     rng: np.random.Generator,
     progress: Progress,
-) -> Identification:
+) -> Fit:
     from scipy.optimize import Bounds, differential_evolution
 
     rows: list[Row] = []
@@ -87,4 +87,4 @@ def _identified(
     )
     rows.append(final := row_of(found))
     why = "converged" if found.success else "generation limit"
-    return Identification(*final[:2], int(found.nit), evaluations, why, History.of(rows))
+    return Fit(*final[:2], int(found.nit), evaluations, why, History.of(rows))

@@ -17,8 +17,9 @@ from scipy.optimize import minimize_scalar
 
 from biogrip.arrays import Array, IntArray
 from biogrip.fit.any_sample import extreme_responses, fit_responses
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
-from biogrip.fit.problem import CaseProblem, Problem, silent
+from biogrip.fit.problem import TraceProblem, silent
 from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
 
 # Longest relaxation time over the protocol's duration, and how many a decade; the shortest is that
@@ -44,7 +45,7 @@ _NEAR, _ACCURATE = 2, 1e-3
 _ROUNDING = 1e-14
 
 
-def estimate_onset(problem: CaseProblem, time_s: Array, readings: Array) -> float:
+def estimate_onset(problem: Experiment, time_s: Array, readings: Array) -> float:
     """Estimate from when a trace follows the torque, without a sample model, in s of its clock.
 
     The trace is (n_samples,), times ascending. One that begins constant may have an offset.
@@ -112,7 +113,7 @@ def _misfit(fit: OnsetFit) -> float:
 class OnsetFits:
     """Fits of a trace for given onsets, linear and in white noise."""
 
-    case_problem: CaseProblem
+    experiment: Experiment
     """Assumptions of the identification."""
     time_s: Array
     """Times, ascending on any clock, (n_samples,)."""
@@ -120,10 +121,10 @@ class OnsetFits:
     """The trace, (n_samples,)."""
 
     @cached_property
-    def _identified(self) -> CaseProblem:
-        return self.case_problem.to_identify()
+    def _identified(self) -> Experiment:
+        return self.experiment.to_identify()
 
-    def posed(self, onset_s: float) -> Problem:
+    def posed(self, onset_s: float) -> TraceProblem:
         """Return the problem for an onset."""
         return self._identified.of(self.time_s - onset_s, self.readings)
 

@@ -23,7 +23,7 @@ from pydantic import Field
 from biogrip.arrays import Array, IntArray
 from biogrip.digits import counted
 from biogrip.fit.genome import Chromosomes, Genome
-from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
+from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block, Complaint
 from biogrip.physics.misfit import combine_misfits, make_misfit
 
@@ -82,11 +82,11 @@ class GeneticSettings(Block):
 
 
 def identify_many(
-    problems: Sequence[Problem],
+    problems: Sequence[TraceProblem],
     settings: GeneticSettings,
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
-) -> list[Identification]:
+) -> list[Fit]:
     """Identify samples of one model by the paper's genetic algorithm.
 
     `progress` is called after every generation, for all problems together.
@@ -98,7 +98,7 @@ def identify_many(
 class Evolution:
     """The result of one run of the genetic algorithm, with its first and last survivors."""
 
-    identification: Identification
+    identification: Fit
     """Best individual and history."""
     first_survivors: Array
     """Parameters of the survivors of the initial population, best first, (n_survivors,
@@ -108,7 +108,7 @@ class Evolution:
 
 
 def evolve(
-    problems: Sequence[Problem],
+    problems: Sequence[TraceProblem],
     settings: GeneticSettings,
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
@@ -171,11 +171,11 @@ def evolve(
     return [Evolution(*each) for each in zip(found, *survived, strict=True)]
 
 
-def _identification(course: list[Row], has_stalled: bool) -> Identification:
+def _identification(course: list[Row], has_stalled: bool) -> Fit:
     parameters, misfit, _, evaluations = course[-1]
     why = "stalled" if has_stalled else "generation limit"
     history = History.of(course)
-    return Identification(parameters, misfit, len(course) - 1, evaluations, why, history)
+    return Fit(parameters, misfit, len(course) - 1, evaluations, why, history)
 
 
 def select(

@@ -14,7 +14,7 @@ from pydantic import Field
 from biogrip.arrays import Array
 from biogrip.fit.genetic import Evolution, GeneticSettings, evolve
 from biogrip.fit.least_squares import best_of_starts
-from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
+from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block
 
 
@@ -29,11 +29,11 @@ class Polishing(Block):
 
 
 def identify_many(
-    problems: Sequence[Problem],
+    problems: Sequence[TraceProblem],
     settings: tuple[GeneticSettings, Polishing],
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
-) -> list[Identification]:
+) -> list[Fit]:
     """Identify samples of one model by the genetic algorithm and local fits from its survivors.
 
     `progress` is called after every generation, for all problems together, and finally for each.
@@ -56,7 +56,7 @@ def _survivors(evolution: Evolution, chosen: Polishing) -> tuple[Array, Row]:
     return np.log(starts), before
 
 
-def _polished(coarse: Identification, fine: Identification) -> Identification:
+def _polished(coarse: Fit, fine: Fit) -> Fit:
     """Append the fits' history, but for its first row, to that of the generations."""
     columns = zip(vars(coarse.history).values(), vars(fine.history).values(), strict=True)
     return replace(

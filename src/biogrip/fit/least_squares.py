@@ -24,7 +24,7 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.errors import BiogripError
 from biogrip.fit.levenberg_marquardt import Minima, Normal, bounded_step, minimize
 from biogrip.fit.local_fits import FAIR, FINE, ROUGH, LocalFits, alike
-from biogrip.fit.problem import History, Identification, Problem, Progress, Row, silent
+from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block
 
 FINISHED = 4
@@ -42,12 +42,12 @@ class LeastSquaresSettings(Block):
 
 
 def identify_many(
-    problems: Sequence[Problem],
+    problems: Sequence[TraceProblem],
     settings: LeastSquaresSettings,
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
     further: Sequence[Array] | None = None,
-) -> list[Identification]:
+) -> list[Fit]:
     """Identify samples by local fits from the best of many random points.
 
     Further starts of each trace are log-parameters, (n_further, n_parameters). `progress` is called
@@ -62,7 +62,7 @@ def identify_many(
 
 
 def screened(
-    problem: Problem, settings: LeastSquaresSettings, rng: np.random.Generator
+    problem: TraceProblem, settings: LeastSquaresSettings, rng: np.random.Generator
 ) -> tuple[Array, Row]:
     """Return the best random points as starts, and the first row of the history."""
     shape = (settings.candidates, len(problem.low))
@@ -82,18 +82,18 @@ def screened(
 
 
 def best_of_starts(
-    problems: Sequence[Problem],
+    problems: Sequence[TraceProblem],
     starts: Sequence[Array],
     before: Sequence[Row],
     progress: Progress,
-) -> list[Identification]:
+) -> list[Fit]:
     """Fit every trace from each of its starts and return the optima of lowest misfit.
 
     Misfits are compared in single precision and the first of equals wins, so that the
     last bits, which differ between processors, decide nothing. Starts of each trace are
     log-parameters, (n_starts, n_parameters); the first row of its history is what was before.
     """
-    answers: dict[int, Identification] = {}
+    answers: dict[int, Fit] = {}
     for group in alike(problems):
         found = _best_of_alike(
             [problems[index] for index in group],
@@ -106,11 +106,11 @@ def best_of_starts(
 
 
 def _best_of_alike(
-    problems: Sequence[Problem],
+    problems: Sequence[TraceProblem],
     starts: Sequence[Array],
     before: Sequence[Row],
     progress: Progress,
-) -> list[Identification]:
+) -> list[Fit]:
     fits, traces = LocalFits(problems), np.arange(len(problems))
     rough, trace, fine, trace_of_fine = _finished(fits, starts)
     winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
@@ -160,21 +160,21 @@ def _descents(found: Minima, before: Row) -> list[Row]:
     return rows
 
 
-def _answer_of(rows: list[Row], *, converged: bool) -> Identification:
+def _answer_of(rows: list[Row], *, converged: bool) -> Fit:
     """Return an identification with a history, whose last row is its result."""
     parameters, misfit, _, evaluations = rows[-1]
     steps, why = len(rows) - 1, "all starts fitted"
-    return Identification(parameters, misfit, steps, evaluations, why, History.of(rows), converged)
+    return Fit(parameters, misfit, steps, evaluations, why, History.of(rows), converged)
 
 
-def identify_from(problem: Problem, start: Array) -> Identification:
+def identify_from(problem: TraceProblem, start: Array) -> Fit:
     """Fit a trace from a single start, (n_parameters,) log-parameters."""
     misfit = float(problem.residuals.misfit(np.exp(start)[None])[0])
     row = np.exp(start), misfit, misfit, 1
     return best_of_starts([problem], [start[None]], [row], silent)[0]
 
 
-def fit_from(problems: Sequence[Problem], starts: Array, *, roughly: bool = False) -> Minima:
+def fit_from(problems: Sequence[TraceProblem], starts: Array, *, roughly: bool = False) -> Minima:
     """Fit every trace from one starting point, and refine the optima by Newton steps.
 
     Starts are log-parameters, (n_parameters,) or (n_traces, n_parameters). Rough fits, to compare

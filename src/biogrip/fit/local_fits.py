@@ -11,7 +11,7 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray, parts
 from biogrip.fit.levenberg_marquardt import Constraint, Minima, Normal, minimize
-from biogrip.fit.problem import Problem
+from biogrip.fit.problem import TraceProblem
 
 PRIOR_WIDTH = 100.0
 """Standard deviation, in e-folds, of the Gaussian prior about the middle of each range.
@@ -34,7 +34,7 @@ _APART = 1e-4
 _AT_ONCE = 1_000_000
 
 
-def alike(problems: Sequence[Problem]) -> list[IntArray]:
+def alike(problems: Sequence[TraceProblem]) -> list[IntArray]:
     """Group the indices of problems that one `LocalFits` can fit together."""
     groups: list[list[int]] = []
     for index, problem in enumerate(problems):
@@ -54,7 +54,7 @@ class LocalFits:
     n_parameters).
     """
 
-    def __init__(self, problems: Sequence[Problem]) -> None:
+    def __init__(self, problems: Sequence[TraceProblem]) -> None:
         self.problems = problems
         self.low = np.stack([problem.low for problem in problems])
         self.high = np.stack([problem.high for problem in problems])

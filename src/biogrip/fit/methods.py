@@ -2,11 +2,11 @@
 
 Each method is a module of this package, named like the method. It has the class of its settings,
 whose fields are the keys of its config block (`biogrip.keys`), and a function
-``identify_many(problems, settings, rngs, progress)``, which returns an `Identification` of each
+``identify_many(problems, settings, rngs, progress)``, which returns an `Fit` of each
 trace, to the bit as if it were alone. Ranges and traces are the problems', the budget of each is
 in the settings, its generator is its only source of randomness, and progress is told of all. A
 method with several blocks is given a tuple of their settings. A history has a row for the start
-and one a step, of which there are `Identification.generations`.
+and one a step, of which there are `Fit.generations`.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ import pandas as pd
 from scipy.stats import binomtest
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.fit.problem import Identification, Problem, Progress
+from biogrip.fit.problem import Fit, Progress, TraceProblem
 
 
 @dataclass(frozen=True)
@@ -88,9 +88,7 @@ METHODS: dict[str, Method] = {
 }
 
 
-Identify = Callable[
-    [Sequence[Problem], Sequence[np.random.Generator], Progress], list[Identification]
-]
+Identify = Callable[[Sequence[TraceProblem], Sequence[np.random.Generator], Progress], list[Fit]]
 """Identifies traces as the ``identify_many`` of a method does, with its settings."""
 
 
@@ -99,8 +97,8 @@ def identifier(name: str, settings: object) -> Identify:
     module = import_module(f"{__package__}.{name}")
 
     def identify(
-        problems: Sequence[Problem], rngs: Sequence[np.random.Generator], progress: Progress
-    ) -> list[Identification]:
+        problems: Sequence[TraceProblem], rngs: Sequence[np.random.Generator], progress: Progress
+    ) -> list[Fit]:
         answers = module.identify_many(problems, settings, rngs, progress)
         pairs = zip(problems, answers, strict=True)
         return [answer.in_order(problem.residuals.model) for problem, answer in pairs]

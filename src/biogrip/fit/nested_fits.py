@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import plain
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
-from biogrip.fit.problem import Identification, Problem, silent
+from biogrip.fit.problem import Fit, TraceProblem, silent
 from biogrip.physics.models import CANDIDATES, as_richer, contained, contained_in, different_in
 from biogrip.physics.sample_model import SampleModel
 
@@ -43,11 +43,11 @@ _NOTICEABLE = 0.01
 # Models that are equivalent in other parameters may improve one another in turn.
 _MOST_ROUNDS = 3
 
-Answers = list[Identification]
+Answers = list[Fit]
 
 
 def fit_models(
-    problems: Mapping[str, Sequence[Problem]],
+    problems: Mapping[str, Sequence[TraceProblem]],
     settings: LeastSquaresSettings,
     rngs: Mapping[str, Sequence[np.random.Generator]],
     done: Callable[[], None],
@@ -105,7 +105,7 @@ def _of_contained(
             yield start
 
 
-def _add_branches(name: str, problems: Sequence[Problem], found: dict[str, Answers]) -> None:
+def _add_branches(name: str, problems: Sequence[TraceProblem], found: dict[str, Answers]) -> None:
     """Take, in place, better fits that start with one branch more than a fit of fewer branches.
 
     Beside strong branches a weak one takes long to show: rough fits would not tell.
@@ -160,7 +160,7 @@ def _usual(kind: str, kinds: Array, values: Array, there: BoolArray, longest_s: 
     return float(np.exp(np.mean(np.log(others)))) * relaxation_s
 
 
-def _fit_again(problems: Mapping[str, Sequence[Problem]], found: dict[str, Answers]) -> None:
+def _fit_again(problems: Mapping[str, Sequence[TraceProblem]], found: dict[str, Answers]) -> None:
     """Fit again, in place, models that fit worse than a nested one within their range."""
     for _ in range(_MOST_ROUNDS):
         news = False
@@ -177,7 +177,9 @@ def _fit_again(problems: Mapping[str, Sequence[Problem]], found: dict[str, Answe
             break
 
 
-def _take_simpler(problems: Mapping[str, Sequence[Problem]], found: dict[str, Answers]) -> None:
+def _take_simpler(
+    problems: Mapping[str, Sequence[TraceProblem]], found: dict[str, Answers]
+) -> None:
     """Replace, in place, a richer model's result by a nested model's better optimum."""
     for name, inner, trace in _worse(found):
         simpler = found[inner][trace]
@@ -198,13 +200,13 @@ def _worse(found: Mapping[str, Answers]) -> Iterator[tuple[str, str, int]]:
                     yield name, inner, trace
 
 
-def _is_noticeably_lower(misfit: float, than: float, problem: Problem) -> bool:
+def _is_noticeably_lower(misfit: float, than: float, problem: TraceProblem) -> bool:
     """Return True if a misfit is lower by what the data could tell: see `_NOTICEABLE`."""
     gain = problem.residuals.samples * (than**2 - misfit**2)
     return gain > _NOTICEABLE * misfit**2
 
 
-def _better_from(answer: Identification, problem: Problem, start: Array) -> Identification:
+def _better_from(answer: Fit, problem: TraceProblem, start: Array) -> Fit:
     """Return the fit from a start if its misfit is lower, or else the answer itself."""
     again = answer.at(fit_from([problem], start))
     return again if _digits(again.misfit) < _digits(answer.misfit) else answer
@@ -215,13 +217,13 @@ def _digits(misfit: float) -> float:
     return float(f"{misfit:.8e}")
 
 
-def within_range(parameters: Array, problem: Problem) -> Array:
+def within_range(parameters: Array, problem: TraceProblem) -> Array:
     """Return log-parameters, clipped to the search range."""
     with np.errstate(divide="ignore"):
         return np.clip(np.log(parameters), problem.low, problem.high)
 
 
-def is_within(parameters: Array, problem: Problem) -> bool:
+def is_within(parameters: Array, problem: TraceProblem) -> bool:
     """Return True if parameters, (n_parameters,), lie in the search range."""
     with np.errstate(divide="ignore"):
         x = np.log(parameters)

@@ -13,9 +13,10 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
 from biogrip.errors import BiogripError
+from biogrip.fit.experiment import Experiment, pose
 from biogrip.fit.least_squares import fit_from
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
-from biogrip.fit.problem import CaseProblem, Identification, Problem
+from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, drift_is_flow
 
@@ -23,7 +24,7 @@ from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, drift_is_flow
 _SECOND_ORDER = 9.0
 
 
-def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Array) -> Array:
+def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) -> Array:
     """Compute the changes of a rotation by the uncertainties of the gripper's properties.
 
     To the first order it is half the difference between responses with the property a standard
@@ -40,10 +41,10 @@ def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Arra
     .. [1] JCGM 100:2008, Evaluation of measurement data: guide to the expression of uncertainty
        in measurement, section 5.1.3, note 2.
     """
-    network = case_problem.searched.network(parameters)
+    network = experiment.searched.network(parameters)
 
     def rotation(part: str = "", key: str = "", error: float = 0.0) -> Array:
-        gripper, torque = case_problem.gripper, case_problem.torque
+        gripper, torque = experiment.gripper, experiment.torque
         if part == "torque":
             torque = torque.times(1 + error)
         elif part == "gripper":
@@ -54,10 +55,10 @@ def gripper_functions(case_problem: CaseProblem, time_s: Array, parameters: Arra
             gripper = replace(gripper, **{part: arm})
         return simulated_response(gripper, network, torque, time_s, nonlinear=False)[0]
 
-    if not case_problem.uncertain:
+    if not experiment.uncertain:
         return np.zeros((0, len(time_s)))
     above, below = (
-        np.array([rotation(part, key, sign * error) for part, key, error in case_problem.uncertain])
+        np.array([rotation(part, key, sign * error) for part, key, error in experiment.uncertain])
         for sign in (1, -1)
     )
     second = 0.5 * (above + below) - rotation()
@@ -71,7 +72,7 @@ _CONVERGED = 1e-2
 _STAYED = 0.03
 _WORTH_SAYING = 0.005
 
-Find = Callable[[Problem], Identification]
+Find = Callable[[TraceProblem], Fit]
 """Function that finds the global optimum of a problem."""
 
 
@@ -79,9 +80,9 @@ Find = Callable[[Problem], Identification]
 class TraceFit:
     """The identification of one trace, with its noise model and outliers."""
 
-    problem: Problem
+    problem: TraceProblem
     """The trace without outliers; its residuals are white."""
-    found: Identification
+    found: Fit
     """Its global optimum."""
     noise_model: NoiseModel | None
     """Autocorrelation model of the noise; None if the noise was assumed to be white."""
@@ -125,9 +126,9 @@ class TraceFit:
 
 
 def fit_traces(
-    case_problems: Sequence[CaseProblem],
+    experiments: Sequence[Experiment],
     traces: Sequence[tuple[Array, Array]],
-    find: Callable[[Sequence[Problem], Sequence[int]], list[Identification]],
+    find: Callable[[Sequence[TraceProblem], Sequence[int]], list[Fit]],
 ) -> list[TraceFit]:
     """Fit each of several traces and, if wanted, estimate the model of its noise.
 
@@ -141,29 +142,27 @@ def fit_traces(
     and readings, (n_samples,), and has assumptions of its own. Too many readings for a coloured
     noise model are a `BiogripError`.
     """
-    plain = [trace for trace, case_problem in enumerate(case_problems) if case_problem.plain]
-    problems = [case_problems[trace].of(*traces[trace]) for trace in plain]
+    plain = [trace for trace, experiment in enumerate(experiments) if experiment.plain]
+    problems = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])
     optima = find(problems, plain) if plain else []
     found = {
         trace: TraceFit(problem, optimum, None, np.zeros(len(traces[trace][0]), dtype=bool))
         for trace, problem, optimum in zip(plain, problems, optima, strict=True)
     }
-    for trace, case_problem in enumerate(case_problems):
+    for trace, experiment in enumerate(experiments):
         if trace not in found:
 
-            def find_alone(problem: Problem, trace: int = trace) -> Identification:
+            def find_alone(problem: TraceProblem, trace: int = trace) -> Fit:
                 return find([problem], [trace])[0]
 
-            found[trace] = _fit_in_noise(case_problem, *traces[trace], find_alone)
+            found[trace] = _fit_in_noise(experiment, *traces[trace], find_alone)
     return [found[trace] for trace in range(len(traces))]
 
 
-def _fit_in_noise(
-    case_problem: CaseProblem, time_s: Array, readings: Array, find: Find
-) -> TraceFit:
+def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: Find) -> TraceFit:
     kept = np.ones(len(time_s), dtype=bool)
-    if not case_problem.coloured:
-        plain = case_problem.of(time_s, readings)
+    if not experiment.coloured:
+        plain = experiment.of(time_s, readings)
         found = find(plain)
     else:
         if len(time_s) > MOST_SAMPLES:
@@ -171,33 +170,33 @@ def _fit_in_noise(
                 f"found {len(time_s)} samples, allowed are at most {MOST_SAMPLES} with a coloured "
                 "noise model: average neighbouring samples."
             )
-        kept, plain, found = _without_outliers(case_problem, time_s, readings, find)
+        kept, plain, found = _without_outliers(experiment, time_s, readings, find)
     time_s, readings = time_s[kept], readings[kept]
-    problem, found, noise_model = _in_turn(case_problem, time_s, readings, plain, found)
+    problem, found, noise_model = _in_turn(experiment, time_s, readings, plain, found)
     # Slow deviations now weigh less, so that another basin may be the deepest.
     other = find(problem)
     if np.float32(other.misfit) < np.float32(found.misfit):
         found = other
-    return TraceFit(problem, found, noise_model, ~kept, _fitted_along(case_problem, time_s))
+    return TraceFit(problem, found, noise_model, ~kept, _fitted_along(experiment, time_s))
 
 
-def _fitted_along(case_problem: CaseProblem, time_s: Array) -> str:
-    terms = ["an offset"] * case_problem.offset + ["a drift"] * case_problem.drift
+def _fitted_along(experiment: Experiment, time_s: Array) -> str:
+    terms = ["an offset"] * experiment.offset + ["a drift"] * experiment.drift
     if not terms:
         return ""
-    controlled = case_problem.instrument.controlled.name
+    controlled = experiment.instrument.controlled.name
     or_flow = f" (or the sample flows: under this {controlled} both give the same line)"
-    doubt = or_flow if case_problem.drift and drift_is_flow(case_problem.torque, time_s) else ""
+    doubt = or_flow if experiment.drift and drift_is_flow(experiment.torque, time_s) else ""
     verb = "are" if len(terms) > 1 else "is"
     return f" {' and '.join(terms)} of the instrument{doubt} {verb} fitted along, and"
 
 
 def _without_outliers(
-    case_problem: CaseProblem, time_s: Array, readings: Array, find: Find
-) -> tuple[BoolArray, Problem, Identification]:
+    experiment: Experiment, time_s: Array, readings: Array, find: Find
+) -> tuple[BoolArray, TraceProblem, Fit]:
     kept = np.ones(len(time_s), dtype=bool)
     for _ in range(_ROUNDS):
-        plain = case_problem.of(time_s[kept], readings[kept])
+        plain = experiment.of(time_s[kept], readings[kept])
         found = find(plain)
         residual = plain.residuals.left(logs := np.log(found.parameters))
         step = plain.residuals.rounding
@@ -206,39 +205,37 @@ def _without_outliers(
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
-    return kept, case_problem.of(time_s[kept], readings[kept]), found
+    return kept, experiment.of(time_s[kept], readings[kept]), found
 
 
 def _in_turn(
-    case_problem: CaseProblem,
+    experiment: Experiment,
     time_s: Array,
     readings: Array,
-    plain: Problem,
-    found: Identification,
-) -> tuple[Problem, Identification, NoiseModel | None]:
+    plain: TraceProblem,
+    found: Fit,
+) -> tuple[TraceProblem, Fit, NoiseModel | None]:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, noise_model = plain, None
     logs = np.log(found.parameters)
     residuals = plain.residuals
     growth = compute_growth(residuals.left(logs), residuals.response(logs), residuals.rounding)
-    grows = case_problem.coloured and np.ptp(growth) > 0
+    grows = experiment.coloured and np.ptp(growth) > 0
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)
-        uncertain = gripper_functions(case_problem, time_s, found.parameters)
+        uncertain = gripper_functions(experiment, time_s, found.parameters)
         left = problem.residuals.free - len(found.parameters)
-        noise_sd = case_problem.noise_sd or found.misfit * np.sqrt(len(time_s) / left)
+        noise_sd = experiment.noise_sd or found.misfit * np.sqrt(len(time_s) / left)
         before: NoiseModel | None = noise_model
         growing = plain.residuals.response(start) if grows else None
-        if case_problem.coloured:
-            nuisance = case_problem.nuisance(time_s)
+        if experiment.coloured:
+            nuisance = experiment.nuisance(time_s)
             directions = np.vstack((sensitivity, nuisance, uncertain))
             likelihood = NoiseModelLikelihood(time_s, residual, directions, growing)
             noise_model = likelihood.best(near=before)
-        condensed = case_problem.in_noise(
-            time_s, noise_model, uncertain / noise_sd, growing=growing
-        )
-        problem = case_problem.of(time_s, readings, condensed=condensed)
+        condensed = experiment.in_noise(time_s, noise_model, uncertain / noise_sd, growing=growing)
+        problem = experiment.of(time_s, readings, condensed=condensed)
         found = found.at(fit := fit_from([problem], start))
         slopes = problem.residuals.condensed_responses(fit.x)[0, 1:]
         moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_sd

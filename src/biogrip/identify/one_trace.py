@@ -24,7 +24,7 @@ from biogrip.arrays import Array
 from biogrip.digits import counted, rounded_numbers
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
-from biogrip.fit.problem import CaseProblem
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.identify.other_fits import (
     FittedModels,
@@ -68,7 +68,7 @@ class Identified:
 
     data: dict[str, Any]
     """Content of the JSON file; numbers of the diagnosis are not rounded."""
-    problem: CaseProblem
+    problem: Experiment
     """Assumptions of the fit."""
     recorded: Measurements
     """The trace."""
@@ -273,7 +273,7 @@ def _data(
     }
 
 
-def _moduli(problem: CaseProblem, time_s: Array, logs: Array) -> dict[str, list[float]]:
+def _moduli(problem: Experiment, time_s: Array, logs: Array) -> dict[str, list[float]]:
     """Return moduli of the fit from one over the duration to one over the first interval."""
     first_s = np.diff(time_s)[np.searchsorted(time_s[:-2], 0.0)]
     ends = 1 / float(np.ptp(time_s)), 1 / float(first_s)
@@ -282,14 +282,14 @@ def _moduli(problem: CaseProblem, time_s: Array, logs: Array) -> dict[str, list[
     return {name: column.tolist() for name, column in table.items()}
 
 
-def _fixed(problem: CaseProblem) -> dict[str, list[str]]:
+def _fixed(problem: Experiment) -> dict[str, list[str]]:
     """Return values and units of fixed parameters in words, or nothing if there are none."""
     units = {p.name: p.unit for p in problem.model.parameters}
     words = [f"{name} = {value:g} {units[name]}".rstrip() for name, value in problem.fixed.items()]
     return {"fixed": words} if words else {}
 
 
-def _gripper_in_limits(problem: CaseProblem) -> str:
+def _gripper_in_limits(problem: Experiment) -> str:
     """Return a sentence on the part that the gripper's uncertainty has in the limits."""
     exact = "gripper" if problem.instrument.has_jaws else problem.instrument.controlled.name
     if not problem.uncertain or not problem.instrument.has_jaws:
@@ -299,7 +299,7 @@ def _gripper_in_limits(problem: CaseProblem) -> str:
 
 
 def _fitted_along(
-    problem: CaseProblem, recorded: Measurements, parameters: Array
+    problem: Experiment, recorded: Measurements, parameters: Array
 ) -> dict[str, float]:
     """Return onset, offset and drift of the instrument in the best fit, as far as fitted."""
     found = {"onset_s": float(recorded.onset_s or 0.0)} if problem.fit_start else {}

@@ -28,7 +28,7 @@ from biogrip.fit.nested_fits import (
     within_range,
 )
 from biogrip.fit.noise_model_fit import absorbed, compare_extremes, compute_growth
-from biogrip.fit.problem import Identification, Problem, Progress
+from biogrip.fit.problem import Fit, Progress, TraceProblem
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.identify.trace_case import TraceCase, flow_of
 from biogrip.judging.diagnosis import Diagnosis, diagnose
@@ -66,7 +66,7 @@ def fits_of(traces: Sequence[TraceCase], progress: Progress) -> list[TraceFit]:
     return fits_judged(cases, problems, [own.readings for own in traces], 0, progress)
 
 
-def _diagnosed(trace: TraceCase, fit: TraceFit, found: Identification) -> Diagnosis:
+def _diagnosed(trace: TraceCase, fit: TraceFit, found: Fit) -> Diagnosis:
     known = trace.case.confidence, trace.problem.noise_sd
     searched = trace.problem.searched
     return diagnose(fit.problem, searched, found, confidence=known[0], noise_sd=known[1])
@@ -80,7 +80,7 @@ class FittedModels:
     """Sample model that the trace was identified with."""
     tried: list[FittedModel] = field(default_factory=list)
     """Rank of each model."""
-    answers: dict[str, Identification] = field(default_factory=dict)
+    answers: dict[str, Fit] = field(default_factory=dict)
     """Fit of each by its name, in the same order."""
 
     @property
@@ -113,7 +113,7 @@ class FittedModels:
         return {"models": rows, "advice": advice(self.tried, self.chosen) if said else None}
 
 
-def _vanished(candidate: str, answer: Identification) -> list[str]:
+def _vanished(candidate: str, answer: Fit) -> list[str]:
     """Name the elements that vanish in the best fit: parameters that are zero or infinite."""
     gone = (answer.parameters == 0) | np.isinf(answer.parameters)
     elements = zip(CANDIDATES[candidate].model.parameters, gone, strict=True)
@@ -161,7 +161,7 @@ def models_tried(
 
 
 def _misfits(
-    diagnosis: Diagnosis, problems: Mapping[str, Problem], answers: Mapping[str, Identification]
+    diagnosis: Diagnosis, problems: Mapping[str, TraceProblem], answers: Mapping[str, Fit]
 ) -> list[float]:
     """Return misfits of models; in noise that clearly grows those of weighted fits, to first order.
 
@@ -181,9 +181,7 @@ def _misfits(
     return misfits
 
 
-def _at_own_onset(
-    trace: TraceCase, name: str, problem: Problem, found: Identification
-) -> Identification:
+def _at_own_onset(trace: TraceCase, name: str, problem: TraceProblem, found: Fit) -> Fit:
     """Return a model's fit with the onset that it fits best with, from that of the chosen model."""
     if name == trace.case.sample.candidate:
         return found
@@ -306,7 +304,7 @@ def _better(
 
 def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnosis) -> Note:
     """Return the warning, with the verdicts that an offset and a drift would change."""
-    case_problem, rejected = trace.problem, diagnosis.status == REJECTED
+    experiment, rejected = trace.problem, diagnosis.status == REJECTED
     # Characteristic times, at the end of the former, are not among the latter.
     changed = [
         f"{after.quantity.label} would be {after.words().removeprefix('determined: ')}"
@@ -314,12 +312,12 @@ def _note(trace: TraceCase, diagnosis: Diagnosis, other: _Other, judged: Diagnos
         if _differ(before, after)
     ]
     changes = "it is not rejected then" if rejected else "; ".join(changed)
-    drifts = other.trace.problem.drift and not case_problem.drift
+    drifts = other.trace.problem.drift and not experiment.drift
     # A constant and a line, if not both are declared already.
-    many = drifts and not case_problem.offset
+    many = drifts and not experiment.offset
     better = f"{'explain' if many else 'explains'} the trace far better (χ² falls by "
     better += f"{plain(other.fall)}; by chance it would {one_in(other.chance)} traces)"
-    instrument, torque = case_problem.instrument, case_problem.torque
+    instrument, torque = experiment.instrument, experiment.torque
     controlled = instrument.controlled.name
     if drifts and drift_is_flow(torque, trace.recorded.time_s):
         text = (

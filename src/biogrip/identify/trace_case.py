@@ -15,8 +15,8 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import plain
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
-from biogrip.fit.problem import CaseProblem
 from biogrip.identify.settings import Asked, case_of
 from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.protocol import is_held, largest_load
@@ -36,7 +36,7 @@ _SATURATED, _MORE_OFTEN, _VALUES = 0.05, 5, 5
 _FLOWS = {"damper": "c_p", "maxwell": "c", "burgers": "c_s"}
 
 
-def flow_of(problem: CaseProblem) -> str:
+def flow_of(problem: Experiment) -> str:
     """Name what a sample flows by under a constant load, on and on in a line; nothing if by none.
 
     Without the spring beside the branches that is the sum of their dampers.
@@ -54,7 +54,7 @@ class TraceCase:
     """The case, with the search ranges of this trace."""
     recorded: Measurements
     """The trace."""
-    problem: CaseProblem
+    problem: Experiment
     """Assumptions of its fit, with the standard deviations of its readings if they are known."""
     given: Mapping[str, Any]
     """Blocks of the config that the user has set, see `Asked.given`."""
@@ -141,22 +141,22 @@ def _without_likenesses(case: Case, time_s: Array) -> Case:
     return replace(case, block=replace(case.block, measurement=measured))
 
 
-def ranges_of(case_problem: CaseProblem, time_s: Array, readings: Array) -> dict[str, GeneRange]:
+def ranges_of(experiment: Experiment, time_s: Array, readings: Array) -> dict[str, GeneRange]:
     """Compute search ranges of springs and dampers from the scales of a trace, (n_samples,).
 
     The problem has the noise, if it is known. Ranges are by name, without that of exponents.
     """
-    turned = readings - np.mean(readings) if case_problem.offset else readings
-    noise_sd = case_problem.sd
+    turned = readings - np.mean(readings) if experiment.offset else readings
+    noise_sd = experiment.sd
     if noise_sd is None:
-        own = case_problem.noise_sd or estimate_noise(readings)
+        own = experiment.noise_sd or estimate_noise(readings)
         noise_sd = np.full(len(turned), own)
     largest = float(np.max(np.abs(turned)))
     ratios = np.linalg.norm([turned / noise_sd, largest / noise_sd], axis=1)
     softer, stiffer = _MARGIN * np.clip(ratios, 1.0, _CLEAREST)
-    torque_Nm = abs(largest_load(case_problem.phases))
-    stiffness = torque_Nm / (case_problem.gripper.lever_m**2 * largest)
-    if case_problem.instrument.deforms:
+    torque_Nm = abs(largest_load(experiment.phases))
+    stiffness = torque_Nm / (experiment.gripper.lever_m**2 * largest)
+    if experiment.instrument.deforms:
         stiffness = largest / torque_Nm
     low, high = stiffness / softer, stiffness * stiffer
     short_s, long_s = float(np.min(np.diff(time_s))), float(np.ptp(time_s))

@@ -11,14 +11,16 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 5. A fit that has not converged is doubtful, and so are arms that ring.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
+from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.least_squares import fit_from
-from biogrip.fit.problem import Identification, Problem
+from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.judging.doubts import (
     DOUBT,
     HARMLESS,
@@ -30,6 +32,7 @@ from biogrip.judging.doubts import (
 )
 from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
+from biogrip.judging.valley import compute_valley
 from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
@@ -48,11 +51,17 @@ class Diagnosis:
     """Best fit and noise."""
     findings: list[Finding]
     """A verdict on every parameter and on the sum of the exchangeable ones."""
-    trades: list[Trade]
+    trades: list[Trade] = field(default_factory=list)
     """Parameters of which only a combination is determined."""
-    grip: Grip | None
+    valley: dict[str, Any] | None = None
+    """Map of chi^2 over two exchangeable parameters, see `compute_valley`, if it is asked for."""
+    lowest: Array | None = None
+    """Log-parameters at which profiles or valley come below the best fit."""
+    converged: bool = True
+    """False if the best fit has not converged to its last digits."""
+    grip: Grip | None = None
     """Force of the jaws on the sample of the best fit."""
-    notes: list[Note]
+    notes: list[Note] = field(default_factory=list)
     """Notes on the result, with weights."""
 
     @property
@@ -67,62 +76,110 @@ class Diagnosis:
 
 
 def diagnose(
-    problem: Problem,
+    problem: TraceProblem,
     model: SampleModel,
-    found: Identification,
+    found: Fit,
     *,
     confidence: float,
     noise_sd: float | None = None,
+    valley: bool = False,
 ) -> Diagnosis:
     """Judge the identification of one trace by profile likelihoods, as `diagnose_all` does."""
     (diagnosis,) = diagnose_all(
-        [problem], model, [found], confidence=confidence, noise_sd=[noise_sd]
+        [problem], model, [found], confidence=confidence, noise_sd=[noise_sd], valley=valley
     )
     return diagnosis
 
 
 def diagnose_all(
-    problems: Sequence[Problem],
+    problems: Sequence[TraceProblem],
     model: SampleModel,
-    found: Sequence[Identification],
+    found: Sequence[Fit],
     *,
     confidence: float,
     noise_sd: Sequence[float | None],
+    valley: bool = False,
 ) -> list[Diagnosis]:
     """Judge the identification of each of several traces by profile likelihoods.
 
     No diagnosis depends on the other traces. Found are their global optima, as far as is known; the
     noise of each, if its standard deviation is not known, is that of the residual. Limits have a
-    confidence, e.g. 0.95.
+    confidence, e.g. 0.95. If `valley` is true, chi^2 is mapped over exchangeable parameters, too.
+    """
+
+    def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
+        every = compute_findings(likelihoods, parameters_and_sum(model))
+        trades = find_trade_offs(likelihoods, model, every)
+        found = list(map(profiled, likelihoods, every, trades))
+        return [_with_valley(each, model) for each in found] if valley else found
+
+    judged = settled(problems, found, profile, confidence=confidence, noise_sd=noise_sd)
+    return [_with_notes(each, model) for each in judged]
+
+
+def settled(
+    problems: Sequence[TraceProblem],
+    found: Sequence[Fit],
+    profile: Callable[[Sequence[Likelihood]], list[Diagnosis]],
+    *,
+    confidence: float,
+    noise_sd: Sequence[float | None],
+) -> list[Diagnosis]:
+    """Profile traces until no profile comes below a best fit.
+
+    1. What each best fit leaves is examined: limits may have to allow for a misfit.
+    2. `profile` computes profiles around all best fits.
+    3. Where one of them comes below the best fit, the trace is fitted from its lowest point, and
+       1 to 3 are repeated for this trace.
+
+    Returns diagnoses with the notes of 1. See `diagnose_all` for the parameters.
     """
     best, done = list(found), dict[int, Diagnosis]()
     while left := [trace for trace in range(len(problems)) if trace not in done]:
-        likelihoods = [
-            make_likelihood(
+        likelihoods, remainders = [], []
+        for trace in left:
+            likelihood = make_likelihood(
                 problems[trace],
                 np.log(best[trace].parameters),
                 best[trace].misfit,
                 confidence=confidence,
                 noise_sd=noise_sd[trace],
             )
-            for trace in left
-        ]
-        remainders = [examine_residuals(likelihood) for likelihood in likelihoods]
-        likelihoods = [
-            likelihood.as_misfit(*remainder.misfit) if remainder.misfit else likelihood
-            for likelihood, remainder in zip(likelihoods, remainders, strict=True)
-        ]
-        every = compute_findings(likelihoods, parameters_and_sum(model))
-        trades = find_trade_offs(likelihoods, model, every)
-        for place, trace in enumerate(left):
-            notes = remainders[place].notes
-            judged = Diagnosis(likelihoods[place], every[place], trades[place], None, notes)
-            lower = _lower_optimum(judged, best[trace])
+            remainder = examine_residuals(likelihood)
+            if remainder.misfit is not None:
+                likelihood = likelihood.as_misfit(*remainder.misfit)
+            likelihoods.append(likelihood)
+            remainders.append(remainder)
+        for trace, judged, remainder in zip(left, profile(likelihoods), remainders, strict=True):
+            lower = _lower_fit(judged, best[trace])
             if lower is None:
-                done[trace] = _with_notes(judged, model, converged=best[trace].converged)
+                converged, notes = best[trace].converged, remainder.notes
+                done[trace] = replace(judged, converged=converged, notes=notes)
             else:
                 best[trace] = lower
     return [done[trace] for trace in range(len(problems))]
+
+
+def _lower_fit(judged: Diagnosis, found: Fit) -> Fit | None:
+    """Return the fit from the lowest point of the profiles, if it is below the best fit."""
+    if judged.lowest is None:
+        return None
+    missed = found.at(fit_from([judged.likelihood.problem], judged.lowest))
+    return None if judged.likelihood.increase(missed.misfit) > -MISSED else missed
+
+
+def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade]) -> Diagnosis:
+    """Return a diagnosis without notes, with the lowest point of its profiles."""
+    every = [*findings, *(trade.finding for trade in trades)]
+    lowest = min((finding.profile for finding in every), key=lambda p: float(p.increases.min()))
+    missed = lowest.lowest if lowest.increases.min() < -MISSED else None
+    return Diagnosis(likelihood, findings, trades, lowest=missed)
+
+
+def _with_valley(judged: Diagnosis, model: SampleModel) -> Diagnosis:
+    """Return a diagnosis with its valley, whose lowest point counts if no profile is lower."""
+    valley, missed = compute_valley(judged.likelihood, model)
+    return replace(judged, valley=valley, lowest=missed if judged.lowest is None else judged.lowest)
 
 
 def with_times(diagnoses: Sequence[Diagnosis], model: SampleModel) -> list[Diagnosis]:
@@ -134,17 +191,7 @@ def with_times(diagnoses: Sequence[Diagnosis], model: SampleModel) -> list[Diagn
     return [replace(own, findings=[*own.findings, *found]) for own, found in pairs]
 
 
-def _lower_optimum(judged: Diagnosis, found: Identification) -> Identification | None:
-    """Return the optimum that is fitted from the lowest point of the profiles, if it is lower."""
-    profiled = [*judged.findings, *(trade.finding for trade in judged.trades)]
-    lowest = min((finding.profile for finding in profiled), key=lambda p: float(p.increases.min()))
-    if lowest.increases.min() > -MISSED:
-        return None
-    missed = found.at(fit_from([judged.likelihood.problem], lowest.lowest))
-    return None if judged.likelihood.increase(missed.misfit) > -MISSED else missed
-
-
-def _with_notes(judged: Diagnosis, model: SampleModel, *, converged: bool) -> Diagnosis:
+def _with_notes(judged: Diagnosis, model: SampleModel) -> Diagnosis:
     """Return a diagnosis with the force of the jaws and with all notes."""
     likelihood, findings = judged.likelihood, judged.findings
     residuals = likelihood.problem.residuals
@@ -160,7 +207,7 @@ def _with_notes(judged: Diagnosis, model: SampleModel, *, converged: bool) -> Di
     ]
     notes += [*_range_ends(likelihood, model), *judged.notes]
     notes += _pulling(grip, residuals.duration_s)
-    if not converged:
+    if not judged.converged:
         text = (
             "The fit has not converged to its last digits: further Newton steps increase "
             "chi-squared. Rely on its verdicts, not on its digits."

@@ -27,7 +27,8 @@ from statistics import NormalDist
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.fit.problem import CaseProblem, Problem
+from biogrip.fit.experiment import Experiment
+from biogrip.fit.problem import TraceProblem
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import Noise, standard_deviation
@@ -46,7 +47,7 @@ A fit that is deeper than an optimum by more shows that the optimum is not the g
 class Likelihood:
     """Optimum, noise and thresholds that define the profile likelihoods of one trace."""
 
-    problem: Problem
+    problem: TraceProblem
     """The trace and the model."""
     best: Array
     """Log-parameters of the global optimum, (n_parameters,)."""
@@ -106,7 +107,7 @@ class Likelihood:
 
 
 def make_likelihood(
-    problem: Problem,
+    problem: TraceProblem,
     best: Array,
     misfit: float,
     *,
@@ -209,7 +210,7 @@ DETERMINED_PERCENT = 100.0
 
 
 def bounds_percent(
-    problem: CaseProblem, noise: Noise, parameters: Mapping[str, float], time_s: Array
+    problem: Experiment, noise: Noise, parameters: Mapping[str, float], time_s: Array
 ) -> list[tuple[Quantity, float]]:
     """Compute the Cramér-Rao bounds of all identified quantities of a case with its noise.
 

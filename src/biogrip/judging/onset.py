@@ -22,6 +22,7 @@ from scipy.special import chdtri, stdtrit
 
 from biogrip.arrays import Array
 from biogrip.digits import instant, plain
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.fitted_onset import (
     OnsetFit,
     OnsetFits,
@@ -30,7 +31,6 @@ from biogrip.fit.fitted_onset import (
     spacing_at,
 )
 from biogrip.fit.least_squares import fit_from
-from biogrip.fit.problem import CaseProblem
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
@@ -55,7 +55,7 @@ _ACCURACY = 0.01
 
 
 def notes_on_start(
-    case_problem: CaseProblem,
+    experiment: Experiment,
     time_s: Array,
     readings: Array,
     diagnosis: Diagnosis,
@@ -71,7 +71,7 @@ def notes_on_start(
 
     Parameters
     ----------
-    case_problem
+    experiment
         Assumptions of the identification, with a protocol that starts at 0.
     time_s, readings : (n_samples,)
         The trace, times ascending.
@@ -80,19 +80,19 @@ def notes_on_start(
     may_be_late
         True if the user says nothing of the start.
     """
-    fits, ramp = OnsetFits(case_problem, time_s, readings), _with_ramp(case_problem, time_s)
+    fits, ramp = OnsetFits(experiment, time_s, readings), _with_ramp(experiment, time_s)
     notes: list[Note] = []
     if may_be_late and ramp and is_cut_off(time_s):
         notes += _about_clock(fits, diagnosis)
     elif begins_constant(time_s, readings):
         # A constant that is not zero is an offset, with which the onset would be biased.
-        free, onset_s = replace(case_problem, offset=True), 0.0
-        if may_be_late or case_problem.fit_start:
+        free, onset_s = replace(experiment, offset=True), 0.0
+        if may_be_late or experiment.fit_start:
             onset_s = estimate_onset(free, time_s, readings)
         if begins_constant(time_s, readings, onset_s):
             if may_be_late:
-                notes += _about_late_onset(replace(fits, case_problem=free), diagnosis, onset_s)
-            if not case_problem.offset and (notes or not may_be_late):
+                notes += _about_late_onset(replace(fits, experiment=free), diagnosis, onset_s)
+            if not experiment.offset and (notes or not may_be_late):
                 notes += _about_tare(fits, diagnosis, onset_s)
     if diagnosis.status != REJECTED and ramp and not notes:
         notes += _about_ramp(fits, diagnosis, ramp)
@@ -101,7 +101,7 @@ def notes_on_start(
 
 def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> Iterator[Note]:
     """Yield a note if a trace is constant up to an onset, with which it fits far better."""
-    trace, noise_sd = (fits.time_s, fits.readings), fits.case_problem.noise_sd
+    trace, noise_sd = (fits.time_s, fits.readings), fits.experiment.noise_sd
     found, given = fits.best(guess_s), fits.at(0.0, diagnosis.likelihood.best)
     fall = compute_fall(len(trace[0]), given.misfit, found.misfit, noise_sd)
     if fall < chdtri(1, _FALSE_ALARM) or not begins_constant(*trace, found.onset_s):
@@ -124,7 +124,7 @@ def _about_tare(fits: OnsetFits, diagnosis: Diagnosis, onset_s: float) -> Iterat
     before = fits.readings[fits.time_s < onset_s][:-1]
     mean, error = float(np.mean(before)), float(np.std(before, ddof=1)) / np.sqrt(len(before))
     if abs(mean) > error * stdtrit(len(before) - 1, 1 - _AS_GOOD / 2):
-        unit = f" {fits.case_problem.instrument.read.unit}".rstrip()
+        unit = f" {fits.experiment.instrument.read.unit}".rstrip()
         yield Note(
             REJECTION if diagnosis.status == REJECTED else DOUBT,
             f"The {len(before)} readings before the start are constant, but {plain(mean)}{unit} "
@@ -187,7 +187,7 @@ def _moved(diagnosis: Diagnosis, given: OnsetFit, other: OnsetFit, widths: float
 
 def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramp: tuple[Phase, ...]) -> Iterator[Note]:
     """Yield a note if a ramp up to the first reading moves a value by the width of its limits."""
-    ramped_fits = replace(fits, case_problem=replace(fits.case_problem, phases=ramp))
+    ramped_fits = replace(fits, experiment=replace(fits.experiment, phases=ramp))
     given, ramped = (own.at(0.0, diagnosis.likelihood.best) for own in (fits, ramped_fits))
     if moved := _moved(diagnosis, given, ramped, 1.0):
         yield Note(
@@ -198,9 +198,9 @@ def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramp: tuple[Phase, ...]) 
         )
 
 
-def _with_ramp(case_problem: CaseProblem, time_s: Array) -> tuple[Phase, ...]:
+def _with_ramp(experiment: Experiment, time_s: Array) -> tuple[Phase, ...]:
     """Return phases with a ramp up to the first reading, none but for a hold until after that."""
-    first, *rest = case_problem.phases
+    first, *rest = experiment.phases
     delay_s = float(time_s[0])
     if not 0 < delay_s < first.duration_s or first.slope or first.curvature:
         return ()

@@ -4,8 +4,10 @@ All quantities of many traces are profiled at once, over their whole search rang
 fitted from the optimum, then from the fits of both neighbours, again and again where these have
 improved: a basin found anywhere in a profile is followed both ways. Where a profile exceeds the
 certainty at an end, its limit is where it crosses the threshold. The limits are the outermost:
-values between them may be excluded, too, which gaps tell. A map of chi^2 shows
-the valley in which a branch's and the parallel damper trade off.
+values between them may be excluded, too, which gaps tell.
+
+Crossings are found by the Illinois rule [3]_, applied to the square root of the increase of chi^2,
+which is nearly linear in the quantity's logarithm: a few fits suffice.
 
 References
 ----------
@@ -13,23 +15,21 @@ References
    confidence intervals, Applied Statistics 37 (1988), 87-94.
 .. [2] A. Raue et al., Structural and practical identifiability analysis of partially observed
    dynamical models by exploiting the profile likelihood, Bioinformatics 25 (2009), 1923-1929.
+.. [3] M. Dowell and P. Jarratt, A modified regula falsi method for computing the root of an
+   equation, BIT 11 (1971), 168-174.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.digits import round_increase, rounded
 from biogrip.fit.local_fits import FAIR, FINE, alike
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
 from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.limits import Brackets, crossings
 from biogrip.judging.quantities import Quantity
-from biogrip.physics.sample_model import SampleModel
 
 HIGHEST = 16.0
 """Increase of chi^2 up to which a profile has dense points, as figures show no more."""
@@ -77,7 +77,7 @@ class Points:
         """Fit points from other points' fits; return a mask of those that have improved much."""
         profile, targets = self.profile[point], self.values[point]
         found = self.fits.at(profile, targets, self.x[start], tolerance)
-        return _keep_lower(self.increases, self.x, point, *found)
+        return keep_lower(self.increases, self.x, point, *found)
 
     def ends(self) -> IntArray:
         """Return the indices of the first and last point of every profile, (2, n_profiles)."""
@@ -139,7 +139,7 @@ class Points:
         self.x = np.insert(self.x, right, x, axis=0)
 
 
-def _keep_lower(
+def keep_lower(
     increases: Array, x: Array, point: IntArray, found: Array, fitted: Array
 ) -> BoolArray:
     """Keep, in place, fits of points that are lower; return a mask of points that improved much.
@@ -262,6 +262,86 @@ def _limits(points: Points) -> Array:
     return crossed
 
 
+# Most fits for a crossing, and the width of an interval in which a profile jumps.
+_MOST_FITS, _CLOSEST = 40, 1e-7
+
+
+@dataclass
+class Brackets:
+    """Intervals in which n profiles cross their thresholds, each with an inner and an outer end."""
+
+    profile: IntArray
+    """Index of the profile in `ConstrainedFits`, (n,)."""
+    values: Array
+    """Logarithms of the quantity at the inner end, below the threshold, and the outer, above, (2,
+    n)."""
+    increases: Array
+    """Increases of chi^2 there, (2, n)."""
+    x: Array
+    """Log-parameters fitted there, (2, n, n_parameters)."""
+    elsewhere: Array
+    """Log-parameters of additional starts that may lead to deeper basins, (n_starts, n,
+    n_parameters)."""
+
+
+def crossings(
+    fits: ConstrainedFits, brackets: Brackets, tolerance: float, accuracy: float
+) -> Array:
+    """Find the logarithms of quantities at which the increase of chi^2 equals the threshold, (n,).
+
+    The accuracy is that of the square root of the increase. Lower fits that are found at outer ends
+    of brackets replace theirs, in place. NaN is where a deeper basin turns out to be below the
+    threshold at the outer end, so that the crossing lies further out.
+    """
+    profile, threshold = brackets.profile, fits.threshold[brackets.profile]
+    root_threshold = np.sqrt(threshold)
+    ends, x = brackets.values.copy(), brackets.x.copy()
+    excess = np.sqrt(np.maximum(brackets.increases, 0.0)) - root_threshold
+    moved = np.full(len(profile), -1)
+    found = ends[1].copy()
+    left = np.arange(len(profile))
+    for tries in range(_MOST_FITS):
+        if not len(left):
+            break
+        share = excess[0, left] / (excess[0, left] - excess[1, left])
+        tried = ends[0, left] + share * (ends[1, left] - ends[0, left])
+        # The fits of the two ends may lie in different basins: the deeper one counts.
+        between = x[0, left] + share[:, None] * (x[1, left] - x[0, left])
+        starts = np.concatenate((between[None], x[:, left]))
+        # In the first round, the best fit from elsewhere is one more start.
+        if not tries:
+            _, deepest = fits.from_each(profile, tried, brackets.elsewhere, FAIR)
+            starts = np.concatenate((starts, deepest[None]))
+        increases, fitted = fits.from_each(profile[left], tried, starts, tolerance)
+        over = np.sqrt(np.maximum(np.min(increases, axis=0), 0.0)) - root_threshold[left]
+        # A basin deeper than that of the outer end may be deeper at the outer end, too.
+        missed = np.sqrt(np.maximum(increases[2], 0.0)) - root_threshold[left] > over + accuracy
+        _lower(fits, brackets, left[missed], fitted[missed], tolerance)
+        void = brackets.increases[1, left] < threshold[left]
+        found[left] = np.where(void, np.nan, tried)
+        side = (over > 0).astype(np.int64)
+        ends[side, left], excess[side, left], x[side, left] = tried, over, fitted
+        # The excess of an end that stays a second time is halved, so that the end moves, too.
+        again = moved[left] == side
+        excess[1 - side[again], left[again]] *= 0.5
+        moved[left] = side
+        # Where a deeper basin begins, the increase may jump past the threshold.
+        apart = np.abs(ends[1, left] - ends[0, left]) > _CLOSEST
+        left = left[(np.abs(over) > accuracy) & apart & ~void]
+    return found
+
+
+def _lower(
+    fits: ConstrainedFits, brackets: Brackets, which: IntArray, starts: Array, tolerance: float
+) -> None:
+    """Fit the outer ends of brackets from other starts and keep, in place, the lower fits."""
+    if not len(which):
+        return
+    increases, x = fits.at(brackets.profile[which], brackets.values[1, which], starts, tolerance)
+    lower = increases < brackets.increases[1, which]
+    brackets.increases[1, which[lower]], brackets.x[1, which[lower]] = increases[lower], x[lower]
+
+
 def find_gaps(
     log_values: Array, increases: Array, threshold: float
 ) -> tuple[tuple[float, float], ...]:
@@ -286,78 +366,3 @@ def _crossing(
         return float(log_values[outside])
     share = min((np.sqrt(threshold) - ends[0]) / (ends[1] - ends[0]), 1.0)
     return float(log_values[inside] + share * (log_values[outside] - log_values[inside]))
-
-
-# Shares of the first damper in the sum, dense where either is small, and sums relative to the best
-# one, dense in the valley.
-_SHARES = 1 / (1 + np.exp(-np.linspace(-8.0, 8.0, 31)))
-_BESIDE = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
-_SUMS = np.concatenate((1 - _BESIDE[::-1], [1.0], 1 + _BESIDE))
-# Second arm of the valley: if the branch is too weak to show, the second damper alone is the sum.
-_FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 12)))
-_SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
-
-
-def compute_valley(
-    likelihood: Likelihood, model: SampleModel
-) -> tuple[dict[str, Any] | None, Array | None]:
-    """Compute the increase of chi^2 over two exchangeable parameters, with the others fitted.
-
-    The first returned has ``x`` and ``y``, names and units; ``best``; and under ``grids``, one
-    along the valley of constant sum and one along its arm of constant second parameter,
-    ``x_values``, ``y_values`` and ``increases``, nested lists. It is None unless exactly two
-    exchangeable parameters were searched, among others. The second are log-parameters whose chi^2
-    is clearly below that of the optimum, which is then not the global one, or None.
-    """
-    pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
-    if len(pair) != 2 or len(model.parameters) == 2:
-        return None, None
-    best = np.exp(likelihood.best[pair])
-    sums = best.sum() * _SUMS[:, None]
-    arm = np.meshgrid(best.sum() * _FIRSTS, best.sum() * _SECONDS)
-    grids, missed = [], None
-    for x_values, y_values in ((sums * _SHARES, sums * (1 - _SHARES)), arm):
-        increases, lower = _increases(likelihood, pair, x_values, y_values)
-        grid = {"x_values": _listed(x_values, rounded), "y_values": _listed(y_values, rounded)}
-        grids.append({**grid, "increases": _listed(increases, round_increase)})
-        missed = missed if lower is None else lower
-    both = [model.parameters[index] for index in pair]
-    x, y = ({"name": p.name, "symbol": p.symbol, "unit": p.unit} for p in both)
-    at_best = [rounded(float(value)) for value in best]
-    return {"x": x, "y": y, "grids": grids, "best": at_best}, missed
-
-
-def _listed(values: Array, rounding: Callable[[float], float | None]) -> list[list[float | None]]:
-    return [[rounding(float(value)) for value in row] for row in values]
-
-
-def _increases(
-    likelihood: Likelihood, pair: list[int], x_values: Array, y_values: Array
-) -> tuple[Array, Array | None]:
-    """Compute the increase of chi^2 at every point of a grid, and find a missed optimum.
-
-    All points are fitted from the optimum, then from neighbours as long as these improve.
-    """
-    fits = ConstrainedFits([likelihood], [])
-    rows, columns = x_values.shape
-    x = np.tile(likelihood.best, (rows * columns, 1))
-    x[:, pair[0]], x[:, pair[1]] = np.log(x_values.ravel()), np.log(y_values.ravel())
-    fixed = np.isin(np.arange(x.shape[1]), pair)
-    increases = np.full(len(x), np.inf)
-    points, start = np.arange(len(x)), x.copy()
-    # A point, and its neighbours on the grid.
-    beside = np.pad(points.reshape(rows, columns), 1, constant_values=-1)
-    shifts = ((0, 1), (2, 1), (1, 0), (1, 2))
-    neighbours = np.stack([beside[i : i + rows, j : j + columns].ravel() for i, j in shifts])
-    tolerance = FAIR
-    while len(points):
-        found = fits.with_fixed(start, fixed, tolerance)
-        news = _keep_lower(increases, x, points, *found)
-        origin = np.repeat(np.flatnonzero(news), 4)
-        points = neighbours[:, news].T.ravel()
-        origin, points = origin[points >= 0], points[points >= 0]
-        start = x[origin].copy()
-        start[:, pair] = x[points][:, pair]
-        tolerance = CLOSE
-    missed = fits.missed.get(0)
-    return increases.reshape(rows, columns), None if missed is None else missed[1]

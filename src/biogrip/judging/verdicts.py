@@ -145,11 +145,14 @@ class Trade:
 
 
 def compute_findings(
-    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Finding]]:
-    """Profile quantities in each of several traces, and reach a verdict on each of them."""
+    """Profile quantities in each of several traces, and reach a verdict on each of them.
+
+    If `smooth` is true, profiles have as many points as a drawing needs.
+    """
     found = []
-    every = compute_profiles(likelihoods, quantities)
+    every = compute_profiles(likelihoods, quantities, smooth=smooth)
     for likelihood, profiles in zip(likelihoods, every, strict=True):
         deviations = map(likelihood.deviation, quantities)
         found.append(list(map(Finding, quantities, profiles, deviations)))

@@ -15,7 +15,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import round_increase, rounded_numbers, significant
 from biogrip.errors import BiogripError
-from biogrip.fit.problem import Identification
+from biogrip.fit.problem import Fit
 from biogrip.judging.doubts import (
     REJECTED,
     REJECTION,
@@ -114,7 +114,7 @@ class Record:
     """Values of fixed parameters by name."""
     seed: int
     """Seed of the trace."""
-    answer: Identification
+    answer: Fit
     noise_rms: float | None
     """RMS of the noise in the trace; None for a recorded trace."""
 

@@ -50,17 +50,17 @@ def identify(
     history: Path,
 ) -> None:
     """Identify a batch of seeds with one method."""
-    case_problem = case.problem.to_identify().calibrated(calibrated)
+    experiment = case.problem.to_identify().calibrated(calibrated)
     identified = identifier(method, case.block.method(method))
     recorded = read_measurements(measurements, list(seeds))
-    case_problem = case_problem.weighted(recorded.sd)
+    experiment = experiment.weighted(recorded.sd)
     progress = Progress(f"{case.name}, {method}", len(seeds))
-    whose = case.name, method, case_problem.model, case_problem.searched, case_problem.fixed
+    whose = case.name, method, experiment.model, experiment.searched, experiment.fixed
     records = []
     for group in groups(seeds):
         traces = [recorded.readings[seed] for seed in group]
         rngs = [stream(case.study.study_seed, case.name, seed, method) for seed in group]
-        problems = [case_problem.of(recorded.time_s, trace) for trace in traces]
+        problems = experiment.of_each(recorded.time_s, traces)
         answers = identified(problems, rngs, progress.within)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
             noise = None if recorded.target is None else rms(trace - recorded.target)
@@ -95,7 +95,7 @@ def join(
     for file in measurements:
         recorded = read_measurements(file)
         traces, weighted = recorded.readings, problem.weighted(recorded.sd)
-        posed = [weighted.of(recorded.time_s, trace) for trace in traces.values()]
+        posed = weighted.of_each(recorded.time_s, [*traces.values()])
         for seed, of_trace in zip(map(str, traces), posed, strict=True):
             misfit = lowest_encodable(of_trace.residuals.misfit, ranges, np.array(ends[seed]))
             lowest[seed] = f"{misfit:.6e}"
@@ -118,7 +118,7 @@ def fit(
     progress = Progress(f"{case.name}, models", len(models) * len(seeds))
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
     for group in groups(seeds):
-        traces = [problem.of(recorded.time_s, recorded.readings[seed]) for seed in group]
+        traces = problem.of_each(recorded.time_s, [recorded.readings[seed] for seed in group])
         found = fit_models(
             {
                 name: [problem.for_model(trace, model) for trace in traces]

@@ -13,15 +13,14 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.files import write_text
-from biogrip.fit.least_squares import fit_from, identify_from
+from biogrip.fit.experiment import Experiment
+from biogrip.fit.least_squares import identify_from
 from biogrip.fit.methods import identifier
-from biogrip.fit.problem import CaseProblem, Identification, Problem, Progress, silent
+from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_traces
-from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit
-from biogrip.judging.likelihood import MISSED
 from biogrip.judging.onset import notes_on_start, profile_over_onset
-from biogrip.judging.profiles import compute_valley
 from biogrip.physics.noise import rms, standard_deviation, stream
 from biogrip.records.identifications import diagnosis_data
 from biogrip.records.traces import read_measurements, read_target
@@ -33,7 +32,7 @@ TRACE = 0
 
 def fits_judged(
     cases: Sequence[Case],
-    case_problems: Sequence[CaseProblem],
+    experiments: Sequence[Experiment],
     traces: Sequence[tuple[Array, Array]],
     seed: int,
     progress: Progress = silent,
@@ -45,28 +44,35 @@ def fits_judged(
     """
     least_squares = identifier("least_squares", cases[0].block.least_squares)
 
-    def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
+    def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
         names = [(cases[index].study.study_seed, cases[index].name) for index in which]
         rngs = [stream(study_seed, name, seed, "identifiability") for study_seed, name in names]
         return least_squares(problems, rngs, progress)
 
-    return fit_traces(case_problems, traces, find)
+    return fit_traces(experiments, traces, find)
 
 
 def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
     """Fit the trace of seed 0 by least squares, and write verdicts, profiles and valley."""
     recorded = read_measurements(measurements, [TRACE])
-    case_problem = case.problem.calibrated(calibrated).weighted(recorded.sd)
+    experiment = case.problem.calibrated(calibrated).weighted(recorded.sd)
     trace = recorded.readings[TRACE]
-    (fit,) = fits_judged([case], [case_problem], [(recorded.time_s, trace)], TRACE)
-    diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
-    if case_problem.fit_start:
+    (fit,) = fits_judged([case], [experiment], [(recorded.time_s, trace)], TRACE)
+    diagnosis = diagnose(
+        fit.problem,
+        experiment.searched,
+        fit.found,
+        confidence=case.confidence,
+        noise_sd=experiment.noise_sd,
+        valley=True,
+    )
+    if experiment.fit_start:
         diagnosis, _ = profile_over_onset(diagnosis, recorded.time_s)
     notes = notes_on_fit(fit)
     if case.may_start_late:
-        notes += notes_on_start(case_problem, recorded.time_s, trace, diagnosis, may_be_late=True)
+        notes += notes_on_start(experiment, recorded.time_s, trace, diagnosis, may_be_late=True)
     said = diagnosis_data(diagnosis, notes)
-    _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": valley})
+    _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": diagnosis.valley})
 
 
 def notes_on_fit(fit: TraceFit) -> list[Note]:
@@ -81,34 +87,19 @@ def notes_on_fit(fit: TraceFit) -> list[Note]:
     return [misfit, *notes] if misfit else notes
 
 
-def _diagnosed(
-    problem: Problem, case_problem: CaseProblem, found: Identification, confidence: float
-) -> tuple[Diagnosis, dict[str, Any] | None]:
-    """Diagnose a trace, and again from a fit along its valley, if that has a lower chi^2."""
-    model, noise_sd = case_problem.searched, case_problem.noise_sd
-    diagnosis = diagnose(problem, model, found, confidence=confidence, noise_sd=noise_sd)
-    valley, missed = compute_valley(diagnosis.likelihood, model)
-    if missed is not None:
-        again = found.at(fit_from([problem], missed))
-        if diagnosis.likelihood.increase(again.misfit) < -MISSED:
-            diagnosis = diagnose(problem, model, again, confidence=confidence, noise_sd=noise_sd)
-            valley, _ = compute_valley(diagnosis.likelihood, model)
-    return diagnosis, valley
-
-
 def expect(case: Case, target: Path, calibrated: list[Path], verdicts: Path) -> None:
     """Write verdicts on the trace without noise, judged with the noise level of the measurement.
 
     They are what to expect of any trace of the case. Without noise, the rounding of the
     target's digits takes its place.
     """
-    case_problem = case.problem.to_identify().calibrated(calibrated)
+    experiment = case.problem.to_identify().calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     noise_sd = rms(standard_deviation(rotation, case.noise)) or None
-    problem = case_problem.of(time_s, rotation, noise_sd=noise_sd)
-    found = identify_from(problem, case_problem.logs(case.parameters))
+    problem = experiment.of(time_s, rotation, noise_sd=noise_sd)
+    found = identify_from(problem, experiment.logs(case.parameters))
     diagnosis = diagnose(
-        problem, case_problem.searched, found, confidence=case.confidence, noise_sd=noise_sd
+        problem, experiment.searched, found, confidence=case.confidence, noise_sd=noise_sd
     )
     _write(verdicts, case, diagnosis_data(diagnosis))
 

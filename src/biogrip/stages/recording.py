@@ -10,8 +10,8 @@ from biogrip.arrays import BoolArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.fitted_onset import OnsetFits, estimate_onset
-from biogrip.fit.problem import CaseProblem
 from biogrip.physics.protocol import Course
 from biogrip.physics.whitening import MOST_SAMPLES
 from biogrip.records.traces import Measurements, write_measurements
@@ -35,7 +35,7 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
 
 def read_checked(
     recorded: Path,
-    problem: CaseProblem,
+    problem: Experiment,
     columns: Columns,
 ) -> Measurements:
     """Read a recorded trace, and refuse one that is impossible with its gripper and protocol."""
@@ -112,7 +112,7 @@ def without_padding(trace: Recording) -> Recording:
     return replace(_part(trace, kept), without_number=trace.without_number + first)
 
 
-def with_fitted_onset(trace: Measurements, problem: CaseProblem) -> Measurements:
+def with_fitted_onset(trace: Measurements, problem: Experiment) -> Measurements:
     """Return a recording with its estimated onset replaced by that of a fit, if that is wanted."""
     if not problem.fit_start or trace.onset_s is None:
         return trace
@@ -121,7 +121,7 @@ def with_fitted_onset(trace: Measurements, problem: CaseProblem) -> Measurements
     return replace(trace, time_s=trace.time_s - later_s, onset_s=trace.onset_s + later_s)
 
 
-def _typical_noise(trace: Recording, problem: CaseProblem) -> float | None:
+def _typical_noise(trace: Recording, problem: Experiment) -> float | None:
     """Return the standard deviation of the noise, if it is given; typical where it differs."""
     if trace.sd is not None:
         return float(np.median(trace.sd))

@@ -170,18 +170,18 @@ def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, 
     for name, reading in readings.items():
         block = built(CaseBlock, overlaid(case.plain, reading.changes))
         interpretation = replace(case, block=block)
-        case_problem = interpretation.problem
+        experiment = interpretation.problem
         for seeds in groups(range(case.seeds)):
             noises, searches = (
                 [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]
                 for purpose in ("noise", "genetic")
             )
             traces = [add_noise(rotation, interpretation.noise, rng, time_s) for rng in noises]
-            problems = [case_problem.of(time_s, trace) for trace in traces]
+            problems = experiment.of_each(time_s, traces)
             answers = identify_many(problems, block.genetic_algorithm, searches)
             for seed, trace, answer in zip(seeds, traces, answers, strict=True):
-                names = case_problem.searched.names
-                values = {**case_problem.fixed, **dict(zip(names, answer.parameters, strict=True))}
+                names = experiment.searched.names
+                values = {**experiment.fixed, **dict(zip(names, answer.parameters, strict=True))}
                 falls = np.flatnonzero(np.diff(answer.history.best_misfit) < 0)
                 yield (
                     *(case.name, name, seed),

@@ -62,7 +62,7 @@ class Uncertainty(Block):
 
     @property
     def by_part(self) -> dict[str, Mapping[str, float]]:
-        """Uncertainties by part and key, as far as they are given, see `CaseProblem`."""
+        """Uncertainties by part and key, as far as they are given, see `Experiment`."""
         own = {key: known for key in _OWN if (known := getattr(self, key))}
         torque = {"share": 0.01 * self.torque_percent} if self.torque_percent else None
         parts = {"left": self.left, "right": self.right, "gripper": own, "torque": torque}

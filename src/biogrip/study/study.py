@@ -7,9 +7,9 @@ from functools import cached_property
 from typing import Any, cast
 
 from biogrip.arrays import Array
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.methods import METHODS, Method
-from biogrip.fit.problem import CaseProblem
 from biogrip.keys import built, plain
 from biogrip.physics.gripper import NO_ARMS, CombDrive, Contact, Gripper
 from biogrip.physics.instruments import GRIPPER, Instrument
@@ -170,14 +170,14 @@ class Case:
         return self.block.contact == "unilateral"
 
     @cached_property
-    def problem(self) -> CaseProblem:
+    def problem(self) -> Experiment:
         """Assumptions of the identification; a calibration replaces the gripper's arms."""
         assumed, measurement = self.block.assumed_gripper, self.block.measurement
         gripper = self.gripper
         if isinstance(assumed, Mapping):
             gripper = built(Gripper, overlaid(plain(gripper), assumed))
         uncertainty = self.block.gripper.uncertainty if self.instrument.has_jaws else None
-        return CaseProblem(
+        return Experiment(
             gripper,
             self.phases,
             dict[str, GeneRange](vars(self.block.search_range)),

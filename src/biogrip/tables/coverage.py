@@ -58,20 +58,20 @@ def coverage(
     rows: list[Row] = []
     estimated = pd.concat([INTERVALS.read(it) for it in intervals], ignore_index=True)
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
-        case_problem = case.problem.calibrated([next(calibrations)] if case.is_calibrated else [])
-        log_truth = case_problem.logs(case.parameters)
+        experiment = case.problem.calibrated([next(calibrations)] if case.is_calibrated else [])
+        log_truth = experiment.logs(case.parameters)
         found = estimated[estimated["case"] == name]
         time_s, _, rotation = read_target(target)
-        _, sensitivity = case_problem.of(time_s, rotation).residuals(log_truth)
+        _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
         noise_sd = standard_deviation(rotation, case.noise)
-        for quantity in parameters_and_sum(case_problem.searched):
+        for quantity in parameters_and_sum(experiment.searched):
             mine = found[found["quantity"] == quantity.label]
             fitted = mine[mine["estimate_rest_known"].notna()]
             shown = mine[mine["verdict"].notna()]
             if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
                 continue
             # The config's value: `log_truth` is clipped to the search range.
-            names = [case_problem.searched.names[index] for index in quantity.members]
+            names = [experiment.searched.names[index] for index in quantity.members]
             truth = sum(case.parameters[member] for member in names)
             head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
             limit = 100 * bound(sensitivity, noise_sd, log_truth, quantity)

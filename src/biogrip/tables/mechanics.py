@@ -336,7 +336,7 @@ def _medians(
     searched = problem.searched
     if len(time_s) <= len(searched.names) + problem.offset + problem.drift + 1:
         return {}
-    problems = [problem.of(time_s, trace) for trace in rotation[: len(time_s)] + noise]
+    problems = problem.of_each(time_s, [*(rotation[: len(time_s)] + noise)])
     rngs = [stream(study_seed, case.name, seed, "contact_loss") for seed in range(len(noise))]
     found = identify_many(problems, case.block.least_squares, rngs)
     values = pd.DataFrame([each.parameters for each in found], columns=searched.names)

@@ -14,7 +14,7 @@ from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import extreme_responses, fit_responses
-from biogrip.fit.problem import CaseProblem
+from biogrip.fit.experiment import Experiment
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import Course, evaluate
 from biogrip.physics.whitening import nuisance_basis, without
@@ -45,7 +45,7 @@ _ABSURD = 1e9
 
 def check_recording(
     recording: Recording,
-    problem: CaseProblem,
+    problem: Experiment,
     noise_sd: float | None = None,
     onset_s: float | None = None,
 ) -> str | None:

@@ -1,0 +1,211 @@
+"""What was done with a sample, which all traces of a case share."""
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.fit.genome import GeneRange
+from biogrip.fit.problem import TraceProblem, make_problem
+from biogrip.physics.calibration import read_calibrated_arms
+from biogrip.physics.condensed import Condensed
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.instruments import Instrument
+from biogrip.physics.models import Sample
+from biogrip.physics.protocol import Course, Phase, join_phases
+from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.sample_model import SampleModel, with_fixed
+from biogrip.physics.whitening import (
+    WEIGHTED,
+    NoiseModel,
+    Whitening,
+    nuisance_basis,
+    with_uncertain,
+)
+
+# Key of an arm that fits leave out, and its uncertainty with it.
+_NOT_FITTED = "inertia_kgm2"
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Assumptions of the identification that all traces of a case share."""
+
+    gripper: Gripper
+    """Gripper of the simulated responses."""
+    phases: tuple[Phase, ...]
+    """The protocol."""
+    ranges: Mapping[str, GeneRange]
+    """Search ranges by `Parameter.range_name`."""
+    sample: Sample
+    """Constitutive model."""
+    fixed: Mapping[str, float]
+    """Parameters that are known, by name."""
+    instrument: Instrument
+    """What is held and read; other than a gripper, it has `NO_ARMS`."""
+    offset: bool = False
+    """True if the instrument may have added a constant."""
+    drift: bool = False
+    """True if it may have added a drift linear in time."""
+    noise_sd: float | None = None
+    """Standard deviation of the noise, if it is known."""
+    noise_share: float | None = None
+    """Standard deviation of the noise as a share of the readings; read by `read_checked`."""
+    sd: Array | None = field(default=None, compare=False)
+    """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
+    coloured: bool = False
+    """True if the noise of a trace may be autocorrelated, see `fit_traces`."""
+    uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
+    ``gripper`` itself; and ``share`` of the ``torque``."""
+    fit_start: bool = False
+    """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
+
+    @cached_property
+    def torque(self) -> Course:
+        """Torque of both arms, or what else is held, against time."""
+        return join_phases(self.phases, deforms=self.instrument.deforms)
+
+    @cached_property
+    def model(self) -> SampleModel:
+        """Sample model."""
+        return self.sample.model
+
+    @cached_property
+    def searched(self) -> SampleModel:
+        """Sample model without the fixed parameters."""
+        return with_fixed(self.model, self.fixed)
+
+    def to_identify(self, *others: SampleModel) -> "Experiment":
+        """Leave out noise model, gripper uncertainty, and ranges neither it nor `others` use."""
+        chosen = {p.range_name for model in (self.model, *others) for p in model.parameters}
+        ranges = {name: genes for name, genes in self.ranges.items() if name in chosen}
+        return replace(self, ranges=ranges, coloured=False, uncertainty={})
+
+    def weighted(self, sd: Array | None) -> "Experiment":
+        """Divide the readings of a trace by their standard deviations, if these are known.
+
+        The noise becomes white, with their root mean square as its standard deviation.
+        """
+        if sd is None:
+            return self
+        return replace(self, sd=sd, noise_sd=float(np.sqrt(np.mean(sd**2))))
+
+    @property
+    def unknowns(self) -> int:
+        """Number of parameters that are fitted to a trace, those of the instrument included."""
+        return len(self.searched.names) + self.offset + self.drift + self.fit_start
+
+    @property
+    def uncertain(self) -> list[tuple[str, str, float]]:
+        """Parts, keys and standard uncertainties that change what a fit simulates."""
+        return [
+            (part, key, error)
+            for part, known in self.uncertainty.items()
+            for key, error in known.items()
+            if error and key != _NOT_FITTED
+        ]
+
+    @property
+    def plain(self) -> bool:
+        """True if noise is assumed to be white, and the gripper to be known exactly."""
+        return not (self.coloured or self.uncertain)
+
+    def calibrated(self, files: Sequence[Path]) -> "Experiment":
+        """Take the arms of the first calibration file (YAML), if there is one.
+
+        If it cannot be read, it is a `BiogripError`.
+        """
+        if not files:
+            return self
+        gripper, uncertainty = read_calibrated_arms(files[0], self.gripper)
+        return replace(self, gripper=gripper, uncertainty={**self.uncertainty, **uncertainty})
+
+    def of(
+        self,
+        time_s: Array,
+        readings: Array,
+        model: SampleModel | None = None,
+        noise_sd: float | None = None,
+        condensed: Condensed | None = None,
+    ) -> TraceProblem:
+        """Pose the problem of a trace, (n_samples,), times ascending.
+
+        `model`, `noise_sd`, and `condensed` from `in_noise` replace those of the case.
+        """
+        rows = condensed or self._condensed(time_s)
+        trace = Trace(time_s, readings, rows, noise_sd or self.noise_sd)
+        given = self.gripper, model or self.searched, self.torque, trace
+        return make_problem(Residuals(*given, instrument=self.instrument), self.ranges)
+
+    def of_each(
+        self, time_s: Array, traces: Sequence[Array], model: SampleModel | None = None
+    ) -> list[TraceProblem]:
+        """Pose the problems of several traces of the same times, which share their rows."""
+        rows = self._condensed(time_s)
+        return [self.of(time_s, readings, model, condensed=rows) for readings in traces]
+
+    def _condensed(self, time_s: Array) -> Condensed:
+        """Return rows for times, weighted if `sd` is known."""
+        return self.in_noise(time_s, None, np.zeros((0, len(time_s))))
+
+    def rows_key(self, time_s: Array) -> Hashable:
+        """Return what the rows of a trace depend on, whose times are (n_samples,)."""
+        sd = None if self.sd is None else self.sd.tobytes()
+        return self.phases, self.instrument, self.offset, self.drift, sd, time_s.tobytes()
+
+    def for_model(self, problem: TraceProblem, model: SampleModel) -> TraceProblem:
+        """Return one of its problems posed for another model; both share rows of the trace."""
+        return make_problem(problem.residuals.of_model(model), self.ranges)
+
+    def nuisance(self, time_s: Array) -> Array:
+        """Return the nuisance functions, offset and drift, (n_functions, n_samples)."""
+        return nuisance_basis(time_s, offset=self.offset, drift=self.drift)
+
+    def in_noise(
+        self,
+        time_s: Array,
+        noise_model: NoiseModel | None,
+        uncertain: Array,
+        *,
+        growing: Array | None = None,
+    ) -> Condensed:
+        """Condense the readings for autocorrelated noise or an uncertain gripper.
+
+        Noise without a model is white. Uncertain are functions added with a random amplitude, see
+        `with_uncertain`; noise may grow with a rotation, see `Whitening`: (n_functions, n_samples)
+        and (n_samples,).
+        """
+        nuisance, whitening = self.nuisance(time_s), None
+        if noise_model is None and self.sd is not None:
+            noise_model, growing = WEIGHTED, self.sd
+        if noise_model is not None:
+            whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
+        basis = with_uncertain(nuisance, uncertain)
+        return Condensed(self.torque, time_s, basis, whitening=whitening)
+
+    def logs(self, parameters: Mapping[str, float]) -> Array:
+        """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""
+        chosen = [(parameters[p.name], self.ranges[p.range_name]) for p in self.searched.parameters]
+        return np.log([max(value, genes.low) for value, genes in chosen])
+
+
+def pose(
+    experiments: Sequence[Experiment], traces: Sequence[tuple[Array, Array]]
+) -> list[TraceProblem]:
+    """Pose the problem of each of several traces.
+
+    A trace is its ascending times and readings, (n_samples,), and has an experiment. Traces whose
+    experiments and times are alike share rows: they are then fitted together, and rows take as long
+    as some fifty responses.
+    """
+    posed: list[TraceProblem] = []
+    rows: dict[Hashable, Condensed] = {}
+    for experiment, (time_s, readings) in zip(experiments, traces, strict=True):
+        key = experiment.rows_key(time_s)
+        posed.append(experiment.of(time_s, readings, condensed=rows.get(key)))
+        rows[key] = posed[-1].residuals.trace.condensed
+    return posed
