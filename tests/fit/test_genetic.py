@@ -17,7 +17,7 @@ from biogrip.physics.misfit import make_misfit
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.sample_model import with_fixed
 from tests.helpers.plain_genetic import identified
-from tests.helpers.problems import clean, experiment
+from tests.helpers.problems import clean, pose_noisy
 
 SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)
 READINGS = {
@@ -64,7 +64,7 @@ def test_the_best_are_selected_and_the_lowest_genes_of_equals(digits: int) -> No
 
 
 def posed(count: int, model: Any = MAXWELL, **assumed: Any) -> list[TraceProblem]:
-    return experiment(*clean("endothelial_cell"), count, model, **assumed)
+    return pose_noisy(*clean("endothelial_cell"), count, model, **assumed)
 
 
 def rng_of(seed: int) -> np.random.Generator:

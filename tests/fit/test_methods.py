@@ -32,8 +32,8 @@ from tests.helpers.problems import (
     SAMPLES,
     TORQUE,
     clean,
-    experiment,
     of_case,
+    pose_noisy,
     posed_for,
     problem,
     run,
@@ -188,7 +188,7 @@ def test_a_trace_without_noise_gives_every_model_back(name: str) -> None:
     response = superpose(
         step_response(GRIPPER, model.network([truth]), inertia=False), TORQUE, times
     )
-    (problem,) = experiment(times, response[0], 1, model, level=0.0)
+    (problem,) = pose_noisy(times, response[0], 1, model, level=0.0)
     near = np.log(truth) + 0.1 * np.random.default_rng(1).normal(size=(5, len(truth)))
     found = LocalFits([problem]).fitted(near, np.zeros(5, dtype=np.int64))
     assert np.min(found.misfit) < 1e-6 * np.abs(response).max()
@@ -201,8 +201,8 @@ def test_answers_do_not_depend_on_the_batch_byte_for_byte() -> None:
     """Fits share responses: of one model, at the same times; search ranges may differ."""
     times, response = clean("liquid_drop_2")
     linear = of_case("liquid_drop_2", 4)
-    (offset,) = experiment(times, response, 1, offset=True)
-    (sparse,) = experiment(times[::2], response[::2], 1)
+    (offset,) = pose_noisy(times, response, 1, offset=True)
+    (sparse,) = pose_noisy(times[::2], response[::2], 1)
     narrow = replace(linear[2], low=linear[2].low + 1)
     simple = posed_for(MODELS["liquid_drop"], times, response)
     problems = [linear[0], linear[1], sparse, offset, narrow, linear[3], simple]

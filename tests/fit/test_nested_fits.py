@@ -13,7 +13,7 @@ from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.physics.models import CANDIDATES, MODELS, contained
 from biogrip.physics.response import step_response, superpose
 from tests.helpers.default import seen, study_of
-from tests.helpers.problems import GRIPPER, SAMPLES, TORQUE, clean, experiment
+from tests.helpers.problems import GRIPPER, SAMPLES, TORQUE, clean, pose_noisy
 
 TRIED = (*MODELS, "generalized_maxwell_2")
 LADDERS = [name for name in TRIED if not CANDIDATES[name].model.power_law]
@@ -24,7 +24,7 @@ def fitted(
     response: Array, times: Array, tried: Sequence[str], traces: int, level: float
 ) -> tuple[dict[str, list[TraceProblem]], dict[str, list[Fit]]]:
     problems = {
-        name: experiment(times, response, traces, CANDIDATES[name].model, level) for name in tried
+        name: pose_noisy(times, response, traces, CANDIDATES[name].model, level) for name in tried
     }
     rngs = {name: [np.random.default_rng(n) for n in range(traces)] for name in tried}
     return problems, fit_models(problems, FEW, rngs, lambda: None)

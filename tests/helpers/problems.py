@@ -38,7 +38,7 @@ def posed_for(model: SampleModel, times: Array, trace: Array, **assumed: Any) ->
     return replace(EXPERIMENT, ranges=STUDY.ranges, **assumed).of(times, trace, model)
 
 
-def experiment(
+def pose_noisy(
     times: Array,
     response: Array,
     count: int,
@@ -49,20 +49,20 @@ def experiment(
     """Problems that share everything but the noise."""
     noise = Noise("gaussian", level, "peak")
     traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
-    return [posed_for(model, times, trace, **assumed) for trace in traces]
+    return replace(EXPERIMENT, ranges=STUDY.ranges, **assumed).of_each(times, traces, model)
 
 
 def of_case(case: str, count: int, level: float = 0.1) -> list[TraceProblem]:
-    return experiment(*clean(case), count, level=level)
+    return pose_noisy(*clean(case), count, level=level)
 
 
 def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> TraceProblem:
-    return experiment(*clean(case, rate_Hz), seed + 1, level=level)[seed]
+    return pose_noisy(*clean(case, rate_Hz), seed + 1, level=level)[seed]
 
 
-def run(method: str, experiment: TraceProblem, seed: int = 0) -> Fit:
+def run(method: str, posed: TraceProblem, seed: int = 0) -> Fit:
     identify = identifier(method, STUDY.config.method(method))
-    (answer,) = identify([experiment], [np.random.default_rng(seed)], silent)
+    (answer,) = identify([posed], [np.random.default_rng(seed)], silent)
     return answer
 
 

@@ -13,7 +13,7 @@ from biogrip.physics.models import MODELS
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import Grip
 from tests.helpers.default import seen
-from tests.helpers.problems import MODEL, clean, experiment, run
+from tests.helpers.problems import MODEL, clean, pose_noisy, run
 
 DAMPER = MODELS["damper"]
 
@@ -21,7 +21,7 @@ DAMPER = MODELS["damper"]
 @pytest.mark.parametrize("rise", [0.02, 0.2])
 def test_an_optimum_is_one_to_a_twentieth_of_chi_squared(rise: float) -> None:
     """Profiles find what is lower by more, and all is done again from there."""
-    (problem,) = experiment(*clean("liquid_drop_2"), 1, DAMPER)
+    (problem,) = pose_noisy(*clean("liquid_drop_2"), 1, DAMPER)
     best = run("least_squares", problem)
     likelihood = make_likelihood(problem, np.log(best.parameters), best.misfit, confidence=0.95)
     slopes = problem.residuals(likelihood.best)[1] / likelihood.noise_sd

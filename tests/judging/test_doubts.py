@@ -24,7 +24,7 @@ from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.noise import AR1, Noise, Outliers, add_noise
 from biogrip.physics.whitening import NoiseModel
 from tests.helpers.default import seen
-from tests.helpers.problems import MODEL, clean, experiment, likelihood_of, posed_for
+from tests.helpers.problems import MODEL, clean, likelihood_of, pose_noisy, posed_for
 
 
 def examined(parts: dict[str, Any], place: int | None = None) -> str:
@@ -78,7 +78,7 @@ def test_what_a_misfit_has_in_a_row_is_no_outlier(neighbours: int, named: bool) 
 def test_a_given_noise_is_held_against_what_parameters_leave(beyond: float, said: bool) -> None:
     """Of eleven readings and four parameters: chi-squared of seven, once in 333 traces more."""
     times, response = (values[::40] for values in clean("liquid_drop_2"))
-    (problem,) = experiment(times, response, 1)
+    (problem,) = pose_noisy(times, response, 1)
     fit = likelihood_of(problem)
     noise_sd = fit.misfit * np.sqrt(len(times) / (beyond * chi2.isf(0.003, 7)))
     held = make_likelihood(problem, fit.best, fit.misfit, confidence=0.95, noise_sd=noise_sd)

@@ -29,7 +29,7 @@ from tests.helpers.problems import (
     SAMPLES,
     TORQUE,
     clean,
-    experiment,
+    pose_noisy,
     posed_for,
     problem,
     run,
@@ -154,7 +154,7 @@ def test_a_bare_damper_is_known_from_one_side_by_a_spring_it_hides() -> None:
 @pytest.mark.parametrize(("times", "said"), [(0.5, True), (1.1, False), (1.5, False), (2.5, True)])
 def test_a_noise_that_leaves_more_than_it_is_is_doubted(times: float, said: bool) -> None:
     """But of a trace without noise nothing is left at all, whatever noise it is held against."""
-    (damper_problem,) = experiment(*clean("liquid_drop_2"), 1, DAMPER)
+    (damper_problem,) = pose_noisy(*clean("liquid_drop_2"), 1, DAMPER)
     found = run("least_squares", damper_problem)
     noise_sd = times * found.misfit
     exact = replace(found, misfit=1e-5 * noise_sd)

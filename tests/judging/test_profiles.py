@@ -22,8 +22,8 @@ from tests.helpers.problems import (
     MODEL,
     TORQUE,
     clean,
-    experiment,
     likelihood_of,
+    pose_noisy,
     posed_for,
     run,
 )
@@ -33,7 +33,7 @@ PARAMETERS = parameters_and_sum(MODEL)
 
 
 def likelihoods(case: str, count: int, **assumed: Any) -> list[Likelihood]:
-    return [likelihood_of(each) for each in experiment(*clean(case), count, **assumed)]
+    return [likelihood_of(each) for each in pose_noisy(*clean(case), count, **assumed)]
 
 
 def labelled(*labels: str) -> list[Quantity]:
@@ -141,7 +141,7 @@ def test_noise_and_threshold_are_those_of_a_regression(taken_out: dict[str, bool
     Of known noise it is the normal distribution.
     """
     times = np.arange(0.0, 400.0, 40.0)
-    (problem,) = experiment(times, 1e-6 * times, 1, MODELS["maxwell"], **taken_out)
+    (problem,) = pose_noisy(times, 1e-6 * times, 1, MODELS["maxwell"], **taken_out)
     left = len(times) - 2 - len(taken_out)
     found = make_likelihood(problem, np.zeros(2), 1e-6, confidence=0.95)
     assert found.noise_sd**2 == pytest.approx(len(times) * 1e-12 / left)
