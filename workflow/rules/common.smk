@@ -14,7 +14,7 @@ from biogrip.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases
 from biogrip.stages.job import settings, software
 from biogrip.study.load import load_given_study
 from biogrip.study.measurement_block import MeasurementBlock
-from biogrip.study.source import default_config, shipped
+from biogrip.study.source import default_config, shipped, snakefile
 
 
 def usable(read, *given):
