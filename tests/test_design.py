@@ -59,7 +59,7 @@ def test_a_design_is_better_keeps_its_limits_and_runs(
         assert label in said
     (case,) = study_of(output.read_text()).cases.values()
     assert max(phase.left.value_Nm for phase in case.phases) <= 1.6e-9 * (1 + 1e-12)
-    assert case.problem.torque.end_s == pytest.approx(400.0)
+    assert case.experiment.torque.end_s == pytest.approx(400.0)
     assert len(case.sampling.over(400.0)) == 4001
     # The same command gives the same bytes.
     before = output.read_bytes()
@@ -72,7 +72,7 @@ def test_the_search_knows_the_bounds_of_a_train() -> None:
     train, step = search(specimens, limits, 20)[0], 1e-4
     for one in specimens:
         found = rated(one, train.phases, Sampling(limits.rate_Hz))
-        problem = replace(one.case.problem, phases=train.phases)
+        problem = replace(one.case.experiment, phases=train.phases)
 
         def read(shift: Array, one: Specimen = one, problem: Experiment = problem) -> Array:
             values = dict(zip(problem.searched.names, one.parameters * np.exp(shift), strict=True))
@@ -95,7 +95,7 @@ def test_the_search_knows_the_force_of_the_jaws() -> None:
     pressed = []
     for unknowns in np.random.default_rng(0).random((30, 2 * limits.steps)):
         train = decode(unknowns, limits)
-        torque = replace(one.case.problem, phases=train.phases).torque
+        torque = replace(one.case.experiment, phases=train.phases).torque
         network = one.case.searched.network(one.parameters[None])
         grip = compute_grip(one.case.gripper, network, torque, nonlinear=False)
         pressed.append(grip.lowest_N > 0)

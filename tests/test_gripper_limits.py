@@ -35,7 +35,7 @@ def simulated(parameters: dict[str, float], torque: float = 1.0, length: float =
 def test_a_torque_is_uncertain_by_percent() -> None:
     study = study_of("gripper: {uncertainty: {torque_percent: 3.0, left: {inertia_kgm2: 1e-15}}}")
     expected = {"left": {"inertia_kgm2": 1e-15}, "torque": {"share": 0.03}}
-    assert study.case("liquid_drop_1").problem.uncertainty == expected
+    assert study.case("liquid_drop_1").experiment.uncertainty == expected
 
 
 @pytest.mark.nightly

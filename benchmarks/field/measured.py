@@ -52,7 +52,7 @@ def _recorded(name: str) -> tuple[Case, Measurements]:
     files = [ROOT / file for file in CONFIGS]
     case = load_study(read_configs(files), files).cases[name]
     file = ROOT / f"data/measured/{name}.csv"
-    return case, read_checked(file, case.problem, case.columns)
+    return case, read_checked(file, case.experiment, case.columns)
 
 
 @dataclass(frozen=True)

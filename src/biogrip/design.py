@@ -181,7 +181,7 @@ def set_up(cases: Sequence[Case], block: DesignBlock) -> tuple[Limits, list[Spec
     if block.largest is not None:
         largest = float(np.copysign(block.largest, largest))
     rate_Hz = min(case.block.measurement.rate_Hz for case in cases)
-    duration_s = block.duration_s or min(case.problem.torque.end_s for case in cases)
+    duration_s = block.duration_s or min(case.experiment.torque.end_s for case in cases)
     intervals = int(duration_s * rate_Hz * (1 + 1e-12))
     if intervals < _FEWEST:
         text = f"found room for {intervals} readings at {rate_Hz:g} Hz, allowed are at least "
@@ -212,7 +212,7 @@ def _problem(case: Case, first: Case) -> str | None:
 
 
 def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
-    problem, model, network = case.problem, case.searched, case.sample.model.sample(case.parameters)
+    problem, model, network = case.experiment, case.searched, case.sample.model.sample(case.parameters)
     required = np.array([name in (block.parameters or model.names) for name in model.names])
     # The noise of an instrument: that of its own sample under its own protocol.
     times_s = case.sampling.over(problem.torque.end_s)
@@ -289,7 +289,7 @@ def rated(specimen: Specimen, phases: tuple[Phase, ...], sampling: Sampling) -> 
 
     If it turns the arms further than the comb drives can, it is a `BiogripError`.
     """
-    case, problem = specimen.case, replace(specimen.case.problem, phases=phases)
+    case, problem = specimen.case, replace(specimen.case.experiment, phases=phases)
     times_s, model = sampling.over(problem.torque.end_s), problem.searched
     given = problem.gripper, model, problem.torque, times_s, specimen.parameters[None]
     read, *slopes = linear_responses(*given)[0]

@@ -22,7 +22,7 @@ from tests.helpers.default import STUDY
 
 MODEL = MODELS["generalized_maxwell"]
 SAMPLES = {name: case.parameters for name, case in STUDY.cases.items()}
-EXPERIMENT = STUDY.cases["liquid_drop_2"].problem
+EXPERIMENT = STUDY.cases["liquid_drop_2"].experiment
 GRIPPER, TORQUE = EXPERIMENT.gripper, EXPERIMENT.torque
 
 
@@ -49,7 +49,7 @@ def experiment(
     """Problems that share everything but the noise."""
     noise = Noise("gaussian", level, "peak")
     traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
-    return [posed_for(model, times, trace, **assumed) for trace in traces]
+    return replace(EXPERIMENT, ranges=STUDY.ranges, **assumed).of_each(times, traces, model)
 
 
 def of_case(case: str, count: int, level: float = 0.1) -> list[TraceProblem]:

@@ -121,6 +121,8 @@ use rule judgement as recorded_judgement with:
         verdicts="results/identifiability/{case}.json",
     wildcard_constraints:
         case=names(STUDY.recorded),
+    params:
+        **settings_of("study_seed", "model_selection", *JUDGED),
 
 
 rule intervals:

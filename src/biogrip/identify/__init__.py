@@ -1,1 +1,1 @@
-"""Identification of recorded traces from CSV files to verdicts, without Snakemake."""
+"""Identification of a recorded trace: what was read and what was done go in, a diagnosis comes out."""

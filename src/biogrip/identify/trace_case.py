@@ -111,26 +111,26 @@ def read_trace(asked: Asked) -> TraceCase:
     case, given = case_of(asked), asked.given
     columns = replace(case.columns, by_options=True)
     declared = case.block.measurement
-    problem = replace(case.problem, offset=bool(declared.offset), drift=bool(declared.drift))
+    problem = replace(case.experiment, offset=bool(declared.offset), drift=bool(declared.drift))
     trace = recording.read_checked(asked.trace, problem, columns)
-    if case.problem.coloured:
+    if case.experiment.coloured:
         case = _without_likenesses(case, trace.time_s)
     read = _with_ranges(case, trace, given)
-    return replace(read, recorded=recording.with_fitted_onset(trace, read.case.problem))
+    return replace(read, recorded=recording.with_fitted_onset(trace, read.case.experiment))
 
 
 def _with_ranges(case: Case, trace: Measurements, given: Mapping[str, Any]) -> TraceCase:
-    ranges = ranges_of(case.problem.weighted(trace.sd), trace.time_s, trace.readings[0])
+    ranges = ranges_of(case.experiment.weighted(trace.sd), trace.time_s, trace.readings[0])
     for name in given.get("search_range") or {}:
         ranges.pop(name, None)
     block = replace(case.block, search_range=replace(case.block.search_range, **ranges))
     case = replace(case, block=block)
-    return TraceCase(case, trace, case.problem.weighted(trace.sd), given)
+    return TraceCase(case, trace, case.experiment.weighted(trace.sd), given)
 
 
 def _without_likenesses(case: Case, time_s: Array) -> Case:
     """Return a case without a default offset or drift that looks like what its sample does."""
-    measured, problem = case.block.measurement, case.problem
+    measured, problem = case.block.measurement, case.experiment
     network = problem.searched.network([problem.searched.example])
     own = network.k_p[0] > 0 if problem.instrument.deforms else network.c_p[0] == 0
     if measured.offset is None and own and is_held(problem.torque, time_s):

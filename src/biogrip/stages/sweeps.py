@@ -75,7 +75,7 @@ def _rows(
     bounds = {}
     for point in points:
         case = study.points[point.name]
-        problem = case.problem.calibrated(calibrations.get(point.name, []))
+        problem = case.experiment.calibrated(calibrations.get(point.name, []))
         time_s = case.sampling.over(problem.torque.end_s)
         bounds[point.name] = bounds_percent(problem, case.noise, true, time_s)
     heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
@@ -134,7 +134,7 @@ def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
 
 def _resolution(point: Case, true: Mapping[str, float]) -> float:
     """Return the noise-free RMS misfit of the encodable parameters nearest to the truth."""
-    problem = point.problem
+    problem = point.experiment
     time_s = point.sampling.over(problem.torque.end_s)
     truth = [true[p.name] for p in problem.model.parameters]
     rounded = [
@@ -164,7 +164,7 @@ def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, 
     time_s, _, rotation = read_target(target)
     progress = Progress(f"{case.name}, interpretations", len(case.interpretations) * case.seeds)
     for name, interpretation in case.interpretations.items():
-        experiment = interpretation.problem
+        experiment = interpretation.experiment
         for seeds in groups(range(case.seeds)):
             noises, searches = (
                 [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]

@@ -159,6 +159,12 @@ class MeasurementBlock(Block):
         return [name for name in READINGS if getattr(self, name) is not None]
 
     @property
+    def undeclared(self) -> frozenset[str]:
+        """Which of offset and drift nothing is said of."""
+        said = {"offset": self.offset, "drift": self.drift}
+        return frozenset(name for name, declared in said.items() if declared is None)
+
+    @property
     def fits_offset(self) -> bool:
         """True if a constant offset is fitted along."""
         return self.coloured if self.offset is None else self.offset

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genetic import GeneticSettings
-from biogrip.fit.genome import GeneRange
+from biogrip.fit.genome import GeneRange, SearchRange
 from biogrip.fit.methods import METHODS, Method
 from biogrip.keys import built, plain
 from biogrip.physics.contact import Contact
@@ -19,7 +19,7 @@ from biogrip.physics.protocol import Phase, torque_history
 from biogrip.physics.sample_model import with_fixed
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
-from biogrip.study.source import overlaid
+from biogrip.study.source import default_config, overlaid, read_config
 from biogrip.study.sweeps import point_blocks
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class Case:
     """Number of traces; 1 for a recorded trace."""
     fixed = _of_case(lambda case: {name: float(it) for name, it in case.block.fixed.items()})
     """Parameters that are not identified, by name."""
-    searched = _of_case(lambda case: case.problem.searched)
+    searched = _of_case(lambda case: case.experiment.searched)
     """Sample model without fixed parameters."""
     torque = _of_case(lambda it: torque_history(it.phases, deforms=it.instrument.deforms))
     """What the instrument holds over time."""
@@ -126,8 +126,8 @@ class Case:
         return math.radians(self.actuator.stroke_deg) - closing
 
     @cached_property
-    def problem(self) -> Experiment:
-        """Assumptions of the identification; a calibration replaces the gripper's arms."""
+    def experiment(self) -> Experiment:
+        """What was done, for any identification; a calibration replaces the gripper's arms."""
         assumed, measurement = self.block.assumed_gripper, self.block.measurement
         gripper = self.gripper
         if isinstance(assumed, Mapping):
@@ -147,6 +147,34 @@ class Case:
             coloured=measurement.coloured,
             uncertainty=uncertainty.by_part if uncertainty else {},
             fit_start=measurement.fit_start,
+            undeclared=measurement.undeclared,
+            given_ranges=self.given_ranges,
+            start_given=not self.may_start_late,
+            simulated=not self.recorded,
+            name=self.name,
+        )
+
+    @property
+    def given_ranges(self) -> frozenset[str]:
+        """Names of search ranges that are not the default study's: those that the user gave."""
+        default = built(SearchRange, read_config(default_config())["search_range"])
+        return frozenset(
+            name for name, genes in self.ranges.items() if genes != getattr(default, name)
+        )
+
+    @property
+    def judged_experiment(self) -> Experiment:
+        """What was done, and how a trace is judged."""
+        models: tuple[str, ...] = ()
+        if self.recorded:
+            models = self.study.config.model_selection.models
+        return replace(
+            self.experiment,
+            models=models,
+            cheap_models=[*models] == read_config(default_config())["model_selection"]["models"],
+            least_squares=self.least_squares,
+            confidence=self.confidence,
+            study_seed=self.study.study_seed,
         )
 
     @property
