@@ -130,7 +130,10 @@ def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read() -> N
         ({"config": {"protocl": {}}}, "protocl"),
         ({"time_s": FRAME}, r"time_s: found the shape \(325, 2\), allowed is one column"),
         ({"time_s": ["a"]}, "time_s: could not convert .*; allowed are numbers"),
-        ({"time_s": FRAME["t"][::-1]}, "trace.csv, line 3, .* allowed are times that increase"),
+        (
+            {"time_s": FRAME["t"][::-1]},
+            r"time_s\[1\]: .* \(\[0\]\), allowed are times that increase",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_said_by_the_name_of_the_argument(

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array, as_column
+from biogrip.command.notebook import TraceResult, identify_trace, one_blas_thread
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.problem import Fit, silent
-from biogrip.identify.notebook import TraceResult, identify_trace, one_blas_thread
 from biogrip.judging.diagnosis import Diagnosis, diagnose, with_times
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument

@@ -49,7 +49,7 @@ def judged_fit(
     case: Case, verdicts: Mapping[str, Any], measurements: Path, calibrated: list[Path]
 ) -> Fit:
     """Return the judged trace of a case and its best fit."""
-    problem = case.problem.calibrated(calibrated)
+    problem = case.experiment.calibrated(calibrated)
     found = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
     values = {name: found[name] for name in problem.searched.names}
     recorded = read_measurements(measurements, [TRACE])

@@ -55,7 +55,7 @@ def fits_of_basins(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> dict[str, Fit]:
     """Return the fit of the first run of each basin, by label, from files of a case."""
-    problem = case.problem.calibrated(calibrated)
+    problem = case.experiment.calibrated(calibrated)
     found = read_identifications(identifications, case.study.shown)
     fits = {}
     for words, run in first_of_basins(found, case.study.near_noise_tolerance).items():

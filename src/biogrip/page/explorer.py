@@ -43,7 +43,7 @@ def fits_of(
     calibrated: Sequence[Path],
 ) -> Fits:
     """Return the judged trace of a case with the fit of each method, from files of the case."""
-    problem = case.problem.calibrated(calibrated)
+    problem = case.experiment.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
     fits = []
     for method in methods:

@@ -48,7 +48,7 @@ def estimate(
 
     The noise of a seed is that of its measurement.
     """
-    experiment = case.problem.calibrated(calibrated)
+    experiment = case.experiment.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     found = read_verdicts(expected)["quantities"]
     determined = {item["quantity"] for item in found if item["verdict"] == DETERMINED}

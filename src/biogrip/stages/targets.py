@@ -1,10 +1,10 @@
 """What is simulated of a case: its response, noisy traces of it, and a test without sample.
 
 A target is the response without noise: what the instrument reads and, of the gripper, the force of
-the jaws. A measurement adds noise to it, a trace a seed. A calibration identifies the gripper's
-arms by a test without sample. The difference of the linear from the
-nonlinear model is computed on a grid of angles and torques: at every point the largest over the
-protocol is compared with the peak rotation.
+the jaws. A measurement adds noise to it, a trace a seed; of a recorded trace it is what was read of
+the user's file. A calibration identifies the gripper's arms by a test without sample. The
+difference of the linear from the nonlinear model is computed on a grid of angles and torques: at
+every point the largest over the protocol is compared with the peak rotation.
 """
 
 from collections.abc import Iterable, Iterator
@@ -16,6 +16,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
+from biogrip.identify.prepare import prepare
 from biogrip.physics.calibration import FreeMotion, calibrate, calibration_yaml, free_motion
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import Noise, add_noise, stream
@@ -29,12 +30,15 @@ from biogrip.records.identifications import DIFFERENCES
 from biogrip.records.rows import write_arrays
 from biogrip.records.traces import (
     Measurements,
+    of_recording,
     read_target,
     write_measurements,
     write_target,
 )
 from biogrip.study.study import Case, Study
 from biogrip.terminal import warn
+from biogrip.traces.columns import place
+from biogrip.traces.reader import read_recording
 
 
 def simulate(case: Case, target: Path) -> None:
@@ -167,3 +171,13 @@ def _times(torque: Course) -> Array:
     return np.concatenate(
         [start + np.geomspace(min(0.1, lasts / 2), lasts, 60) for start, lasts in lasting]
     )
+
+
+def record(case: Case, recorded: Path, measurements: Path) -> None:
+    """Read, check and convert the user's file; errors name file, line and column."""
+    if case.columns.load is not None:
+        raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
+    trace, _ = prepare(read_recording(recorded, case.columns), case.experiment)
+    for remark in trace.remarks():
+        warn(f"{place(recorded)}: {remark}")
+    write_measurements(measurements, of_recording(trace))
