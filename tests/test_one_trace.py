@@ -411,8 +411,8 @@ def test_a_rejected_fit_names_a_better_model_though_it_is_simpler() -> None:
     assert found["fit"] == "rejected"
     assert '(model="springpot") is preferred' in found["advice"]
     lines = side_by_side([found, found | {"fit": "ok"}], {}).splitlines()
-    assert [line for line in lines if "springpot" in line] == [f"trace.csv: {found['advice']}"]
-    assert f"trace.csv: rejected: {found['reasons'][0]}" in lines
+    assert [line for line in lines if "springpot" in line] == [f"trace: {found['advice']}"]
+    assert f"trace: rejected: {found['reasons'][0]}" in lines
 
 
 def test_colours_are_not_for_all_terminals(

@@ -11,7 +11,6 @@ from biogrip.arrays import Array
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.problem import TraceProblem, make_problem
-from biogrip.physics.calibration import read_calibrated_arms
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
@@ -155,6 +154,9 @@ class Experiment:
         """
         if not files:
             return self
+        # Imported here: a recorded trace has no such file.
+        from biogrip.physics.calibration import read_calibrated_arms
+
         gripper, uncertainty = read_calibrated_arms(files[0], self.gripper)
         return replace(self, gripper=gripper, uncertainty={**self.uncertainty, **uncertainty})
 

@@ -35,7 +35,6 @@ from biogrip.judging.doubts import (
 )
 from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
-from biogrip.judging.valley import compute_valley
 from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
@@ -192,6 +191,9 @@ def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade
 
 def _with_valley(judged: Diagnosis, model: SampleModel) -> Diagnosis:
     """Return a diagnosis with its valley, whose lowest point counts if no profile is lower."""
+    # Imported here: only a study has valleys.
+    from biogrip.judging.valley import compute_valley
+
     valley, missed = compute_valley(judged.likelihood, model)
     return replace(judged, valley=valley, lowest=missed if judged.lowest is None else judged.lowest)
 

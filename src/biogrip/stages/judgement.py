@@ -5,6 +5,7 @@ that neither start, offset, drift nor model are doubted.
 """
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ TRACE = 0
 
 
 def experiment_for(
-    experiment: Experiment, measurements: Measurements, calibrated: list[Path]
+    experiment: Experiment, measurements: Measurements, calibrated: Sequence[Path]
 ) -> Experiment:
     """Return the experiment that traces of a case are identified by: see `for_trace`."""
     experiment = experiment.calibrated(calibrated)
