@@ -162,17 +162,17 @@ def fit_traces(
 def fit_least_squares(
     experiments: Sequence[Experiment],
     traces: Sequence[tuple[Array, Array]],
+    rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
-    seed: int = 0,
 ) -> list[TraceFit]:
-    """Fit traces by least squares from many starts, each with the random numbers of a seed.
+    """Fit traces by least squares from many starts, each with random numbers of its own.
 
     See `fit_traces`; all experiments have the same budget.
     """
 
     def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
-        rngs = [experiments[trace].stream("identifiability", seed) for trace in which]
-        found = identify_many(problems, experiments[0].least_squares, rngs, progress)
+        of_traces = [rngs[trace] for trace in which]
+        found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
         pairs = zip(problems, found, strict=True)
         return [fit.in_order(problem.residuals.model) for problem, fit in pairs]
 

@@ -66,15 +66,11 @@ def budget(experiment: Experiment) -> Hashable:
     return experiment.searched, experiment.least_squares, experiment.confidence
 
 
-def _say_nothing(step: str) -> None:
-    """Ignore what is being done."""
-
-
 def identify_alike(
     traces: Sequence[Trace],
     *,
     progress: Progress = silent,
-    doing: Callable[[str], None] = _say_nothing,
+    doing: Callable[[str], None] = lambda step: None,
     valley: bool = False,
 ) -> list[Diagnosis]:
     """Identify prepared traces of the same `budget`, each as if it were alone.

@@ -75,7 +75,8 @@ def readings_of(recording: Recording) -> tuple[Array, Array]:
 def fits_of(traces: Sequence[Trace], progress: Progress) -> list[TraceFit]:
     """Return the fits that judgements of traces with the same model and budget are based on."""
     experiments = [experiment for _, experiment in traces]
-    return fit_least_squares(experiments, [readings_of(own) for own, _ in traces], progress)
+    rngs = [experiment.stream("identifiability") for experiment in experiments]
+    return fit_least_squares(experiments, [readings_of(own) for own, _ in traces], rngs, progress)
 
 
 def _diagnosed(experiment: Experiment, fit: TraceFit, found: Fit, *, valley: bool) -> Diagnosis:
