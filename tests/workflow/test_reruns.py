@@ -27,8 +27,13 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     "noise": (
         {"measurement": {"noise": {"level": 0.2}}},
         {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
-        | {"recorded_judgement": 1, "model_errors": 1}
-        | RECORDED
+        | {"model_errors": 1, "case_tables": 1, "case_figures": 1}
+        | STUDY,
+    ),
+    "models to compare": (
+        {"model_selection": {"models": ["maxwell"]}},
+        {"model_fits": 2, "recorded_judgement": 1, "model_errors": 1, "case_tables": 1}
+        | {"recorded_case_figures": 1}
         | STUDY,
     ),
     "a case, and the title of another": (
