@@ -96,7 +96,9 @@ ANSWERED = [name for name in STUDY.gripped if STUDY.case(name).has_valley][-1:]
 calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 
 # Tables and figures of the study, of what there is in it, and those of a case.
-TABLES = ["errors", "gene_ranges", "parameter_ranges"]
+TABLES = ["errors"]
+# The search ranges of recorded traces follow from them.
+TABLES += ["gene_ranges", "parameter_ranges"] if STUDY.simulated else []
 TABLES += ["gripper", "actuator", "contact", "left_out"] if STUDY.has_gripper else []
 TABLES += ["linearisation", "mechanics"] if STUDY.gripped else []
 TABLES += ["methods"] if STUDY.simulated else []

@@ -25,7 +25,6 @@ from biogrip.identify.other_fits import (
     models_tried,
     note_flow,
     note_saturated,
-    readings_of,
     second_opinions,
 )
 from biogrip.identify.prepare import prepare
@@ -137,7 +136,8 @@ def _notes_on_traces(
         said = [Note(HARMLESS, text) for text in recording.remarks()]
         said += [Note(HARMLESS, _NOT_COMPARED)] if experiment.fixed else []
         said += on_fits[index]
-        start = notes_on_start(experiment, *readings_of(recording), judged[index])
+        given = recording.time_s, recording.readings, judged[index]
+        start = notes_on_start(experiment, *given)
         said += start
         # Beside another start, an offset and a drift mean nothing.
         if all(note.weight == HARMLESS for note in start):

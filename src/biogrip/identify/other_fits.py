@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.fitted_onset import OnsetFits
@@ -67,16 +66,12 @@ Trace = tuple[Recording, Experiment]
 """A recording and the experiment that it is of, as `prepare` returns them."""
 
 
-def readings_of(recording: Recording) -> tuple[Array, Array]:
-    """Return times and readings, (n_samples,) each."""
-    return recording.time_s, recording.readings
-
-
 def fits_of(traces: Sequence[Trace], progress: Progress) -> list[TraceFit]:
     """Return the fits that judgements of traces with the same model and budget are based on."""
     experiments = [experiment for _, experiment in traces]
     rngs = [experiment.stream("identifiability") for experiment in experiments]
-    return fit_least_squares(experiments, [readings_of(own) for own, _ in traces], rngs, progress)
+    posed = [(recording.time_s, recording.readings) for recording, _ in traces]
+    return fit_least_squares(experiments, posed, rngs, progress)
 
 
 def _diagnosed(experiment: Experiment, fit: TraceFit, found: Fit, *, valley: bool) -> Diagnosis:
@@ -158,7 +153,7 @@ def _at_own_onset(
     if name == experiment.sample.candidate:
         return found
     other = replace(experiment, sample=CANDIDATES[name], fixed={})
-    fits = OnsetFits(other, *readings_of(recording))
+    fits = OnsetFits(other, recording.time_s, recording.readings)
     best = fits.near(fits.at(0.0, within_range(found.parameters, problem)))
     if best.misfit >= found.misfit:
         return found
@@ -344,8 +339,7 @@ def note_saturated(recording: Recording, experiment: Experiment) -> list[Note]:
 
     Readings that are only rounded have neighbouring values nearly as often.
     """
-    time_s, readings = readings_of(recording)
-    values, counts = np.unique(readings[time_s > 0], return_counts=True)
+    values, counts = np.unique(recording.readings[recording.time_s > 0], return_counts=True)
     unit, notes = f" {experiment.instrument.read.unit}".rstrip(), []
     for end, at, near in (("largest", -1, slice(-_VALUES, -1)), ("smallest", 0, slice(1, _VALUES))):
         if len(values) < _VALUES or counts[at] <= _SATURATED * np.sum(counts):
