@@ -27,14 +27,14 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     "noise": (
         {"measurement": {"noise": {"level": 0.2}}},
         {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
-        | {"model_errors": 1, "case_tables": 1, "case_figures": 1}
+        | {"recorded_judgement": 1, "model_errors": 1}
+        | RECORDED
         | STUDY,
     ),
     "models to compare": (
         {"model_selection": {"models": ["maxwell"]}},
-        {"model_fits": 2, "recorded_judgement": 1, "model_errors": 1, "case_tables": 1}
-        | {"recorded_case_figures": 1}
-        | STUDY,
+        {"model_fits": 2, "recorded_judgement": 1, "case_tables": 1, "recorded_case_figures": 1}
+        | {"tables": 1, "claims": 1, "page": 1},
     ),
     "a case, and the title of another": (
         {"cases": {"new": CELL, "liquid_drop_2": {"title": "A drop"}}},
@@ -57,7 +57,7 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         {"cases": {"mine": {"measurement": {"until_s": 300.0}}}},
         {"recording": 1, "identification": 2, "model_fits": 1, "recorded_judgement": 1}
         | {"case_tables": 1, "recorded_case_figures": 1}
-        | STUDY,
+        | {"tables": 1, "claims": 1, "page": 1},
     ),
     # Whose points have no figures of their own.
     "budget of a method, and a sweep": (

@@ -123,10 +123,7 @@ use rule judgement as recorded_judgement with:
     wildcard_constraints:
         case=names(STUDY.recorded),
     params:
-        **settings_of(
-            *("study_seed", "actuator", *FIT, "measurement.start_s", "model_selection"),
-            *("identifiability.confidence", "least_squares"),
-        ),
+        **settings_of("measurement.start_s", "model_selection"),
 
 
 rule intervals:
