@@ -55,7 +55,7 @@ rule rulegraph:
         "results/logs/rulegraph.log",
     localrule: True
     params:
-        snakefile=str(shipped("Snakefile")),
+        snakefile=str(snakefile()),
         target="results/report.html",
     message:
         "Drawing the graph of the rules"

@@ -14,7 +14,7 @@ from biogrip.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases
 from biogrip.stages.job import settings, software
 from biogrip.study.load import load_given_study
 from biogrip.study.measurement_block import MeasurementBlock
-from biogrip.study.source import default_config, shipped
+from biogrip.study.source import default_config, shipped, snakefile
 
 
 def usable(read, *given):
@@ -97,21 +97,20 @@ calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 
 # Tables and figures of the study, of what there is in it, and those of a case.
 TABLES = ["errors"]
-# The search ranges of recorded traces follow from them.
-TABLES += ["gene_ranges", "parameter_ranges"] if STUDY.simulated else []
-TABLES += ["gripper", "actuator", "contact", "left_out"] if STUDY.has_gripper else []
-TABLES += ["linearisation", "mechanics"] if STUDY.gripped else []
 TABLES += ["methods"] if STUDY.simulated else []
 TABLES += ["coverage"] if STUDY.covered else []
 TABLES += ["models"] if SELECTING else []
 TABLES += ["verdict_counts"] if STUDY.counted else []
+# The search ranges of recorded traces follow from them.
+INPUTS = ["gene_ranges", "parameter_ranges"] if STUDY.simulated else []
+INPUTS += ["gripper", "actuator"] if STUDY.has_gripper else []
 EVIDENCE = ["evidence", "printed_values", "sampling_evidence"]
-OTHER_TABLES = ["contact_loss"] if STUDY.gripped else []
+OTHER_TABLES = [*INPUTS, *(["contact", "left_out"] if STUDY.has_gripper else [])]
+OTHER_TABLES += ["linearisation", "mechanics", "contact_loss"] if STUDY.gripped else []
 OTHER_TABLES += ["claims", *EVIDENCE] if STUDY.published else []
 OTHER_TABLES += ["interpretations", "interpretations_jointly"] * bool(STUDY.config.interpretations)
 GRIPPER_FIGURES = ["comb", "linkage", "torque"] if STUDY.has_gripper else []
-FIGURES = ["linearisation"] if STUDY.gripped else []
-FIGURES += ["answer"] if ANSWERED else []
+FIGURES = ["answer"] if ANSWERED else []
 FIGURES += ["moduli", "overview"] if STUDY.simulated else []
 
 
@@ -131,6 +130,7 @@ SHOWN = {
     ],
     "figures": [
         *((name, "") for name in [*GRIPPER_FIGURES, *FIGURES]),
+        *(("linearisation", "") for _ in STUDY.gripped[:1]),
         *(
             (name, case)
             for case, its in STUDY.cases.items()

@@ -1,8 +1,8 @@
 """Results of stages: what was identified, a row a seed, and verdicts on a trace, JSON.
 
 Identifications by each method have a row per seed, with histories beside them. Further files of
-rows have the fits of every sample model, the intervals of coverage tests, the difference of the
-linear from the nonlinear model, and identifications under other interpretations of the paper.
+rows have the fits of every sample model, the intervals of coverage tests, and identifications under
+other interpretations of the paper.
 """
 
 from collections.abc import Mapping, Sequence
@@ -55,11 +55,6 @@ INTERVALS = RowFile(
 """A row per quantity and seed. Quantities that traces should determine have an estimate, its
 limits, and the estimate with uninformed parameters fixed at their true values. For some seeds, all
 quantities also have the verdict and limits that users are shown, from whole profiles."""
-
-DIFFERENCES = RowFile(
-    "a comparison",
-    ("case", "reference_angle_deg", "torque_factor", "difference_over_peak"),
-)
 
 INTERPRETATIONS = RowFile(
     "interpretations",
