@@ -31,6 +31,11 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         | RECORDED
         | STUDY,
     ),
+    "models to compare": (
+        {"model_selection": {"models": ["maxwell"]}},
+        {"model_fits": 2, "recorded_judgement": 1, "case_tables": 1, "recorded_case_figures": 1}
+        | {"tables": 1, "claims": 1, "page": 1},
+    ),
     "a case, and the title of another": (
         {"cases": {"new": CELL, "liquid_drop_2": {"title": "A drop"}}},
         {"target": 1, "measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1}
