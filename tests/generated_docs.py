@@ -19,7 +19,7 @@ from scipy.stats import chi2
 from biogrip.cli import main
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
-from biogrip.fit.methods import identifier, share_in_words
+from biogrip.fit.methods import identifier
 from biogrip.fit.problem import silent
 from biogrip.page.answers import (
     compared_rows,
@@ -31,6 +31,7 @@ from biogrip.page.answers import (
 from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.rows import read_table
+from biogrip.records.success import share_in_words
 from biogrip.terminal import QUIET
 from tests.helpers.default import study_of
 from tests.helpers.key_reference import file_schema, reference

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import spearmanr
 
 from biogrip.arrays import Array
 from biogrip.fit.noise_model_fit import (
@@ -10,6 +11,7 @@ from biogrip.fit.noise_model_fit import (
     _noise_model,
     compute_growth,
     outliers_of,
+    significance_of_growth,
 )
 from biogrip.physics.noise import AR1, Noise, add_noise
 from biogrip.physics.whitening import NoiseModel
@@ -109,6 +111,17 @@ def test_noise_that_is_the_same_everywhere_seldom_grows() -> None:
         bool(np.ptp(compute_growth(rng.standard_normal(400), ROTATION))) for _ in range(500)
     )
     assert grown <= 1.5 + 4 * np.sqrt(1.5)
+
+
+@pytest.mark.parametrize("decimals", [0, 1, 8])
+def test_significance_is_scipys(decimals: int) -> None:
+    """With ties, rising and falling."""
+    rng = np.random.default_rng(2)
+    for count in (4, 30, 300):
+        size = np.round(rng.standard_normal(count), decimals)
+        for apart in (rng.random(count), rng.random(count) + 0.3 * size, -size):
+            theirs = spearmanr(size, apart, alternative="greater").pvalue
+            assert significance_of_growth(apart, size) == pytest.approx(theirs, abs=1e-12)
 
 
 @pytest.mark.parametrize("floor", [0.0, 0.1])

@@ -23,10 +23,10 @@ from biogrip.figures.style import (
     line_of,
     panel,
 )
-from biogrip.fit.methods import near_noise
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
 from biogrip.records.identifications import read_identifications
+from biogrip.records.success import near_noise
 from biogrip.records.traces import read_target
 from biogrip.study.study import Case, Study
 

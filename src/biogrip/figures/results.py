@@ -10,11 +10,11 @@ import pandas as pd
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.methods import ALL, basins
 from biogrip.physics.instruments import ROTATION, Channel
 from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import within
 from biogrip.records.identifications import read_histories, read_identifications
+from biogrip.records.success import ALL, basins
 from biogrip.records.traces import Measurements, read_measurements
 from biogrip.stages.job import seeds_of
 from biogrip.stages.judgement import experiment_for

@@ -32,6 +32,7 @@ References
 """
 
 import numpy as np
+from scipy.special import betainc
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.physics.whitening import ROOT_12, NoiseModel, Whitening
@@ -88,7 +89,8 @@ def compute_growth(residual: Array, readings: Array, rounding: float = 0.0) -> A
 
     apart = np.maximum(measure_distances(residual), 1.5 * rounding)
     size = np.abs(readings)
-    if not _grows(apart, size):
+    constant = np.ptp(apart) == 0 or np.ptp(size) == 0
+    if constant or significance_of_growth(apart, size) >= _FALSE_ALARM:
         return np.ones(len(residual))
     found = minimize_scalar(
         lambda odds: _deviance(apart, _growth(odds, size)), bounds=(_GROWTH_LEAST, _GROWTH_MOST)
@@ -102,12 +104,22 @@ def compare_extremes(growth: Array) -> float:
     return float(high / low)
 
 
-def _grows(apart: Array, size: Array) -> bool:
-    from scipy.stats import spearmanr
+def significance_of_growth(apart: Array, size: Array) -> float:
+    """Return how likely distances rank so well with sizes by chance: Spearman's test, one-sided.
 
-    if np.ptp(apart) == 0 or np.ptp(size) == 0:
-        return False
-    return bool(spearmanr(size, apart, alternative="greater").pvalue < _FALSE_ALARM)
+    As `scipy.stats.spearmanr`, but to import that takes a tenth of the time of a first trace.
+    """
+    correlation = np.corrcoef(_ranks(apart), _ranks(size))[0, 1]
+    # Student's t of the correlation, as an incomplete beta function.
+    tail = betainc(len(size) / 2 - 1, 0.5, max(0.0, 1 - correlation**2)) / 2
+    return float(tail if correlation > 0 else 1 - tail)
+
+
+def _ranks(values: Array) -> Array:
+    """Return ranks, equal values with the mean of theirs."""
+    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+    ranks: Array = (np.cumsum(count) - (count - 1) / 2)[place]
+    return ranks
 
 
 def _growth(log_odds: float, size: Array) -> Array:

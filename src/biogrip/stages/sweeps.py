@@ -16,7 +16,6 @@ import pandas as pd
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.genetic import identify_many
 from biogrip.fit.genome import nearest_encodable
-from biogrip.fit.methods import near_noise
 from biogrip.judging.likelihood import bounds_percent, headlines
 from biogrip.judging.quantities import Quantity
 from biogrip.keys import built
@@ -25,6 +24,7 @@ from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import INTERPRETATIONS, read_identifications
 from biogrip.records.rows import RowFile
+from biogrip.records.success import near_noise
 from biogrip.records.traces import read_target
 from biogrip.stages.identification import groups
 from biogrip.study.case_blocks import CaseBlock

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from biogrip.fit.methods import near_noise_words
 from biogrip.judging.likelihood import headlines
+from biogrip.records.success import near_noise_words
 from biogrip.stages.sweeps import POINTS
 from biogrip.study.study import Study
 from biogrip.study.sweeps import AxisBlock
