@@ -48,7 +48,8 @@ LEFT = {
 }
 # The code of posterior.md runs in test_library.py, with a shorter chain.
 TAKES_LONG = {"howto/relaxation.md", "howto/creep.md", "design.md", "tutorial.md"}
-LONG_HOWTOS = ("case", "trace", "noise", "figure", "noise_kind", "posterior")
+# What module.md does, test_module.py does quickly.
+LONG_HOWTOS = ("case", "trace", "noise", "figure", "noise_kind", "posterior", "module")
 TAKES_LONG |= {f"howto/{name}.md" for name in LONG_HOWTOS}
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
