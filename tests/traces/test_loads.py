@@ -1,4 +1,4 @@
-"""A recorded load as ramps: few of them, and near it, whatever its noise, rounding and clock."""
+"""A column of what was controlled: the protocol of all rows."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,46 +10,14 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.identify.settings import Asked, Setting, case_of
 from biogrip.physics.protocol import evaluate
-from biogrip.traces.loads import ramps
 from biogrip.traces.reader import read_recording
 
 EVEN = np.linspace(0.0, 90.0, 2001)
-CLOCKS = {"even": EVEN, "late": EVEN + 1e6, "log": np.r_[0.0, np.geomspace(1e-3, 90.0, 2000)]}
 CORNERS = [0.0, 2.0, 8.0, 50.0, 53.0, 90.0], [0.0, 0.0, 1.0, 1.0, -0.5, -0.5]
 
 
 def load_at(time_s: Array) -> Array:
     return np.interp(time_s - time_s[0], *CORNERS)
-
-
-@pytest.mark.parametrize("clock", CLOCKS)
-@pytest.mark.parametrize(("noise", "step"), [(0.0, 0.0), (2e-3, 0.0), (0.0, 1e-2)])
-def test_a_load_is_few_ramps_within_its_noise(clock: str, noise: float, step: float) -> None:
-    time_s = CLOCKS[clock]
-    true = load_at(time_s)
-    read = true + noise * np.random.default_rng(1).normal(size=len(true))
-    read = np.round(read / step) * step if step else read
-    ends, off = ramps(time_s, 3e-9 * read)
-    found = np.interp(time_s, *ends.T) / 3e-9
-    assert len(ends) <= (15 if noise else 201 if step else 12)
-    assert ends[[0, -1], 0].tolist() == time_s[[0, -1]].tolist()
-    assert ends[0, 1] == 0
-    assert np.sqrt(np.mean((found - true) ** 2)) < max(noise, 0.5 * step, 2e-4)
-    assert off / 3e-9 == pytest.approx(np.max(np.abs(found - read)), abs=1e-2)
-
-
-@pytest.mark.parametrize("name", ["step", "sinusoid", "constant"])
-def test_other_histories_are_ramps_too(name: str) -> None:
-    """A step is one between two readings; of what would be endless ramps, it is told how near."""
-    courses = {
-        "step": np.where(EVEN < 30, 0.0, 2.0),
-        "sinusoid": np.sin(2 * EVEN),
-        "constant": np.full_like(EVEN, 3.0),
-    }
-    ends, off = ramps(EVEN, courses[name])
-    assert len(ends) == {"step": 4, "constant": 2}.get(name, len(ends)) <= 201
-    assert off == pytest.approx(np.max(np.abs(np.interp(EVEN, *ends.T) - courses[name])))
-    assert off < (0.1 if name == "sinusoid" else 1e-9)
 
 
 def written(path: Path, start_s: float = 0.0) -> Asked:
@@ -76,8 +44,12 @@ def test_a_column_of_the_load_is_the_protocol_of_all_rows(tmp_path: Path, start_
     case = case_of(Asked(asked.trace, None, (*asked.settings, rows)))
     history = case.problem.torque
     assert history.deforms
-    np.testing.assert_allclose(evaluate(history, EVEN[:-1]), 5e-6 * load_at(EVEN[:-1]), atol=2e-9)
-    assert not [start for start, order, _ in history.jumps if order == 0]
+    np.testing.assert_allclose(evaluate(history, EVEN), 5e-6 * load_at(EVEN), atol=1e-15)
+    assert len(history.steps_s) == 0
+    # Where it holds still, rows are no phases.
+    assert len(history.time_s) < np.count_nonzero(
+        (EVEN > 1) & (EVEN < 9) | (EVEN > 49) & (EVEN < 54)
+    )
     assert case.columns.start_s == (start_s or None)
     found = read_recording(asked.trace, case.columns)
     dwell = (EVEN >= 8) & (EVEN < 50)

@@ -11,11 +11,12 @@ from biogrip.arrays import Array
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.problem import TraceProblem, make_problem
 from biogrip.physics.calibration import read_calibrated_arms
-from biogrip.physics.condensed import Condensed
+from biogrip.physics.condensed import Condensed, condense
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import Course, Phase, join_phases
+from biogrip.physics.recorded_course import follow_rows
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.physics.whitening import (
@@ -63,10 +64,15 @@ class Experiment:
     ``gripper`` itself; and ``share`` of the ``torque``."""
     fit_start: bool = False
     """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
+    record: Array | None = field(default=None, compare=False)
+    """Times from the start and what was controlled at them, (n, 2), where that was recorded; the
+    phases are then a hold as long and as high."""
 
     @cached_property
     def torque(self) -> Course:
         """Torque of both arms, or what else is held, against time."""
+        if self.record is not None:
+            return follow_rows(*self.record.T, deforms=self.instrument.deforms)
         return join_phases(self.phases, deforms=self.instrument.deforms)
 
     @cached_property
@@ -137,7 +143,7 @@ class Experiment:
         `model`, `noise_sd`, and `condensed` from `in_noise` replace those of the case.
         """
         rows = condensed or self._condensed(time_s)
-        trace = Trace(time_s, readings, rows, noise_sd or self.noise_sd)
+        trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd)
         given = self.gripper, model or self.searched, self.torque, trace
         return make_problem(Residuals(*given, instrument=self.instrument), self.ranges)
 
@@ -154,8 +160,9 @@ class Experiment:
 
     def rows_key(self, time_s: Array) -> Hashable:
         """Return what the rows of a trace depend on, whose times are (n_samples,)."""
-        sd = None if self.sd is None else self.sd.tobytes()
-        return self.phases, self.instrument, self.offset, self.drift, sd, time_s.tobytes()
+        sd, record = (None if of is None else of.tobytes() for of in (self.sd, self.record))
+        held = self.phases, record, self.instrument, self.offset, self.drift
+        return *held, sd, time_s.tobytes()
 
     def for_model(self, problem: TraceProblem, model: SampleModel) -> TraceProblem:
         """Return one of its problems posed for another model; both share rows of the trace."""
@@ -185,7 +192,7 @@ class Experiment:
         if noise_model is not None:
             whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
         basis = with_uncertain(nuisance, uncertain)
-        return Condensed(self.torque, time_s, basis, whitening=whitening)
+        return condense(self.torque, time_s, basis, whitening)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""

@@ -323,6 +323,8 @@ def _assumed(case: Case, tried: Sequence[str]) -> dict[str, Any]:
     """Return what an identification relies on: its model, and a config that repeats it."""
     blocks = ["instrument", "protocol", "search_range", "measurement", "models", "least_squares"]
     blocks += ["gripper"] if case.instrument.has_jaws else []
+    if case.record is not None:
+        blocks.remove("protocol")
     return {
         "model": case.sample.candidate,
         **{name: plain(getattr(case.block, name)) for name in blocks},

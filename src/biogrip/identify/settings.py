@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import StringIO
 from itertools import zip_longest
 from pathlib import Path
@@ -130,7 +130,7 @@ def case_of(asked: Asked) -> Case:
         of_config = [*keys_in(read_configs([asked.config] if asked.config else []))]
         said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in found]
         raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
-    merged = _with_instrument(overlaid(below, given), given, asked.trace)
+    merged, record = _with_instrument(overlaid(below, given), given, asked.trace)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
         merged.pop(name, None)
@@ -143,7 +143,7 @@ def case_of(asked: Asked) -> Case:
     except BiogripError as error:
         _, *problems = str(error).replace(f"cases.{case}.", "").split("\n")
         raise BiogripError("\n".join(problems)) from error
-    return study.cases[case]
+    return replace(study.cases[case], record=record)
 
 
 def _source(
@@ -162,11 +162,14 @@ def _source(
 
 def _with_instrument(
     merged: dict[str, Any], given: Mapping[str, Any], trace: Path
-) -> dict[str, Any]:
-    """Return the blocks with the trace's file, its instrument, and a protocol of that."""
+) -> tuple[dict[str, Any], Array | None]:
+    """Return the blocks with the trace's file, its instrument, and a protocol of that.
+
+    Beside them stands what was controlled, if it was recorded, see `Experiment.record`.
+    """
     level = merged.pop(HOLD[0], None)
     if not isinstance(merged["measurement"], dict):
-        return merged
+        return merged, None
     instrument = _instrument(merged, given)
     usual = {"time": "time_s", instrument.read.name: instrument.read.column}
     measurement = usual | merged["measurement"] | {"file": str(trace)}
@@ -176,7 +179,7 @@ def _with_instrument(
     of_column = measurement.get(LOAD[-1]) is not None
     if level is None and not of_column:
         if "protocol" in given or instrument.has_jaws:
-            return found
+            return found, None
         if not instrument.relative:
             unit = f" in {controlled.unit}" if controlled.unit else ""
             raise BiogripError(
@@ -184,31 +187,34 @@ def _with_instrument(
                 "column of it by --load, or a protocol in --config."
             )
     own = _recording(trace, measurement)
-    phases = [{"duration_s": 1.0, controlled.column: 1.0 if level is None else level}]
-    start_s = measurement.get("start_s")
+    phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
+    record, start_s = None, measurement.get("start_s")
     if own is not None and own.load is not None:
-        start_s = own.load[0, 0] if start_s is None else start_s
-        measurement["start_s"] = float(start_s) or None
-        phases = _phases(own.load, start_s, controlled.column) or phases
+        start_s = float(own.load[0, 0] if start_s is None else start_s)
+        measurement["start_s"] = start_s or None
+        record = _from(own.load, start_s)
+        largest = max(record[:, 1], key=abs)
+        if instrument.relative:
+            record[:, 1] /= largest
+        phase = {"duration_s": float(record[-1, 0]), controlled.column: float(largest)}
     elif own is not None:
         first = start_s or min(float(own.time_s[0]), 0.0)
         lasts = float(own.time_s[-1]) - first
-        phases[0]["duration_s"] = lasts if lasts > 0 else 1.0
+        phase["duration_s"] = lasts if lasts > 0 else 1.0
         if lasts > 0 and not SHORTEST_S <= lasts <= LONGEST_S:
             raise BiogripError(
                 f"{place(trace)}: found {lasts:g} s from the protocol's start, at {first:g} s, to "
                 f"the last reading; allowed are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit of "
                 "time right? Or say when it started (--start)."
             )
-    return {**found, "protocol": {"phases": phases}}
+    return {**found, "protocol": {"phases": [phase]}}, record
 
 
-def _phases(load: Array, start_s: float, key: str) -> list[dict[str, float]]:
-    """Return the phases of ramps, (n, 2) times and loads, from a time on."""
-    times, loads = load[load[:, 0] > start_s].T
-    times, loads = np.r_[start_s, times], np.r_[np.interp(start_s, *load.T), loads]
-    ramps = np.c_[np.diff(times), loads[:-1], loads[1:]].tolist()
-    return [{"duration_s": lasts, key: of, f"to_{key}": to} for lasts, of, to in ramps]
+def _from(load: Array, start_s: float) -> Array:
+    """Return rows of times and loads, (n, 2), from a time on, counted from it."""
+    after = load[load[:, 0] > start_s]
+    first = start_s, np.interp(start_s, *load.T)
+    return np.vstack((first, after)) - (start_s, 0.0)
 
 
 def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrument:

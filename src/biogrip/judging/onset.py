@@ -202,7 +202,12 @@ def _with_ramp(experiment: Experiment, time_s: Array) -> tuple[Phase, ...]:
     """Return phases with a ramp up to the first reading, none but for a hold until after that."""
     first, *rest = experiment.phases
     delay_s = float(time_s[0])
-    if not 0 < delay_s < first.duration_s or first.slope or first.curvature:
+    if (
+        experiment.record is not None
+        or not 0 < delay_s < first.duration_s
+        or first.slope
+        or first.curvature
+    ):
         return ()
     return (
         ramp(delay_s, 0.0, first.level),

@@ -14,6 +14,11 @@ of some fifty dimensions only, in which a function is determined by its values a
 well-chosen times [2]_, [3]_. So a response is simulated at those times, and a square matrix turns
 its values into rows with the sum of squares, and the gradients, of the residuals at all readings.
 
+A course that changes at nearly every reading, as one that was recorded, leaves no nodes to save.
+There a few modes stand for all (`CondensedRecord`): whatever the course, the response of any mode
+is a sum of those of some seventy chosen ones (`SpanningModes`). These are computed at all readings,
+in parts, and one triangular matrix has all their products.
+
 References
 ----------
 .. [1] L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapter 8:
@@ -34,9 +39,9 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array, IntArray
-from biogrip.physics.modes import mode_responses
+from biogrip.physics.modes import mode_responses, responses_in_turn
 from biogrip.physics.protocol import Course
-from biogrip.physics.rate_tables import ModeRows
+from biogrip.physics.rate_tables import ModeRows, SpanningModes
 from biogrip.physics.whitening import Whitening, without
 
 _NODES = 20
@@ -58,6 +63,8 @@ _SPACING_OF_RATES = 0.25
 _SLOWEST_RATE, _FASTEST_RATE = 1e-6, 1e3
 # Directions with a smaller relative singular value are rounding errors.
 _LEAST_SINGULAR_VALUE = 1e-14
+# Changes of a course from which on nearly all readings would be nodes.
+_MANY_CHANGES = 100
 
 
 @dataclass(frozen=True)
@@ -197,7 +204,7 @@ class Condensed:
 
     def later(self, change_s: float) -> "Condensed":
         """Return rows for a protocol that starts later by some s; noise and nuisance stay."""
-        return replace(self, all_s=self.all_s - change_s)
+        return replace(self, all_s=self.course.snapped(self.all_s - change_s))
 
     def cleared(self, rows: Array) -> Array:
         """Project nuisance out of functions of time, (..., n_samples), and whiten noise."""
@@ -237,9 +244,13 @@ class Condensed:
     @cached_property
     def of_modes(self) -> ModeRows:
         """Function from modes of many samples to rows of their responses."""
-        elapsed = np.subtract.outer(self.time_s, self.course.changes_s)
-        shortest_s = float(np.min(elapsed, where=elapsed > 0, initial=self.time_s[-1]))
-        return ModeRows(self.course, self.time_s, self.to_rows, shortest_s)
+
+        def rows(rates: Array, divisors: Array) -> Array:
+            found, _ = mode_responses(rates[None], self.course, self.time_s, slopes=False)
+            return (found[0] / divisors[:, None]) @ self.to_rows
+
+        shortest_s = _shortest_after(self.course, self.time_s)
+        return ModeRows(rows, float(self.time_s[-1]), shortest_s, deforms=self.course.deforms)
 
     @cached_property
     def dense(self) -> DenseSamples:
@@ -297,3 +308,77 @@ class Condensed:
         if self.whitening is not None:
             return self.whitening(rows)
         return without(self._nuisance_rows, rows)
+
+
+class CondensedRecord(Condensed):
+    """Condensed rows for a course that changes at nearly every reading."""
+
+    def of_trace(self, readings: Array) -> Array:
+        """Return rows of a trace without nuisance, (n_rows,); no response reaches the last."""
+        rows: Array = self._triangle(readings)[:, -1]
+        return rows
+
+    @cached_property
+    def of_modes(self) -> ModeRows:
+        """Function from modes of many samples to rows of their responses."""
+        triangle, first = self._triangle(np.zeros_like(self.all_s)), len(self._projected)
+        spanned = without(triangle[:, :first].T, triangle[:, first:-1].T)
+        family = self._family
+
+        def rows(rates: Array, divisors: Array) -> Array:
+            shares = family.shares(rates) / (family.scale(rates) * divisors)
+            return shares.T @ spanned
+
+        deforms = self.course.deforms
+        return ModeRows(rows, family.end_s, family.shortest_s, deforms=deforms)
+
+    @cached_property
+    def _family(self) -> SpanningModes:
+        """The modes that stand for all."""
+        shortest_s = _shortest_after(self.course, self.all_s)
+        return SpanningModes(float(self.all_s[-1]), shortest_s, deforms=self.course.deforms)
+
+    @property
+    def _projected(self) -> Array:
+        """Functions that whitening does not project out, (n_functions, n_samples)."""
+        return self.functions if self.whitening is None else self.functions[:0]
+
+    def _triangle(self, readings: Array) -> Array:
+        """Return R of functions, modes and readings in a column each, (n_rows, n_rows).
+
+        Products of its columns are those of functions, of responses of the modes, and of readings.
+        """
+        columns = len(self._projected) + len(self._family.rates) + 1
+        triangle = np.zeros((columns, columns))
+        for here, responses in self._responses():
+            more = np.vstack((self._projected[:, here], responses, readings[here])).T
+            found = np.asarray(np.linalg.qr(np.concatenate((triangle, more)), mode="r"))
+            triangle = np.where(np.diagonal(found) < 0, -1.0, 1.0)[:, None] * found
+        return triangle
+
+    def _responses(self) -> Iterator[tuple[slice, Array]]:
+        """Yield parts of the readings and of the responses of the modes, (n_modes, n_samples)."""
+        rates, scale = self._family.rates[None], self._family.scale(self._family.rates)[:, None]
+        if self.whitening is not None:
+            responses, _ = mode_responses(rates, self.course, self.all_s, slopes=False)
+            yield slice(None), self.whitening(scale * responses[0])
+            return
+        before = int(self.all_s.searchsorted(self.course.time_s[0], side="right"))
+        yield slice(before), np.zeros((len(scale), before))
+        for here, found in responses_in_turn(rates, self.course, self.all_s, slopes=False):
+            yield here, scale * found[0, 0]
+
+
+def condense(
+    course: Course, time_s: Array, functions: Array, whitening: Whitening | None = None
+) -> Condensed:
+    """Return condensed rows for the readings of a protocol, see `Condensed` for the arguments."""
+    kind = CondensedRecord if len(course.changes_s) > _MANY_CHANGES else Condensed
+    return kind(course, course.snapped(time_s), functions, whitening)
+
+
+def _shortest_after(course: Course, time_s: Array) -> float:
+    """Return the shortest time of a reading after a change, for ascending times, (n_times,)."""
+    starts = np.append(-np.inf, course.changes_s)
+    elapsed = time_s - starts[starts.searchsorted(time_s) - 1]
+    return float(np.min(elapsed, initial=time_s[-1]))

@@ -84,10 +84,10 @@ def without_steps(
 ) -> tuple[Recording, tuple[float, ...]]:
     """Leave out readings at the very instant of a step, and return their times by the file's clock.
 
-    Without inertia a sample may jump there, and nothing tells on which side a reading was taken.
+    Without inertia a sample may jump there, and nothing tells on which side a reading was taken. A
+    damper's force jumps with the rate of a deformation, too.
     """
-    steps = [start for start, order, _ in protocol.jumps if order == 0]
-    at = np.isin(trace.time_s, steps)
+    at = np.isin(protocol.snapped(trace.time_s), protocol.jumps_s)
     return _part(trace, ~at), tuple((trace.time_s[at] + onset_s).tolist())
 
 
@@ -144,12 +144,11 @@ def notes_on_recording(trace: Measurements) -> list[str]:
         notes.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
     if "others" in form:
         notes.append(f"Left out, for rows asks for others: {counted(form['others'], 'row')}.")
-    if "load" in form:
-        notes.append(f"The protocol is {form['load']}.")
     if trace.at_steps:
         times = ", ".join(f"{time_s:.6g} s" for time_s in trace.at_steps)
         notes.append(
-            f"Left out at the instant of a step, of which nothing tells on which side of it they "
-            f"were taken: {counted(len(trace.at_steps), 'reading')}, at {times}."
+            "Left out where a sample may jump, at a step or where the rate of a deformation jumps, "
+            "since nothing tells on which side they were taken: "
+            f"{counted(len(trace.at_steps), 'reading')}, at {times}."
         )
     return notes

@@ -33,6 +33,8 @@ class Case:
     block: CaseBlock
     """Config block, with the study's blocks merged in."""
     study: "Study"
+    record: Array | None = None
+    """What was controlled in a recorded trace, if it was recorded; see `Experiment.record`."""
 
     @cached_property
     def plain(self) -> dict[str, Any]:
@@ -94,7 +96,8 @@ class Case:
     def may_start_late(self) -> bool:
         """True if the trace is recorded, and nothing says when its protocol starts."""
         measured = self.block.measurement
-        return self.recorded and measured.start_s is None and not measured.fit_start
+        known = measured.start_s is not None or self.record is not None
+        return self.recorded and not known and not measured.fit_start
 
     @property
     def instrument(self) -> Instrument:
@@ -191,6 +194,7 @@ class Case:
             coloured=measurement.coloured,
             uncertainty=uncertainty.by_part if uncertainty else {},
             fit_start=measurement.fit_start,
+            record=self.record,
         )
 
     @property

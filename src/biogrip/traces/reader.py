@@ -20,7 +20,6 @@ from biogrip.traces.columns import (
     shortened,
     unit_of,
 )
-from biogrip.traces.loads import ramps
 from biogrip.traces.tables import BLANKS, Sheet, Table, find_tables, number_or_inf, read_sheet
 
 FEWEST_SAMPLES = 10
@@ -32,11 +31,12 @@ _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
 
 def is_usual(form: Mapping[str, Any], columns: Columns) -> bool:
     """Return True if a file, by its `Recording.form`, is a table as biogrip itself would write."""
-    odd = ("units_line", "block", "preamble", "averaged", "outside", "others", "load")
+    odd = ("units_line", "block", "preamble", "averaged", "outside", "others")
     return (
         (form["encoding"], form["separator"], form["decimal"]) == ("UTF-8", "commas", "point")
         and not any(key in form for key in odd)
         and columns.block is None
+        and columns.load is None
         and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
     )
 
@@ -74,8 +74,8 @@ class Recording:
     """What was recognised in the file, for people to check before they believe a fit; `read_as` of
     the JSON file."""
     load: Array | None = None
-    """Times and loads, or deformations, in SI units, linear between them, (n, 2), where they are
-    read: of all rows, used or not. See `ramps`."""
+    """Times and loads, or deformations, in SI units, (n, 2), where they are read: of all rows, used
+    or not."""
 
 
 def read_recording(path: Path, columns: Columns) -> Recording:
@@ -105,11 +105,11 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     header_line = int(sheet.numbers[table.at]) or None
     indices, units = _columns_of(path, header_line, table, columns)
     values, decimal = _numbers(path, sheet, table, indices)
-    lines, load, followed = sheet.numbers[table.first : table.end], None, None
+    lines, load = sheet.numbers[table.first : table.end], None
     if columns.load is not None:
         history, values = values[:, [0, -1]], values[:, :-1]
         numbers = ~np.any(np.isnan(history), axis=1)
-        load, followed = _load(path, columns, history[numbers], lines[numbers], units)
+        load = _load(path, columns, history[numbers], lines[numbers], units)
     chosen = _chosen(path, sheet, table, columns)
     gaps = chosen & np.any(np.isnan(values), axis=1)
     kept, lines = values[chosen & ~gaps], lines[chosen & ~gaps]
@@ -148,7 +148,6 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         "averaged": averaged or None,
         "outside": int(np.count_nonzero(~used)) or None,
         "others": int(np.count_nonzero(~chosen)) or None,
-        "load": followed,
         "first_s": float(time_s[0]),
         "last_s": float(time_s[-1]),
     }
@@ -270,17 +269,14 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: Columns) -> BoolArr
     return chosen
 
 
-def _load(
-    path: Path, columns: Columns, history: Array, lines: IntArray, units: list[str]
-) -> tuple[Array, str]:
-    """Return ramps in SI units that follow times and loads, (n, 2), and how they do in words."""
+def _load(path: Path, columns: Columns, history: Array, lines: IntArray, units: list[str]) -> Array:
+    """Return rows of times and loads, (n, 2), in SI units."""
     _check_count(path, columns, len(history), 0)
     if columns.average_repeated:
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
-    ends, off = ramps(*history.T)
-    said = f"{counted(len(ends) - 1, 'ramp')} along {columns.load}, within {off:.2g} {units[-1]}"
-    return ends * [TIME_UNITS[units[0]], columns.controlled.units[units[-1]]], said
+    sizes: Array = history * [TIME_UNITS[units[0]], columns.controlled.units[units[-1]]]
+    return sizes
 
 
 def _averaged(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:
