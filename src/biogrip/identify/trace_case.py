@@ -24,6 +24,7 @@ from biogrip.physics.whitening import drift_is_flow, estimate_noise
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
 from biogrip.study.study import Case
+from biogrip.traces.loads import without_noise
 
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
 _CLEAREST, _MARGIN = 1e5, 10.0
@@ -113,6 +114,9 @@ def read_trace(asked: Asked) -> TraceCase:
     declared = case.block.measurement
     problem = replace(case.problem, offset=bool(declared.offset), drift=bool(declared.drift))
     trace = recording.read_checked(asked.trace, problem, columns)
+    if case.record is not None:
+        record, noise = without_noise(case.problem, trace.time_s, trace.readings[0])
+        case, trace = replace(case, record=record), replace(trace, load_noise=noise)
     if case.problem.coloured:
         case = _without_likenesses(case, trace.time_s)
     read = _with_ranges(case, trace, given)

@@ -39,6 +39,8 @@ class Measurements:
     at_steps: tuple[float, ...] = ()
     """Times by the recording's clock of readings that were left out, for they are at the very
     instant of a step of what is controlled."""
+    load_noise: float = 0.0
+    """Standard deviation of what was smoothed out of a record of what was controlled."""
     form: Mapping[str, Any] = field(default_factory=dict)
     """What was recognised in the file of a recording, see `Recording.form`."""
 
