@@ -1,4 +1,4 @@
-"""A column of what was controlled: the protocol of all rows."""
+"""What was held or loaded: its unit, and a column of it, which is the protocol of all rows."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +9,12 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.identify.settings import Asked, Setting, case_of
+from biogrip.identify.trace_case import note_on_hold, read_trace
+from biogrip.physics.instruments import CONTROLLED, INSTRUMENTS
 from biogrip.physics.protocol import evaluate
+from biogrip.study.source import HOLD
+from biogrip.traces.columns import held_unit
+from biogrip.traces.loads import smoothed
 from biogrip.traces.reader import read_recording
 
 EVEN = np.linspace(0.0, 90.0, 2001)
@@ -18,6 +23,89 @@ CORNERS = [0.0, 2.0, 8.0, 50.0, 53.0, 90.0], [0.0, 0.0, 1.0, 1.0, -0.5, -0.5]
 
 def load_at(time_s: Array) -> Array:
     return np.interp(time_s - time_s[0], *CORNERS)
+
+
+UNITS = {
+    "20 pN": ("force", 20e-12),
+    "20pN": ("force", 20e-12),
+    "1e-3N": ("force", 1e-3),
+    "3 gf": ("force", 3 * 9.80665e-3),
+    "5 µm": ("displacement", 5e-6),
+    "5%": ("strain", 0.05),
+    ".5 ‰": ("strain", 5e-4),
+    "0.1": ("strain", 0.1),
+    "-5 mbar": ("stress", -500.0),
+    "2 bar": ("stress", 2e5),
+    "10 cm H2O": ("stress", 980.665),
+    "1 mmHg": ("stress", 133.322387415),
+    "2": ("stress", 2.0),
+}
+
+
+@pytest.mark.parametrize("text", UNITS)
+def test_what_was_held_may_have_its_unit(text: str) -> None:
+    name, expected = UNITS[text]
+    controlled = next(each for each in CONTROLLED if each.name == name)
+    number, unit = held_unit(text, controlled)
+    assert number * controlled.units[unit] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_unit_of_something_else_is_refused() -> None:
+    with pytest.raises(BiogripError, match="found the unit 'mV' of a stress, allowed are Pa, kPa"):
+        held_unit("5 mV", INSTRUMENTS["strain"].controlled)
+
+
+CLOCK = np.arange(400) / 10
+
+
+def crept(stress: Array, seed: int) -> Array:
+    """Strain of a Zener solid (500, 300 Pa, 10 s) step by step, with noise of 1e-4."""
+    voigt = np.zeros(len(stress))
+    for row in range(1, len(stress)):
+        rest = 0.5 * (stress[row] + stress[row - 1]) / 300
+        voigt[row] = rest + (voigt[row - 1] - rest) * np.exp(-0.01)
+    return stress / 500 + voigt + np.random.default_rng(seed).normal(0, 1e-4, len(stress))
+
+
+@pytest.mark.parametrize(("felt", "smoothed"), [(False, True), (True, False)])
+def test_scatter_that_readings_do_not_follow_is_smoothed_out(
+    tmp_path: Path, felt: bool, smoothed: bool
+) -> None:
+    """A step to 5 Pa, and 0.05 Pa of noise, of the sensor or of the stress itself."""
+    true = np.where(CLOCK < 10, 0.0, 5.0)
+    read = true + np.random.default_rng(2).normal(0, 0.05, len(CLOCK))
+    path = tmp_path / "t.csv"
+    rows = np.column_stack((CLOCK, crept(read if felt else true, 3), read))
+    np.savetxt(path, rows, delimiter=",", header="time_s,strain,stress_Pa", comments="")
+    given = {"strain": "strain", "load": "stress_Pa"}
+    settings = [Setting("--set", ("measurement", key), value) for key, value in given.items()]
+    trace = read_trace(Asked(path, None, tuple(settings)))
+    assert trace.recorded.load_noise == pytest.approx(0.01 * smoothed, rel=0.1)
+    assert trace.case.record is not None
+    off = trace.case.record[:, 1] - (true if smoothed else read)
+    assert np.sqrt(np.mean(off**2)) < (0.02 if smoothed else 1e-12)
+    assert trace.load_in_words.endswith("from 0 s (column stress_Pa, 400 rows).")
+
+
+def test_of_a_clean_course_nothing_is_smoothed_out() -> None:
+    """Of a sinusoid with 25 rows a period 3e-4, and nothing of a constant or of steps."""
+    course = np.sin(2 * np.pi * np.arange(500) / 25)
+    np.testing.assert_allclose(smoothed(course), course, atol=3e-4)
+    for still in (np.full(100, 3.0), np.repeat([0.0, 2.0, 1.0], 50)):
+        np.testing.assert_allclose(smoothed(still), still, atol=1e-12)
+
+
+def test_a_bare_number_beside_readings_with_a_prefix_has_a_note(tmp_path: Path) -> None:
+    path = tmp_path / "bead.csv"
+    rows = np.column_stack((CLOCK[1:], 40.0 + 10 * np.sqrt(CLOCK[1:])))
+    np.savetxt(path, rows, delimiter=",", header="time_s,displacement_nm", comments="")
+    reading = Setting("--reading", ("measurement", "displacement"), "displacement_nm")
+    for held, shown, notes in ((20.0, "20 N", 1), ("20 pN", "20 pN", 0), ("20 N", "20 N", 0)):
+        trace = read_trace(Asked(path, None, (reading, Setting("--hold", HOLD, held))))
+        assert trace.load_in_words == f"Held: {shown} from 0 s to 39.9 s."
+        found = note_on_hold(trace)
+        assert len(found) == notes
+        assert all('as in --hold "20 nN"' in note.text for note in found)
 
 
 def written(path: Path, start_s: float = 0.0) -> Asked:

@@ -36,7 +36,7 @@ from biogrip.identify.other_fits import (
 )
 from biogrip.identify.outputs import WRITTEN_BY, Outcome, in_own_units
 from biogrip.identify.settings import Asked
-from biogrip.identify.trace_case import TraceCase, note_saturated, read_trace
+from biogrip.identify.trace_case import TraceCase, note_on_hold, note_saturated, read_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
 from biogrip.judging.onset import notes_on_start, profile_over_onset
@@ -226,7 +226,7 @@ def identify_alike(
         # Beside another start, an offset and a drift mean nothing.
         opinions[index] *= not any(note.weight != HARMLESS for note in starts[index])
         notes = [*again[index][1], *starts[index], *opinions[index]]
-        notes += [*note_flow(own), *note_saturated(own)]
+        notes += [*note_flow(own), *note_saturated(own), *note_on_hold(own)]
         data = _data(own, fits[index], diagnoses[index], models[index], notes)
         if index in onsets_s:
             data["onset_limits_s"] = [data["onset_s"] + end_s for end_s in onsets_s[index]]
@@ -257,6 +257,7 @@ def _data(
         "instrument": instrument.kind,
         "reads": {"quantity": instrument.read.name, "unit": instrument.read.unit},
         **({} if usual else {"read_as": recorded.form}),
+        **({"load": trace.load_in_words} if trace.load_in_words else {}),
         **_fixed(problem),
         "limits": _gripper_in_limits(problem),
         **_fitted_along(problem, recorded, np.exp(best)),

@@ -44,7 +44,7 @@ from biogrip.study.source import (
 )
 from biogrip.study.study import Case
 from biogrip.terminal import visible
-from biogrip.traces.columns import listed, place, trace_file_problem
+from biogrip.traces.columns import held_unit, listed, place, trace_file_problem
 from biogrip.traces.reader import Recording, read_recording
 
 MODEL = "generalized_maxwell"
@@ -186,6 +186,9 @@ def _with_instrument(
                 f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, a "
                 "column of it by --load, or a protocol in --config."
             )
+    if level is not None:
+        level, unit = held_unit(level, controlled)
+        level *= controlled.units[unit]
     own = _recording(trace, measurement)
     phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
     record, start_s = None, measurement.get("start_s")

@@ -18,12 +18,14 @@ from biogrip.digits import plain
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
 from biogrip.identify.settings import Asked, case_of
-from biogrip.judging.doubts import DOUBT, Note
+from biogrip.judging.doubts import DOUBT, HARMLESS, Note
 from biogrip.physics.protocol import is_held, largest_load
 from biogrip.physics.whitening import drift_is_flow, estimate_noise
 from biogrip.records.traces import Measurements
 from biogrip.stages import recording
+from biogrip.study.source import HOLD
 from biogrip.study.study import Case
+from biogrip.traces.columns import held_unit
 from biogrip.traces.loads import without_noise
 
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
@@ -66,6 +68,26 @@ class TraceCase:
         return self.recorded.time_s, self.recorded.readings[0]
 
     @property
+    def load_in_words(self) -> str:
+        """What was held or loaded, as the user gave it; nothing where a config has the protocol."""
+        case, form = self.case, self.recorded.form
+        controlled, start_s = case.instrument.controlled, case.columns.start_s or 0.0
+        if case.record is not None:
+            column, loads = form["columns"]["load"], case.record[:, 1]
+            if case.instrument.relative:
+                loads = loads * getattr(case.block.protocol.phases[0], controlled.column)
+            ends = loads.min(), loads.max()
+            low, high = (plain(end / controlled.units[column["unit"]]) for end in ends)
+            what = _with_unit(high if low == high else f"{low} to {high}", column["unit"])
+            rows = f"column {column['column']}, {len(loads):,} rows"
+            return f"Load: {what} from {start_s:g} s ({rows})."
+        if HOLD[0] not in self.given:
+            return ""
+        number, unit = held_unit(self.given[HOLD[0]], controlled)
+        start = "its start, as fitted," if self.problem.fit_start else f"{start_s:g} s"
+        return f"Held: {_with_unit(f'{number:g}', unit)} from {start} to {form['last_s']:g} s."
+
+    @property
     def names_models(self) -> bool:
         """True if the user names the sample models to compare."""
         return "models" in (self.given.get("model_selection") or {})
@@ -81,6 +103,29 @@ class TraceCase:
         measured = replace(measured, offset=True, drift=drift or self.problem.drift)
         case = replace(self.case, block=replace(self.case.block, measurement=measured))
         return _with_ranges(case, self.recorded, self.given)
+
+
+def _with_unit(number: str, unit: str) -> str:
+    return number if unit == "1" else f"{number} {unit}"
+
+
+def note_on_hold(trace: TraceCase) -> list[Note]:
+    """Return a note if readings have a unit with a prefix, and what was held is a bare number."""
+    read, controlled = trace.problem.instrument.read, trace.problem.instrument.controlled
+    unit = trace.recorded.form["columns"][read.name]["unit"]
+    prefix, held = unit.removesuffix(read.unit), trace.given.get(HOLD[0])
+    if held is None or not (prefix and read.unit and controlled.unit) or prefix == unit:
+        return []
+    number, own = held_unit(held, controlled)
+    if own != controlled.unit or str(held).rstrip().endswith(own):
+        return []
+    likely = prefix + controlled.unit
+    likely = likely if likely in controlled.units else controlled.unit
+    text = (
+        f"The {read.name} is in {unit}, but what was held, {number:g}, is taken to be in {own}: "
+        f'say its unit, as in --hold "{number:g} {likely}".'
+    )
+    return [Note(HARMLESS, text)]
 
 
 def note_saturated(trace: TraceCase) -> list[Note]:

@@ -40,7 +40,8 @@ class Measurements:
     """Times by the recording's clock of readings that were left out, for they are at the very
     instant of a step of what is controlled."""
     load_noise: float = 0.0
-    """Standard deviation of what was smoothed out of a record of what was controlled."""
+    """Standard deviation of what was smoothed out of a record of what was controlled, as a share
+    of its largest value."""
     form: Mapping[str, Any] = field(default_factory=dict)
     """What was recognised in the file of a recording, see `Recording.form`."""
 

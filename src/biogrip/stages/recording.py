@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import BoolArray
-from biogrip.digits import counted
+from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.experiment import Experiment
@@ -144,6 +144,12 @@ def notes_on_recording(trace: Measurements) -> list[str]:
         notes.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
     if "others" in form:
         notes.append(f"Left out, for rows asks for others: {counted(form['others'], 'row')}.")
+    if trace.load_noise:
+        column = form["columns"]["load"]["column"]
+        notes.append(
+            f"Smoothed out of {column}, since the readings do not follow it: what scatters from "
+            f"row to row by {plain(100 * trace.load_noise, 2)} % of the largest."
+        )
     if trace.at_steps:
         times = ", ".join(f"{time_s:.6g} s" for time_s in trace.at_steps)
         notes.append(

@@ -30,8 +30,8 @@ from biogrip.physics.whitening import without
 # Weights that are tried; change of a row over the median's that is no scatter; fewest rows.
 _WEIGHTS = 10.0 ** np.arange(-2, 13)
 _FAR, _FEWEST = 8.0, 20
-# Longest relaxation time over the protocol's duration, and how many a decade.
-_LONGEST, _A_DECADE = 10.0, 2
+# Relaxation times: longest over the protocol's duration, shortest over the interval, a decade.
+_LONGEST, _SHORTEST, _A_DECADE = 10.0, 0.01, 2
 # Most readings that are compared, and by how much χ² has to fall: by less than a tenth it does
 # where nothing is smoothed out, and if it hardly falls, both courses will do.
 _MOST_READINGS, _BETTER = 5000, 1.0
@@ -52,16 +52,17 @@ def without_noise(experiment: Experiment, time_s: Array, readings: Array) -> tup
     record : (n, 2)
         As `Experiment.record`.
     noise
-        Standard deviation of what was smoothed out, in the unit of what is controlled.
+        Standard deviation of what was smoothed out, as a share of the largest value.
     """
     assert experiment.record is not None
     smooth = experiment.record.copy()
-    smooth[:, 1] = _smoothed(smooth[:, 1])
-    noise = float(np.std(smooth[:, 1] - experiment.record[:, 1]))
+    smooth[:, 1] = smoothed(smooth[:, 1])
+    values, largest = experiment.record[:, 1], float(np.max(np.abs(experiment.record[:, 1])))
+    noise = float(np.std(smooth[:, 1] - values)) / largest
     if not noise:
         return smooth, noise
     some = np.unique(np.linspace(0, len(time_s) - 1, _MOST_READINGS).astype(np.int64))
-    shortest = float(np.min(np.diff(time_s))) / experiment.torque.end_s
+    shortest = _SHORTEST * float(np.min(np.diff(time_s))) / experiment.torque.end_s
     decades = np.log10(_LONGEST / shortest)
     lags = np.geomspace(shortest, _LONGEST, 2 + int(_A_DECADE * decades)).tolist()
     nuisance = experiment.nuisance(time_s[some])
@@ -73,7 +74,7 @@ def without_noise(experiment: Experiment, time_s: Array, readings: Array) -> tup
     return (smooth, noise) if better else (experiment.record, 0.0)
 
 
-def _smoothed(values: Array) -> Array:
+def smoothed(values: Array) -> Array:
     """Return a course, (n,), without what scatters in its stretches."""
     changes = np.abs(np.diff(values))
     ends = 1 + np.flatnonzero(changes > _FAR * np.median(changes))
