@@ -148,7 +148,8 @@ def notes_on_recording(trace: Measurements) -> list[str]:
         column = form["columns"]["load"]["column"]
         notes.append(
             f"Smoothed out of {column}, since the readings do not follow it: what scatters from "
-            f"row to row by {plain(100 * trace.load_noise, 2)} % of the largest."
+            f"row to row by {plain(100 * trace.load_noise, 2)} % of the largest. What is left of it "
+            "counts as exact."
         )
     if trace.at_steps:
         times = ", ".join(f"{time_s:.6g} s" for time_s in trace.at_steps)
