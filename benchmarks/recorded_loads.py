@@ -45,9 +45,9 @@ class SetUp:
 
 def _rows(rng: np.random.Generator, last_s: float, interval_s: float) -> Array:
     """Return times from 0 or later on, at an interval of its own."""
-    interval_s *= rng.uniform(0.7, 1.4)
-    rows: Array = np.arange(rng.integers(0, 2), int(last_s / interval_s)) * interval_s
-    return rows
+    interval_s = interval_s * float(rng.uniform(0.7, 1.4))
+    first, count = int(rng.integers(0, 2)), int(last_s / interval_s)
+    return np.linspace(first * interval_s, (count - 1) * interval_s, count - first)
 
 
 def _sine(rng: np.random.Generator) -> tuple[Array, Course]:
