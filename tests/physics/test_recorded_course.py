@@ -7,7 +7,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics import modes
-from biogrip.physics.condensed import CondensedRecord, condense
+from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS
@@ -161,7 +161,7 @@ def test_a_sample_under_a_recorded_sinusoid_responds_as_under_the_true_one(name:
 
 
 @functools.cache
-def condensed(deforms: bool, noise: str) -> CondensedRecord:
+def condensed(deforms: bool, noise: str) -> Condensed:
     """Rows for readings before the course, at its rows, and beside them."""
     course = follow_rows(
         UNEVEN, np.sin(3 * UNEVEN) + 0.02 * RNG.standard_normal(251), deforms=deforms
@@ -170,9 +170,7 @@ def condensed(deforms: bool, noise: str) -> CondensedRecord:
     nuisance = nuisance_basis(time_s, offset=noise != "plain", drift=noise != "plain")
     colour = NoiseModel(ar1=0.5, time_s=0.3, flicker=0.0)
     whitening = Whitening(time_s, colour, nuisance) if noise == "coloured" else None
-    found = condense(course, time_s, nuisance, whitening)
-    assert isinstance(found, CondensedRecord)
-    return found
+    return Condensed(course, time_s, nuisance, whitening)
 
 
 @pytest.mark.parametrize("noise", ["plain", "drifting", "coloured"])

@@ -11,7 +11,7 @@ from biogrip.arrays import Array
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.problem import TraceProblem, make_problem
 from biogrip.physics.calibration import read_calibrated_arms
-from biogrip.physics.condensed import Condensed, condense
+from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
@@ -192,7 +192,7 @@ class Experiment:
         if noise_model is not None:
             whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
         basis = with_uncertain(nuisance, uncertain)
-        return condense(self.torque, time_s, basis, whitening)
+        return Condensed(self.torque, self.torque.snapped(time_s), basis, whitening)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""

@@ -24,6 +24,7 @@ References
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial, chebyshev
@@ -41,8 +42,8 @@ _DECAYED = 40.0
 
 # Spacing in u of the rates to choose modes from, and of times on a logarithmic scale.
 _SPACING_OF_RATES, _SPACING_OF_TIMES = 0.05, 0.1
-# Orders of jumps; what is left of a mode beside those chosen, relative to the first.
-_JUMPS, _LEFT_OUT = range(4), 1e-14
+# What is left of a mode beside those chosen, relative to the first.
+_LEFT_OUT = 1e-14
 
 # Chebyshev's nodes on (0, 1).
 _NODES, _SHORT_NODES = (
@@ -123,43 +124,15 @@ class ModeRows:
     Of a mode so fast that nothing lasts until the next reading, only powers of 1/r remain, up to
     the fifth: the last piece is a polynomial in those.
 
-    Parameters
-    ----------
-    rows
-        Function of rates, (n,), and of divisors, (n,), that returns the rows of the responses of
-        modes of unit weight over their divisor, (n, n_rows).
-    end_s
-        T.
-    shortest_s
-        Shortest time of a reading after a change of what is controlled.
-    deforms
-        True if a deformation is controlled.
+    Given are modes that stand for all, and the rows of their responses, (n_modes, n_rows).
     """
 
-    def __init__(
-        self,
-        rows: Callable[[Array, Array], Array],
-        end_s: float,
-        shortest_s: float,
-        *,
-        deforms: bool,
-    ) -> None:
-        self._end_s, self._deforms = end_s, deforms
-
-        def values(scaled: Array) -> Array:
-            return rows(-scaled / end_s, self._scale(scaled)).T
-
-        wide = int(np.ceil(np.log1p(_DECAYED * end_s / shortest_s) / _WIDTH))
-        self._last = wide * _SHORTER_OF_ROWS
-        self._decayed = np.expm1(_WIDTH * wide)
-        pieces = [
-            _in_short_pieces(values(np.expm1(_WIDTH * (piece + _NODES))), _SHORTER_OF_ROWS)
-            for piece in range(wide)
-        ]
-        beyond = values(self._decayed / _SHORT_NODES) @ _TO_SERIES @ _TO_POWERS
+    def __init__(self, modes: "SpanningModes", rows: Array) -> None:
+        self._end_s, self._deforms, self._decayed = modes.end_s, modes.deforms, modes.decayed
+        powers = modes.powers.reshape(len(rows), -1).T @ rows
         # (n_pieces + 1, degree + 1, n_rows).
-        table = np.concatenate([*pieces, beyond[:, None]], axis=1)
-        self._table = np.ascontiguousarray(table.transpose(1, 2, 0))
+        self._table = powers.reshape(-1, len(_ORDERS), rows.shape[1])
+        self._last = len(self._table) - 1
 
     def __call__(self, modes: Modes) -> Array:
         """Return rows of responses with derivatives, (n, 1 + n_parameters, n_rows)."""
@@ -176,7 +149,7 @@ class ModeRows:
             lasts, 1 / (width * (1 + scaled)), -beyond / np.maximum(scaled, self._decayed)
         )
         place_slopes = place_slopes[:, None] * scaled_slopes
-        scale = self._scale(scaled)
+        scale = _divisor(scaled, self._decayed, self._deforms)
         scale_slopes = np.where(lasts, 1.0, 0.0)[:, None] * scaled_slopes
         if self._deforms:
             # What a fast mode has not forgotten falls with its rate.
@@ -193,10 +166,6 @@ class ModeRows:
         pieces = self._table[piece].reshape(count, -1, self._table.shape[2])
         return mixed.reshape(count, 1 + parameters, -1) @ pieces
 
-    def _scale(self, scaled: Array) -> Array:
-        """Return the divisor of a mode's rows by -T r."""
-        return 1 / (1 + scaled) if self._deforms else np.minimum(scaled, self._decayed)
-
 
 class SpanningModes:
     """Modes whose responses to any course span those of all modes, slow and fast.
@@ -211,42 +180,72 @@ class SpanningModes:
         T.
     shortest_s
         Shortest time of a reading after a change of what is controlled.
+    orders
+        Number of orders of the course.
     deforms
         True if a deformation is controlled.
     """
 
-    def __init__(self, end_s: float, shortest_s: float, *, deforms: bool) -> None:
-        # Imported here: the genetic algorithm does not need it, and loading takes long.
-        from scipy.linalg import qr
-
-        self.end_s, self.shortest_s, self._deforms = end_s, shortest_s, deforms
-        spaced = np.arange(0.0, np.log(end_s / shortest_s) + _SPACING_OF_TIMES, _SPACING_OF_TIMES)
-        self._elapsed_s = end_s * np.exp(-spaced)
-        last = np.log1p(_DECAYED / _SHORT_NODES[0] * end_s / shortest_s)
-        candidates = -np.expm1(np.arange(_SPACING_OF_RATES, last, _SPACING_OF_RATES)) / end_s
-        jumps = self._jumps(candidates)
-        sizes = np.max(np.abs(jumps), axis=1, keepdims=True)
-        basis, triangle, order = qr(jumps / sizes, mode="economic", pivoting=True)
-        left = np.abs(np.diagonal(triangle))
-        count = int(np.count_nonzero(left > _LEFT_OUT * left[0]))
-        self.rates: Array = candidates[order[:count]]
+    def __init__(self, end_s: float, shortest_s: float, orders: int, *, deforms: bool) -> None:
+        self.end_s, self.deforms = end_s, deforms
+        # Rounded up, so that many traces have the same.
+        halvings = int(np.ceil(np.log2(end_s / shortest_s)))
+        rates, self.decayed, self.powers = _spanning(halvings, orders, deforms)
+        self.rates: Array = rates / end_s
         """Rates of the modes, (n_modes,)."""
-        self._basis, self._triangle = basis[:, :count] / sizes, triangle[:count, :count]
+        self.scale = _scale(rates, deforms)
+        """Factors, (n_modes,), with which responses of modes are as large for all rates."""
 
-    def scale(self, rates: Array) -> Array:
-        """Return factors, (n,), with which responses of modes are as large for all rates, (n,)."""
-        scaled = -self.end_s * rates
-        return 1 + scaled if self._deforms else (1 + scaled) / scaled
 
-    def shares(self, rates: Array) -> Array:
-        """Return the shares of the modes in those of other rates, (n_modes, n), all scaled."""
-        found = np.linalg.solve(self._triangle, self._basis.T @ self._jumps(rates))
-        return np.asarray(found, np.float64)
+@lru_cache(maxsize=16)
+def _spanning(halvings: int, orders: int, deforms: bool) -> tuple[Array, float, Array]:
+    """Return rates of spanning modes over T, a rate beyond which nothing lasts, and a table.
 
-    def _jumps(self, rates: Array) -> Array:
+    It has coefficients of the share of each mode in that of any rate, piece by piece, (n_modes,
+    n_pieces + 1, degree + 1), see `ModeRows`.
+    """
+    # Imported here: the genetic algorithm does not need it, and loading takes long.
+    from scipy.linalg import qr
+
+    elapsed = np.exp(-np.arange(0.0, halvings * np.log(2) + _SPACING_OF_TIMES, _SPACING_OF_TIMES))
+
+    def jumps(rates: Array) -> Array:
         """Return scaled responses to jumps of all orders after all times, (n_jumps, n)."""
-        every = respond(_JUMPS, rates, self._elapsed_s[:, None], deforms=self._deforms)
-        return np.concatenate([found[0] for found in every]) * self.scale(rates)
+        every = respond(range(orders), rates, elapsed[:, None], deforms=deforms)
+        return np.concatenate([found[0] for found in every]) * _scale(rates, deforms)
+
+    wide = int(np.ceil(np.log1p(_DECAYED * 2.0**halvings) / _WIDTH))
+    decayed = float(np.expm1(_WIDTH * wide))
+    last = np.log1p(decayed / _SHORT_NODES[0])
+    candidates = -np.expm1(np.arange(_SPACING_OF_RATES, last, _SPACING_OF_RATES))
+    found = jumps(candidates)
+    sizes = np.max(np.abs(found), axis=1, keepdims=True)
+    basis, triangle, order = qr(found / sizes, mode="economic", pivoting=True)
+    left = np.abs(np.diagonal(triangle))
+    count = int(np.count_nonzero(left > _LEFT_OUT * left[0]))
+    rates, basis = candidates[order[:count]], basis[:, :count] / sizes
+
+    def values(scaled: Array) -> Array:
+        """Return shares of modes in tabulated rows, by -T r, (n_modes, n)."""
+        shares = np.linalg.solve(triangle[:count, :count], basis.T @ jumps(-scaled))
+        return shares / (_scale(-scaled, deforms) * _divisor(scaled, decayed, deforms))
+
+    pieces = [
+        _in_short_pieces(values(np.expm1(_WIDTH * (piece + _NODES))), _SHORTER_OF_ROWS)
+        for piece in range(wide)
+    ]
+    beyond = values(decayed / _SHORT_NODES) @ _TO_SERIES @ _TO_POWERS
+    return rates, decayed, np.concatenate([*pieces, beyond[:, None]], axis=1)
+
+
+def _scale(rates: Array, deforms: bool) -> Array:
+    """Return factors with which responses of modes are as large for all rates over T."""
+    return 1 - rates if deforms else 1 - 1 / rates
+
+
+def _divisor(scaled: Array, decayed: float, deforms: bool) -> Array:
+    """Return the divisor of a mode's rows by -T r."""
+    return 1 / (1 + scaled) if deforms else np.minimum(scaled, decayed)
 
 
 def _powers(place: Array) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from biogrip.arrays import Array, parts
-from biogrip.physics.condensed import Condensed, CondensedRecord
+from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.modes import compute_modes, linear_responses
@@ -54,13 +54,6 @@ class Trace:
     def rows(self) -> Array:
         """Condensed rows, (n_rows,)."""
         return self.condensed.of_trace(self.cleared)
-
-    @cached_property
-    def at_nodes(self) -> tuple[Array, float]:
-        """Rows of the nodes, and the norm of what no response reaches."""
-        if isinstance(self.condensed, CondensedRecord):
-            return self.rows, 0.0
-        return self.condensed.dense.rows_of_samples(self.cleared)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,23 +181,12 @@ class Residuals:
         """
         n, parameters = log_parameters.shape
         sums = np.empty((n, 1 + parameters))
-        numbers = len(self.trace.at_nodes[0]) * (1 + parameters)
-        for some in parts(n, max(1, _NUMBERS_AT_ONCE // numbers)):
-            rows = self._at_nodes(log_parameters[some])
-            measured, rest = zip(*(other.trace.at_nodes for other in others[some]), strict=True)
-            rows[:, 0] -= measured
+        for some in parts(n, max(1, _NUMBERS_AT_ONCE // (len(self.trace.rows) * (1 + parameters)))):
+            rows = self.condensed_responses(log_parameters[some])
+            rows[:, 0] -= [other.trace.rows for other in others[some]]
             # One product per sample: the order of its sums does not depend on their number.
             sums[some] = (rows @ np.ascontiguousarray(rows[:, 0])[:, :, None])[:, :, 0]
-            sums[some, 0] += np.square(rest)
         return sums[:, 1:], np.sqrt(sums[:, 0] / self.samples)
-
-    def _at_nodes(self, log_parameters: Array) -> Array:
-        """Return rows of the nodes of responses with derivatives, (n, 1 + n_parameters, n_rows)."""
-        condensed = self.trace.condensed
-        if isinstance(condensed, CondensedRecord):
-            return self.condensed_responses(log_parameters)
-        simulated = self._simulated(log_parameters, condensed.dense.time_s)
-        return condensed.rows_of_nodes(simulated)
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Compute condensed rows of the responses of many samples.

@@ -148,7 +148,7 @@ def notes_on_recording(trace: Measurements) -> list[str]:
         column = form["columns"]["load"]["column"]
         notes.append(
             f"Smoothed out of {column}, since the readings do not follow it: what scatters from "
-            f"row to row by {plain(100 * trace.load_noise, 2)} % of the largest. What is left of it "
+            f"row to row by {plain(100 * trace.load_noise, 2)} % of the largest. What is left "
             "counts as exact."
         )
     if trace.at_steps:
