@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.command.held import load_in_words
+from biogrip.command.settings import Asked, Setting, case_of, read_trace
 from biogrip.errors import BiogripError
-from biogrip.identify.settings import Asked, Setting, case_of
-from biogrip.identify.trace_case import note_on_hold, read_trace
+from biogrip.identify.load_noise import smoothed
+from biogrip.identify.prepare import prepare
 from biogrip.physics.instruments import CONTROLLED, INSTRUMENTS
 from biogrip.physics.protocol import evaluate
 from biogrip.study.source import HOLD
 from biogrip.traces.columns import held_unit
-from biogrip.traces.loads import smoothed
 from biogrip.traces.reader import read_recording
 
 EVEN = np.linspace(0.0, 90.0, 2001)
@@ -79,12 +80,14 @@ def test_scatter_that_readings_do_not_follow_is_smoothed_out(
     np.savetxt(path, rows, delimiter=",", header="time_s,strain,stress_Pa", comments="")
     given = {"strain": "strain", "load": "stress_Pa"}
     settings = [Setting("--set", ("measurement", key), value) for key, value in given.items()]
-    trace = read_trace(Asked(path, None, tuple(settings)))
-    assert trace.recorded.load_noise == pytest.approx(0.01 * smoothed, rel=0.1)
-    assert trace.case.record is not None
-    off = trace.case.record[:, 1] - (true if smoothed else read)
+    recording, case = read_trace(Asked(path, None, tuple(settings)))
+    recording, experiment = prepare(recording, case.judged_experiment)
+    assert recording.load_noise == pytest.approx(0.01 * smoothed, rel=0.1)
+    assert experiment.record is not None
+    off = experiment.record[:, 1] - (true if smoothed else read)
     assert np.sqrt(np.mean(off**2)) < (0.02 if smoothed else 1e-12)
-    assert trace.load_in_words.endswith("from 0 s (column stress_Pa, 400 rows).")
+    said = load_in_words((recording, experiment), case, {})
+    assert said.endswith("from 0 s (column stress_Pa, 400 rows).")
 
 
 def test_of_a_clean_course_nothing_is_smoothed_out() -> None:
@@ -101,11 +104,13 @@ def test_a_bare_number_beside_readings_with_a_prefix_has_a_note(tmp_path: Path) 
     np.savetxt(path, rows, delimiter=",", header="time_s,displacement_nm", comments="")
     reading = Setting("--reading", ("measurement", "displacement"), "displacement_nm")
     for held, shown, notes in ((20.0, "20 N", 1), ("20 pN", "20 pN", 0), ("20 N", "20 N", 0)):
-        trace = read_trace(Asked(path, None, (reading, Setting("--hold", HOLD, held))))
-        assert trace.load_in_words == f"Held: {shown} from 0 s to 39.9 s."
-        found = note_on_hold(trace)
-        assert len(found) == notes
-        assert all('as in --hold "20 nN"' in note.text for note in found)
+        asked = Asked(path, None, (reading, Setting("--hold", HOLD, held)))
+        recording, case = read_trace(asked)
+        said = load_in_words((recording, case.experiment), case, asked.given)
+        assert said == f"Held: {shown} from 0 s to 39.9 s."
+        remarks = recording.remarks()
+        assert len(remarks) == notes
+        assert all('as in --hold "20 nN"' in remark for remark in remarks)
 
 
 def written(path: Path, start_s: float = 0.0) -> Asked:
@@ -130,7 +135,7 @@ def test_a_column_of_the_load_is_the_protocol_of_all_rows(tmp_path: Path, start_
     asked = written(tmp_path / "t.csv", start_s)
     rows = Setting("--set", ("measurement", "rows"), {"Segment": "dwell"})
     case = case_of(Asked(asked.trace, None, (*asked.settings, rows)))
-    history = case.problem.torque
+    history = case.experiment.torque
     assert history.deforms
     np.testing.assert_allclose(evaluate(history, EVEN), 5e-6 * load_at(EVEN), atol=1e-15)
     assert len(history.steps_s) == 0
