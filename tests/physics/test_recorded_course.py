@@ -13,7 +13,7 @@ from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS
 from biogrip.physics.modes import linear_responses, mode_responses
 from biogrip.physics.protocol import Course, evaluate, hold, join_phases, ramp
-from biogrip.physics.recorded_course import follow_rows
+from biogrip.physics.recorded_course import follow_rows, with_steps
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import NoiseModel, Whitening, nuisance_basis
@@ -54,6 +54,23 @@ def test_rows_are_followed_whatever_they_are(clock: str) -> None:
     np.testing.assert_allclose(
         evaluate(course, rows_s[1:-1] * (1 - 1e-15)), values[1:-1], atol=1e-9
     )
+
+
+def test_a_step_between_two_rows_stands_in_the_middle() -> None:
+    """On a rising line, that it goes on from; a triangle and a course of noise have none."""
+    rows_s = np.arange(20.0)
+    line = 0.1 * rows_s
+    record, uncertain_s = with_steps(np.column_stack((rows_s, line + 3.0 * (rows_s > 7))))
+    np.testing.assert_allclose(uncertain_s, [np.std(np.linspace(7, 8, 10_001))], rtol=1e-3)
+    course = follow_rows(*record.T, deforms=False)
+    np.testing.assert_allclose(course.steps_s, [7.5], rtol=1e-15)
+    np.testing.assert_allclose(evaluate(course, rows_s), line + 3.0 * (rows_s > 7), atol=1e-14)
+    # Between the two rows it stays where it was.
+    np.testing.assert_allclose(evaluate(course, [7.49, 7.5]), [0.7, 3.8], atol=1e-3)
+    for other in (np.abs(rows_s % 8 - 4), RNG.standard_normal(20)):
+        same, none = with_steps(np.column_stack((rows_s, other)))
+        assert len(none) == 0
+        np.testing.assert_array_equal(same[:, 1], other)
 
 
 def test_a_row_off_a_line_has_the_mean_of_the_rates_on_both_sides() -> None:

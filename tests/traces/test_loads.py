@@ -10,6 +10,8 @@ from biogrip.arrays import Array
 from biogrip.command.held import load_in_words
 from biogrip.command.settings import Asked, Setting, case_of, read_trace
 from biogrip.errors import BiogripError
+from biogrip.identify.data import trace_data
+from biogrip.identify.identify import identify
 from biogrip.identify.load_noise import smoothed
 from biogrip.identify.prepare import prepare
 from biogrip.physics.instruments import CONTROLLED, INSTRUMENTS
@@ -84,10 +86,55 @@ def test_scatter_that_readings_do_not_follow_is_smoothed_out(
     recording, experiment = prepare(recording, case.judged_experiment)
     assert recording.load_noise == pytest.approx(0.01 * smoothed, rel=0.1)
     assert experiment.record is not None
-    off = experiment.record[:, 1] - (true if smoothed else read)
+    # Without both rows of the step.
+    rows = np.delete(experiment.record[:, 1], [100, 101])
+    off = rows - (true if smoothed else read)
     assert np.sqrt(np.mean(off**2)) < (0.02 if smoothed else 1e-12)
     said = load_in_words((recording, experiment), case, {})
     assert said.endswith("from 0 s (column stress_Pa, 400 rows).")
+
+
+@pytest.mark.parametrize("came_s", [9.05, 9.95])
+def test_limits_allow_for_a_step_anywhere_between_two_rows(tmp_path: Path, came_s: float) -> None:
+    """A Zener solid's creep, in closed form, under a step to 5 Pa that a log of 1 s has."""
+    log_s = np.arange(100.0)
+    since = np.maximum(log_s - came_s, 0.0)
+    strain = 5 * np.where(since > 0, 1 / 500 + (1 - np.exp(-since / 10)) / 300, 0.0)
+    strain += np.random.default_rng(5).normal(0, 1e-4, len(log_s))
+    path = tmp_path / "log.csv"
+    rows = np.column_stack((log_s, strain, np.where(since > 0, 5.0, 0.0)))
+    np.savetxt(path, rows, delimiter=",", header="time_s,strain,stress_Pa", comments="")
+    given = {"strain": "strain", "load": "stress_Pa"}
+    settings = [Setting("--set", ("measurement", key), value) for key, value in given.items()]
+    model = Setting("--model", ("sample", "model"), "zener_kelvin")
+    recording, case = read_trace(Asked(path, None, (*settings, model)))
+    alone = replace(case.judged_experiment, models=(), cheap_models=False)
+    diagnosis = identify(recording, alone)
+    assert diagnosis.status == "ok"
+    width = []
+    for finding, truth in zip(diagnosis.findings, (500.0, 300.0, 3000.0, 10.0), strict=True):
+        low, high = finding.low or 0.0, finding.high or np.inf
+        assert low < truth < high
+        width.append(np.log(high / low))
+    # By as much as the step may be earlier or later; the retardation time does not hang on it.
+    assert 0.1 < width[0] < 0.3
+    assert width[3] < 0.05
+    assert trace_data(diagnosis)["limits"].startswith("Limits allow for 1 step of the stress any")
+
+
+@pytest.mark.parametrize("first_s", [0.5, 0.0])
+def test_a_load_that_is_there_in_the_first_row_came_before_it(
+    tmp_path: Path, first_s: float
+) -> None:
+    clock = first_s + CLOCK
+    path = tmp_path / "late.csv"
+    rows = np.column_stack((clock, clock, np.full(len(clock), 5.0)))
+    np.savetxt(path, rows, delimiter=",", header="time_s,strain,stress_Pa", comments="")
+    given = {"strain": "strain", "load": "stress_Pa"}
+    settings = [Setting("--set", ("measurement", key), value) for key, value in given.items()]
+    experiment = case_of(Asked(path, None, tuple(settings))).judged_experiment
+    assert not experiment.start_given
+    assert evaluate(experiment.torque, [0.0, first_s, 9.0]).tolist() == [5.0, 5.0, 5.0]
 
 
 def test_of_a_clean_course_nothing_is_smoothed_out() -> None:

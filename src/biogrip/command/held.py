@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from biogrip.digits import plain
 from biogrip.identify.other_fits import Trace
 from biogrip.study.source import HOLD
@@ -18,14 +20,15 @@ def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
     """
     (recording, experiment), controlled = trace, case.instrument.controlled
     form, start_s = recording.form, case.columns.start_s or 0.0
-    if experiment.record is not None:
+    if recording.load is not None and experiment.record is not None:
         column, loads = form["columns"]["load"], experiment.record[:, 1]
         if case.instrument.relative:
             loads = loads * getattr(case.block.protocol.phases[0], controlled.column)
         ends = loads.min(), loads.max()
         low, high = (plain(end / controlled.units[column["unit"]]) for end in ends)
         what = _with_unit(high if low == high else f"{low} to {high}", column["unit"])
-        rows = f"column {column['column']}, {len(loads):,} rows"
+        count = np.count_nonzero(recording.load[:, 0] >= start_s)
+        rows = f"column {column['column']}, {count:,} rows"
         return f"Load: {what} from {start_s:g} s ({rows})."
     if HOLD[0] not in given:
         return ""

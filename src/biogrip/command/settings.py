@@ -221,7 +221,9 @@ def _with_instrument(
     phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
     record, start_s = None, measurement.get("start_s")
     if own is not None and own.load is not None:
-        start_s = float(own.load[0, 0] if start_s is None else start_s)
+        first_s, first = own.load[0].tolist()
+        # A load that is there in the first row came before it: at 0, as one that is held.
+        start_s = (min(first_s, 0.0) if first else first_s) if start_s is None else start_s
         measurement["start_s"] = start_s or None
         record = _from(own.load, start_s)
         largest = max(record[:, 1], key=abs)

@@ -62,12 +62,13 @@ class Experiment:
     """True if the noise of a trace may be autocorrelated, see `fit_traces`."""
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
-    ``gripper`` itself; and ``share`` of the ``torque``."""
+    ``gripper`` itself; ``share`` of the ``torque``; and of the ``steps`` of a record, by their
+    number from 0, when each came."""
     fit_start: bool = False
     """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
     record: Array | None = field(default=None, compare=False)
-    """Times from the start and what was controlled at them, (n, 2), where that was recorded; the
-    phases are then a hold as long and as high."""
+    """Times from the start and what was controlled at them, (n, 2), where that was recorded, see
+    `follow_rows`; the phases are then a hold as long and as high."""
     undeclared: frozenset[str] = frozenset()
     """Which of ``offset`` and ``drift`` nothing is said of: a noise model brings them along."""
     given_ranges: frozenset[str] = frozenset()
@@ -148,9 +149,17 @@ class Experiment:
             if error and key != _NOT_FITTED
         ]
 
+    def with_step(self, number: int, later_s: float) -> "Experiment":
+        """Return an experiment of which a step of the record comes later by some s."""
+        assert self.record is not None
+        record = self.record.copy()
+        row = np.flatnonzero(np.diff(record[:, 0]) == 0)[number]
+        record[[row, row + 1], 0] += later_s
+        return replace(self, record=record)
+
     @property
     def plain(self) -> bool:
-        """True if noise is assumed to be white, and the gripper to be known exactly."""
+        """True if noise is assumed to be white, and gripper and protocol to be known exactly."""
         return not (self.coloured or self.uncertain)
 
     def calibrated(self, files: Sequence[Path]) -> "Experiment":

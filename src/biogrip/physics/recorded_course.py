@@ -7,6 +7,9 @@ Between two rows it is the cubic that has the readings and the rates at both. Th
 - else that of the quartic through five rows, where these are smooth: of a sinusoid with 25 rows a
   period it is off by 1e-4, where the mean of the rates on both sides is off by 1e-2;
 - the mean of both sides elsewhere, as in noise.
+
+A step of which the rows tell only between which two of them it came stands in the middle
+(`with_steps`); how far it may be from there is uncertain.
 """
 
 import numpy as np
@@ -19,6 +22,25 @@ _ROWS, _ASIDE = 5, 2
 # Change of the second derivative from row to row, as a share of its size, in smooth rows; second
 # derivative of rows in a line, as a share of that at the end of the line.
 _SMOOTH, _STRAIGHT = 0.25, 0.1
+# Change from row to row that is a step: over those of the rows around, and of the extent.
+_ABRUPT, _LEAST_STEP = 8.0, 0.01
+
+
+def with_steps(record: Array) -> tuple[Array, Array]:
+    """Return a record, (n, 2), with a step in the middle of each two rows between which one came.
+
+    A step is two rows of one time. Also returned are standard deviations of their times in s,
+    (n_steps,), which are anywhere between the rows.
+    """
+    time_s, values = record.T
+    sizes = np.pad(np.abs(np.diff(values)), _ASIDE)
+    around = [np.roll(sizes, by) for by in (-2, -1, 1, 2)]
+    abrupt = sizes > np.maximum(_ABRUPT * np.max(around, axis=0), _LEAST_STEP * np.ptp(values))
+    before = np.flatnonzero(abrupt[_ASIDE:-_ASIDE])
+    middle_s = 0.5 * (time_s[before] + time_s[before + 1])
+    steps = np.stack((np.repeat(middle_s, 2), np.ravel(values[before[:, None] + [0, 1]])), axis=1)
+    lasts_s = time_s[before + 1] - time_s[before]
+    return np.insert(record, np.repeat(before + 1, 2), steps, axis=0), lasts_s / np.sqrt(12)
 
 
 def follow_rows(time_s: Array, values: Array, *, deforms: bool) -> Course:
@@ -27,13 +49,20 @@ def follow_rows(time_s: Array, values: Array, *, deforms: bool) -> Course:
     Parameters
     ----------
     time_s : (n,)
-        Times from the start of the protocol, ascending, at least two. Where nothing changes, rows
-        make no phases of their own.
+        Times from the start of the protocol, ascending, at least two; two rows of one time are a
+        step. Where nothing changes, rows make no phases of their own.
     values : (n,)
         What was controlled; at the first row it jumps there from zero.
     deforms
         True if that is a deformation.
     """
+    # Without its steps the course goes on from row to row.
+    at_once = np.diff(time_s, append=np.inf) == 0
+    heights = np.where(at_once, np.diff(values, append=0.0), 0.0)
+    first = ~np.append(False, at_once[:-1])
+    levels = np.cumsum(heights)
+    values, time_s = (values - levels + heights)[first], time_s[first]
+    heights, levels = heights[first], levels[first]
     left, right = _rates(time_s, values)
     length, chord = np.diff(time_s), np.diff(values) / np.diff(time_s)
     # What the rates at both ends of a piece exceed that of a line by.
@@ -48,7 +77,8 @@ def follow_rows(time_s: Array, values: Array, *, deforms: bool) -> Course:
         axis=1,
     )
     changes = powers.copy()
-    changes[1:, 0] = 0.0
+    powers[:, 0] += levels[:-1]
+    changes[1:, 0] = heights[1:-1]
     changes[1:, 1] -= left[1:-1]
     changes[1:, 2] -= powers[:-1, 2] + powers[:-1, 3] * length[:-1]
     changes[1:, 3] -= powers[:-1, 3]

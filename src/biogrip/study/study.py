@@ -213,7 +213,8 @@ class Case:
         if not self.recorded:
             return judged
         measured, models = self.block.measurement, self.study.config.model_selection.models
-        known = measured.fit_start or self.record is not None
+        # A recorded load that is there in its first row came before that.
+        known = measured.fit_start or (self.record is not None and not self.record[0, 1])
         default = read_config(default_config())["model_selection"]["models"]
         return replace(
             judged,
