@@ -85,10 +85,13 @@ def test_columns_of_pandas_are_identified_as_by_the_command(tmp_path: Path) -> N
     config = compared(*models)
     result = library.identify_trace(FRAME["t"], FRAME[["strain"]], **HELD, **own, **config)
     FRAME.to_csv(tmp_path / "trace.csv", index=False)
-    options = "--time t --set measurement.time_unit=s --reading strain=strain --hold 5 --start 85"
+    options = "--time t --set measurement.time_unit=s --reading strain=strain --start 85"
     options += " --model zener_kelvin --offset --noise 2e-4"
     given = yaml.safe_dump(config["config"])
-    found = identified(tmp_path, tmp_path / "trace.csv", *options.split(), config=given)
+    told = *options.split(), "--hold", "5e-3 kPa"
+    found = identified(tmp_path, tmp_path / "trace.csv", *told, config=given)
+    assert found["load"] == f"Held: 0.005 kPa from 85 s to {FRAME['t'].iloc[-1]:g} s."
+    assert f"\nHeld: 5 Pa from 85 s to {FRAME['t'].iloc[-1]:g} s.\n" in str(result)
     frame = result.to_frame()
     assert list(frame.index) == [*TRUTH, "tau_v"]
     for quantity in found["quantities"]:

@@ -110,11 +110,14 @@ def _start(text: str) -> tuple[tuple[str, ...], Any]:
 
 def _hold(text: str) -> tuple[tuple[str, ...], Any]:
     from biogrip.study.source import HOLD
+    from biogrip.traces.columns import number_and_unit
 
     with suppress(ValueError):
-        if (value := float(text)) and math.isfinite(value):
-            return HOLD, value
-    raise argparse.ArgumentTypeError(f"found '{text}', allowed is a number, and not 0")
+        number, unit = number_and_unit(text)
+        if number and math.isfinite(number):
+            return HOLD, text if unit else number
+    form = "allowed is a number, and not 0, with its unit or in SI units"
+    raise argparse.ArgumentTypeError(f"found '{text}', {form}")
 
 
 def _fix(text: str) -> tuple[tuple[str, ...], Any]:
@@ -151,8 +154,9 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
     "what was done": [
         (
             *("--hold", _hold, "VALUE"),
-            "what was held from 0 to the end, without a config: a stress in Pa for a strain, a "
-            "force in N for a displacement, and the reverse; 1 for a compliance or a modulus",
+            "what was held from 0 to the end, without a config: a stress for a strain, a force for "
+            "a displacement, and the reverse, as in '20 pN', 5mbar or 5%%, or in SI units; 1 for a "
+            "compliance or a modulus",
         ),
         ("--load", "measurement.load", "COLUMN", "of what was held, as recorded, instead"),
         ("--start", _start, "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),

@@ -1,10 +1,13 @@
 """Noise, thresholds and covariance by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from biogrip.judging.likelihood import Likelihood, covariance, make_likelihood
+from biogrip.judging.likelihood import Likelihood, check_rows, covariance, make_likelihood
 from tests.helpers.default import seen
+from tests.helpers.problems import likelihood_of, problem
 
 
 def likelihood_with(freedom: float) -> Likelihood:
@@ -42,3 +45,17 @@ def test_noise_that_grows_has_the_covariance_of_unweighted_fits() -> None:
     """Of a slope from readings at 10 and 20: (10^2 + 20^2 3^2) / (10^2 + 20^2)^2."""
     found = covariance(np.array([[10.0, 20.0]]), np.array([1.0, 3.0]))
     assert found[0, 0] == pytest.approx(3700 / 500**2)
+
+
+def test_rows_of_another_misfit_than_that_of_the_readings_have_no_limits() -> None:
+    """A reading is moved behind the back of the rows, by four standard deviations of the noise."""
+    likelihood = likelihood_of(problem("liquid_drop_1", 0))
+    check_rows(likelihood)
+    residuals = likelihood.problem.residuals
+    readings = residuals.trace.readings + 0.0
+    readings[7] += 4 * likelihood.noise_sd
+    moved = replace(residuals.trace, readings=readings)
+    moved.__dict__["rows"] = residuals.trace.rows
+    posed = replace(likelihood.problem, residuals=replace(residuals, trace=moved))
+    with pytest.raises(ArithmeticError, match="stand for readings with"):
+        check_rows(replace(likelihood, problem=posed))

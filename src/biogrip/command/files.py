@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from biogrip import __version__
+from biogrip.command.held import load_in_words
 from biogrip.command.outputs import WRITTEN_BY, Outcome, check_output, in_own_units, write_table
 from biogrip.command.settings import (
     Asked,
@@ -264,13 +265,16 @@ def data_of(
 
     Given are the blocks of the config that the user has set.
     """
-    recording = diagnosis.recording
+    recording, experiment = diagnosis.recording, diagnosis.experiment
     assert recording
+    assert experiment
+    load = load_in_words((recording, experiment), case, given)
     tried = diagnosis.models.answers if diagnosis.models else ()
     return {
         WRITTEN_BY: __version__,
         "trace": trace,
         **({} if is_usual(recording) else {"read_as": recording.form}),
+        **({"load": load} if load else {}),
         **trace_data(diagnosis),
         "assumed": _assumed(diagnosis, case, list(tried or case.models)),
         "by_default": _by_default(given) if case.instrument.has_jaws else [],
@@ -287,6 +291,8 @@ def _assumed(diagnosis: Diagnosis, case: Case, tried: Sequence[str]) -> dict[str
     assert found
     blocks = ["instrument", "protocol", "search_range", "measurement", "models", "least_squares"]
     blocks += ["gripper"] if case.instrument.has_jaws else []
+    if case.record is not None:
+        blocks.remove("protocol")
     terms: dict[str, Any] = {"offset": found.offset, "drift": found.drift}
     left_out = {name: it for name, it in terms.items() if it != getattr(case.experiment, name)}
     block = replace(

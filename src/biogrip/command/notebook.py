@@ -108,7 +108,7 @@ def identify_trace(
     *,
     reads: str = GRIPPER.read.name,
     model: str = MODEL,
-    hold: float | None = None,
+    hold: float | str | None = None,
     start: float | str | None = None,
     sd: ArrayLike | None = None,
     noise: float | None = None,
@@ -130,7 +130,8 @@ def identify_trace(
     model
         Name of the sample model.
     hold
-        What is held from 0 to the end, SI units, unless ``config`` has the protocol.
+        What is held from 0 to the end, in SI units or with its unit, as ``"20 pN"``, unless
+        ``config`` has the protocol.
     start
         Start of the protocol on the clock of `time_s`, in s, or ``"fit"``.
     sd : (n_samples,), optional

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.command.held import remarks_on_hold
 from biogrip.command.outputs import COLUMNS
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
@@ -44,7 +45,7 @@ from biogrip.study.source import (
 )
 from biogrip.study.study import Case
 from biogrip.terminal import visible
-from biogrip.traces.columns import Columns, listed, place, trace_file_problem
+from biogrip.traces.columns import Columns, held_unit, listed, place, trace_file_problem
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
 
 MODEL = "generalized_maxwell"
@@ -134,7 +135,8 @@ def read_trace(asked: Asked) -> tuple[Recording, Case]:
     case, recording = _case_of(asked)
     columns = replace(case.columns, by_options=True)
     # What its protocol follows from was read before the protocol's start was known.
-    return replace(recording, read=columns) if recording else asked.read(columns), case
+    recording = replace(recording, read=columns) if recording else asked.read(columns)
+    return replace(recording, remarks_before=remarks_on_hold(recording, case, asked.given)), case
 
 
 def case_of(asked: Asked) -> Case:
@@ -154,7 +156,7 @@ def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
         of_config = [*keys_in(read_configs([asked.config] if asked.config else []))]
         said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in found]
         raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
-    merged, recording = _with_instrument(overlaid(below, given), given, asked)
+    merged, recording, record = _with_instrument(overlaid(below, given), given, asked)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
         merged.pop(name, None)
@@ -167,7 +169,7 @@ def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
     except BiogripError as error:
         _, *problems = str(error).replace(f"cases.{case}.", "").split("\n")
         raise BiogripError("\n".join(problems)) from error
-    return study.cases[case], recording
+    return replace(study.cases[case], record=record), recording
 
 
 def _source(
@@ -186,14 +188,15 @@ def _source(
 
 def _with_instrument(
     merged: dict[str, Any], given: Mapping[str, Any], asked: Asked
-) -> tuple[dict[str, Any], Recording | None]:
+) -> tuple[dict[str, Any], Recording | None, Array | None]:
     """Return the blocks with the trace's file, its instrument, and a protocol of that.
 
-    Where the protocol follows from the trace, it is returned, too.
+    Where the protocol follows from the trace, it is returned, too, and what was controlled, if it
+    was recorded, see `Experiment.record`.
     """
     level = merged.pop(HOLD[0], None)
     if not isinstance(merged["measurement"], dict):
-        return merged, None
+        return merged, None, None
     instrument = _instrument(merged, given)
     usual = {"time": "time_s", instrument.read.name: instrument.read.column}
     file = ARRAYS if asked.arrays else str(asked.trace)
@@ -204,39 +207,47 @@ def _with_instrument(
     of_column = measurement.get(LOAD[-1]) is not None
     if level is None and not of_column:
         if "protocol" in given or instrument.has_jaws:
-            return found, None
+            return found, None, None
         if not instrument.relative:
             unit = f" in {controlled.unit}" if controlled.unit else ""
             raise BiogripError(
                 f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, a "
                 "column of it by --load, or a protocol in --config."
             )
+    if level is not None:
+        level, unit = held_unit(level, controlled)
+        level *= controlled.units[unit]
     own = _recording(asked, measurement)
-    phases = [{"duration_s": 1.0, controlled.column: 1.0 if level is None else level}]
-    start_s = measurement.get("start_s")
+    phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
+    record, start_s = None, measurement.get("start_s")
     if own is not None and own.load is not None:
-        start_s = own.load[0, 0] if start_s is None else start_s
-        measurement["start_s"] = float(start_s) or None
-        phases = _phases(own.load, start_s, controlled.column) or phases
+        first_s, first = own.load[0].tolist()
+        # A load that is there in the first row came before it: at 0, as one that is held.
+        start_s = (min(first_s, 0.0) if first else first_s) if start_s is None else start_s
+        measurement["start_s"] = start_s or None
+        record = _from(own.load, start_s)
+        largest = max(record[:, 1], key=abs)
+        if instrument.relative:
+            record[:, 1] /= largest
+        phase = {"duration_s": float(record[-1, 0]), controlled.column: float(largest)}
     elif own is not None:
         first = start_s or min(float(own.time_s[0]), 0.0)
         lasts = float(own.time_s[-1]) - first
-        phases[0]["duration_s"] = lasts if lasts > 0 else 1.0
+        phase["duration_s"] = lasts if lasts > 0 else 1.0
         if lasts > 0 and not SHORTEST_S <= lasts <= LONGEST_S:
             raise BiogripError(
                 f"{place(own.path)}: found {lasts:g} s from the protocol's start, at {first:g} s, "
                 f"to the last reading; allowed are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit "
                 "of time right? Or say when it started (--start)."
             )
-    return {**found, "protocol": {"phases": phases}}, own
+    return {**found, "protocol": {"phases": [phase]}}, own, record
 
 
-def _phases(load: Array, start_s: float, key: str) -> list[dict[str, float]]:
-    """Return the phases of ramps, (n, 2) times and loads, from a time on."""
-    times, loads = load[load[:, 0] > start_s].T
-    times, loads = np.r_[start_s, times], np.r_[np.interp(start_s, *load.T), loads]
-    ramps = np.c_[np.diff(times), loads[:-1], loads[1:]].tolist()
-    return [{"duration_s": lasts, key: of, f"to_{key}": to} for lasts, of, to in ramps]
+def _from(load: Array, start_s: float) -> Array:
+    """Return rows of times and loads, (n, 2), from a time on, counted from it."""
+    after = load[load[:, 0] > start_s]
+    first = start_s, np.interp(start_s, *load.T)
+    return np.vstack((first, after)) - (start_s, 0.0)
 
 
 def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrument:

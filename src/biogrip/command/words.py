@@ -72,8 +72,8 @@ def in_unit(value: float, found: Mapping[str, Any]) -> str:
 
 
 def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
-    """Return lines on fixed parameters, and on onset, offset and drift as far as fitted."""
-    lines = fixed_in_words(found)
+    """Return lines on what is given, and on onset, offset and drift as far as fitted."""
+    lines = given_in_words(found)
     if "onset_s" in found:
         when = instant(found["onset_s"], *found["onset_limits_s"])
         lines.append(f"The protocol starts at {when} of the clock, as fitted.")
@@ -84,9 +84,10 @@ def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def fixed_in_words(found: Mapping[str, Any]) -> list[str]:
-    """Return a line on fixed parameters, or none."""
-    return [f"Fixed: {', '.join(found['fixed'])}."] if "fixed" in found else []
+def given_in_words(found: Mapping[str, Any]) -> list[str]:
+    """Return a line on what was held or loaded, and one on fixed parameters, as far as given."""
+    lines = [visible(found["load"])] if "load" in found else []
+    return [*lines, f"Fixed: {', '.join(found['fixed'])}."] if "fixed" in found else lines
 
 
 def one_sided_in_words(found: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -147,7 +148,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)
-        lines += _once(found, fixed_in_words)
+        lines += _once(found, given_in_words)
         for each in found:
             said = [f"{_SAID[note['weight']]}: {note['text']}" for note in each["notes"]]
             said += [each["advice"]] if each["fit"] == REJECTED and each["advice"] else []

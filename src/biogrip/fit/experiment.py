@@ -17,6 +17,7 @@ from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
 from biogrip.physics.noise import stream
 from biogrip.physics.protocol import Course, Phase, join_phases
+from biogrip.physics.recorded_course import follow_rows
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.physics.whitening import (
@@ -61,9 +62,13 @@ class Experiment:
     """True if the noise of a trace may be autocorrelated, see `fit_traces`."""
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
-    ``gripper`` itself; and ``share`` of the ``torque``."""
+    ``gripper`` itself; ``share`` of the ``torque``; and of the ``steps`` of a record, by their
+    number from 0, when each came."""
     fit_start: bool = False
     """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
+    record: Array | None = field(default=None, compare=False)
+    """Times from the start and what was controlled at them, (n, 2), where that was recorded, see
+    `follow_rows`; the phases are then a hold as long and as high."""
     undeclared: frozenset[str] = frozenset()
     """Which of ``offset`` and ``drift`` nothing is said of: a noise model brings them along."""
     given_ranges: frozenset[str] = frozenset()
@@ -91,6 +96,8 @@ class Experiment:
     @cached_property
     def torque(self) -> Course:
         """Torque of both arms, or what else is held, against time."""
+        if self.record is not None:
+            return follow_rows(*self.record.T, deforms=self.instrument.deforms)
         return join_phases(self.phases, deforms=self.instrument.deforms)
 
     @cached_property
@@ -142,9 +149,17 @@ class Experiment:
             if error and key != _NOT_FITTED
         ]
 
+    def with_step(self, number: int, later_s: float) -> "Experiment":
+        """Return an experiment of which a step of the record comes later by some s."""
+        assert self.record is not None
+        record = self.record.copy()
+        row = np.flatnonzero(np.diff(record[:, 0]) == 0)[number]
+        record[[row, row + 1], 0] += later_s
+        return replace(self, record=record)
+
     @property
     def plain(self) -> bool:
-        """True if noise is assumed to be white, and the gripper to be known exactly."""
+        """True if noise is assumed to be white, and gripper and protocol to be known exactly."""
         return not (self.coloured or self.uncertain)
 
     def calibrated(self, files: Sequence[Path]) -> "Experiment":
@@ -173,7 +188,7 @@ class Experiment:
         `model`, `noise_sd`, and `condensed` from `in_noise` replace those of the case.
         """
         rows = condensed or self._condensed(time_s)
-        trace = Trace(time_s, readings, rows, noise_sd or self.noise_sd)
+        trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd)
         given = self.gripper, model or self.searched, self.torque, trace
         return make_problem(Residuals(*given, instrument=self.instrument), self.ranges)
 
@@ -190,8 +205,9 @@ class Experiment:
 
     def rows_key(self, time_s: Array) -> Hashable:
         """Return what the rows of a trace depend on, whose times are (n_samples,)."""
-        sd = None if self.sd is None else self.sd.tobytes()
-        return self.phases, self.instrument, self.offset, self.drift, sd, time_s.tobytes()
+        sd, record = (None if of is None else of.tobytes() for of in (self.sd, self.record))
+        held = self.phases, record, self.instrument, self.offset, self.drift
+        return *held, sd, time_s.tobytes()
 
     def for_model(self, problem: TraceProblem, model: SampleModel) -> TraceProblem:
         """Return one of its problems posed for another model; both share rows of the trace."""
@@ -221,7 +237,7 @@ class Experiment:
         if noise_model is not None:
             whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
         basis = with_uncertain(nuisance, uncertain)
-        return Condensed(self.torque, time_s, basis, whitening=whitening)
+        return Condensed(self.torque, self.torque.snapped(time_s), basis, whitening)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""

@@ -1,8 +1,8 @@
-"""Identification of one trace together with its noise model and an uncertain gripper.
+"""Identification of one trace with its noise model, an uncertain gripper, and uncertain steps.
 
-If the noise is white and the gripper known, this is one global fit. Otherwise outliers are struck.
-Then the best fit, the autocorrelation of its residuals and the effect of the gripper's uncertainty
-are computed in turn, until none of them changes.
+If the noise is white and all else known, this is one global fit. Otherwise outliers are struck.
+Then the best fit, the autocorrelation of its residuals and the effects of what is uncertain are
+computed in turn, until none of them changes.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,7 +25,7 @@ _SECOND_ORDER = 9.0
 
 
 def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) -> Array:
-    """Compute the changes of a rotation by the uncertainties of the gripper's properties.
+    """Compute the changes of a reading by the uncertainties of the gripper and of the protocol.
 
     To the first order it is half the difference between responses with the property a standard
     uncertainty above and below its value, as is recommended for nonlinear models [1]_. The mean
@@ -47,6 +47,8 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
         gripper, torque = experiment.gripper, experiment.torque
         if part == "torque":
             torque = torque.times(1 + error)
+        elif part == "steps":
+            torque = experiment.with_step(int(key), error).torque
         elif part == "gripper":
             gripper = replace(gripper, **{key: getattr(gripper, key) + error})
         elif part:

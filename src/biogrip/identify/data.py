@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from biogrip.digits import round_increase
+from biogrip.digits import counted, round_increase
 from biogrip.fit.experiment import Experiment
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import (
@@ -128,14 +128,20 @@ def _fixed(experiment: Experiment) -> dict[str, list[str]]:
 
 
 def _what_limits_include(experiment: Experiment) -> str:
-    """Return a sentence on the part that the gripper's uncertainty has in the limits."""
-    instrument = experiment.instrument
-    exact = "gripper" if instrument.has_jaws else instrument.controlled.name
-    if not experiment.uncertain or not instrument.has_jaws:
-        return f"Limits are statistical only: the {exact} is taken as exact."
-    uncertain = experiment.uncertain
-    keys = ", ".join(f"{part}.{key}".removesuffix(".share") for part, key, _ in uncertain)
-    return f"Limits include uncertainties of the gripper: {keys}."
+    """Return a sentence on the part that uncertainties of gripper and protocol have in limits."""
+    instrument, controlled = experiment.instrument, experiment.instrument.controlled.name
+    exact = "gripper" if instrument.has_jaws else controlled
+    known = [(part, key) for part, key, _ in experiment.uncertain]
+    keys = [f"{part}.{key}".removesuffix(".share") for part, key in known if part != "steps"]
+    said = []
+    if instrument.has_jaws and keys:
+        said.append(f"Limits include uncertainties of the gripper: {', '.join(keys)}.")
+    if steps := len(known) - len(keys):
+        said.append(
+            f"Limits allow for {counted(steps, 'step')} of the {controlled} anywhere between the "
+            f"two rows of its record; otherwise the {exact} is taken as exact."
+        )
+    return " ".join(said) or f"Limits are statistical only: the {exact} is taken as exact."
 
 
 def _fitted_along(

@@ -22,8 +22,10 @@ from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.fitted_onset import OnsetFits, estimate_onset
 from biogrip.fit.genome import GeneRange
+from biogrip.identify.load_noise import without_noise
 from biogrip.identify.plausibility import check_recording
 from biogrip.physics.protocol import Course, is_held, largest_load
+from biogrip.physics.recorded_course import with_steps
 from biogrip.physics.whitening import MOST_SAMPLES, drift_is_flow, estimate_noise
 from biogrip.traces.columns import place
 from biogrip.traces.reader import Recording
@@ -51,7 +53,16 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
 
     A `BiogripError` has file, line and column of what is impossible with instrument and protocol.
     """
+    if experiment.record is not None:
+        record, uncertain_s = with_steps(experiment.record)
+        steps = {str(number): error for number, error in enumerate(uncertain_s.tolist())}
+        uncertainty = {**experiment.uncertainty, "steps": steps}
+        experiment = replace(experiment, record=record, uncertainty=uncertainty)
     recording = _checked(recording, experiment)
+    if experiment.record is not None:
+        record, noise = without_noise(experiment, recording.time_s, recording.readings)
+        experiment = replace(experiment, record=record)
+        recording = replace(recording, load_noise=noise)
     experiment = for_trace(experiment, recording)
     if experiment.fit_start and recording.onset_s is not None:
         fits = OnsetFits(experiment, recording.time_s, recording.readings)
@@ -108,10 +119,10 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
 def without_steps(trace: Recording, protocol: Course) -> Recording:
     """Leave out readings at the very instant of a step.
 
-    Without inertia a sample may jump there, and nothing tells on which side a reading was taken.
+    Without inertia a sample may jump there, and nothing tells on which side a reading was taken. A
+    damper's force jumps with the rate of a deformation, too.
     """
-    steps = [start for start, order, _ in protocol.jumps if order == 0]
-    at = np.isin(trace.time_s, steps)
+    at = np.isin(protocol.snapped(trace.time_s), protocol.jumps_s)
     times = trace.time_s[at] + (trace.onset_s or 0.0)
     return replace(trace.part(~at), at_steps=tuple(times.tolist()))
 

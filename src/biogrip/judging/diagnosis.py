@@ -33,7 +33,7 @@ from biogrip.judging.doubts import (
     compute_status,
     examine_residuals,
 )
-from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
+from biogrip.judging.likelihood import MISSED, Likelihood, check_rows, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
 from biogrip.physics.sample_model import C_P, SampleModel
@@ -158,6 +158,7 @@ def settled(
                 confidence=confidence,
                 noise_sd=noise_sd[trace],
             )
+            check_rows(likelihood)
             remainder = examine_residuals(likelihood)
             if remainder.misfit is not None:
                 likelihood = likelihood.as_misfit(*remainder.misfit)

@@ -290,10 +290,9 @@ def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
     if len(far):
         named = ", ".join(f"{each:.6g} s" for each in far[:_NAMED])
         more = f" and {len(far) - _NAMED} more" if len(far) > _NAMED else ""
-        steps = [start for start, order, _ in residuals.course.jumps if order == 0]
         at_step = (
             " Readings at the very instant of a step may be of either side of it: leave them out."
-            if np.isin(far, steps).any()
+            if np.isin(far, residuals.course.steps_s).any()
             else ""
         )
         yield (

@@ -43,6 +43,10 @@ A fit that is deeper than an optimum by more shows that the optimum is not the g
 """
 
 
+# Error of sums of squares, as a share of those of the largest reading.
+_ROUNDING = 1e-12
+
+
 @dataclass(frozen=True)
 class Likelihood:
     """Optimum, noise and thresholds that define the profile likelihoods of one trace."""
@@ -125,6 +129,22 @@ def make_likelihood(
         freedom = float(min(left, problem.residuals.freedom))
     threshold, certainty = _thresholds(confidence, freedom)
     return Likelihood(problem, best, misfit, noise_sd, threshold, certainty, freedom, confidence)
+
+
+def check_rows(likelihood: Likelihood) -> None:
+    """Raise an `ArithmeticError` if the condensed rows have another misfit than the readings.
+
+    Profiles, which see the rows alone, would then have limits around another optimum.
+    """
+    residuals, best = likelihood.problem.residuals, likelihood.best
+    of_rows = float(residuals.misfit(np.exp(best)[None])[0])
+    of_readings = float(np.sqrt(np.mean(residuals.left(best) ** 2)))
+    largest = float(np.max(np.abs(residuals.trace.readings)))
+    rounding = _ROUNDING * residuals.samples * (largest / likelihood.noise_sd) ** 2
+    apart = likelihood.increase(of_rows) - likelihood.increase(of_readings)
+    if abs(apart) > MISSED + rounding:
+        text = f"rows with a misfit of {of_rows:.6g} stand for readings with {of_readings:.6g}"
+        raise ArithmeticError(text)
 
 
 def _thresholds(confidence: float, freedom: float) -> tuple[float, float]:

@@ -36,7 +36,7 @@ from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.verdicts import Finding
-from biogrip.physics.protocol import Phase, ramp
+from biogrip.physics.protocol import ramp
 from biogrip.physics.whitening import estimate_noise
 
 # So that correlated noise does not look like a late onset; and level of other tests.
@@ -44,6 +44,8 @@ _FALSE_ALARM, _AS_GOOD = 1e-9, 1e-3
 # Intervals from a change to the first reading of a trace that is cut off, fewest readings by which
 # their growth is known, and its powers of the time if readings were spaced from the change on.
 _DELAYED, _FEWEST_APART, _PLANNED = 10.0, 3, (0.5, 1.5)
+# Change of a recorded load that is held, as a share of it.
+_HELD = 0.1
 # Misfit over the scatter of neighbours that a right fit does not exceed.
 _WHITE = 1.5
 _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
@@ -77,9 +79,9 @@ def notes_on_start(
         That of the best fit with that protocol.
     """
     may_be_late = not experiment.start_given
-    fits, ramp = OnsetFits(experiment, time_s, readings), _with_ramp(experiment, time_s)
+    fits, ramped = OnsetFits(experiment, time_s, readings), _with_ramp(experiment, time_s)
     notes: list[Note] = []
-    if may_be_late and ramp and is_cut_off(time_s):
+    if may_be_late and ramped and is_cut_off(time_s):
         notes += _about_clock(fits, diagnosis)
     elif begins_constant(time_s, readings):
         # A constant that is not zero is an offset, with which the onset would be biased.
@@ -91,8 +93,8 @@ def notes_on_start(
                 notes += _about_late_onset(replace(fits, experiment=free), diagnosis, onset_s)
             if not experiment.offset and (notes or not may_be_late):
                 notes += _about_tare(fits, diagnosis, onset_s)
-    if diagnosis.status != REJECTED and ramp and not notes:
-        notes += _about_ramp(fits, diagnosis, ramp)
+    if diagnosis.status != REJECTED and ramped and not notes:
+        notes += _about_ramp(fits, diagnosis, ramped)
     return notes
 
 
@@ -182,11 +184,11 @@ def _moved(diagnosis: Diagnosis, given: OnsetFit, other: OnsetFit, widths: float
     return "; ".join(said)
 
 
-def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramp: tuple[Phase, ...]) -> Iterator[Note]:
+def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> Iterator[Note]:
     """Yield a note if a ramp up to the first reading moves a value by the width of its limits."""
-    ramped_fits = replace(fits, experiment=replace(fits.experiment, phases=ramp))
-    given, ramped = (own.at(0.0, diagnosis.likelihood.best) for own in (fits, ramped_fits))
-    if moved := _moved(diagnosis, given, ramped, 1.0):
+    both = fits, replace(fits, experiment=ramped)
+    given, other = (own.at(0.0, diagnosis.likelihood.best) for own in both)
+    if moved := _moved(diagnosis, given, other, 1.0):
         yield Note(
             HARMLESS,
             "If the load was no step but a ramp that ends with the first reading, at "
@@ -195,17 +197,24 @@ def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramp: tuple[Phase, ...]) 
         )
 
 
-def _with_ramp(experiment: Experiment, time_s: Array) -> tuple[Phase, ...]:
-    """Return phases with a ramp up to the first reading, none but for a hold until after that."""
+def _with_ramp(experiment: Experiment, time_s: Array) -> Experiment | None:
+    """Return one with a ramp up to the first reading, none but for a hold until after that."""
+    delay_s, record = float(time_s[0]), experiment.record
+    if record is not None:
+        later = record[record[:, 0] > delay_s]
+        level, before = record[0, 1], record[: len(record) - len(later), 1]
+        if delay_s <= 0 or not level or np.ptp(before) > _HELD * abs(level):
+            return None
+        return replace(experiment, record=np.vstack(([0.0, 0.0], [delay_s, level], later)))
     first, *rest = experiment.phases
-    delay_s = float(time_s[0])
     if not 0 < delay_s < first.duration_s or first.slope or first.curvature:
-        return ()
-    return (
+        return None
+    phases = (
         ramp(delay_s, 0.0, first.level),
         replace(first, duration_s=first.duration_s - delay_s),
         *rest,
     )
+    return replace(experiment, phases=phases)
 
 
 def onset_limits(best: Likelihood, time_s: Array) -> tuple[float, float]:

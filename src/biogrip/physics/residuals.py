@@ -55,11 +55,6 @@ class Trace:
         """Condensed rows, (n_rows,)."""
         return self.condensed.of_trace(self.cleared)
 
-    @cached_property
-    def at_nodes(self) -> tuple[Array, float]:
-        """Rows of the nodes, and the norm of what no response reaches."""
-        return self.condensed.dense.rows_of_samples(self.cleared)
-
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
@@ -136,7 +131,7 @@ class Residuals:
         """Return the residuals of the same trace for a protocol that starts later by some s."""
         trace = self.trace
         condensed = trace.condensed.later(change_s)
-        moved = Trace(trace.time_s - change_s, trace.readings, condensed, trace.noise_sd)
+        moved = Trace(condensed.all_s, trace.readings, condensed, trace.noise_sd)
         return replace(self, trace=moved)
 
     def shares_responses(self, other: "Residuals") -> bool:
@@ -185,15 +180,12 @@ class Residuals:
             Root mean squares.
         """
         n, parameters = log_parameters.shape
-        condensed, sums = self.trace.condensed, np.empty((n, 1 + parameters))
-        nodes_s = condensed.dense.time_s
-        for some in parts(n, max(1, _NUMBERS_AT_ONCE // (len(nodes_s) * (1 + parameters)))):
-            rows = condensed.rows_of_nodes(self._simulated(log_parameters[some], nodes_s))
-            measured, rest = zip(*(other.trace.at_nodes for other in others[some]), strict=True)
-            rows[:, 0] -= measured
+        sums = np.empty((n, 1 + parameters))
+        for some in parts(n, max(1, _NUMBERS_AT_ONCE // (len(self.trace.rows) * (1 + parameters)))):
+            rows = self.condensed_responses(log_parameters[some])
+            rows[:, 0] -= [other.trace.rows for other in others[some]]
             # One product per sample: the order of its sums does not depend on their number.
             sums[some] = (rows @ np.ascontiguousarray(rows[:, 0])[:, :, None])[:, :, 0]
-            sums[some, 0] += np.square(rest)
         return sums[:, 1:], np.sqrt(sums[:, 0] / self.samples)
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:

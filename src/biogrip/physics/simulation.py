@@ -16,7 +16,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper, displacement_of_tip
-from biogrip.physics.modes import relaxation
+from biogrip.physics.modes import mode_responses, relaxation
 from biogrip.physics.protocol import Course
 from biogrip.physics.response import (
     LEFT,
@@ -57,7 +57,7 @@ def jaw_force(
 
 # Forces below this share of the largest one are rounding errors.
 _LEAST_FORCE = 1e-9
-_TIMES_OF_PHASE = 200
+_TIMES_OF_PHASE, _MOST_TIMES = 200, 20_000
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,8 @@ def compute_grip(gripper: Gripper, network: Network, course: Course, *, nonlinea
 def _instants(course: Course) -> Array:
     """Return times that are dense after every change of the load."""
     lengths = np.diff(course.time_s, append=course.end_s)
-    share = np.geomspace(1e-9, 1.0, _TIMES_OF_PHASE)[:-1]
+    count = max(3, min(_TIMES_OF_PHASE, _MOST_TIMES // len(lengths)))
+    share = np.geomspace(1e-9, 1.0, count)[:-1]
     pieces = [start + length * share for start, length in zip(course.time_s, lengths, strict=True)]
     return np.unique(np.append(np.concatenate(pieces), course.end_s))
 
@@ -128,7 +129,11 @@ def simulated_response(
     if course.deforms:
         return relaxation(network, course, time_s)
     response = step_response(gripper, network, inertia=gripper.has_inertia)
-    return superpose(response, course, time_s)
+    if gripper.has_inertia:
+        return superpose(response, course, time_s)
+    growth, _ = mode_responses(response.rates, course, time_s, slopes=False)
+    rotation: Array = (response.weights[:, LEFT, None] @ growth)[:, 0]
+    return rotation
 
 
 def simulated_shortening(

@@ -33,6 +33,8 @@ class Case:
     block: CaseBlock
     """Config block, with the study's blocks merged in."""
     study: "Study"
+    record: Array | None = None
+    """What was controlled in a recorded trace, if it was recorded; see `Experiment.record`."""
 
     @cached_property
     def plain(self) -> dict[str, Any]:
@@ -185,6 +187,7 @@ class Case:
             coloured=measurement.coloured,
             uncertainty=uncertainty.by_part if uncertainty else {},
             fit_start=measurement.fit_start,
+            record=self.record,
             undeclared=measurement.undeclared,
             given_ranges=self._given_ranges,
             simulated=not self.recorded,
@@ -210,10 +213,12 @@ class Case:
         if not self.recorded:
             return judged
         measured, models = self.block.measurement, self.study.config.model_selection.models
+        # A recorded load that is there in its first row came before that.
+        known = measured.fit_start or (self.record is not None and not self.record[0, 1])
         default = read_config(default_config())["model_selection"]["models"]
         return replace(
             judged,
-            start_given=measured.fit_start or measured.start_s is not None,
+            start_given=known or measured.start_s is not None,
             models=models,
             cheap_models=[*models] == default,
         )

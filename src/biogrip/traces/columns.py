@@ -48,6 +48,8 @@ _PURE = re.compile(
     r"[^\W\d_]+|(?:[\w.,-]*[\w.,]?[ _-])*(?:strain|deformation|gamma|epsilon|eps|[γεϵ])", re.I
 )
 _NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
+# A number with what may be its unit behind it.
+_SIZED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*?)\s*", re.I)
 # Keys that no option of the command sets but `--set`, with what they may say.
 _BY_SET = {
     "time_unit": "UNIT",
@@ -197,6 +199,31 @@ def known_unit(written: str, allowed: Collection[str]) -> str | None:
         if bare == unit.replace(" ", "") or plain.lower() in _SPELLED_OUT.get(unit, ()):
             return unit
     return None
+
+
+def number_and_unit(text: str) -> tuple[float, str]:
+    """Return a number and what stands behind it, as in ``20 pN`` or ``5%``.
+
+    A `ValueError` says that it does not begin with a number.
+    """
+    found = _SIZED.fullmatch(plain_name(text))
+    if found is None:
+        raise ValueError(f"found '{shortened(text)}', allowed is a number, or one with its unit")
+    return float(found[1]), found[2]
+
+
+def held_unit(value: float | str, controlled: Channel) -> tuple[float, str]:
+    """Return the number and the unit of what was held, a key of its units; a number is in SI units.
+
+    A `BiogripError` has the units that are allowed.
+    """
+    number, written = number_and_unit(str(value))
+    unit = known_unit(written, controlled.units) if written else controlled.si
+    if unit is None:
+        allowed = ", ".join(controlled.units)
+        found = f"found the unit '{shortened(written)}' of a {controlled.name}"
+        raise BiogripError(f"--hold: {found}, allowed are {allowed}.")
+    return number, unit
 
 
 def _endings(column: str, *patterns: str) -> list[str]:

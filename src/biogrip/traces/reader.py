@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.digits import counted
+from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
 from biogrip.terminal import visible
 from biogrip.traces.columns import (
@@ -20,7 +20,6 @@ from biogrip.traces.columns import (
     shortened,
     unit_of,
 )
-from biogrip.traces.loads import ramps
 from biogrip.traces.tables import BLANKS, Sheet, Table, find_tables, number_or_inf, read_sheet
 
 FEWEST_SAMPLES = 10
@@ -63,17 +62,20 @@ class Recording:
     gaps: int = 0
     """Number of rows left out for want of a number."""
     at_steps: tuple[float, ...] = ()
-    """Times by the clock of readings that were left out at the very instant of a step."""
+    """Times by the clock of readings that were left out where a sample may jump."""
+    load_noise: float = 0.0
+    """Standard deviation of what was smoothed out of `load`, as a share of its largest value."""
     suspicion: str | None = None
     """Sentence on a reading that is hardly plausible."""
     form: Mapping[str, Any] = field(default_factory=dict)
     """What was recognised in the file, for people to check before they believe a fit; `read_as` of
     the JSON file."""
     remarks_before: tuple[str, ...] = ()
-    """Sentences of an earlier reading, where `form` is lost."""
+    """Sentences that come before: of an earlier reading, where `form` is lost, or on what was
+    held."""
     load: Array | None = None
-    """Times and loads, or deformations, in SI units, linear between them, (n, 2), where they are
-    read: of all rows, used or not. See `ramps`."""
+    """Times and loads, or deformations, in SI units, (n, 2), where they are read: of all rows, used
+    or not."""
 
     def part(self, kept: BoolArray) -> "Recording":
         """Return some of the readings, (n_samples,) true for those."""
@@ -109,13 +111,18 @@ class Recording:
             said.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
         if "others" in form:
             said.append(f"Left out, for rows asks for others: {counted(form['others'], 'row')}.")
-        if "load" in form:
-            said.append(f"The protocol is {form['load']}.")
+        if self.load_noise:
+            said.append(
+                f"Smoothed out of {self.read.load}, since the readings do not follow it: what "
+                f"scatters from row to row by {plain(100 * self.load_noise, 2)} % of the largest. "
+                "What is left counts as exact."
+            )
         if self.at_steps:
             times = ", ".join(f"{time_s:.6g} s" for time_s in self.at_steps)
             said.append(
-                "Left out at the instant of a step, of which nothing tells on which side of it "
-                f"they were taken: {counted(len(self.at_steps), 'reading')}, at {times}."
+                "Left out where a sample may jump, at a step or where the rate of a deformation "
+                "jumps, since nothing tells on which side they were taken: "
+                f"{counted(len(self.at_steps), 'reading')}, at {times}."
             )
         return said
 
@@ -123,11 +130,12 @@ class Recording:
 def is_usual(recording: Recording) -> bool:
     """Return True of arrays, and of a file with a table as biogrip itself would write."""
     form, columns = recording.form, recording.read
-    odd = ("units_line", "block", "preamble", "averaged", "outside", "others", "load")
+    odd = ("units_line", "block", "preamble", "averaged", "outside", "others")
     return recording.path is None or (
         (form["encoding"], form["separator"], form["decimal"]) == ("UTF-8", "commas", "point")
         and not any(key in form for key in odd)
         and columns.block is None
+        and columns.load is None
         and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
     )
 
@@ -159,11 +167,11 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     header_line = int(sheet.numbers[table.at]) or None
     indices, units = _columns_of(path, header_line, table, columns)
     values, decimal = _numbers(path, sheet, table, indices)
-    lines, load, followed = sheet.numbers[table.first : table.end], None, None
+    lines, load = sheet.numbers[table.first : table.end], None
     if columns.load is not None:
         history, values = values[:, [0, -1]], values[:, :-1]
         numbers = ~np.any(np.isnan(history), axis=1)
-        load, followed = _load(path, columns, history[numbers], lines[numbers], units)
+        load = _load(path, columns, history[numbers], lines[numbers], units)
     chosen = _chosen(path, sheet, table, columns)
     names_and_units = (
         {"column": table.names[i], "unit": unit} for i, unit in zip(indices, units, strict=True)
@@ -182,7 +190,6 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     }
     others = int(np.count_nonzero(~chosen)) or None
     form |= {"rows": len(values), "gaps": None, "averaged": None, "outside": None, "others": others}
-    form |= {"load": followed}
     found = _checked(path, columns, (units[0], units[1]), values[chosen], lines[chosen])
     form |= found.form
     return replace(
@@ -361,17 +368,14 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: Columns) -> BoolArr
     return chosen
 
 
-def _load(
-    path: Path, columns: Columns, history: Array, lines: IntArray, units: list[str]
-) -> tuple[Array, str]:
-    """Return ramps in SI units that follow times and loads, (n, 2), and how they do in words."""
+def _load(path: Path, columns: Columns, history: Array, lines: IntArray, units: list[str]) -> Array:
+    """Return rows of times and loads, (n, 2), in SI units."""
     _check_count(path, columns, len(history), 0)
     if columns.average_repeated:
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
-    ends, off = ramps(*history.T)
-    said = f"{counted(len(ends) - 1, 'ramp')} along {columns.load}, within {off:.2g} {units[-1]}"
-    return ends * [TIME_UNITS[units[0]], columns.controlled.units[units[-1]]], said
+    sizes: Array = history * [TIME_UNITS[units[0]], columns.controlled.units[units[-1]]]
+    return sizes
 
 
 def _averaged(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:
