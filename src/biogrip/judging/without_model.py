@@ -1,0 +1,416 @@
+"""What any linear sample would show, whatever its model: quantities with limits, and a test.
+
+A linear passive sample has a spectrum of relaxation times that is nowhere negative. Its relaxation
+modulus G, its compliance J and what they are at a frequency are linear functionals of it, or ratios
+of two. The limits of a quantity are the ends of what it is over all spectra whose sum of squares
+exceeds the least by no more than a quantile of F, or of chi-squared if the noise is known [1]_,
+[2]_. In each fit for a limit one more row, of great weight, holds the quantity at a value v: f at
+v, or the ratio f/g by f - v g at zero. The root of the excess is nearly linear in v, and Newton's
+method takes two or three fits.
+
+What the best fit leaves tells the noise, as the sum of squares over the degrees of freedom that the
+relaxation times of the best fit and their amplitudes leave.
+
+In relaxation nothing is told of what relaxes before the first reading after a step. G' and G'' are
+then those of what relaxes later, to which the rest would add.
+
+Between arms that yield, a load is shared by arms and sample. Of a gripper, K is the force over the
+shortening at a time after a step of the torque: at once and at rest it is the sample's stiffness.
+
+References
+----------
+.. [1] B. W. Rust and W. R. Burrus, Mathematical Programming and the Numerical Solution of Linear
+   Equations, Elsevier, 1972: limits of linear functionals of what is not negative.
+.. [2] P. B. Stark, Inference in infinite-dimensional inverse problems: discretization and duality,
+   Journal of Geophysical Research 97 (1992), 14055-14082.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.special import chdtrc
+
+from biogrip.arrays import Array, BoolArray
+from biogrip.digits import plain, with_limits
+from biogrip.fit.any_sample import AnySampleFit, Lags, fit_any_sample, lagged_loads
+from biogrip.fit.noise_model_fit import absorbed
+from biogrip.judging.likelihood import find_thresholds
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.judging.whiteness import as_correlated, correlated
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.residuals import Residuals
+
+# Chance below which what a fit leaves is no noise, and how much larger than the noise it then is.
+_CHANCE, _TOO_MUCH = 0.001, 1.2
+# First digits of the times at which quantities are told and, where these are too few, of more.
+_DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2
+# Weight of the row that holds a quantity, in the inverse of its standard deviation; accuracy of
+# the threshold's root and of ends at which the excess jumps; share of the root that is flat; most
+# fits; growth of steps.
+_WEIGHT, _ACCURACY, _CLOSE, _FLAT, _MOST_FITS, _LARGER = 300.0, 0.02, 1e-3, 0.03, 25, 4.0
+# How often lags are divided at most, and change of a limit that ends it, over its distance.
+_MOST_DIVISIONS, _SETTLED = 5, 0.01
+# Share of the first time beyond which slopes have an upper limit.
+_AFTER_FIRST = 1.1
+# A limit hangs on what hardly shows if a noise of that changes the quantity so many times more.
+_HANGS = 10.0
+# Standard deviation of a quantity that counts as none, over the largest that a noise of one lag
+# makes.
+_LEAST = 1e-3
+
+# Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
+_UNITS = {False: ("N/m", "m/N", "m/(N s)", "N s/m"), True: ("Pa", "1/Pa", "1/(Pa s)", "Pa s")}
+_SIGNS = {
+    "tan delta": r"\tan\delta",
+    "exponent": "n",
+    "slope at the end": r"\dot{J}",
+    "viscosity": r"\eta",
+    " at once": "_0",
+    " at rest": r"_\infty",
+}
+
+
+@dataclass(frozen=True)
+class Told:
+    """A quantity, and its limits over all linear samples."""
+
+    quantity: str
+    """Its name, such as ``G(10 s)``."""
+    symbol: str
+    """The same as mathtext."""
+    at: float | None
+    """Time in s after a step, or angular frequency in rad/s."""
+    unit: str
+    """SI unit; empty for a pure number."""
+    value: float | None
+    """Of the best fit; None unless there are both limits."""
+    low: float | None
+    """Lower limit, if there is one."""
+    high: float | None
+    """Upper limit, if there is one."""
+
+    @property
+    def verdict(self) -> str:
+        """Verdict as on a model's quantities: determined, bounded below or above, or not."""
+        if self.low is not None:
+            return BOUNDED_BELOW if self.high is None else DETERMINED
+        return NOT_DETERMINED if self.high is None else BOUNDED_ABOVE
+
+    def words(self) -> str:
+        """Return value and limits, or the only limit, in words."""
+        unit = f" {self.unit}".rstrip()
+        if self.value is not None and self.low is not None and self.high is not None:
+            return with_limits(self.value, self.low, self.high, self.unit)
+        if self.low is not None:
+            return f"at least {plain(self.low)}{unit}"
+        return "not determined" if self.high is None else f"at most {plain(self.high)}{unit}"
+
+
+@dataclass(frozen=True)
+class WithoutModel:
+    """What a trace tells without a model."""
+
+    told: list[Told]
+    """Quantities with their limits."""
+    misfit: float
+    """RMS of what the linear sample that fits best leaves, in the unit of the readings."""
+    times_noise: float
+    """The same in the known noise or, if it is not, in the scatter of neighbouring readings."""
+    chance: float
+    """Chance of as correlated a rest in noise, or of as large a one in known noise."""
+    sees_start: bool
+    """False if what relaxes before the first reading after a step does not show."""
+
+    @property
+    def is_linear(self) -> bool:
+        """False if no linear sample gives this trace, for what the best leaves is no noise."""
+        return self.chance >= _CHANCE or self.times_noise <= _TOO_MUCH
+
+
+def tell_without_model(
+    residuals: Residuals,
+    *,
+    confidence: float,
+    noise_sd: float | None = None,
+    at: Sequence[float] = (),
+) -> WithoutModel:
+    """Tell what a trace says of any linear sample, whatever its model.
+
+    Parameters
+    ----------
+    residuals
+        Protocol, trace with what is projected out and whitened, and instrument; their model is not
+        used.
+    confidence
+        Of two limits, such as 0.95; a single limit is one of such a pair.
+    noise_sd
+        Standard deviation of the noise, if it is known.
+    at
+        Times in s after a step, whose inverses are angular frequencies; by default one a decade.
+    """
+    fit = fit_any_sample(residuals)
+    rest = float(np.linalg.norm(fit.left)) * residuals.noise_scale
+    free = max(residuals.free - fit.taken, 1)
+    residual, basis = _left_of_readings(residuals, fit)
+    _, chance = correlated(residual, basis)
+    sd, freedom = rest / math.sqrt(free), min(free, residuals.freedom)
+    times = sd / (noise_sd or residuals.noise_scale)
+    if noise_sd is not None:
+        too_large = float(chdtrc(free, (rest / noise_sd) ** 2))
+        chance = min(chance, too_large)
+        if too_large >= _CHANCE:
+            sd, freedom = noise_sd, math.inf
+    if chance < _CHANCE and times > _TOO_MUCH:
+        independent, freedom = as_correlated(residual, basis)
+        sd = rest / math.sqrt(independent)
+    threshold, _ = find_thresholds(confidence, freedom)
+    root = math.sqrt(threshold) * sd / residuals.noise_scale
+    quantities = _quantities(residuals, fit.lags, at or decades(*fit.lags.covered_s))
+    told = [_told(fit, each, root) for each in quantities]
+    misfit = rest / math.sqrt(residuals.samples)
+    return WithoutModel(told, misfit, times, chance, _sees_start(fit.lags))
+
+
+def decades(first_s: float, last_s: float) -> list[float]:
+    """Return powers of ten between two times or, of less than two, more round numbers."""
+    powers = range(math.floor(math.log10(first_s)), math.floor(math.log10(last_s)) + 1)
+    for digits in _DIGITS:
+        times = [float(f"{digit}e{power}") for power in powers for digit in digits]
+        inside = [time_s for time_s in times if first_s <= time_s <= last_s]
+        if len(inside) >= _FEWEST_TIMES:
+            break
+    return inside
+
+
+def _left_of_readings(residuals: Residuals, fit: AnySampleFit) -> tuple[Array, Array]:
+    """Return what the best fit leaves of all readings, and a basis of what it absorbs."""
+    trace, own, lags = residuals.trace, fit.amplitudes > 0, fit.lags
+    shown = trace.condensed.cleared(lagged_loads(residuals, lags.rates[own]))
+    shown /= lags.sizes[own, None]
+    residual = trace.cleared - fit.amplitudes[own] @ shown
+    return residual, absorbed(np.vstack((shown, trace.condensed.nuisance)))
+
+
+def _sees_start(lags: Lags) -> bool:
+    """Return True if the fastest lag, of a damper, shows."""
+    return bool(lags.rows[-1].any())
+
+
+@dataclass(frozen=True)
+class _Quantity:
+    """A functional of the amplitudes of lags, or the ratio of two."""
+
+    name: str
+    at: float | None
+    unit: str
+    above: Callable[[Array], Array]
+    """What unit amplitudes add, (n_rates,), by rates in 1/s, (n_rates,)."""
+    below: Callable[[Array], Array] | None = None
+    """The same of what it is divided by."""
+    sides: tuple[int, ...] = (-1, 1)
+    """Sides on which it may have a limit, -1 or 1."""
+    turned: Callable[[float], float] | None = None
+    """Falling function of it that is told in its place."""
+
+
+def _told(fit: AnySampleFit, quantity: _Quantity, root: float) -> Told:
+    """Find the limits of a quantity that is not negative."""
+    profile = _Profile(fit, quantity, root)
+    value: float | None = profile.best
+    ends = [profile.limit(side) if side in quantity.sides else None for side in (-1, 1)]
+    if (turned := quantity.turned) is not None:
+        value, *ends = (turned(it) if it else None for it in (value, *ends[::-1]))
+    low, high = (end if end is not None and end > 0 else None for end in ends)
+    if low is not None and value is not None and low < _CLOSE * value:
+        low = None
+    value = None if low is None or high is None else value
+    low, value, high = (each if each is None else float(each) for each in (low, value, high))
+    return Told(quantity.name, _symbol(quantity.name), quantity.at, quantity.unit, value, low, high)
+
+
+def _symbol(name: str) -> str:
+    """Return the name of a quantity as mathtext."""
+    for words, sign in _SIGNS.items():
+        name = name.replace(words, sign)
+    at = re.sub(r"\((.*) (\S+)\)$", r"(\1\\,\\mathrm{\2})", name)
+    return f"${at.replace(' ', chr(92) + ' ')}$"
+
+
+class _Profile:
+    """The root of the least excess of the sum of squares, as a function of a quantity."""
+
+    def __init__(self, fit: AnySampleFit, quantity: _Quantity, root: float) -> None:
+        self._fit, self._quantity, self._root = fit, quantity, root
+        self._least = float(fit.left @ fit.left)
+        above, below = self._added(fit.lags)
+        divisor = float(below @ fit.amplitudes) if quantity.below else 1.0
+        self.best = float(above @ fit.amplitudes) / divisor if divisor else math.nan
+        """The value of the best fit, NaN if it has none."""
+        row, own, faint = above - self.best * below, fit.amplitudes > 0, fit.lags.faint
+        clearly = float(np.abs(row[~faint]).max())
+        deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[own], row[own])[0]))
+        deviation = deviation if deviation > _LEAST * clearly else clearly
+        self._stride = root * deviation / (divisor or 1.0)
+        held = min(deviation, 0.1 * self.best * divisor) or deviation
+        self._weight = _WEIGHT / held if held else 0.0
+        self._open = [it for it in (-1, 1) if np.any(it * row[faint] > _HANGS * clearly)]
+
+    def _added(self, lags: Lags) -> tuple[Array, Array]:
+        """Return what amplitudes of rows add to the quantity, or its numerator, and divisor."""
+        above, below = self._quantity.above(lags.rates), np.zeros(len(lags.rates))
+        if self._quantity.below is not None:
+            below = self._quantity.below(lags.rates)
+        return above / lags.sizes, below / lags.sizes
+
+    def limit(self, side: int) -> float | None:
+        """Find the lower or upper limit, side -1 or 1, if there is one.
+
+        Lags are divided next to those that it needs until it stays.
+        """
+        if not self._stride > 0 or side in self._open:
+            return None
+        lags, start, before = self._fit.lags, self.best + side * self._stride, self.best
+        for _ in range(_MOST_DIVISIONS):
+            found, needed = self._crossing(lags, side, start)
+            if found is None or abs(found - before) < _SETTLED * abs(found - self.best):
+                break
+            before = start = found
+            lags = lags.divided(needed)
+        return found
+
+    def _crossing(self, lags: Lags, side: int, value: float) -> tuple[float | None, BoolArray]:
+        """Return the limit with certain lags, and which it needs, beginning with a value."""
+        above, below = self._added(lags)
+        seen: BoolArray = np.any(lags.rows, axis=1)
+        ratio = self._quantity.below is not None
+        rows = np.column_stack((lags.rows, above))
+        measured, weight = np.append(self._fit.measured, 0.0), self._weight
+        inner, outer = self.best, math.inf
+        for _ in range(_MOST_FITS):
+            value = value if side > 0 else max(value, 0.0)
+            rows[:, -1] = np.where(seen, weight * (above - value * below), 0.0)
+            measured[-1] = 0.0 if ratio else weight * value
+            amplitudes, norm = nnls(rows.T, measured, maxiter=100 * len(rows))
+            reached = math.sqrt(max(norm**2 - self._least, 0.0))
+            over = reached - self._root
+            if over < 0 and value <= 0:
+                break
+            force = weight * float(measured[-1] - amplitudes @ rows[:, -1])
+            slope = force * (float(below @ amplitudes) if ratio else 1.0)
+            # Where the excess is flat, its slope says nothing.
+            steep = side * slope > 0 and reached > _FLAT * self._root
+            step = -over * reached / slope if steep else side * math.inf
+            if abs(over) < _ACCURACY * self._root:
+                return value + (step if steep else 0.0), amplitudes > 0
+            inner, outer = (value, outer) if over < 0 else (inner, value)
+            if abs(outer - inner) < _CLOSE * abs(inner - self.best):
+                return inner, amplitudes > 0
+            far = outer if math.isfinite(outer) else self.best + _LARGER * (value - self.best)
+            share = (value + step - inner) / (far - inner)
+            if far == outer and not _CLOSE < share < 1 - _CLOSE:
+                share = 0.5
+            value = inner + min(share, 1.0) * (far - inner)
+        return None, seen
+
+
+def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Iterator[_Quantity]:
+    """Yield what is told at times, and beyond the readings."""
+    instrument, (first_s, last_s) = residuals.instrument, lags.covered_s
+    deforms, jaws = instrument.deforms, instrument.has_jaws
+    inside = [time_s for time_s in times if first_s <= time_s <= last_s]
+    letter, (unit, *of_creep) = "G" if instrument.per_area else "K", _UNITS[instrument.per_area]
+    if not (deforms or jaws):
+        letter, unit = "J", of_creep[0]
+    turned = _secant_stiffness(residuals.gripper) if jaws else None
+    # What falls is not smaller before the first reading, and not larger after the last one.
+    falls, at = (1, _left) if deforms else (-1, _yielded)
+    for time_s in times:
+        sides = (-falls,) * (time_s <= last_s) + (falls,) * (time_s >= first_s)
+        name, added = f"{letter}({time_s:g} s)", partial(at, time_s)
+        yield _Quantity(name, time_s, unit, added, None, sides, turned)
+    at_once, at_rest = partial(at, first_s), _slowest if deforms else _every
+    yield _Quantity(f"{letter} at once", None, unit, at_once, None, (-falls,), turned)
+    if deforms or jaws:
+        yield _Quantity(f"{letter} at rest", None, unit, at_rest, None, (falls,), turned)
+    if jaws:
+        return
+    if not deforms:
+        for before_s, time_s in pairwise(inside):
+            name = f"J({before_s:g} to {time_s:g} s)"
+            yield _Quantity(name, time_s, unit, partial(_rise, before_s, time_s))
+        _, per_s, viscosity = of_creep
+        yield _Quantity("slope at the end", last_s, per_s, partial(_rate, last_s))
+        yield _Quantity("viscosity", None, viscosity, _flow, None, (1,), lambda flow: 1 / flow)
+    for time_s in inside:
+        # At the first reading, what fades until then may be as steep as one likes.
+        sides = (-1, 1) if time_s > _AFTER_FIRST * first_s else (-1,)
+        name, log_slope = f"exponent({time_s:g} s)", partial(_log_slope, time_s)
+        yield _Quantity(name, time_s, "", log_slope, partial(at, time_s), sides)
+    fastest = 1 / first_s if deforms and not _sees_start(lags) else math.inf
+    for omega in [1 / time_s for time_s in reversed(inside)]:
+        stored = partial(_stored if deforms else _yielded_at_once, omega, fastest)
+        lost, where = partial(_lost, omega, fastest), f"({omega:.3g} rad/s)"
+        yield _Quantity(f"{letter}'{where}", omega, unit, stored)
+        yield _Quantity(f"{letter}''{where}", omega, unit, lost)
+        yield _Quantity(f"tan delta{where}", omega, "", lost, stored)
+
+
+# What unit amplitudes of lags add, (n_rates,), by their rates in 1/s: at times, between two, per
+# second, per logarithm of time; at rest; and at an angular frequency, up to the fastest that shows.
+def _left(time_s: float, rates: Array) -> Array:
+    return np.exp(-rates * time_s)
+
+
+def _yielded(time_s: float, rates: Array) -> Array:
+    return -np.expm1(-rates * time_s)
+
+
+def _rise(before_s: float, time_s: float, rates: Array) -> Array:
+    return _left(before_s, rates) - _left(time_s, rates)
+
+
+def _rate(time_s: float, rates: Array) -> Array:
+    return rates * _left(time_s, rates)
+
+
+def _log_slope(time_s: float, rates: Array) -> Array:
+    return time_s * _rate(time_s, rates)
+
+
+def _slowest(rates: Array) -> Array:
+    return np.eye(1, len(rates))[0]
+
+
+def _every(rates: Array) -> Array:
+    return np.ones_like(rates)
+
+
+def _flow(rates: Array) -> Array:
+    return rates * _slowest(rates)
+
+
+def _stored(omega: float, fastest: float, rates: Array) -> Array:
+    return omega**2 / (omega**2 + rates**2) * (rates <= fastest)
+
+
+def _yielded_at_once(omega: float, fastest: float, rates: Array) -> Array:
+    return rates**2 / (omega**2 + rates**2) * (rates <= fastest)
+
+
+def _lost(omega: float, fastest: float, rates: Array) -> Array:
+    return omega * rates / (omega**2 + rates**2) * (rates <= fastest)
+
+
+def _secant_stiffness(gripper: Gripper) -> Callable[[float], float]:
+    """Return a function from the left arm's rotation per torque to a sample's force per shortening.
+
+    Statically, the free arm turns by 1/k_2, and by 1/(k_2 + k_2 K/K_jaws) on a sample.
+    """
+    free, jaws = 1 / gripper.left.stiffness_Nm_per_rad, gripper.jaw_stiffness_N_per_m
+    return lambda turned: jaws * (free / turned - 1)
