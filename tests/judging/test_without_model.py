@@ -162,7 +162,7 @@ def test_a_gripper_tells_the_stiffness_beside_its_arms() -> None:
 def test_the_grid_changes_nothing(
     a_decade: int, shift: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Limits move by some percent of their width: to that they are found."""
+    """Limits move by less than they are accurate to, three percent of their width."""
     traces = [
         (zener(TIMES) + noise(3.6), "stress"),
         (100 * TIMES**-0.2 + noise(0.1), "stress"),
@@ -178,7 +178,7 @@ def test_the_grid_changes_nothing(
             width = (own.high or 0.0) - (own.low or 0.0)
             for end in ("low", "high"):
                 if (value := getattr(own, end)) is not None:
-                    assert abs(getattr(other, end) - value) < 0.02 * abs(width), own.quantity
+                    assert abs(getattr(other, end) - value) < 0.03 * abs(width), own.quantity
 
 
 def test_limits_beyond_the_readings_are_one_sided() -> None:

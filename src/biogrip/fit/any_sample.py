@@ -43,7 +43,7 @@ _ROUNDING = 1e-7
 _RATES_A_DECADE, _FASTEST = 8, 20.0
 # Places at which an interval of rates is divided; how often at most, and decrease of chi^2 that
 # ends it.
-_DIVIDED, _MOST_DIVISIONS, _SETTLED = np.array([[0.25], [0.5], [0.75]]), 6, 0.01
+_DIVIDED, _MOST_DIVISIONS, _SETTLED = np.array([[0.2], [0.4], [0.6], [0.8]]), 6, 0.01
 # Shares of the clearest response below which one is rounding errors, and hardly shows; size of a
 # row that is zero.
 _UNSEEN, _FAINT, _NOTHING = 1e-9, 1e-3, 1e-100

@@ -50,12 +50,11 @@ from biogrip.physics.residuals import Residuals
 _CHANCE, _TOO_MUCH = 0.001, 1.2
 # First digits of the times at which quantities are told and, where these are too few, of more.
 _DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2
-# Weight of the row that holds a quantity, in the inverse of its standard deviation; accuracy of
-# the threshold's root and of ends at which the excess jumps; share of the root that is flat; most
+# Weight of the row that holds a quantity, in the inverse of its standard deviation; accuracies of
+# the threshold's root, and of ends at which the excess jumps; share of the root that is flat; most
 # fits; growth of steps.
-_WEIGHT, _ACCURACY, _CLOSE, _FLAT, _MOST_FITS, _LARGER = 300.0, 0.02, 1e-3, 0.03, 25, 4.0
-# How often lags are divided at most, and change of a limit that ends it, over its distance.
-_MOST_DIVISIONS, _SETTLED = 5, 0.01
+_WEIGHT, _ROUGH, _ACCURATE, _CLOSE, _FLAT = 300.0, 0.3, 0.02, 1e-3, 0.03
+_MOST_FITS, _LARGER = 25, 4.0
 # Share of the first time beyond which slopes have an upper limit.
 _AFTER_FIRST = 1.1
 # A limit hangs on what hardly shows if a noise of that changes the quantity so many times more.
@@ -64,16 +63,11 @@ _HANGS = 10.0
 # makes.
 _LEAST = 1e-3
 
+# Share of a value below which a lower limit says no more than that it is positive.
+_LITTLE = 0.01
 # Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
 _UNITS = {False: ("N/m", "m/N", "m/(N s)", "N s/m"), True: ("Pa", "1/Pa", "1/(Pa s)", "Pa s")}
-_SIGNS = {
-    "tan delta": r"\tan\delta",
-    "exponent": "n",
-    "slope at the end": r"\dot{J}",
-    "viscosity": r"\eta",
-    " at once": "_0",
-    " at rest": r"_\infty",
-}
+_SIGNS = {"tan delta": r"\tan\delta", "exponent": "n", "viscosity": r"\eta"}
 
 
 @dataclass(frozen=True)
@@ -227,7 +221,7 @@ def _told(fit: AnySampleFit, quantity: _Quantity, root: float) -> Told:
     if (turned := quantity.turned) is not None:
         value, *ends = (turned(it) if it else None for it in (value, *ends[::-1]))
     low, high = (end if end is not None and end > 0 else None for end in ends)
-    if low is not None and value is not None and low < _CLOSE * value:
+    if low is not None and value is not None and low < _LITTLE * value:
         low = None
     value = None if low is None or high is None else value
     low, value, high = (each if each is None else float(each) for each in (low, value, high))
@@ -238,8 +232,8 @@ def _symbol(name: str) -> str:
     """Return the name of a quantity as mathtext."""
     for words, sign in _SIGNS.items():
         name = name.replace(words, sign)
-    at = re.sub(r"\((.*) (\S+)\)$", r"(\1\\,\\mathrm{\2})", name)
-    return f"${at.replace(' ', chr(92) + ' ')}$"
+    name = re.sub(" ([a-z/ ]+)", r"\\,\\mathrm{\1}", name).replace(" ", r"\ ")
+    return f"${name}$"
 
 
 class _Profile:
@@ -271,21 +265,24 @@ class _Profile:
     def limit(self, side: int) -> float | None:
         """Find the lower or upper limit, side -1 or 1, if there is one.
 
-        Lags are divided next to those that it needs until it stays.
+        It is found roughly, and then with closer lags on either side of those that it needs.
         """
         if not self._stride > 0 or side in self._open:
             return None
-        lags, start, before = self._fit.lags, self.best + side * self._stride, self.best
-        for _ in range(_MOST_DIVISIONS):
-            found, needed = self._crossing(lags, side, start)
-            if found is None or abs(found - before) < _SETTLED * abs(found - self.best):
-                break
-            before = start = found
-            lags = lags.divided(needed)
+        lags, value = self._fit.lags, self.best + side * self._stride
+        rough, needed = self._crossing(lags, side, value, _ROUGH)
+        if rough is None:
+            return None
+        found, needed = self._crossing(lags.divided(needed), side, rough, _ACCURATE)
         return found
 
-    def _crossing(self, lags: Lags, side: int, value: float) -> tuple[float | None, BoolArray]:
-        """Return the limit with certain lags, and which it needs, beginning with a value."""
+    def _crossing(
+        self, lags: Lags, side: int, value: float, accuracy: float
+    ) -> tuple[float | None, BoolArray]:
+        """Return the limit with certain lags, and which it needs, beginning with a value.
+
+        The root of the excess there is accurate to a share.
+        """
         above, below = self._added(lags)
         seen: BoolArray = np.any(lags.rows, axis=1)
         ratio = self._quantity.below is not None
@@ -306,7 +303,7 @@ class _Profile:
             # Where the excess is flat, its slope says nothing.
             steep = side * slope > 0 and reached > _FLAT * self._root
             step = -over * reached / slope if steep else side * math.inf
-            if abs(over) < _ACCURACY * self._root:
+            if abs(over) < accuracy * self._root:
                 return value + (step if steep else 0.0), amplitudes > 0
             inner, outer = (value, outer) if over < 0 else (inner, value)
             if abs(outer - inner) < _CLOSE * abs(inner - self.best):
