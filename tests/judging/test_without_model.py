@@ -189,6 +189,7 @@ def test_limits_beyond_the_readings_are_one_sided() -> None:
     assert found["G at once"].verdict == BOUNDED_BELOW
     assert found["G at rest"].verdict == BOUNDED_ABOVE
     assert not {"exponent(0.01 s)", "G'(100 rad/s)", "G'(0.001 rad/s)"} & set(found)
+    assert {"exponent(1 s)", "G'(1 rad/s)"} < set(found)
     compliance = 1 / 3 + TIMES / 200
     flows = by_name(tell(TIMES, compliance + noise(0.01), reads="strain", at=[0.01, 1.0, 1000.0]))
     assert flows["J(0.01 s)"].verdict == BOUNDED_ABOVE

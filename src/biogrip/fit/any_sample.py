@@ -44,6 +44,8 @@ _RATES_A_DECADE, _FASTEST = 8, 20.0
 # Places at which an interval of rates is divided; how often at most, and decrease of chi^2 that
 # ends it.
 _DIVIDED, _MOST_DIVISIONS, _SETTLED = np.array([[0.2], [0.4], [0.6], [0.8]]), 6, 0.01
+# Difference of logarithms of rates that are close.
+_CLOSE = 0.06
 # Shares of the clearest response below which one is rounding errors, and hardly shows; size of a
 # row that is zero.
 _UNSEEN, _FAINT, _NOTHING = 1e-9, 1e-3, 1e-100
@@ -66,9 +68,21 @@ class Lags:
     faint: BoolArray
     """True for lags that hardly show, (n_rates,)."""
 
+    def _beside(self, chosen: BoolArray) -> tuple[Array, BoolArray]:
+        """Return places of the rates, and the intervals next to lags that are chosen."""
+        return np.log1p(self.covered_s[1] * self.rates), chosen[1:] | chosen[:-1]
+
+    def are_close(self, chosen: BoolArray) -> bool:
+        """Return True if lags next to those that are chosen, (n_rates,), hardly differ from them.
+
+        Between the fastest two there is nothing to be told apart.
+        """
+        places, beside = self._beside(chosen)
+        return bool(np.max(np.diff(places)[:-1], where=beside[:-1], initial=0.0) < _CLOSE)
+
     def divided(self, chosen: BoolArray) -> "Lags":
         """Return the grid with closer lags on either side of those that are chosen, (n_rates,)."""
-        places, beside = np.log1p(self.covered_s[1] * self.rates), chosen[1:] | chosen[:-1]
+        places, beside = self._beside(chosen)
         more = places[:-1][beside] + _DIVIDED * np.diff(places)[beside]
         near = self.rates[np.append(beside, False) | np.append(False, beside)]
         rates = np.concatenate((near, np.expm1(more.ravel()) / self.covered_s[1]))

@@ -52,11 +52,11 @@ _CHANCE, _TOO_MUCH = 0.001, 1.2
 _DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2
 # Weight of the row that holds a quantity, in the inverse of its standard deviation; accuracies of
 # the threshold's root, and of ends at which the excess jumps; share of the root that is flat; most
-# fits; growth of steps.
+# fits; growth of steps; most grids.
 _WEIGHT, _ROUGH, _ACCURATE, _CLOSE, _FLAT = 300.0, 0.3, 0.02, 1e-3, 0.03
-_MOST_FITS, _LARGER = 25, 4.0
-# Share of the first time beyond which slopes have an upper limit.
-_AFTER_FIRST = 1.1
+_MOST_FITS, _LARGER, _MOST_DIVISIONS = 25, 4.0, 4
+# Least ratio of a time to the first, and of the last to it, for slopes and moduli.
+_INNER = 2.0
 # A limit hangs on what hardly shows if a noise of that changes the quantity so many times more.
 _HANGS = 10.0
 # Standard deviation of a quantity that counts as none, over the largest that a noise of one lag
@@ -269,11 +269,12 @@ class _Profile:
         """
         if not self._stride > 0 or side in self._open:
             return None
-        lags, value = self._fit.lags, self.best + side * self._stride
-        rough, needed = self._crossing(lags, side, value, _ROUGH)
-        if rough is None:
-            return None
-        found, needed = self._crossing(lags.divided(needed), side, rough, _ACCURATE)
+        lags, value, accuracy = self._fit.lags, self.best + side * self._stride, _ROUGH
+        for _ in range(_MOST_DIVISIONS):
+            found, needed = self._crossing(lags, side, value, accuracy)
+            if found is None or (accuracy < _ROUGH and lags.are_close(needed)):
+                break
+            lags, value, accuracy = lags.divided(needed), found, _ACCURATE
         return found
 
     def _crossing(
@@ -321,6 +322,8 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
     instrument, (first_s, last_s) = residuals.instrument, lags.covered_s
     deforms, jaws = instrument.deforms, instrument.has_jaws
     inside = [time_s for time_s in times if first_s <= time_s <= last_s]
+    # Slopes and moduli at an end of the trace are hardly known.
+    inner = [time_s for time_s in inside if _INNER * first_s <= time_s <= last_s / _INNER]
     letter, (unit, *of_creep) = "G" if instrument.per_area else "K", _UNITS[instrument.per_area]
     if not (deforms or jaws):
         letter, unit = "J", of_creep[0]
@@ -344,13 +347,11 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
         _, per_s, viscosity = of_creep
         yield _Quantity("slope at the end", last_s, per_s, partial(_rate, last_s))
         yield _Quantity("viscosity", None, viscosity, _flow, None, (1,), lambda flow: 1 / flow)
-    for time_s in inside:
-        # At the first reading, what fades until then may be as steep as one likes.
-        sides = (-1, 1) if time_s > _AFTER_FIRST * first_s else (-1,)
+    for time_s in inner:
         name, log_slope = f"exponent({time_s:g} s)", partial(_log_slope, time_s)
-        yield _Quantity(name, time_s, "", log_slope, partial(at, time_s), sides)
+        yield _Quantity(name, time_s, "", log_slope, partial(at, time_s))
     fastest = 1 / first_s if deforms and not _sees_start(lags) else math.inf
-    for omega in [1 / time_s for time_s in reversed(inside)]:
+    for omega in [1 / time_s for time_s in reversed(inner)]:
         stored = partial(_stored if deforms else _yielded_at_once, omega, fastest)
         lost, where = partial(_lost, omega, fastest), f"({omega:.3g} rad/s)"
         yield _Quantity(f"{letter}'{where}", omega, unit, stored)
