@@ -1,7 +1,7 @@
 """A trace in a notebook: identified and told as by the command, from arrays or pandas columns."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,6 +17,7 @@ from biogrip.identify.one_trace import Identified, identify_alike
 from biogrip.identify.settings import MODEL, Asked, Setting
 from biogrip.identify.trace_case import read_trace
 from biogrip.identify.words import in_words
+from biogrip.judging.without_model import tell_without_model
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS
 from biogrip.study.source import HOLD
 from biogrip.terminal import Progress
@@ -80,6 +81,19 @@ class TraceResult(Identified):
             return pd.DataFrame(self.data[what])
         frame = pd.DataFrame(self.data[what], columns=["quantity", "unit", "verdict", *limits])
         return frame.astype(limits).set_index("quantity")
+
+    def without_model(self, at: Sequence[float] = ()) -> "pd.DataFrame":
+        """Return a table of what any linear sample would show, whatever its model.
+
+        At times in s after a step, and inverse angular frequencies; by default one a decade.
+        """
+        import pandas as pd
+
+        known, confidence = self.problem.noise_sd, self.data["confidence"]
+        found = tell_without_model(self.residuals, confidence=confidence, noise_sd=known, at=at)
+        columns = ["quantity", "at", "unit", "value", "low", "high"]
+        frame = pd.DataFrame(found.told)[columns]
+        return frame.astype(dict.fromkeys(["at", "value", "low", "high"], float))
 
     def plot(self) -> "Figure":
         """Draw the trace, its fit and the residuals."""

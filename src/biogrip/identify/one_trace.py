@@ -40,7 +40,9 @@ from biogrip.identify.trace_case import TraceCase, note_saturated, read_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import HARMLESS, REJECTED, Note
 from biogrip.judging.onset import notes_on_start, profile_over_onset
+from biogrip.judging.without_model import tell_without_model
 from biogrip.keys import plain
+from biogrip.physics.residuals import Residuals
 from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import within
 from biogrip.processes import worker_processes
@@ -72,6 +74,8 @@ class Identified:
     """Assumptions of the fit."""
     recorded: Measurements
     """The trace."""
+    residuals: Residuals
+    """Those of the fit."""
 
 
 def identify_traces(asked: Sequence[Asked], outputs: Sequence[Path], *, drawn: bool) -> Outcome:
@@ -230,8 +234,15 @@ def identify_alike(
         data = _data(own, fits[index], diagnoses[index], models[index], notes)
         if index in onsets_s:
             data["onset_limits_s"] = [data["onset_s"] + end_s for end_s in onsets_s[index]]
+        residuals = diagnoses[index].likelihood.problem.residuals
+        data["without_model"] = tell_without_model(
+            residuals,
+            confidence=own.case.confidence,
+            noise_sd=own.problem.noise_sd,
+            at=own.case.at_s,
+        ).data()
         data = {WRITTEN_BY: __version__, "trace": str(files[index]), **data}
-        found.append(Identified(data, own.problem, own.recorded))
+        found.append(Identified(data, own.problem, own.recorded, residuals))
     return found
 
 
@@ -328,7 +339,7 @@ def _assumed(case: Case, tried: Sequence[str]) -> dict[str, Any]:
         **{name: plain(getattr(case.block, name)) for name in blocks},
         **({"actuator": plain(case.study.actuator)} if case.instrument.has_jaws else {}),
         "fixed": case.fixed,
-        "identifiability": {"confidence": case.confidence},
+        "identifiability": {"confidence": case.confidence, "at_s": list(case.at_s)},
         "model_selection": {"models": list(tried)},
         "study_seed": case.study.study_seed,
     }

@@ -28,9 +28,10 @@ References
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
@@ -126,6 +127,19 @@ class WithoutModel:
         """False if no linear sample gives this trace, for what the best leaves is no noise."""
         return self.chance >= _CHANCE or self.times_noise <= _TOO_MUCH
 
+    def data(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            "is_linear": self.is_linear,
+            "times_noise": self.times_noise,
+            "misfit_rad": self.misfit,
+            "sees_start": self.sees_start,
+            "quantities": [
+                {**asdict(each), "verdict": each.verdict, "in_words": each.words()}
+                for each in self.told
+            ],
+        }
+
 
 def tell_without_model(
     residuals: Residuals,
@@ -149,12 +163,12 @@ def tell_without_model(
         Times in s after a step, whose inverses are angular frequencies; by default one a decade.
     """
     fit = fit_any_sample(residuals)
-    rest = float(np.linalg.norm(fit.left)) * residuals.noise_scale
+    rest = float(np.linalg.norm(fit.left) * residuals.noise_scale)
     free = max(residuals.free - fit.taken, 1)
     residual, basis = _left_of_readings(residuals, fit)
     _, chance = correlated(residual, basis)
     sd, freedom = rest / math.sqrt(free), min(free, residuals.freedom)
-    times = sd / (noise_sd or residuals.noise_scale)
+    times = float(sd / (noise_sd or residuals.noise_scale))
     if noise_sd is not None:
         too_large = float(chdtrc(free, (rest / noise_sd) ** 2))
         chance = min(chance, too_large)
@@ -334,6 +348,9 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
         sides = (-falls,) * (time_s <= last_s) + (falls,) * (time_s >= first_s)
         name, added = f"{letter}({time_s:g} s)", partial(at, time_s)
         yield _Quantity(name, time_s, unit, added, None, sides, turned)
+        if time_s in inner and not jaws:
+            name, log_slope = f"exponent({time_s:g} s)", partial(_log_slope, time_s)
+            yield _Quantity(name, time_s, "", log_slope, added)
     at_once, at_rest = partial(at, first_s), _slowest if deforms else _every
     yield _Quantity(f"{letter} at once", None, unit, at_once, None, (-falls,), turned)
     if deforms or jaws:
@@ -347,9 +364,6 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
         _, per_s, viscosity = of_creep
         yield _Quantity("slope at the end", last_s, per_s, partial(_rate, last_s))
         yield _Quantity("viscosity", None, viscosity, _flow, None, (1,), lambda flow: 1 / flow)
-    for time_s in inner:
-        name, log_slope = f"exponent({time_s:g} s)", partial(_log_slope, time_s)
-        yield _Quantity(name, time_s, "", log_slope, partial(at, time_s))
     fastest = 1 / first_s if deforms and not _sees_start(lags) else math.inf
     for omega in [1 / time_s for time_s in reversed(inner)]:
         stored = partial(_stored if deforms else _yielded_at_once, omega, fastest)
