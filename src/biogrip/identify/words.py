@@ -27,6 +27,8 @@ _COLOURS = {
     FIT_REJECTED: 90,
 }
 
+# Most lines on what any linear sample would show.
+_LINES = 5
 # What the notes of a weight do to the fit.
 _SAID = {HARMLESS: "note", DOUBT: DOUBTFUL, REJECTION: REJECTED}
 
@@ -34,25 +36,40 @@ _SAID = {HARMLESS: "note", DOUBT: DOUBTFUL, REJECTION: REJECTED}
 def in_words(found: Mapping[str, Any]) -> str:
     """Return the result of one trace as plain text."""
     width = max(len(item["quantity"]) for item in found["quantities"])
+    rejected = found["fit"] == REJECTED
     lines = [
         f"{visible(found['trace'])}: fit {found['fit']}",
         *(f"  {visible(reason)}" for reason in found["reasons"]),
         f"{found['samples']} samples, {noise_in_words(found)}, "
         f"misfit {in_unit(found['misfit_rad'], found)}",
+        *(without_model_in_words(found) if rejected else []),
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
         *(
             f"  {item['quantity']:<{width}}  {_coloured(item['in_words'], item['verdict'])}"
             for item in found["quantities"]
         ),
     ]
+    lines += [] if rejected else without_model_in_words(found)
     lines += one_sided_in_words([found])
-    lines += [found["limits"]] if found["fit"] != REJECTED else []
+    lines += [found["limits"]] if not rejected else []
     lines += [trade["words"] for trade in found["trades"]]
     lines += fitted_in_words(found)
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
     return "\n".join(lines)
+
+
+def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
+    """Return lines on what any linear sample would show, as far as that is told."""
+    own = found["without_model"]
+    told = [each for each in own["quantities"] if each["verdict"] != NOT_DETERMINED][:_LINES]
+    width = max((len(each["quantity"]) for each in told), default=0)
+    what = "Any linear sample, whatever its model"
+    if not own["is_linear"]:
+        what = "The nearest of all linear samples"
+    lines = (f"  {each['quantity']:<{width}}  {each['in_words']}" for each in told)
+    return [f"{what}, leaves {in_unit(own['misfit_rad'], found)}:", *lines]
 
 
 def noise_in_words(found: Mapping[str, Any]) -> str:
@@ -92,6 +109,7 @@ def fixed_in_words(found: Mapping[str, Any]) -> list[str]:
 def one_sided_in_words(found: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return a sentence on the confidence of one-sided limits of traces; nothing without any."""
     quantities = [item for each in found for item in each["quantities"]]
+    quantities += [item for each in found for item in each["without_model"]["quantities"]]
     if all((item["low"] is None) == (item["high"] is None) for item in quantities):
         return []
     return [f"One-sided limits hold with {50 * (1 + found[0]['confidence']):g} % confidence."]

@@ -21,6 +21,7 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, plain
+from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
     absorbed,
@@ -206,7 +207,7 @@ def _misfit(
     more, read = plain(times, 2), residuals.trace.readings
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak
     of_peak = f"{plain(100 * share, 2)} % of the peak"
-    suspects = residuals.instrument.suspects(unit=True)
+    suspects = _suspects(residuals, times, scale)
     if not residuals.rounding and np.mean(read[1:] == read[:-1]) > _REPEATED:
         text = (
             "Most readings repeat the one before, as of a sensor that is read less often than it "
@@ -220,18 +221,34 @@ def _misfit(
     elif share < _FAR_OFF:
         text = (
             f"The fit is good to {of_peak}; the rest, {more} times the noise of the trace, is not "
-            f"noise: {suspects} is not quite the right one."
+            f"noise: {suspects}."
         )
     else:
-        text = (
-            f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects} is not "
-            "the right one."
-        )
+        text = f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects}."
         return Remainder([Note(REJECTION, text)])
     misfit = as_correlated(*bulk)
     count = f"{plain(misfit[0], 2)} independent ones" if misfit[0] > 1 else "less than one"
     allowed = f"The limits count the {len(bulk[0])} residuals as {count}."
     return Remainder([Note(DOUBT, f"{text} {allowed}")], misfit)
+
+
+def _suspects(residuals: Residuals, times: float, scale: float) -> str:
+    """Return what is wrong if a misfit is some times the scale of the noise.
+
+    A linear sample of any other model may leave less.
+    """
+    fit = fit_any_sample(residuals)
+    free = max(residuals.free - fit.taken, 1)
+    other = float(np.linalg.norm(fit.left)) * residuals.noise_scale / scale / np.sqrt(free)
+    if other * _TOO_MUCH < times:
+        return (
+            "the model is not adequate, for a linear sample of another kind fits to "
+            f"{plain(other, 2)} noises"
+        )
+    return (
+        "no linear sample gives this trace under this protocol: look at load, clock, contact and "
+        "drift"
+    )
 
 
 def _about_growth(
