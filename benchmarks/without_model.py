@@ -294,15 +294,7 @@ def main() -> None:
                 print(name, model, flush=True)
     rows = pd.concat(parts)
     keys = ["set-up", "model", "quantity"]
-    kept = rows.groupby(keys, sort=False).agg(
-        {
-            "truth": "first",
-            "holds": "sum",
-            "limits": "mean",
-            "width": "median",
-            "of the model": "first",
-        }
-    )
+    kept = rows.groupby(keys, sort=False).agg(_KEPT)
     write_text(_RESULTS, kept.to_csv(float_format="%.4g"))
     write_text(_RESULTS.with_suffix(".md"), _PAGE.format(traces=traces, table=table(rows)))
 

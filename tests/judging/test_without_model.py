@@ -182,7 +182,7 @@ def test_the_grid_changes_nothing(
 
 
 def test_limits_beyond_the_readings_are_one_sided() -> None:
-    found = by_name(tell(TIMES, zener(TIMES) + noise(3.6), at=[0.01, 1.0, 1000.0]))
+    found = by_name(tell(TIMES, zener(TIMES) + noise(3.6), at_s=[0.01, 1.0, 1000.0]))
     assert found["G(0.01 s)"].verdict == BOUNDED_BELOW
     assert found["G(1 s)"].verdict == DETERMINED
     assert found["G(1000 s)"].verdict == BOUNDED_ABOVE
@@ -191,7 +191,7 @@ def test_limits_beyond_the_readings_are_one_sided() -> None:
     assert not {"exponent(0.01 s)", "G'(100 rad/s)", "G'(0.001 rad/s)"} & set(found)
     assert {"exponent(1 s)", "G'(1 rad/s)"} < set(found)
     compliance = 1 / 3 + TIMES / 200
-    flows = by_name(tell(TIMES, compliance + noise(0.01), reads="strain", at=[0.01, 1.0, 1000.0]))
+    flows = by_name(tell(TIMES, compliance + noise(0.01), reads="strain", at_s=[0.01, 1.0, 1000.0]))
     assert flows["J(0.01 s)"].verdict == BOUNDED_ABOVE
     assert flows["J(1000 s)"].verdict == BOUNDED_BELOW
     assert flows["viscosity"].verdict == BOUNDED_BELOW

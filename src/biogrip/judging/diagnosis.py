@@ -19,8 +19,11 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import plain
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from
+from biogrip.fit.nested_fits import FittedModels
 from biogrip.fit.problem import Fit, TraceProblem
+from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.doubts import (
     DOUBT,
     HARMLESS,
@@ -32,10 +35,11 @@ from biogrip.judging.doubts import (
 )
 from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
-from biogrip.judging.valley import compute_valley
 from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.without_model import WithoutModel, tell_without_model
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
+from biogrip.traces.reader import Recording
 
 # Decrease of chi^2 beyond an end that is more than chance: three standard deviations squared.
 _NOTICEABLE = 9.0
@@ -63,11 +67,31 @@ class Diagnosis:
     """Force of the jaws on the sample of the best fit."""
     notes: list[Note] = field(default_factory=list)
     """Notes on the result, with weights."""
+    recording: Recording | None = None
+    """The trace as it was fitted, of a trace that was identified."""
+    experiment: Experiment | None = None
+    """What was assumed of it, with what follows from the trace."""
+    fit: TraceFit | None = None
+    """The fit that was judged first, with the model of its noise."""
+    models: FittedModels | None = None
+    """Fits of other sample models."""
+    onset_limits_s: tuple[float, float] | None = None
+    """Limits of a fitted onset, from it."""
 
     @property
     def status(self) -> str:
         """Status of the fit by these notes: ok, doubtful or rejected."""
         return compute_status(self.notes)
+
+    def without_model(self, at_s: Sequence[float] = ()) -> WithoutModel:
+        """Tell what any linear sample would show, see `tell_without_model`."""
+        likelihood, experiment = self.likelihood, self.experiment
+        return tell_without_model(
+            likelihood.problem.residuals,
+            confidence=likelihood.confidence,
+            noise_sd=experiment.noise_sd if experiment else None,
+            at_s=at_s,
+        )
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""
@@ -178,6 +202,9 @@ def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade
 
 def _with_valley(judged: Diagnosis, model: SampleModel) -> Diagnosis:
     """Return a diagnosis with its valley, whose lowest point counts if no profile is lower."""
+    # Imported here: only a study has valleys.
+    from biogrip.judging.valley import compute_valley
+
     valley, missed = compute_valley(judged.likelihood, model)
     return replace(judged, valley=valley, lowest=missed if judged.lowest is None else judged.lowest)
 

@@ -146,7 +146,7 @@ def tell_without_model(
     *,
     confidence: float,
     noise_sd: float | None = None,
-    at: Sequence[float] = (),
+    at_s: Sequence[float] = (),
 ) -> WithoutModel:
     """Tell what a trace says of any linear sample, whatever its model.
 
@@ -159,7 +159,7 @@ def tell_without_model(
         Of two limits, such as 0.95; a single limit is one of such a pair.
     noise_sd
         Standard deviation of the noise, if it is known.
-    at
+    at_s
         Times in s after a step, whose inverses are angular frequencies; by default one a decade.
     """
     fit = fit_any_sample(residuals)
@@ -179,7 +179,7 @@ def tell_without_model(
         sd = rest / math.sqrt(independent)
     threshold, _ = find_thresholds(confidence, freedom)
     root = math.sqrt(threshold) * sd / residuals.noise_scale
-    quantities = _quantities(residuals, fit.lags, at or decades(*fit.lags.covered_s))
+    quantities = _quantities(residuals, fit.lags, at_s or decades(*fit.lags.covered_s))
     told = [_told(fit, each, root) for each in quantities]
     misfit = rest / math.sqrt(residuals.samples)
     return WithoutModel(told, misfit, times, chance, _sees_start(fit.lags))

@@ -21,6 +21,9 @@ NOISE_MODELS = ("white", COLOURED)
 KNOWN_NOISE = ("noise_rad", "sd", "noise_share")
 """Keys that say how large the noise is."""
 
+ARRAYS = "<arrays>"
+"""The file of a trace that is given as arrays."""
+
 READINGS = tuple(INSTRUMENTS)
 """Keys that name the column of the readings, one for each quantity that an instrument reads."""
 
@@ -155,6 +158,12 @@ class MeasurementBlock(Block):
         return [name for name in READINGS if getattr(self, name) is not None]
 
     @property
+    def undeclared(self) -> frozenset[str]:
+        """Which of offset and drift nothing is said of."""
+        said = {"offset": self.offset, "drift": self.drift}
+        return frozenset(name for name, declared in said.items() if declared is None)
+
+    @property
     def fits_offset(self) -> bool:
         """True if a constant offset is fitted along."""
         return self.coloured if self.offset is None else self.offset
@@ -185,7 +194,7 @@ class MeasurementBlock(Block):
         if self.time is None:
             yield ("time",), "is missing: a recorded trace needs the name of its time column."
         yield from self._reading_complaints()
-        if complaint := trace_file_problem(self.file):
+        if self.file != ARRAYS and (complaint := trace_file_problem(self.file)):
             yield ("file",), complaint
 
     def _reading_complaints(self) -> Iterator[Complaint]:
