@@ -133,9 +133,9 @@ class Truth:
 
     def value(self, told: Told) -> float:
         """Value of a quantity by its name."""
-        name, at = told.quantity, told.at or 0.0
+        name, at = told.quantity, told.at_s or 0.0
         if "rad/s" in name:
-            modulus = np.complex128(self._modulus(at))
+            modulus = np.complex128(self._modulus(1 / at))
             if self.set_up.reads == "strain":
                 modulus = 1 / modulus.conjugate()
             parts = {"'": modulus.real, "''": modulus.imag, "tan delta": np.tan(np.angle(modulus))}
@@ -148,7 +148,7 @@ class Truth:
             return abs(at * self._rate(at) / self._step(at))
         if " to " in name:
             return self._step(at) - self._step(float(name.split()[0][2:]))
-        step = self._step(at or {"e": 1e-9, "t": 1e12}[name[-1]])
+        step = self._step({"e": 1e-9, "t": 1e12}.get(name[-1], at))
         if self.set_up.reads == "rotation":
             return (1 / step - _STIFFNESS_NM) / (2 * _LEVER_M**2)
         return step

@@ -10,7 +10,13 @@ from scipy.optimize import nnls
 from biogrip.arrays import Array
 from biogrip.fit import any_sample
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
-from biogrip.judging.without_model import Told, WithoutModel, decades, tell_without_model
+from biogrip.judging.without_model import (
+    LEVEL,
+    Told,
+    WithoutModel,
+    decades,
+    tell_without_model,
+)
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.instruments import INSTRUMENTS
@@ -200,12 +206,15 @@ def test_limits_beyond_the_readings_are_one_sided() -> None:
 
 def test_a_ramp_shows_what_a_step_hides() -> None:
     """Of a damper beside a spring the force under a step is the spring's alone."""
-    assert not tell(TIMES, 100 + noise(1.0)).sees_start
+    hidden = by_name(tell(TIMES, 100 + noise(1.0)))
+    for quantity, most in (("G''(1 rad/s)", 1.0), ("exponent(1 s)", 0.01)):
+        assert hidden[quantity].low is None
+        assert hidden[quantity].high is not None
+        assert (hidden[quantity].high or 0.0) < most
     force = 20 * EVEN + 200 * (EVEN < 5)
     force[EVEN > 5] = 100
     phases = ramp(5.0, 0.0, 1.0), hold(95.0, 1.0)
     found = tell(EVEN, force + noise(1.0, 0, len(EVEN)), phases)
-    assert found.sees_start
     loss = by_name(found)["G''(1 rad/s)"]
     assert loss.low is not None
     assert loss.high is not None
@@ -261,7 +270,7 @@ def test_times_at_which_it_is_told() -> None:
 
 def test_words_are_those_of_a_verdict() -> None:
     ends = [(15.0, 14.0, 16.0), (None, 14.0, None), (None, None, 16.0), (None, None, None)]
-    told = [Told("G(1 s)", "", 1.0, "Pa", *each) for each in ends]
+    told = [Told("G(1 s)", LEVEL, 1.0, "Pa", *each) for each in ends]
     verdicts = [DETERMINED, BOUNDED_BELOW, BOUNDED_ABOVE, NOT_DETERMINED]
     assert [each.verdict for each in told] == verdicts
     words = ["15.0 Pa (14.0 to 16.0)", "at least 14 Pa", "at most 16 Pa", "not determined"]

@@ -93,9 +93,9 @@ class TraceResult:
         import pandas as pd
 
         found = self.diagnosis.without_model(at)
-        columns = ["quantity", "at", "unit", "value", "low", "high"]
+        columns = ["quantity", "at_s", "unit", "value", "low", "high"]
         frame = pd.DataFrame(found.told)[columns]
-        return frame.astype(dict.fromkeys(["at", "value", "low", "high"], float))
+        return frame.astype(dict.fromkeys(["at_s", "value", "low", "high"], float))
 
     def plot(self) -> "Figure":
         """Draw the trace, its fit and the residuals."""

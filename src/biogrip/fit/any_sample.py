@@ -23,7 +23,7 @@ from scipy.optimize import nnls
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
-from biogrip.physics.modes import Modes, lag_course, mode_responses
+from biogrip.physics.modes import Modes, lag_course
 from biogrip.physics.residuals import Residuals
 
 # Retardation times a decade; shortest over the sampling interval, longest over the protocol, and
@@ -164,12 +164,6 @@ def spread_rates(
     inner, middle = np.expm1(places[places > 0]) / last_s, 1 / first_s
     ends = 1e-12 / last_s, _FASTEST / first_s, 1e6 / first_s
     return np.unique(np.concatenate((ends, inner, [middle, middle * (1 + 1e-9)])))
-
-
-def lagged_loads(residuals: Residuals, rates: Array) -> Array:
-    """Return what lags of unit amplitude give at all readings, (n_rates, n_samples)."""
-    lagged, _ = mode_responses(-rates[None], residuals.course, residuals.trace.time_s)
-    return lagged[0] if residuals.course.deforms else -lagged[0]
 
 
 def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:

@@ -26,8 +26,7 @@ References
 """
 
 import math
-import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import pairwise
@@ -39,12 +38,12 @@ from scipy.special import chdtrc
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
-from biogrip.fit.any_sample import AnySampleFit, Lags, fit_any_sample, lagged_loads
+from biogrip.fit.any_sample import AnySampleFit, Lags, fit_any_sample
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.judging.likelihood import find_thresholds
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.judging.whiteness import as_correlated, correlated
-from biogrip.physics.gripper import Gripper
+from biogrip.physics.modes import lag_course
 from biogrip.physics.residuals import Residuals
 
 # Chance below which what a fit leaves is no noise, and how much larger than the noise it then is.
@@ -68,7 +67,27 @@ _LEAST = 1e-3
 _LITTLE = 0.01
 # Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
 _UNITS = {False: ("N/m", "m/N", "m/(N s)", "N s/m"), True: ("Pa", "1/Pa", "1/(Pa s)", "Pa s")}
-_SIGNS = {"tan delta": r"\tan\delta", "exponent": "n", "viscosity": r"\eta"}
+
+LEVEL, EXPONENT, LOSS, BEYOND, FLOW = "level", "exponent", "loss", "beyond", "flow"
+KINDS = (LEVEL, EXPONENT, LOSS, BEYOND, FLOW, "storage", "loss tangent", "increment", "slope")
+"""Kinds of quantities. A level is a modulus, a stiffness or a compliance at a time; beyond is what
+it is at once and at rest."""
+
+# What lags of unit amplitude add, (n_rates,), by a time in s and their rates in 1/s, (n_rates,).
+_Functional = Callable[[float, Array], Array]
+_ADDED: dict[str, _Functional] = {
+    "left": lambda time_s, rates: np.exp(-rates * time_s),
+    "yielded": lambda time_s, rates: -np.expm1(-rates * time_s),
+    "per second": lambda time_s, rates: rates * np.exp(-rates * time_s),
+    "per e-fold": lambda time_s, rates: time_s * rates * np.exp(-rates * time_s),
+    "lasting": lambda _, rates: np.eye(1, len(rates))[0],
+    "flowing": lambda _, rates: rates * np.eye(1, len(rates))[0],
+    "all": lambda _, rates: np.ones_like(rates),
+    # At the angular frequency that is the inverse of the time.
+    "slow": lambda time_s, rates: 1 / (1 + (rates * time_s) ** 2),
+    "fast": lambda time_s, rates: (rates * time_s) ** 2 / (1 + (rates * time_s) ** 2),
+    "lost": lambda time_s, rates: rates * time_s / (1 + (rates * time_s) ** 2),
+}
 
 
 @dataclass(frozen=True)
@@ -77,10 +96,10 @@ class Told:
 
     quantity: str
     """Its name, such as ``G(10 s)``."""
-    symbol: str
-    """The same as mathtext."""
-    at: float | None
-    """Time in s after a step, or angular frequency in rad/s."""
+    kind: str
+    """One of the `KINDS`."""
+    at_s: float | None
+    """Time in s after a step, or the inverse of an angular frequency."""
     unit: str
     """SI unit; empty for a pure number."""
     value: float | None
@@ -117,15 +136,10 @@ class WithoutModel:
     """RMS of what the linear sample that fits best leaves, in the unit of the readings."""
     times_noise: float
     """The same in the known noise or, if it is not, in the scatter of neighbouring readings."""
-    chance: float
-    """Chance of as correlated a rest in noise, or of as large a one in known noise."""
-    sees_start: bool
-    """False if what relaxes before the first reading after a step does not show."""
-
-    @property
-    def is_linear(self) -> bool:
-        """False if no linear sample gives this trace, for what the best leaves is no noise."""
-        return self.chance >= _CHANCE or self.times_noise <= _TOO_MUCH
+    is_linear: bool
+    """False if no linear sample gives this trace, for what the best leaves is no noise."""
+    covered_s: tuple[float, float]
+    """From when to when after a step there are readings, and so limits on either side."""
 
     def data(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -133,7 +147,7 @@ class WithoutModel:
             "is_linear": self.is_linear,
             "times_noise": self.times_noise,
             "misfit_rad": self.misfit,
-            "sees_start": self.sees_start,
+            "covered_s": list(self.covered_s),
             "quantities": [
                 {**asdict(each), "verdict": each.verdict, "in_words": each.words()}
                 for each in self.told
@@ -147,6 +161,7 @@ def tell_without_model(
     confidence: float,
     noise_sd: float | None = None,
     at_s: Sequence[float] = (),
+    kinds: Collection[str] = KINDS,
 ) -> WithoutModel:
     """Tell what a trace says of any linear sample, whatever its model.
 
@@ -161,28 +176,58 @@ def tell_without_model(
         Standard deviation of the noise, if it is known.
     at_s
         Times in s after a step, whose inverses are angular frequencies; by default one a decade.
+    kinds
+        What is to be told.
     """
-    fit = fit_any_sample(residuals)
-    rest = float(np.linalg.norm(fit.left) * residuals.noise_scale)
-    free = max(residuals.free - fit.taken, 1)
-    residual, basis = _left_of_readings(residuals, fit)
-    _, chance = correlated(residual, basis)
-    sd, freedom = rest / math.sqrt(free), min(free, residuals.freedom)
-    times = float(sd / (noise_sd or residuals.noise_scale))
+    rest = examine_any_sample(residuals)
+    fit, free, chance, sd = rest.fit, rest.free, rest.chance, rest.sd
+    freedom, times = min(free, residuals.freedom), float(sd / (noise_sd or residuals.noise_scale))
     if noise_sd is not None:
-        too_large = float(chdtrc(free, (rest / noise_sd) ** 2))
+        too_large = float(chdtrc(free, free * times**2))
         chance = min(chance, too_large)
         if too_large >= _CHANCE:
             sd, freedom = noise_sd, math.inf
-    if chance < _CHANCE and times > _TOO_MUCH:
-        independent, freedom = as_correlated(residual, basis)
-        sd = rest / math.sqrt(independent)
+    is_linear = chance >= _CHANCE or times <= _TOO_MUCH
+    if not is_linear:
+        independent, freedom = as_correlated(rest.residual, rest.basis)
+        sd = rest.sd * math.sqrt(free / independent)
     threshold, _ = find_thresholds(confidence, freedom)
     root = math.sqrt(threshold) * sd / residuals.noise_scale
-    quantities = _quantities(residuals, fit.lags, at_s or decades(*fit.lags.covered_s))
+    times_s = at_s or decades(*fit.lags.covered_s)
+    quantities = (each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds)
     told = [_told(fit, each, root) for each in quantities]
-    misfit = rest / math.sqrt(residuals.samples)
-    return WithoutModel(told, misfit, times, chance, _sees_start(fit.lags))
+    misfit = rest.sd * math.sqrt(free / residuals.samples)
+    return WithoutModel(told, misfit, times, is_linear, fit.lags.covered_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """What the linear sample that fits a trace best leaves of it."""
+
+    fit: AnySampleFit
+    """That sample."""
+    free: int
+    """Degrees of freedom of what it leaves."""
+    sd: float
+    """Standard deviation of the noise that this would be."""
+    residual: Array
+    """What it leaves of the readings, (n_samples,)."""
+    basis: Array
+    """Orthonormal functions that the fit absorbs, (n_functions, n_samples)."""
+    chance: float
+    """Chance of neighbours that are as correlated in white noise."""
+
+
+def examine_any_sample(residuals: Residuals) -> Rest:
+    """Fit any linear sample to a trace, and test what that leaves; the model is not used."""
+    fit, trace, course = fit_any_sample(residuals), residuals.trace, residuals.course
+    own, lags, free = fit.amplitudes > 0, fit.lags, max(residuals.free - fit.taken, 1)
+    shown = lag_course(course, (1 / (course.end_s * lags.rates[own])).tolist())(trace.time_s)
+    shown = trace.condensed.cleared(shown) / lags.sizes[own, None]
+    residual = trace.cleared - fit.amplitudes[own] @ shown
+    basis = absorbed(np.vstack((shown, trace.condensed.nuisance)))
+    sd = float(np.linalg.norm(fit.left)) * residuals.noise_scale / math.sqrt(free)
+    return Rest(fit, free, sd, residual, basis, correlated(residual, basis)[1])
 
 
 def decades(first_s: float, last_s: float) -> list[float]:
@@ -196,18 +241,17 @@ def decades(first_s: float, last_s: float) -> list[float]:
     return inside
 
 
-def _left_of_readings(residuals: Residuals, fit: AnySampleFit) -> tuple[Array, Array]:
-    """Return what the best fit leaves of all readings, and a basis of what it absorbs."""
-    trace, own, lags = residuals.trace, fit.amplitudes > 0, fit.lags
-    shown = trace.condensed.cleared(lagged_loads(residuals, lags.rates[own]))
-    shown /= lags.sizes[own, None]
-    residual = trace.cleared - fit.amplitudes[own] @ shown
-    return residual, absorbed(np.vstack((shown, trace.condensed.nuisance)))
+def level_turned(residuals: Residuals) -> Callable[[Any], Any] | None:
+    """Return the function of a response to a unit step that is told as the level, if not itself.
 
-
-def _sees_start(lags: Lags) -> bool:
-    """Return True if the fastest lag, of a damper, shows."""
-    return bool(lags.rows[-1].any())
+    Of a gripper, whose free arm turns by 1/k_2, and by 1/(k_2 + k_2 K/K_jaws) on a sample, it is
+    the static K, force over shortening, from the left arm's rotation per torque.
+    """
+    if not residuals.instrument.has_jaws:
+        return None
+    gripper = residuals.gripper
+    free, jaws = 1 / gripper.left.stiffness_Nm_per_rad, gripper.jaw_stiffness_N_per_m
+    return lambda turned: jaws * (free / turned - 1)
 
 
 @dataclass(frozen=True)
@@ -215,16 +259,24 @@ class _Quantity:
     """A functional of the amplitudes of lags, or the ratio of two."""
 
     name: str
-    at: float | None
+    kind: str
+    at_s: float | None
     unit: str
-    above: Callable[[Array], Array]
-    """What unit amplitudes add, (n_rates,), by rates in 1/s, (n_rates,)."""
-    below: Callable[[Array], Array] | None = None
-    """The same of what it is divided by."""
+    above: _Functional
+    below: _Functional | None = None
+    """What it is divided by."""
     sides: tuple[int, ...] = (-1, 1)
     """Sides on which it may have a limit, -1 or 1."""
     turned: Callable[[float], float] | None = None
     """Falling function of it that is told in its place."""
+    fastest: float = math.inf
+    """Rate in 1/s up to which lags count."""
+
+    def added(self, lags: Lags) -> tuple[Array, Array]:
+        """Return what amplitudes of rows add to it, or its numerator, and to its divisor."""
+        at_s, shown = self.at_s or 0.0, (lags.rates <= self.fastest) / lags.sizes
+        below = self.below(at_s, lags.rates) if self.below else np.zeros_like(shown)
+        return self.above(at_s, lags.rates) * shown, below * shown
 
 
 def _told(fit: AnySampleFit, quantity: _Quantity, root: float) -> Told:
@@ -234,20 +286,11 @@ def _told(fit: AnySampleFit, quantity: _Quantity, root: float) -> Told:
     ends = [profile.limit(side) if side in quantity.sides else None for side in (-1, 1)]
     if (turned := quantity.turned) is not None:
         value, *ends = (turned(it) if it else None for it in (value, *ends[::-1]))
-    low, high = (end if end is not None and end > 0 else None for end in ends)
-    if low is not None and value is not None and low < _LITTLE * value:
+    low, high = (float(end) if end is not None and end > 0 else None for end in ends)
+    if low is not None and value is not None and low < _LITTLE * max(value, _LITTLE * (high or 0)):
         low = None
-    value = None if low is None or high is None else value
-    low, value, high = (each if each is None else float(each) for each in (low, value, high))
-    return Told(quantity.name, _symbol(quantity.name), quantity.at, quantity.unit, value, low, high)
-
-
-def _symbol(name: str) -> str:
-    """Return the name of a quantity as mathtext."""
-    for words, sign in _SIGNS.items():
-        name = name.replace(words, sign)
-    name = re.sub(" ([a-z/ ]+)", r"\\,\\mathrm{\1}", name).replace(" ", r"\ ")
-    return f"${name}$"
+    value = None if low is None or high is None or value is None else float(value)
+    return Told(quantity.name, quantity.kind, quantity.at_s, quantity.unit, value, low, high)
 
 
 class _Profile:
@@ -256,7 +299,7 @@ class _Profile:
     def __init__(self, fit: AnySampleFit, quantity: _Quantity, root: float) -> None:
         self._fit, self._quantity, self._root = fit, quantity, root
         self._least = float(fit.left @ fit.left)
-        above, below = self._added(fit.lags)
+        above, below = quantity.added(fit.lags)
         divisor = float(below @ fit.amplitudes) if quantity.below else 1.0
         self.best = float(above @ fit.amplitudes) / divisor if divisor else math.nan
         """The value of the best fit, NaN if it has none."""
@@ -265,16 +308,10 @@ class _Profile:
         deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[own], row[own])[0]))
         deviation = deviation if deviation > _LEAST * clearly else clearly
         self._stride = root * deviation / (divisor or 1.0)
-        held = min(deviation, 0.1 * self.best * divisor) or deviation
+        share = 0.1 * self.best * divisor
+        held = share if _LEAST * deviation < share < deviation else deviation
         self._weight = _WEIGHT / held if held else 0.0
         self._open = [it for it in (-1, 1) if np.any(it * row[faint] > _HANGS * clearly)]
-
-    def _added(self, lags: Lags) -> tuple[Array, Array]:
-        """Return what amplitudes of rows add to the quantity, or its numerator, and divisor."""
-        above, below = self._quantity.above(lags.rates), np.zeros(len(lags.rates))
-        if self._quantity.below is not None:
-            below = self._quantity.below(lags.rates)
-        return above / lags.sizes, below / lags.sizes
 
     def limit(self, side: int) -> float | None:
         """Find the lower or upper limit, side -1 or 1, if there is one.
@@ -298,7 +335,7 @@ class _Profile:
 
         The root of the excess there is accurate to a share.
         """
-        above, below = self._added(lags)
+        above, below = self._quantity.added(lags)
         seen: BoolArray = np.any(lags.rows, axis=1)
         ratio = self._quantity.below is not None
         rows = np.column_stack((lags.rows, above))
@@ -334,95 +371,46 @@ class _Profile:
 def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Iterator[_Quantity]:
     """Yield what is told at times, and beyond the readings."""
     instrument, (first_s, last_s) = residuals.instrument, lags.covered_s
-    deforms, jaws = instrument.deforms, instrument.has_jaws
+    deforms, jaws, turned = instrument.deforms, instrument.has_jaws, level_turned(residuals)
     inside = [time_s for time_s in times if first_s <= time_s <= last_s]
     # Slopes and moduli at an end of the trace are hardly known.
     inner = [time_s for time_s in inside if _INNER * first_s <= time_s <= last_s / _INNER]
     letter, (unit, *of_creep) = "G" if instrument.per_area else "K", _UNITS[instrument.per_area]
     if not (deforms or jaws):
         letter, unit = "J", of_creep[0]
-    turned = _secant_stiffness(residuals.gripper) if jaws else None
     # What falls is not smaller before the first reading, and not larger after the last one.
-    falls, at = (1, _left) if deforms else (-1, _yielded)
-    for time_s in times:
-        sides = (-falls,) * (time_s <= last_s) + (falls,) * (time_s >= first_s)
-        name, added = f"{letter}({time_s:g} s)", partial(at, time_s)
-        yield _Quantity(name, time_s, unit, added, None, sides, turned)
-        if time_s in inner and not jaws:
-            name, log_slope = f"exponent({time_s:g} s)", partial(_log_slope, time_s)
-            yield _Quantity(name, time_s, "", log_slope, added)
-    at_once, at_rest = partial(at, first_s), _slowest if deforms else _every
-    yield _Quantity(f"{letter} at once", None, unit, at_once, None, (-falls,), turned)
+    falls, level = (1, _ADDED["left"]) if deforms else (-1, _ADDED["yielded"])
+    for at_s in times:
+        sides = (-falls,) * (at_s <= last_s) + (falls,) * (at_s >= first_s)
+        yield _Quantity(f"{letter}({at_s:g} s)", LEVEL, at_s, unit, level, None, sides, turned)
+    for at_s in inner if not jaws else ():
+        yield _Quantity(f"exponent({at_s:g} s)", EXPONENT, at_s, "", _ADDED["per e-fold"], level)
+    yield _Quantity(f"{letter} at once", BEYOND, first_s, unit, level, None, (-falls,), turned)
     if deforms or jaws:
-        yield _Quantity(f"{letter} at rest", None, unit, at_rest, None, (falls,), turned)
+        final = _ADDED["lasting" if deforms else "all"]
+        yield _Quantity(f"{letter} at rest", BEYOND, None, unit, final, None, (falls,), turned)
     if jaws:
         return
     if not deforms:
-        for before_s, time_s in pairwise(inside):
-            name = f"J({before_s:g} to {time_s:g} s)"
-            yield _Quantity(name, time_s, unit, partial(_rise, before_s, time_s))
+        for before_s, at_s in pairwise(inside):
+            name = f"J({before_s:g} to {at_s:g} s)"
+            yield _Quantity(name, "increment", at_s, unit, partial(_rise, before_s))
         _, per_s, viscosity = of_creep
-        yield _Quantity("slope at the end", last_s, per_s, partial(_rate, last_s))
-        yield _Quantity("viscosity", None, viscosity, _flow, None, (1,), lambda flow: 1 / flow)
-    fastest = 1 / first_s if deforms and not _sees_start(lags) else math.inf
-    for omega in [1 / time_s for time_s in reversed(inner)]:
-        stored = partial(_stored if deforms else _yielded_at_once, omega, fastest)
-        lost, where = partial(_lost, omega, fastest), f"({omega:.3g} rad/s)"
-        yield _Quantity(f"{letter}'{where}", omega, unit, stored)
-        yield _Quantity(f"{letter}''{where}", omega, unit, lost)
-        yield _Quantity(f"tan delta{where}", omega, "", lost, stored)
-
-
-# What unit amplitudes of lags add, (n_rates,), by their rates in 1/s: at times, between two, per
-# second, per logarithm of time; at rest; and at an angular frequency, up to the fastest that shows.
-def _left(time_s: float, rates: Array) -> Array:
-    return np.exp(-rates * time_s)
-
-
-def _yielded(time_s: float, rates: Array) -> Array:
-    return -np.expm1(-rates * time_s)
+        yield _Quantity("slope at the end", "slope", last_s, per_s, _ADDED["per second"])
+        flow = _ADDED["flowing"]
+        yield _Quantity("viscosity", FLOW, None, viscosity, flow, None, (1,), lambda it: 1 / it)
+    # Under a step of the deformation the fastest lag, of a damper, does not show.
+    fastest = 1 / first_s if deforms and not lags.rows[-1].any() else math.inf
+    stored, lost = _ADDED["slow" if deforms else "fast"], _ADDED["lost"]
+    for at_s in reversed(inner):
+        for name, kind, its, above, below in (
+            (f"{letter}'", "storage", unit, stored, None),
+            (f"{letter}''", LOSS, unit, lost, None),
+            ("tan delta", "loss tangent", "", lost, stored),
+        ):
+            name = f"{name}({1 / at_s:.3g} rad/s)"
+            yield _Quantity(name, kind, at_s, its, above, below, fastest=fastest)
 
 
 def _rise(before_s: float, time_s: float, rates: Array) -> Array:
-    return _left(before_s, rates) - _left(time_s, rates)
-
-
-def _rate(time_s: float, rates: Array) -> Array:
-    return rates * _left(time_s, rates)
-
-
-def _log_slope(time_s: float, rates: Array) -> Array:
-    return time_s * _rate(time_s, rates)
-
-
-def _slowest(rates: Array) -> Array:
-    return np.eye(1, len(rates))[0]
-
-
-def _every(rates: Array) -> Array:
-    return np.ones_like(rates)
-
-
-def _flow(rates: Array) -> Array:
-    return rates * _slowest(rates)
-
-
-def _stored(omega: float, fastest: float, rates: Array) -> Array:
-    return omega**2 / (omega**2 + rates**2) * (rates <= fastest)
-
-
-def _yielded_at_once(omega: float, fastest: float, rates: Array) -> Array:
-    return rates**2 / (omega**2 + rates**2) * (rates <= fastest)
-
-
-def _lost(omega: float, fastest: float, rates: Array) -> Array:
-    return omega * rates / (omega**2 + rates**2) * (rates <= fastest)
-
-
-def _secant_stiffness(gripper: Gripper) -> Callable[[float], float]:
-    """Return a function from the left arm's rotation per torque to a sample's force per shortening.
-
-    Statically, the free arm turns by 1/k_2, and by 1/(k_2 + k_2 K/K_jaws) on a sample.
-    """
-    free, jaws = 1 / gripper.left.stiffness_Nm_per_rad, gripper.jaw_stiffness_N_per_m
-    return lambda turned: jaws * (free / turned - 1)
+    return np.exp(-rates * before_s) - np.exp(-rates * time_s)
