@@ -22,9 +22,12 @@ WRITTEN_BY = "written_by_biogrip"
 FAILED = "failed"
 """Status of a trace that could not be read, or whose fit failed; and the column that says why."""
 
+LINEAR = "linear"
+"""Column that is ``yes`` if a linear sample leaves noise of the trace, else ``no``."""
+
 COLUMNS = (
     *("trace", "fit", "confidence", "model", "preferred_model", "samples"),
-    *("noise_rad", "misfit_rad", "fixed", FAILED, WRITTEN_BY),
+    *("noise_rad", "misfit_rad", "fixed", LINEAR, FAILED, WRITTEN_BY),
 )
 """Columns of the table of traces, but for those of quantities."""
 
@@ -100,6 +103,7 @@ def write_table(outcome: Outcome, table: Path) -> None:
         # The model of the lowest BIC, if others were compared.
         best = [model["model"] for model in each["models"] if model["delta_bic"] == 0]
         row |= {"preferred_model": "".join(best[:1]), "fixed": "; ".join(each.get("fixed", ()))}
+        row[LINEAR] = "yes" if each["without_model"]["is_linear"] else "no"
         without = each["without_model"]["quantities"]
         if not each["assumed"]["identifiability"]["at_s"]:
             without = [own for own in without if own["kind"] in (LEVEL, EXPONENT)]

@@ -99,8 +99,10 @@ class Diagnosis:
             at_s=at_s,
             kinds=kinds,
         )
-        far_off = not found.is_linear and found.misfit > FAR_OFF * residuals.peak
-        return replace(found, told=[]) if far_off and self.status == REJECTED else found
+        # Beyond the noise.
+        far_off = found.misfit**2 - residuals.noise_scale**2 > (FAR_OFF * residuals.peak) ** 2
+        hopeless = far_off and not found.is_linear and self.status == REJECTED
+        return replace(found, told=[]) if hopeless else found
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""

@@ -242,8 +242,11 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     rest = examine_any_sample(residuals)
     other = rest.sd / scale
     noises = counted(plain(other, 2), "noise")
-    if rest.chance >= FALSE_ALARM or other * _TOO_MUCH < times:
-        return f"the model is not adequate, as a linear sample of another kind fits to {noises}"
+    inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
+    if rest.chance >= FALSE_ALARM:
+        return inadequate
+    if other * _TOO_MUCH < times:
+        return f"{inadequate}; what that leaves is of load, clock, contact or drift"
     return (
         "no linear sample gives this trace under this protocol, but leaves at least "
         f"{noises}: load, clock, contact or drift"
