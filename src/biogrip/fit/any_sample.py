@@ -23,7 +23,8 @@ from scipy.optimize import nnls
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
-from biogrip.physics.modes import Modes, lag_course
+from biogrip.fit.noise_model_fit import absorbed
+from biogrip.physics.modes import Modes, lag_course, mode_responses
 from biogrip.physics.residuals import Residuals
 
 # Retardation times a decade; shortest over the sampling interval, longest over the protocol, and
@@ -41,6 +42,8 @@ _ROUNDING = 1e-7
 
 # Rates a decade, and the fastest but one times the first time.
 _RATES_A_DECADE, _FASTEST = 8, 20.0
+# The slowest times the last time: a line in time to so much.
+_SLOWEST = 1e-8
 # Places at which an interval of rates is divided; how often at most, and decrease of chi^2 that
 # ends it.
 _DIVIDED, _MOST_DIVISIONS, _SETTLED = np.array([[0.2], [0.4], [0.6], [0.8]]), 6, 0.01
@@ -92,7 +95,10 @@ class Lags:
 def show_lags(residuals: Residuals, covered_s: tuple[float, float], more: Array) -> Lags:
     """Compute what a trace would show of a grid of lags, and of more rates in 1/s, (n_more,)."""
     rates = np.unique(np.append(spread_rates(*covered_s), more))
-    deforms, places = residuals.course.deforms, covered_s[1] * rates
+    if deforms := residuals.course.deforms:
+        # What does not relax has no part in what is lost.
+        rates[0] = 0.0
+    places = covered_s[1] * rates
     sign, none = np.full((len(rates), 1), 1.0 if deforms else -1.0), np.zeros((len(rates), 0, 1))
     rows = residuals.trace.condensed.of_modes(Modes(-rates[:, None], sign, none, none))[:, 0]
     rows /= residuals.noise_scale
@@ -129,6 +135,27 @@ class AnySampleFit:
         """What they leave of the trace's rows, (n_rows,)."""
         return self.measured - self.amplitudes @ self.lags.rows
 
+    @property
+    def free(self) -> int:
+        """Degrees of freedom of what it leaves."""
+        return max(self.lags.residuals.free - self.taken, 1)
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of the noise that this would be."""
+        scale = self.lags.residuals.noise_scale
+        return float(np.linalg.norm(self.left)) * scale / float(np.sqrt(self.free))
+
+    def left_of_readings(self) -> tuple[Array, Array]:
+        """Return what it leaves of the readings, (n_samples,), and a basis of what it absorbs."""
+        own, lags, residuals = self.amplitudes > 0, self.lags, self.lags.residuals
+        trace, course = residuals.trace, residuals.course
+        shown = mode_responses(-lags.rates[own][None], course, trace.time_s)[0][0]
+        shown *= (1.0 if course.deforms else -1.0) / lags.sizes[own, None]
+        shown = trace.condensed.cleared(shown)
+        residual: Array = trace.cleared - self.amplitudes[own] @ shown
+        return residual, absorbed(np.vstack((shown, trace.condensed.nuisance)))
+
 
 def fit_any_sample(residuals: Residuals) -> AnySampleFit:
     """Fit any linear sample to a trace; the model of its residuals is not used.
@@ -162,7 +189,7 @@ def spread_rates(
     spacing = np.log(10) / a_decade
     places = np.arange(shift, np.log1p(_FASTEST * last_s / first_s) / spacing) * spacing
     inner, middle = np.expm1(places[places > 0]) / last_s, 1 / first_s
-    ends = 1e-12 / last_s, _FASTEST / first_s, 1e6 / first_s
+    ends = _SLOWEST / last_s, _FASTEST / first_s, 1e6 / first_s
     return np.unique(np.concatenate((ends, inner, [middle, middle * (1 + 1e-9)])))
 
 

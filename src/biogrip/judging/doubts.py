@@ -22,6 +22,7 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, plain
+from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
     absorbed,
@@ -38,7 +39,6 @@ from biogrip.judging.whiteness import (
     uneven,
     wandering,
 )
-from biogrip.judging.without_model import examine_any_sample
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, estimate_noise, without
 
@@ -239,11 +239,11 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
 
     What any linear sample leaves is noise, or no model's fault.
     """
-    rest = examine_any_sample(residuals)
-    other = rest.sd / scale
+    fit = fit_any_sample(residuals)
+    other = fit.sd / scale
     noises = counted(plain(other, 2), "noise")
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
-    if rest.chance >= FALSE_ALARM:
+    if correlated(*fit.left_of_readings())[1] >= FALSE_ALARM:
         return inadequate
     if other * _TOO_MUCH < times:
         return f"{inadequate}; what that leaves is of load, clock, contact or drift"

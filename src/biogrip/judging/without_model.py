@@ -39,11 +39,9 @@ from scipy.special import chdtrc
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
 from biogrip.fit.any_sample import AnySampleFit, Lags, fit_any_sample
-from biogrip.fit.noise_model_fit import absorbed
 from biogrip.judging.likelihood import find_thresholds
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.judging.whiteness import as_correlated, correlated
-from biogrip.physics.modes import lag_course
 from biogrip.physics.residuals import Residuals
 
 # Chance below which what a fit leaves is no noise, and how much larger than the noise it then is.
@@ -62,6 +60,8 @@ _HANGS = 10.0
 # Standard deviation of a quantity that counts as none, over the largest that a noise of one lag
 # makes.
 _LEAST = 1e-3
+# Share of what the clearest lag adds that is none.
+_NONE = 1e-9
 
 # Share of a value below which a lower limit says no more than that it is positive.
 _LITTLE = 0.01
@@ -179,8 +179,9 @@ def tell_without_model(
     kinds
         What is to be told.
     """
-    rest = examine_any_sample(residuals)
-    fit, free, chance, sd = rest.fit, rest.free, rest.chance, rest.sd
+    fit = fit_any_sample(residuals)
+    free, sd, left = fit.free, fit.sd, fit.left_of_readings()
+    _, chance = correlated(*left)
     freedom, times = min(free, residuals.freedom), float(sd / (noise_sd or residuals.noise_scale))
     if noise_sd is not None:
         too_large = float(chdtrc(free, free * times**2))
@@ -189,45 +190,15 @@ def tell_without_model(
             sd, freedom = noise_sd, math.inf
     is_linear = chance >= _CHANCE or times <= _TOO_MUCH
     if not is_linear:
-        independent, freedom = as_correlated(rest.residual, rest.basis)
-        sd = rest.sd * math.sqrt(free / independent)
+        independent, freedom = as_correlated(*left)
+        sd = fit.sd * math.sqrt(free / independent)
     threshold, _ = find_thresholds(confidence, freedom)
     root = math.sqrt(threshold) * sd / residuals.noise_scale
     times_s = at_s or decades(*fit.lags.covered_s)
     quantities = (each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds)
     told = [_told(fit, each, root) for each in quantities]
-    misfit = rest.sd * math.sqrt(free / residuals.samples)
+    misfit = fit.sd * math.sqrt(free / residuals.samples)
     return WithoutModel(told, misfit, times, is_linear, fit.lags.covered_s)
-
-
-@dataclass(frozen=True, eq=False)
-class Rest:
-    """What the linear sample that fits a trace best leaves of it."""
-
-    fit: AnySampleFit
-    """That sample."""
-    free: int
-    """Degrees of freedom of what it leaves."""
-    sd: float
-    """Standard deviation of the noise that this would be."""
-    residual: Array
-    """What it leaves of the readings, (n_samples,)."""
-    basis: Array
-    """Orthonormal functions that the fit absorbs, (n_functions, n_samples)."""
-    chance: float
-    """Chance of neighbours that are as correlated in white noise."""
-
-
-def examine_any_sample(residuals: Residuals) -> Rest:
-    """Fit any linear sample to a trace, and test what that leaves; the model is not used."""
-    fit, trace, course = fit_any_sample(residuals), residuals.trace, residuals.course
-    own, lags, free = fit.amplitudes > 0, fit.lags, max(residuals.free - fit.taken, 1)
-    shown = lag_course(course, (1 / (course.end_s * lags.rates[own])).tolist())(trace.time_s)
-    shown = trace.condensed.cleared(shown) / lags.sizes[own, None]
-    residual = trace.cleared - fit.amplitudes[own] @ shown
-    basis = absorbed(np.vstack((shown, trace.condensed.nuisance)))
-    sd = float(np.linalg.norm(fit.left)) * residuals.noise_scale / math.sqrt(free)
-    return Rest(fit, free, sd, residual, basis, correlated(residual, basis)[1])
 
 
 def decades(first_s: float, last_s: float) -> list[float]:
@@ -308,8 +279,7 @@ class _Profile:
         deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[own], row[own])[0]))
         deviation = deviation if deviation > _LEAST * clearly else clearly
         self._stride = root * deviation / (divisor or 1.0)
-        share = 0.1 * self.best * divisor
-        held = share if _LEAST * deviation < share < deviation else deviation
+        held = min(deviation, max(0.1 * self.best * divisor, _NONE * clearly))
         self._weight = _WEIGHT / held if held else 0.0
         self._open = [it for it in (-1, 1) if np.any(it * row[faint] > _HANGS * clearly)]
 

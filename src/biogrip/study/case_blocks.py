@@ -71,7 +71,7 @@ class Identifiability(Block):
     at_s: Annotated[
         tuple[Annotated[float, Field(ge=1e-12, le=1e12)], ...], Field(max_length=20)
     ] = ()
-    """Times after a step, and inverse angular frequencies, at which `biogrip identify` tells what
+    """Times after a step, and inverses of angular frequencies, at which `biogrip identify` tells what
     any linear sample would show. By default one a decade."""
 
 

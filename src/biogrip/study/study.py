@@ -65,11 +65,6 @@ class Case:
         return self.block.identifiability.confidence
 
     @property
-    def at_s(self) -> tuple[float, ...]:
-        """Times at which it is told what any linear sample would show; empty for decades."""
-        return self.block.identifiability.at_s
-
-    @property
     def coverage_seeds(self) -> int:
         """Number of seeds to test the coverage of intervals with; 0 without noise."""
         tried = not self.recorded and not self.noise.absent
