@@ -243,7 +243,9 @@ def shorter_arms() -> str:
 
 
 def _quantities(text: str) -> str:
-    return "\n".join(line[2:] for line in text.splitlines() if line.startswith("      "))
+    lines = [line.removeprefix("    ") for line in text.splitlines()]
+    told = (line for line in lines if line.startswith(("  ", "Any linear sample")))
+    return "\n".join(f"    {line.removeprefix('  ')}" for line in told)
 
 
 def command_help() -> str:

@@ -128,6 +128,12 @@ def _fix(text: str) -> tuple[tuple[str, ...], Any]:
     raise argparse.ArgumentTypeError(f"found '{text}', allowed is NAME=VALUE, as in k_p=0")
 
 
+def _at(text: str) -> tuple[tuple[str, ...], Any]:
+    with suppress(ValueError):
+        return ("identifiability", "at_s"), [float(each) for each in text.split(",")]
+    raise argparse.ArgumentTypeError(f"found '{text}', allowed are times in s, as in 1,10,100")
+
+
 def _any_key(text: str) -> tuple[tuple[str, ...], Any]:
     from biogrip.study.source import value_of
 
@@ -178,6 +184,7 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
     "the sample": [
         ("--model", "sample.model", "NAME", "sample model [generalized_maxwell]"),
         ("--fix", _fix, "NAME=VALUE", "known parameter, SI units; 0 for no element; repeatable"),
+        ("--at", _at, "SECONDS,...", "times after a step at which to tell what any model would"),
     ],
     "any other key of the config": [
         (

@@ -276,6 +276,7 @@ def data_of(
         **({} if is_usual(recording) else {"read_as": recording.form}),
         **({"load": load} if load else {}),
         **trace_data(diagnosis),
+        "without_model": diagnosis.without_model(case.block.identifiability.at_s).data(),
         "assumed": _assumed(diagnosis, case, list(tried or case.models)),
         "by_default": _by_default(given) if case.instrument.has_jaws else [],
         "versions": {
@@ -289,6 +290,7 @@ def _assumed(diagnosis: Diagnosis, case: Case, tried: Sequence[str]) -> dict[str
     """Return what an identification relies on: its model, and a config that repeats it."""
     found = diagnosis.experiment
     assert found
+    asked = case.block.identifiability
     blocks = ["instrument", "protocol", "search_range", "measurement", "models", "least_squares"]
     blocks += ["gripper"] if case.instrument.has_jaws else []
     if case.record is not None:
@@ -305,7 +307,7 @@ def _assumed(diagnosis: Diagnosis, case: Case, tried: Sequence[str]) -> dict[str
         **{name: plain(getattr(block, name)) for name in blocks},
         **({"actuator": plain(case.study.actuator)} if case.instrument.has_jaws else {}),
         "fixed": case.fixed,
-        "identifiability": {"confidence": case.confidence},
+        "identifiability": {key: plain(getattr(asked, key)) for key in ("confidence", "at_s")},
         "model_selection": {"models": list(tried)},
         "study_seed": case.study.study_seed,
     }

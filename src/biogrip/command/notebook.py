@@ -1,7 +1,7 @@
 """A trace in a notebook: identified and told as by the command, from arrays or pandas columns."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -84,6 +84,18 @@ class TraceResult:
             return pd.DataFrame(self.data[what])
         frame = pd.DataFrame(self.data[what], columns=["quantity", "unit", "verdict", *limits])
         return frame.astype(limits).set_index("quantity")
+
+    def without_model(self, at: Sequence[float] = ()) -> "pd.DataFrame":
+        """Return a table of what any linear sample would show, whatever its model.
+
+        At times in s after a step, and inverse angular frequencies; by default one a decade.
+        """
+        import pandas as pd
+
+        found = self.diagnosis.without_model(at)
+        columns = ["quantity", "at_s", "unit", "value", "low", "high"]
+        frame = pd.DataFrame(found.told)[columns]
+        return frame.astype(dict.fromkeys(["at_s", "value", "low", "high"], float))
 
     def plot(self) -> "Figure":
         """Draw the trace, its fit and the residuals."""

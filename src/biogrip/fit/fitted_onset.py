@@ -16,10 +16,11 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.any_sample import extreme_responses, fit_responses
+from biogrip.fit.any_sample import fit_responses
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import TraceProblem, silent
+from biogrip.physics.modes import lag_course
 from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
 
 # Longest relaxation time over the protocol's duration, and how many a decade; the shortest is that
@@ -55,7 +56,7 @@ def estimate_onset(problem: Experiment, time_s: Array, readings: Array) -> float
     shortest = float(np.min(np.diff(time_s)))
     decades = np.log10(_LONGEST * torque.end_s / shortest)
     shares = np.geomspace(shortest / torque.end_s, _LONGEST, 2 + int(_A_DECADE * decades))
-    responses = extreme_responses(problem, shares.tolist())
+    responses = lag_course(torque, shares.tolist())
 
     def square_sum(onset_s: float, some: IntArray) -> float:
         nuisance = nuisance_basis(time_s[some], offset=offset, drift=problem.drift)

@@ -29,7 +29,7 @@ from biogrip.identify.other_fits import (
 )
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
-from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit
+from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit, name_suspects
 from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.traces.reader import Recording
 
@@ -98,7 +98,7 @@ def identify_alike(
         if experiment.fit_start:
             judged[index], onsets_s[index] = profile_over_onset(judged[index], recording.time_s)
     doing("trying an offset and a drift")
-    notes = [_notes_on_fit(fit) for fit in fits]
+    notes = [_notes_on_fit(*pair) for pair in zip(fits, experiments, strict=True)]
     if not first.simulated:
         notes = _notes_on_traces(traces, judged, notes)
     return [
@@ -147,7 +147,7 @@ def _notes_on_traces(
     return notes
 
 
-def _notes_on_fit(fit: TraceFit) -> list[Note]:
+def _notes_on_fit(fit: TraceFit, experiment: Experiment) -> list[Note]:
     """Return notes on the noise model of a fit; one that holds much misfit rejects the fit."""
     notes = [Note(HARMLESS, text) for text in fit.notes()]
     if fit.noise_model is None:
@@ -155,5 +155,12 @@ def _notes_on_fit(fit: TraceFit) -> list[Note]:
     residuals = fit.problem.residuals
     peak = np.max(np.abs(residuals.response(np.log(fit.found.parameters))))
     share = float(fit.found.misfit * np.sqrt(fit.noise_model.ar1) / peak)
-    misfit = find_slow_misfit(fit.noise_model, residuals.duration_s, share, residuals.instrument)
+
+    def suspects() -> str:
+        # A slow noise model would take misfit for noise again.
+        trace = residuals.trace
+        white = experiment.to_identify().of(trace.time_s, trace.readings).residuals
+        return name_suspects(white, fit.found.misfit / white.noise_scale, white.noise_scale)
+
+    misfit = find_slow_misfit(fit.noise_model, residuals.duration_s, share, suspects)
     return [misfit, *notes] if misfit else notes

@@ -13,9 +13,10 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
-from biogrip.fit.any_sample import extreme_responses, fit_responses
+from biogrip.fit.any_sample import fit_responses
 from biogrip.fit.experiment import Experiment
 from biogrip.physics.gripper import Gripper
+from biogrip.physics.modes import lag_course
 from biogrip.physics.protocol import Course, evaluate
 from biogrip.physics.whitening import nuisance_basis, without
 from biogrip.traces.columns import TIME_UNITS
@@ -83,7 +84,7 @@ def check_recording(
     free, largest = free_rotation(experiment.gripper, torque), float(np.abs(trace).max())
     if largest > _ABSURD * free:
         return _check_turn(recording, largest, free, None)
-    responses = extreme_responses(experiment, _LAG_SHARES)(time_s)
+    responses = lag_course(torque, _LAG_SHARES)(time_s)
     nuisance = experiment.nuisance(time_s)
     (amplitudes, rest), (_, mirrored) = _either_sign(trace, responses, nuisance)
     where = recording.extent(recording.read.reading)

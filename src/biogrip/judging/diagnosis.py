@@ -11,7 +11,7 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 5. A fit that has not converged is doubtful, and so are arms that ring.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -26,6 +26,7 @@ from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.doubts import (
     DOUBT,
+    FAR_OFF,
     HARMLESS,
     REJECTED,
     REJECTION,
@@ -36,6 +37,7 @@ from biogrip.judging.doubts import (
 from biogrip.judging.likelihood import MISSED, Likelihood, check_rows, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
 from biogrip.traces.reader import Recording
@@ -81,6 +83,26 @@ class Diagnosis:
     def status(self) -> str:
         """Status of the fit by these notes: ok, doubtful or rejected."""
         return compute_status(self.notes)
+
+    def without_model(
+        self, at_s: Sequence[float] = (), kinds: Collection[str] = KINDS
+    ) -> WithoutModel:
+        """Tell what any linear sample would show, see `tell_without_model`.
+
+        Where none gives the trace, as the best of them would be rejected, nothing is told.
+        """
+        residuals, experiment = self.likelihood.problem.residuals, self.experiment
+        found = tell_without_model(
+            residuals,
+            confidence=self.likelihood.confidence,
+            noise_sd=experiment.noise_sd if experiment else None,
+            at_s=at_s,
+            kinds=kinds,
+        )
+        # Beyond the noise.
+        far_off = found.misfit**2 - residuals.noise_scale**2 > (FAR_OFF * residuals.peak) ** 2
+        hopeless = far_off and not found.is_linear and self.status == REJECTED
+        return replace(found, told=[]) if hopeless else found
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""

@@ -14,13 +14,15 @@ independent residuals only: the fit is good to so much of the peak, which is dou
 noise model may be misfit, too (`find_slow_misfit`): if it is correlated for too long.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, plain
+from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
     absorbed,
@@ -37,7 +39,6 @@ from biogrip.judging.whiteness import (
     uneven,
     wandering,
 )
-from biogrip.physics.instruments import Instrument
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, estimate_noise, without
 
@@ -86,8 +87,9 @@ CERTAIN_MISFIT = 0.001
 
 # A misfit larger than the scatter of neighbouring readings by this factor changes limits.
 _TOO_MUCH = 1.2
-# A misfit of this share of the peak is far off.
-_FAR_OFF = 0.02
+FAR_OFF = 0.02
+"""Share of the peak from which on a misfit is far off."""
+
 # A misfit below these shares of the noise and of the peak is that of a trace without noise, and so
 # is one below what no sensor resolves.
 _NOISE_FREE, _NOISE_FREE_OF_PEAK, _UNRESOLVED = 0.01, 1e-3, 1e-6
@@ -156,7 +158,8 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     ]
     # Outliers distort a fit, so that all that it leaves is correlated.
     if not (found or struck.any()):
-        doubts += _about_colour(bulk, basis, correlation, chance, residuals.instrument)
+        suspects = partial(name_suspects, residuals, times, scale)
+        doubts += _about_colour(bulk, basis, correlation, chance, suspects)
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         notes.append(
@@ -206,7 +209,7 @@ def _misfit(
     more, read = plain(times, 2), residuals.trace.readings
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak
     of_peak = f"{plain(100 * share, 2)} % of the peak"
-    suspects = residuals.instrument.suspects(unit=True)
+    suspects = name_suspects(residuals, times, scale)
     if not residuals.rounding and np.mean(read[1:] == read[:-1]) > _REPEATED:
         text = (
             "Most readings repeat the one before, as of a sensor that is read less often than it "
@@ -217,21 +220,37 @@ def _misfit(
             f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
             "correlated for a short time."
         )
-    elif share < _FAR_OFF:
+    elif share < FAR_OFF:
         text = (
             f"The fit is good to {of_peak}; the rest, {more} times the noise of the trace, is not "
-            f"noise: {suspects} is not quite the right one."
+            f"noise: {suspects}."
         )
     else:
-        text = (
-            f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects} is not "
-            "the right one."
-        )
+        text = f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects}."
         return Remainder([Note(REJECTION, text)])
     misfit = as_correlated(*bulk)
     count = f"{plain(misfit[0], 2)} independent ones" if misfit[0] > 1 else "less than one"
     allowed = f"The limits count the {len(bulk[0])} residuals as {count}."
     return Remainder([Note(DOUBT, f"{text} {allowed}")], misfit)
+
+
+def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
+    """Return what is wrong where a model's misfit is some times the scale of the noise.
+
+    What any linear sample leaves is noise, or no model's fault.
+    """
+    fit = fit_any_sample(residuals)
+    other = fit.sd / scale
+    noises = counted(plain(other, 2), "noise")
+    inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
+    if correlated(*fit.left_of_readings())[1] >= FALSE_ALARM:
+        return inadequate
+    if other * _TOO_MUCH < times:
+        return f"{inadequate}; what that leaves is of load, clock, contact or drift"
+    return (
+        "no linear sample gives this trace under this protocol, but leaves at least "
+        f"{noises}: load, clock, contact or drift"
+    )
 
 
 def _about_growth(
@@ -257,23 +276,25 @@ def _about_growth(
 
 
 def _about_colour(
-    residual: Array, basis: Array, correlation: float, chance: float, instrument: Instrument
+    residual: Array,
+    basis: Array,
+    correlation: float,
+    chance: float,
+    suspects: Callable[[], str],
 ) -> Iterator[str]:
     """Yield a sentence for each test of white noise that residuals, (n_samples,), fail.
 
     The correlation of neighbours and its chance are given.
     """
-    wrong = instrument.suspects()
     if chance < FALSE_ALARM:
         yield (
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
-            f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {wrong} "
-            "is not the right one."
+            f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {suspects()}."
         )
     elif (chance := uneven(residual, basis)) < FALSE_ALARM:
         yield (
             "The residual has more of some frequencies than of others, as white noise has only "
-            f"{one_in(chance)} traces: the intervals are wrong, or {wrong} is."
+            f"{one_in(chance)} traces: the intervals are wrong, or {suspects()}."
         )
     chance = wandering(residual, basis)
     if chance < FALSE_ALARM:
@@ -338,30 +359,26 @@ _AS_THE_SCATTER = 1.44
 
 
 def find_slow_misfit(
-    noise_model: NoiseModel, duration_s: float, share_of_peak: float, instrument: Instrument
+    noise_model: NoiseModel, duration_s: float, share_of_peak: float, suspects: Callable[[], str]
 ) -> Note | None:
     """Return a note if the autocorrelated part of a noise model is, or may be, misfit.
 
-    `share_of_peak` is the standard deviation of that part over the largest response.
+    `share_of_peak` is the standard deviation of that part over the largest response; `suspects`
+    says what is wrong if it is misfit.
     """
     share, time_s = noise_model.ar1, noise_model.time_s
     misfit = share > _MOST and time_s > _SLOW * duration_s
     if not misfit and not (share > _NOTICEABLE and time_s > _LONG * duration_s):
         return None
-    suspects = instrument.suspects(unit=True).capitalize()
+    meaning = "that is misfit, not noise"
     if not misfit:
-        meaning = f"that may be misfit, of a {instrument.suspects('')} that is not the right one."
-    elif share_of_peak < _FAR_OFF:
-        meaning = (
-            f"that is misfit, not noise, of {plain(100 * share_of_peak, 2)} % of the peak, which "
-            f"the limits allow for. {suspects} is not quite the right one."
-        )
-    else:
-        meaning = f"that is misfit, not noise. {suspects} is not the right one."
+        meaning = "that may be misfit"
+    elif share_of_peak < FAR_OFF:
+        meaning += f", of {plain(100 * share_of_peak, 2)} % of the peak, which the limits allow for"
     return Note(
-        REJECTION if misfit and share_of_peak >= _FAR_OFF else DOUBT,
+        REJECTION if misfit and share_of_peak >= FAR_OFF else DOUBT,
         f"What the fit leaves is correlated over {plain(time_s, 2)} s of a trace of "
-        f"{plain(duration_s)} s, {100 * share:.0f} % of its variance: {meaning}",
+        f"{plain(duration_s)} s, {100 * share:.0f} % of its variance: {meaning}; {suspects()}.",
     )
 
 

@@ -79,9 +79,9 @@ class Likelihood:
         `biogrip.judging.whiteness.as_correlated`.
         """
         noise_sd = self.misfit * math.sqrt(self.problem.residuals.samples / independent)
-        threshold, _ = _thresholds(self.confidence, freedom)
+        threshold, _ = find_thresholds(self.confidence, freedom)
         # What few degrees of freedom say of one misfit in a thousand is not known.
-        known, certain = _thresholds(self.confidence, inf)
+        known, certain = find_thresholds(self.confidence, inf)
         return replace(
             self,
             noise_sd=noise_sd,
@@ -127,7 +127,7 @@ def make_likelihood(
         left = problem.residuals.free - len(best)
         noise_sd = misfit * float(np.sqrt(problem.residuals.samples / left))
         freedom = float(min(left, problem.residuals.freedom))
-    threshold, certainty = _thresholds(confidence, freedom)
+    threshold, certainty = find_thresholds(confidence, freedom)
     return Likelihood(problem, best, misfit, noise_sd, threshold, certainty, freedom, confidence)
 
 
@@ -147,7 +147,7 @@ def check_rows(likelihood: Likelihood) -> None:
         raise ArithmeticError(text)
 
 
-def _thresholds(confidence: float, freedom: float) -> tuple[float, float]:
+def find_thresholds(confidence: float, freedom: float) -> tuple[float, float]:
     """Return the increases of chi^2 at limits and at `CERTAIN`, by the freedom of the noise.
 
     If the noise is known, chi-squared of one degree of freedom, 3.84 at 95 %; else F(1, freedom).

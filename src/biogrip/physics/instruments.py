@@ -66,12 +66,6 @@ class Instrument:
         """True if a deformation is controlled and a load is read."""
         return self.kind == "relaxation"
 
-    def suspects(self, article: str = "the ", *, unit: bool = False) -> str:
-        """Return what may be wrong if a model does not fit, and with `unit` the file's unit too."""
-        parts = ["model", "protocol", *(["gripper"] if self.has_jaws else []), *["unit"][:unit]]
-        *first, last = (f"{article}{part}" for part in parts)
-        return f"{', '.join(first)} or {last}"
-
     @property
     def has_jaws(self) -> bool:
         """True if it grips the sample between arms, which yield and may let it go."""
