@@ -22,7 +22,6 @@ import pandas as pd
 from benchmarks.one_thread import keep_to_one_thread
 from biogrip.arrays import Array
 from biogrip.files import write_text
-from biogrip.fit.methods import share_in_words
 from biogrip.judging.without_model import Told, tell_without_model
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
@@ -31,6 +30,7 @@ from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import Phase, hold, join_phases, ramp
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.whitening import nuisance_basis
+from biogrip.records.success import share_in_words
 from tests.helpers.laplace import IMPEDANCES
 
 _RESULTS = Path(__file__).parent / "results" / "without_model.csv"

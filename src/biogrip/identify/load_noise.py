@@ -23,8 +23,9 @@ from itertools import pairwise
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.fit.any_sample import extreme_responses, fit_responses
+from biogrip.fit.any_sample import fit_responses
 from biogrip.fit.experiment import Experiment
+from biogrip.physics.modes import lag_course
 from biogrip.physics.whitening import without
 
 # Weights that are tried; change of a row over the median's that is no scatter; fewest rows.
@@ -68,7 +69,7 @@ def without_noise(experiment: Experiment, time_s: Array, readings: Array) -> tup
     nuisance = experiment.nuisance(time_s[some])
     rest = []
     for own in (experiment, replace(experiment, record=smooth)):
-        responses = without(nuisance, extreme_responses(own, lags)(time_s[some]))
+        responses = without(nuisance, lag_course(own.torque, lags)(time_s[some]))
         rest.append(fit_responses(without(nuisance, readings[some]), responses)[1])
     better = rest[0] > rest[1] * np.exp(_BETTER / len(some))
     return (smooth, noise) if better else (experiment.record, 0.0)
