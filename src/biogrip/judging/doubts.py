@@ -3,8 +3,9 @@
 The heaviest note decides the status of a fit: ok, doubtful or rejected (`compute_status`).
 Residuals are tested for white noise (`biogrip.judging.whiteness`), each test at the level
 `FALSE_ALARM`: correlation of neighbours, the cumulative periodogram, means over stretches,
-outliers. Noise that grows with the rotation is told first, and the other tests are of what it
-leaves.
+outliers, a step at any time, halves that differ (`biogrip.judging.changes`). A step that explains
+the others is named in their place. Noise that grows with the rotation is told first, and the other
+tests are of what it leaves.
 
 What is correlated beyond chance (`CERTAIN_MISFIT`) and larger than the scatter of neighbouring
 readings may be noise all the same: if it is correlated for a short time (`has_fast_noise`), or if
@@ -28,6 +29,7 @@ from biogrip.fit.noise_model_fit import (
     compute_growth,
     outliers_of,
 )
+from biogrip.judging.changes import Step, compare_halves, find_step
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.whiteness import (
     as_correlated,
@@ -135,6 +137,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     struck = outliers_of(by_leverage(standard, basis), rounding)
     if far_out(standard, struck, basis) >= FALSE_ALARM:
         struck[:] = False
+    whole = not struck.any()
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
     bulk = standard[~struck]
     basis = absorbed(basis[:, ~struck]) if struck.any() else basis
@@ -155,8 +158,10 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
         *_about_outliers(residuals, struck),
     ]
     # Outliers distort a fit, so that all that it leaves is correlated.
-    if not (found or struck.any()):
-        doubts += _about_colour(bulk, basis, correlation, chance, residuals.instrument)
+    if whole:
+        colour = list(_about_colour(bulk, basis, correlation, chance, residuals.instrument))
+        changes = _about_changes(residuals, bulk, basis, growth, coloured=bool(colour))
+        doubts += changes or (colour if not found else [])
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         notes.append(
@@ -282,6 +287,50 @@ def _about_colour(
             f"of white noise do only {one_in(chance)} traces. It contains something slow that the "
             "model lacks, perhaps a drift of the instrument: the intervals are too narrow."
         )
+
+
+def _about_changes(
+    residuals: Residuals, residual: Array, basis: Array, growth: Array, *, coloured: bool
+) -> list[str]:
+    """Return a sentence on a change within the trace, if it explains what its fit leaves.
+
+    Residuals, (n_samples,), are over the growth of the noise; they may seem to be coloured.
+    """
+    trace = residuals.trace
+    step = find_step(residual, basis, lambda rows: trace.condensed.cleared(rows) / growth)
+    if step and step.chance < FALSE_ALARM and not (coloured and _is_coloured(step)):
+        before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
+        size = plain(-step.size, 2)
+        unit = f" {residuals.instrument.read.unit}".rstrip()
+        return [
+            f"The readings change at about {plain(0.5 * (before_s + after_s))} s, as by a step of "
+            f"{size}{unit}, which white noise shows only {one_in(step.chance)} traces: the values "
+            "may be far off. Leave out what is before or after (--from, --until)."
+        ]
+    split = _middle(residuals)
+    chance = 1.0 if coloured else compare_halves(residual, basis, split)
+    if chance >= FALSE_ALARM:
+        return []
+    return [
+        f"The readings up to {plain(trace.time_s[split - 1])} s and those after it, each fitted "
+        f"by itself, differ as those with white noise do only {one_in(chance)} traces: the "
+        "sample, the instrument or the protocol changed, and the values may be far off."
+    ]
+
+
+def _is_coloured(step: Step) -> bool:
+    """Return True if what a fit leaves with a step is not white noise, either."""
+    given = step.left, step.basis
+    chances = correlated(*given)[1], uneven(*given), wandering(*given)
+    return min(chances) < FALSE_ALARM
+
+
+def _middle(residuals: Residuals) -> int:
+    """Return the reading at which phases part a trace, or the middle one."""
+    count = residuals.samples
+    starts = np.searchsorted(residuals.trace.time_s, residuals.course.changes_s)
+    nearest = int(starts[np.argmin(np.abs(starts - count // 2))]) if len(starts) else 0
+    return nearest if count // 4 <= nearest <= count - count // 4 else count // 2
 
 
 def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
