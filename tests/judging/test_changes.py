@@ -79,7 +79,7 @@ def test_a_step_is_what_a_fit_with_it_finds() -> None:
     found = find_step(trace - trace @ basis.T @ basis, basis, itself)
     assert found
     assert found.before == 24
-    design = np.vstack((basis, times > 60)).T
+    design: Array = np.vstack((basis, np.where(times > 60, 1.0, 0.0))).T
     amplitudes = np.linalg.lstsq(design, trace, rcond=None)[0]
     assert found.size == pytest.approx(amplitudes[-1])
     assert found.left == pytest.approx(trace - design @ amplitudes, abs=1e-9)
