@@ -13,6 +13,7 @@ from biogrip.identify.notebook import identify_trace
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
+    HARMLESS,
     OK,
     REJECTION,
     examine_residuals,
@@ -83,7 +84,38 @@ def test_a_given_noise_is_held_against_what_parameters_leave(beyond: float, said
     noise_sd = fit.misfit * np.sqrt(len(times) / (beyond * chi2.isf(0.003, 7)))
     held = make_likelihood(problem, fit.best, fit.misfit, confidence=0.95, noise_sd=noise_sd)
     notes = examine_residuals(held).notes
-    assert any(note.text.startswith("The noise that was given") for note in notes) == said
+    assert any("the noise that was given" in note.text for note in notes) == said
+
+
+@pytest.mark.parametrize(
+    ("times", "weight", "said"),
+    [
+        (1e-4, DOUBT, "is 10000 times the noise that was given: its value or unit"),
+        (0.5, DOUBT, "is 2 times the noise that was given"),
+        (0.85, HARMLESS, "is 1.18 times the noise that was given: limits are too narrow"),
+        (1.0, "", ""),
+        (1e5, DOUBT, "The noise that was given is 100000 times"),
+    ],
+)
+def test_a_stated_noise_moves_no_optimum_and_is_all_that_is_said(
+    times: float, weight: str, said: str
+) -> None:
+    """A scale of the noise scales chi-squared alone; fits end to ten digits."""
+    time_s = np.linspace(0.25, 100, 400)
+    noise = np.random.default_rng(2).standard_normal(400)
+    noise /= np.std(noise) * np.sqrt(400 / 397)
+    readings = 100 + 80 * np.exp(-time_s / 20) + noise
+    config: dict[str, Any] = {"model_selection": {"models": []}}
+    given: dict[str, Any] = {"reads": "modulus", "model": "zener_maxwell", "config": config}
+    found = identify_trace(time_s, readings, noise=times, **given)
+    without = identify_trace(time_s, readings, **given)
+    values = [[each["value"] for each in one.data["quantities"]] for one in (found, without)]
+    assert values[0] == pytest.approx(values[1], rel=1e-9)
+    assert found.data["misfit_rad"] == pytest.approx(without.data["misfit_rad"], rel=1e-12)
+    # Of limits that are too narrow, a ramp before the first reading is said to move one.
+    notes = [note for note in found.data["notes"] if "If the load was" not in note["text"]]
+    assert [note["weight"] for note in notes] == [weight] * bool(weight)
+    assert all(said in note["text"] for note in notes)
 
 
 def left_by(noise: str) -> Array:

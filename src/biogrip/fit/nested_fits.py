@@ -1,7 +1,7 @@
 """Fits of nested sample models to the same traces, and the choice of the simplest adequate one.
 
 Each model is fitted from starts of its own and from the optima of the models nested in it, so that
-none fits worse than a model nested in it. If one of these still fits better, because its optimum
+none fits worse than a model nested in it, and then with other relaxation times (`deepen`). If one of these still fits better, because its optimum
 lies outside the richer model's search range, its optimum is the richer model's result, with
 elements that have vanished (`biogrip.physics.models`).
 
@@ -23,27 +23,64 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import Fit, TraceProblem, silent
-from biogrip.physics.models import CANDIDATES, as_richer, contained, contained_in, different_in
+from biogrip.physics.models import CANDIDATES, as_richer, contained_in, different_in
 from biogrip.physics.sample_model import SampleModel
 
 # Factors by which an element that has vanished exceeds a usual one, or falls short of it, at a
 # start; and the usual relaxation time as a share of the length of the experiment.
 _AWAY, _SHARE = (3.0, 100.0), 0.1
-# Relaxation times at which an additional branch starts, over the usual one.
-_FURTHER = 0.03, 1.0, 30.0
 # Factors by which power laws have fewer points and fewer starts. Their responses take forty times
 # as long; of 150 fits to 75 traces none had a chi^2 higher by more than 5e-7 than with all.
 _FEWER = 10, 2
 # A decrease of chi^2 that is worth a fit, far below the 1 that a standard error changes it by.
 _NOTICEABLE = 0.01
+# Relaxation times that every branch of a single model tries.
+_TIMES = 6
 # Models that are equivalent in other parameters may improve one another in turn.
 _MOST_ROUNDS = 3
 
 Answers = list[Fit]
+
+
+def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> Answers:
+    """Return the fits of traces by one model, or lower ones with another relaxation time.
+
+    Random starts may all miss a basin in which an element hardly shows: then no time that they end
+    with is near. So every spring and its damper start once more, as stiff as the others on average,
+    with times from that of the closest readings to the trace's length.
+    """
+    model = problems[0].residuals.model
+    names = model.names
+    pairs = [
+        (index, names.index(f"c{name[1:]}"))
+        for index, name in enumerate(names)
+        if name.startswith("k") and f"c{name[1:]}" in names and name != "k_p"
+    ]
+    if not pairs or model.power_law:
+        return [*found]
+    springs = [spring for spring, _ in pairs]
+    starts = np.repeat(np.log([fit.parameters for fit in found]), len(pairs) * _TIMES, axis=0)
+    every = starts.reshape(len(found), len(pairs), _TIMES, len(names))
+    for trace, problem in enumerate(problems):
+        times = problem.residuals.trace.time_s
+        tried = np.log(np.geomspace(np.diff(times).min(), times[-1], _TIMES))
+        for place, (spring, damper) in enumerate(pairs):
+            every[trace, place, :, spring] = np.mean(every[trace, place, 0, springs])
+            every[trace, place, :, damper] = every[trace, place, 0, spring] + tried
+        every[trace] = np.clip(every[trace], problem.low, problem.high)
+    which = np.repeat(np.arange(len(found)), len(pairs) * _TIMES)
+    ends = fit_from([problems[trace] for trace in which.tolist()], starts, roughly=True)
+    best = [*found]
+    for trace, problem in enumerate(problems):
+        own = ends[which == trace]
+        lowest = int(np.argmin(own.misfit.astype(np.float32)))
+        if _is_noticeably_lower(float(own.misfit[lowest]), best[trace].misfit, problem):
+            best[trace] = _better_from(best[trace], problem, own.x[lowest])
+    return best
 
 
 def fit_models(
@@ -71,7 +108,7 @@ def fit_models(
             further.append(np.reshape(points, (-1, len(problem.low))))
         own = _fewer(settings) if CANDIDATES[name].model.power_law else settings
         found[name] = identify_many(problems[name], own, rngs[name], silent, further)
-        _add_branches(name, problems[name], found)
+        found[name] = deepen(problems[name], found[name])
         done()
     _fit_again(problems, found)
     _take_simpler(problems, found)
@@ -103,52 +140,6 @@ def _of_contained(
                 usual = _usual(kinds[index], kinds, parameters, ~gone, longest_s)
                 start[index] = usual * times if parameters[index] else usual / times
             yield start
-
-
-def _add_branches(name: str, problems: Sequence[TraceProblem], found: dict[str, Answers]) -> None:
-    """Take, in place, better fits that start with one branch more than a fit of fewer branches.
-
-    Beside strong branches a weak one takes long to show: rough fits would not tell.
-    """
-    branches = CANDIDATES[name].model.free_branches
-    fewer = [
-        inner
-        for inner in contained_in(name, found)
-        if 0 < len(CANDIDATES[inner].model.free_branches) == len(branches) - 1
-    ]
-    # A fit of the richest has what those of the models in it have.
-    for inner in [
-        inner for inner in fewer if not any(inner in contained(other) for other in fewer)
-    ]:
-        pairs = [
-            (trace, within_range(start, problem))
-            for trace, problem in enumerate(problems)
-            for start in _with_a_branch_more(
-                as_richer(name, inner, found[inner][trace].parameters), np.array(branches)
-            )
-        ]
-        if not pairs:
-            continue
-        traces = [trace for trace, _ in pairs]
-        starts = np.array([x for _, x in pairs])
-        ends = fit_from([problems[t] for t in traces], starts, roughly=True)
-        for trace, x, misfit in zip(traces, ends.x, ends.misfit.tolist(), strict=True):
-            if _is_noticeably_lower(misfit, found[name][trace].misfit, problems[trace]):
-                found[name][trace] = _better_from(found[name][trace], problems[trace], x)
-
-
-def _with_a_branch_more(parameters: Array, branches: IntArray) -> Iterator[Array]:
-    """Starting points with a branch in the place of one that is gone, weaker than the others."""
-    sizes = parameters[branches]
-    there = np.all((sizes > 0) & np.isfinite(sizes), axis=1)
-    gone = np.flatnonzero(sizes[:, 0] == 0)
-    if not (len(gone) and there.any()):
-        return
-    k, c = np.exp(np.mean(np.log(sizes[there]), axis=0)) / _AWAY[0]
-    for times in _FURTHER:
-        start = parameters.copy()
-        start[branches[gone[-1]]] = k, times * c
-        yield start
 
 
 def _usual(kind: str, kinds: Array, values: Array, there: BoolArray, longest_s: float) -> float:

@@ -215,7 +215,7 @@ class ConstrainedFits:
         self.missed: dict[int, tuple[float, Array]] = {}
         self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
-        scale = np.array([problem.residuals.noise_scale for problem in problems])
+        scale = np.array([problem.residuals.scatter for problem in problems])
         # Ratio of chi^2 to the fits' sums of squares.
         self._ratio = (scale / self._noise_sd) ** 2
 

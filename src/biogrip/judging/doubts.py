@@ -90,9 +90,9 @@ CERTAIN_MISFIT = 0.001
 _TOO_MUCH = 1.2
 # A misfit of this share of the peak is far off.
 _FAR_OFF = 0.02
-# A misfit below these shares of the noise and of the peak is that of a trace without noise, and so
-# is one below what no sensor resolves.
-_NOISE_FREE, _NOISE_FREE_OF_PEAK, _UNRESOLVED = 0.01, 1e-3, 1e-6
+# A misfit below these shares of the noise and of the peak is that of a trace without noise, if
+# neighbours scatter by this share of it; and so is one below what no sensor resolves.
+_NOISE_FREE, _NOISE_FREE_OF_PEAK, _NO_SCATTER, _UNRESOLVED = 0.01, 1e-3, 0.1, 1e-6
 # A misfit below this share of the given noise is reported: noise is rarely known better.
 _TOO_LITTLE = 0.5
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
@@ -122,11 +122,13 @@ class Remainder:
 def examine_residuals(likelihood: Likelihood) -> Remainder:
     """Test what the best fit of a trace leaves for noise, and for misfit."""
     residuals, misfit = likelihood.problem.residuals, likelihood.misfit
-    least = min(_NOISE_FREE * likelihood.noise_sd, _NOISE_FREE_OF_PEAK * residuals.peak)
-    if misfit < max(least, _UNRESOLVED * residuals.peak):
+    if misfit < _UNRESOLVED * residuals.peak:
         return Remainder([])
     residual, slopes = _left(residuals, likelihood.best)
     rounding = residuals.rounding
+    least = min(_NOISE_FREE * likelihood.noise_sd, _NOISE_FREE_OF_PEAK * residuals.peak)
+    if misfit < least and estimate_noise(residual, rounding) < _NO_SCATTER * misfit:
+        return Remainder([])
     growth = compute_growth(residual, residuals.response(likelihood.best), rounding)
     directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
     basis = absorbed(directions / growth)
@@ -142,17 +144,21 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     bulk = standard[~struck]
     basis = absorbed(basis[:, ~struck]) if struck.any() else basis
     scale = residuals.noise_scale
-    if np.ptp(growth):
+    if np.ptp(growth) or likelihood.freedom == np.inf:
         scale = max(scale, estimate_noise(standard, rounding))
     times = float(np.sqrt(np.mean(bulk**2))) / scale
     correlation, chance = correlated(bulk, basis)
-    notes: list[Note] = []
+    notes = list(_about_given(likelihood, bulk))
     found = None
     if chance < CERTAIN_MISFIT and times > _TOO_MUCH:
         found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
+        notes.clear()
         notes += found.notes
         # What a misfit has in a row are no outliers.
         struck &= ~(np.convolve(struck, (1, 0, 1), "same") > 0)
+    elif compute_status(notes) == DOUBTFUL:
+        # With the wrong noise or unit, nothing else is known.
+        return Remainder(notes)
     doubts = [
         *_about_growth(growth, scale, residuals, likelihood.best),
         *_about_outliers(residuals, struck),
@@ -169,15 +175,6 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
                 HARMLESS,
                 "If the set-up is right, measurement.noise_model: coloured, or --noise-model "
                 "coloured, gives intervals that allow for such noise.",
-            )
-        )
-    if not found and _is_far_from_given(likelihood):
-        notes.append(
-            Note(
-                DOUBT,
-                "The noise that was given is "
-                f"{plain(likelihood.noise_sd / misfit, 2)} times what the fit leaves: its "
-                "value, or its unit, is not the right one.",
             )
         )
     return Remainder(notes, found.misfit if found else None)
@@ -351,18 +348,32 @@ def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
         )
 
 
-def _is_far_from_given(likelihood: Likelihood) -> bool:
-    """Return True if the misfit is far from the noise that was given, by a chi-squared test."""
+def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
+    """Yield a note if the noise that was given is refuted by residuals, in a chi-squared test."""
     from scipy.special import chdtr, chdtrc
 
     if likelihood.freedom < np.inf:
-        return False
+        return
     residuals = likelihood.problem.residuals
-    share = likelihood.misfit / likelihood.noise_sd
-    left = max(residuals.free - len(likelihood.best), 1)
-    sum_of_squares = residuals.samples * share**2
-    too_little = share < _TOO_LITTLE and float(chdtr(left, sum_of_squares)) < FALSE_ALARM
-    return too_little or (share > _TOO_MUCH and float(chdtrc(left, sum_of_squares)) < FALSE_ALARM)
+    lost = residuals.samples - residuals.free + len(likelihood.best)
+    left = max(len(residual) - lost, 1)
+    chi_squared = float(residual @ residual) / likelihood.noise_sd**2
+    share = float(np.sqrt(chi_squared / left))
+    if share < _TOO_LITTLE and float(chdtr(left, chi_squared)) < FALSE_ALARM:
+        yield Note(
+            DOUBT,
+            f"The noise that was given is {plain(1 / share, 2)} times what the fit leaves: its "
+            "value, or its unit, is not the right one.",
+        )
+    if share > 1 and float(chdtrc(left, chi_squared)) < FALSE_ALARM:
+        much = share > _TOO_MUCH
+        suspects = residuals.instrument.suspects()
+        wrong = f"its value or unit is not the right one, or {suspects} is not"
+        so = wrong if much else "limits are too narrow by that"
+        yield Note(
+            DOUBT if much else HARMLESS,
+            f"What the fit leaves is {plain(share, 3)} times the noise that was given: {so}.",
+        )
 
 
 def one_in(chance: float) -> str:

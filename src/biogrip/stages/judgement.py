@@ -16,6 +16,7 @@ from biogrip.files import write_text
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_from
 from biogrip.fit.methods import identifier
+from biogrip.fit.nested_fits import deepen
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_traces
 from biogrip.judging.diagnosis import diagnose
@@ -47,7 +48,7 @@ def fits_judged(
     def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
         names = [(cases[index].study.study_seed, cases[index].name) for index in which]
         rngs = [stream(study_seed, name, seed, "identifiability") for study_seed, name in names]
-        return least_squares(problems, rngs, progress)
+        return deepen(problems, least_squares(problems, rngs, progress))
 
     return fit_traces(experiments, traces, find)
 
