@@ -22,7 +22,7 @@ from pydantic import Field
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.errors import BiogripError
-from biogrip.fit.levenberg_marquardt import Minima, Normal, bounded_step
+from biogrip.fit.levenberg_marquardt import Minima, Normal, bounded_step, minimize
 from biogrip.fit.local_fits import FAIR, FINE, ROUGH, LocalFits, alike
 from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block
@@ -189,7 +189,9 @@ def fit_from(problems: Sequence[TraceProblem], starts: Array, *, roughly: bool =
     return Minima.joined(found)[np.argsort(np.concatenate(groups))]
 
 
-_MOST_STEPS = 120
+# Tolerance and initial damping of the steps that approach a minimum along a curved valley.
+_CLOSE, _DAMPING = 1e-10, 1e-6
+_MOST_STEPS = 60
 # Least damping after a rejected step, and the factor by which damping then changes.
 _LITTLE, _MORE = 1e-9, 10.0
 # E-folds; shorter steps are rounding, and every machine decides alike whether a step is shorter.
@@ -214,8 +216,8 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     Descents compare sums of squares, and so find an optimum to half the digits. Its vanishing
     gradient locates it to all of them. Gauss-Newton steps need not converge there: for an element
     too weak to be seen, second derivatives of the residuals decide how the gradient changes. So
-    the steps are Newton's. Each is compared, on all readings, with the point before it, and kept
-    only if it fits no worse; the next one is damped if not.
+    the steps are Newton's. The first are damped, and compared on condensed rows. Each of the last
+    is compared, on all readings, with the point before it, and kept only if it fits no worse.
 
     Found are optima, fitted with the finest tolerance, each to the trace of an index, (n,).
     Returned are optima with their misfits on all readings, none above that of `found`, and the
@@ -223,12 +225,18 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     its next step would change the sum of squares by next to nothing of what the fit leaves of one
     reading, or by rounding.
     """
+
+    def convex(x: Array, fit: IntArray) -> Normal:
+        return _convex(fits, x, trace[fit])
+
     low, high = fits.low[trace], fits.high[trace]
+    closer = minimize(convex, found.x, low, high, _CLOSE, None, _DAMPING, _MOST_STEPS)
+    evaluations = closer.evaluations * (1 + 2 * found.x.shape[1])
     here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
     scatter = np.array([fits.problems[own].residuals.scatter for own in trace.tolist()])
     left_of_one, rounding = (here.misfit / scatter) ** 2, _rounding(fits, here.misfit, trace)
     state = _State(fits, trace, rounding, found.x.copy(), here)
-    evaluations = np.zeros(len(moving), dtype=np.int64)
+    state.move(moving, closer.x)
     left, damping = np.full(len(moving), np.inf), np.zeros(len(moving))
     for _ in range(_MOST_STEPS):
         if not len(moving):

@@ -1,9 +1,9 @@
 """Fits of nested sample models to the same traces, and the choice of the simplest adequate one.
 
-Each model is fitted from starts of its own and from the optima of the models nested in it, so that
-none fits worse than a model nested in it, and then with other relaxation times (`deepen`). If one of these still fits better, because its optimum
-lies outside the richer model's search range, its optimum is the richer model's result, with
-elements that have vanished (`biogrip.physics.models`).
+Each model is fitted from starts of its own and from the optima of the models nested in it, and then
+with other relaxation times (`deepen`), so that none fits worse than a model nested in it. If one of
+these still fits better, because its optimum lies outside the richer model's search range, its
+optimum is the richer model's result, with elements that have vanished (`biogrip.physics.models`).
 
 Models are compared by the information criteria AIC [1]_ and BIC [2]_; differences in BIC below
 `WORTH_A_MENTION` prefer none [3]_.

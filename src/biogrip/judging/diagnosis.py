@@ -33,7 +33,13 @@ from biogrip.judging.doubts import (
 from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.valley import compute_valley
-from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.verdicts import (
+    DETERMINED,
+    Finding,
+    Trade,
+    compute_findings,
+    find_trade_offs,
+)
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
 
@@ -205,7 +211,7 @@ def _with_notes(judged: Diagnosis, model: SampleModel) -> Diagnosis:
         for finding in findings
         if finding.gaps
     ]
-    notes += [*_range_ends(likelihood, model), *judged.notes]
+    notes += [*_range_ends(likelihood, model), *judged.notes, *_too_slow(judged)]
     notes += _pulling(grip, residuals.duration_s)
     if not judged.converged:
         text = (
@@ -215,6 +221,17 @@ def _with_notes(judged: Diagnosis, model: SampleModel) -> Diagnosis:
         notes.append(Note(DOUBT, text))
     notes += _ringing(judged, rejected=compute_status(notes) == REJECTED)
     return replace(judged, grip=grip, notes=notes)
+
+
+def _too_slow(judged: Diagnosis) -> Iterator[Note]:
+    """Yield a note if limits that allow for a misfit as slow as the trace are too wide."""
+    wide = any(each.verdict == DETERMINED and each.is_wide for each in judged.findings)
+    if judged.likelihood.independent < 1 and wide:
+        yield Note(
+            REJECTION,
+            "What the fit leaves is as slow as the trace, and limits that allow for it tell hardly "
+            "more than an order of magnitude: what the trace determines cannot be judged.",
+        )
 
 
 def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:

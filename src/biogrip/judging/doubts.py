@@ -3,9 +3,9 @@
 The heaviest note decides the status of a fit: ok, doubtful or rejected (`compute_status`).
 Residuals are tested for white noise (`biogrip.judging.whiteness`), each test at the level
 `FALSE_ALARM`: correlation of neighbours, the cumulative periodogram, means over stretches,
-outliers, a step at any time, halves that differ (`biogrip.judging.changes`). A step that explains
-the others is named in their place. Noise that grows with the rotation is told first, and the other
-tests are of what it leaves.
+outliers, a line in the spectrum (`biogrip.judging.lines`), a step at any time, parts that differ
+(`biogrip.judging.changes`). A line or a step that explains the others is named in their place.
+Noise that grows with the rotation is told first, and the other tests are of what it leaves.
 
 What is correlated beyond chance (`CERTAIN_MISFIT`) and larger than the scatter of neighbouring
 readings may be noise all the same: if it is correlated for a short time (`has_fast_noise`), or if
@@ -31,6 +31,7 @@ from biogrip.fit.noise_model_fit import (
 )
 from biogrip.judging.changes import Step, compare_halves, find_step
 from biogrip.judging.likelihood import Likelihood
+from biogrip.judging.lines import Line, find_line
 from biogrip.judging.whiteness import (
     as_correlated,
     by_leverage,
@@ -104,8 +105,8 @@ CLEARLY = 3.0
 
 # Share of readings that repeat the one before where a sensor is read less often than it is logged.
 _REPEATED = 0.45
-# Most outliers that are named.
-_NAMED = 5
+# Most outliers that are named, and lines of a spectrum.
+_NAMED, _MOST_LINES = 5, 3
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,8 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     correlation, chance = correlated(bulk, basis)
     notes = list(_about_given(likelihood, bulk))
     found = None
-    if chance < CERTAIN_MISFIT and times > _TOO_MUCH:
+    lines = list(_lines(bulk, basis, residuals, scale)) if whole else []
+    if chance < CERTAIN_MISFIT and times > _TOO_MUCH and not lines:
         found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
         notes.clear()
         notes += found.notes
@@ -167,7 +169,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     if whole:
         colour = list(_about_colour(bulk, basis, correlation, chance, residuals.instrument))
         changes = _about_changes(residuals, bulk, basis, growth, coloured=bool(colour))
-        doubts += changes or (colour if not found else [])
+        doubts += lines or changes or (colour if not found else [])
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         notes.append(
@@ -231,9 +233,12 @@ def _misfit(
         )
         return Remainder([Note(REJECTION, text)])
     misfit = as_correlated(*bulk)
-    count = f"{plain(misfit[0], 2)} independent ones" if misfit[0] > 1 else "less than one"
-    allowed = f"The limits count the {len(bulk[0])} residuals as {count}."
-    return Remainder([Note(DOUBT, f"{text} {allowed}")], misfit)
+    if misfit[0] < 1:
+        text += " It is as slow as the trace, which the limits allow for."
+    else:
+        counted_as = f"{plain(misfit[0], 2)} independent ones"
+        text += f" The limits count the {len(bulk[0])} residuals as {counted_as}."
+    return Remainder([Note(DOUBT, text)], misfit)
 
 
 def _about_growth(
@@ -284,6 +289,31 @@ def _about_colour(
             f"of white noise do only {one_in(chance)} traces. It contains something slow that the "
             "model lacks, perhaps a drift of the instrument: the intervals are too narrow."
         )
+
+
+def _lines(residual: Array, basis: Array, residuals: Residuals, scale: float) -> Iterator[str]:
+    """Yield a sentence on lines in the spectrum of residuals, if these have no other misfit."""
+    rest, taken, found = residual, basis, list[Line]()
+    time_s = residuals.trace.time_s
+    while len(found) < _MOST_LINES:
+        line = find_line(rest, time_s)
+        if line is None or line.chance >= FALSE_ALARM:
+            break
+        found.append(line)
+        taken = absorbed(np.vstack((taken, line.basis)))
+        rest = without(taken, residual)
+    size = float(np.sqrt(np.mean(rest**2)))
+    misfit = correlated(rest, taken)[1] < CERTAIN_MISFIT and size > _TOO_MUCH * scale
+    if misfit or not found:
+        return
+    unit = f" {residuals.instrument.read.unit}".rstrip()
+    named = " and ".join(
+        f"{plain(each.frequency_Hz, 3)} Hz ({plain(each.amplitude, 2)}{unit})" for each in found
+    )
+    yield (
+        f"The residual has a line in its spectrum, at {named}, as of hum or a vibration. Filter "
+        f"it out, or average the readings over {plain(1 / found[0].frequency_Hz, 3)} s."
+    )
 
 
 def _about_changes(

@@ -205,7 +205,7 @@ def as_correlated(residual: Array, basis: Array) -> tuple[float, float]:
     largest = float(np.linalg.eigvalsh(taken.T @ found @ taken)[-1])
     remaining = found - taken @ (taken.T @ found)
     freedom = float(np.trace(remaining) ** 2 / np.sum(remaining * remaining.T))
-    independent = n * float(np.mean(residual**2)) / largest
+    independent = min(n * float(np.mean(residual**2)) / largest, float(n - len(basis)))
     return max(independent, _FEWEST), max(freedom, _LEAST_FREEDOM)
 
 
