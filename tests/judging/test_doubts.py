@@ -15,7 +15,6 @@ from biogrip.judging.doubts import (
     DOUBTFUL,
     HARMLESS,
     OK,
-    REJECTION,
     examine_residuals,
     find_slow_misfit,
     has_fast_noise,
@@ -139,21 +138,27 @@ def test_fast_noise_is_neither_smooth_nor_in_one_place(noise: str, fast: bool) -
 
 
 @pytest.mark.parametrize(
-    ("share", "time_s", "of_peak", "weight"),
+    ("share", "time_s", "error", "walk", "said"),
     [
-        (0.6, 10.0, 0.03, REJECTION),
-        (0.6, 10.0, 0.01, DOUBT),
-        (0.6, 7.0, 0.03, None),
-        (0.4, 100.0, 0.03, DOUBT),
-        (0.4, 70.0, 0.03, None),
-        (0.3, 400.0, 0.03, None),
+        (0.6, 10.0, 0.0, 0.0, "is correlated over 10 s of a trace of 400 s, 60 % of its variance"),
+        # Two standard deviations of the time below it are 8 s, a fiftieth of the trace, or less.
+        (0.6, 10.0, 0.1, 0.0, "is correlated over 10 s"),
+        (0.6, 10.0, 0.12, 0.0, ""),
+        (0.6, 7.0, 0.0, 0.0, ""),
+        (0.4, 100.0, 0.0, 0.0, "is correlated over 100 s"),
+        (0.4, 70.0, 0.0, 0.0, ""),
+        (0.3, 400.0, 0.0, 0.0, ""),
+        (0.1, 400.0, 0.0, 0.4, "walks at random, 40 % of its variance"),
+        (0.1, 400.0, 0.0, 0.3, ""),
     ],
 )
-def test_share_and_time_decide(
-    share: float, time_s: float, of_peak: float, weight: str | None
+def test_share_and_time_less_its_error_decide(
+    share: float, time_s: float, error: float, walk: float, said: str
 ) -> None:
-    note = find_slow_misfit(NoiseModel(share, time_s, 0.0), 400.0, of_peak, GRIPPER)
-    assert (note and note.weight) == weight
+    noise_model = NoiseModel(share, time_s, 0.0, walk=walk)
+    note = find_slow_misfit(noise_model, error, 400.0, 0.03, GRIPPER)
+    assert (note is not None) == bool(said)
+    assert note is None or (note.weight == DOUBT and said in note.text)
 
 
 def test_noise_that_grows_over_decades_is_weighed_and_its_share_advised() -> None:

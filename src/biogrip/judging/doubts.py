@@ -413,9 +413,10 @@ def one_in(chance: float) -> str:
     return f"once in {plain(1 / chance, 1)}"
 
 
-# Autocorrelated noise with most of the variance, and slower than this share of the trace, is
-# misfit. It may be misfit if it has a noticeable share and lasts for longer.
-_MOST, _SLOW, _NOTICEABLE, _LONG = 0.5, 0.02, 1 / 3, 0.2
+# Autocorrelated noise with most of the variance, and slower than this share of the trace, may be
+# misfit; so may such with a noticeable share that lasts for longer. Two standard deviations of its
+# time are sure.
+_MOST, _SLOW, _NOTICEABLE, _LONG, _SURE = 0.5, 0.02, 1 / 3, 0.2, 2.0
 # What scatters by so much more than noise that is correlated for this share would is smooth.
 _SMOOTH = 3.0
 # Of so many stretches of a trace with stationary noise, which is correlated for less than half a
@@ -429,30 +430,31 @@ _AS_THE_SCATTER = 1.44
 
 
 def find_slow_misfit(
-    noise_model: NoiseModel, duration_s: float, share_of_peak: float, instrument: Instrument
+    noise_model: NoiseModel,
+    time_error: float,
+    duration_s: float,
+    share_of_peak: float,
+    instrument: Instrument,
 ) -> Note | None:
-    """Return a note if the autocorrelated part of a noise model is, or may be, misfit.
+    """Return a note if the slow parts of a noise model may be misfit.
 
-    `share_of_peak` is the standard deviation of that part over the largest response.
+    Its correlation time counts less `_SURE` times the standard deviation of its logarithm.
+    `share_of_peak` is the standard deviation of those parts over the largest response.
     """
     share, time_s = noise_model.ar1, noise_model.time_s
-    misfit = share > _MOST and time_s > _SLOW * duration_s
-    if not misfit and not (share > _NOTICEABLE and time_s > _LONG * duration_s):
+    least_s = time_s * float(np.exp(-_SURE * time_error))
+    slow = share > _MOST and least_s > _SLOW * duration_s
+    slow |= share > _NOTICEABLE and least_s > _LONG * duration_s
+    what = f"is correlated over {plain(time_s, 2)} s of a trace of {plain(duration_s)} s"
+    if noise_model.walk > max(_NOTICEABLE, share):
+        slow, share, what = True, noise_model.walk, "walks at random"
+    if not slow:
         return None
-    suspects = instrument.suspects(unit=True).capitalize()
-    if not misfit:
-        meaning = f"that may be misfit, of a {instrument.suspects('')} that is not the right one."
-    elif share_of_peak < _FAR_OFF:
-        meaning = (
-            f"that is misfit, not noise, of {plain(100 * share_of_peak, 2)} % of the peak, which "
-            f"the limits allow for. {suspects} is not quite the right one."
-        )
-    else:
-        meaning = f"that is misfit, not noise. {suspects} is not the right one."
     return Note(
-        REJECTION if misfit and share_of_peak >= _FAR_OFF else DOUBT,
-        f"What the fit leaves is correlated over {plain(time_s, 2)} s of a trace of "
-        f"{plain(duration_s)} s, {100 * share:.0f} % of its variance: {meaning}",
+        DOUBT,
+        f"What the fit leaves {what}, {100 * share:.0f} % of its variance and "
+        f"{plain(100 * share_of_peak, 2)} % of the peak. The limits allow for that; but it may be "
+        f"misfit, of a {instrument.suspects('')} that is not the right one.",
     )
 
 

@@ -77,14 +77,16 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
 
 
 def notes_on_fit(fit: TraceFit) -> list[Note]:
-    """Return notes on the noise model of a fit; one that holds much misfit rejects the fit."""
+    """Return notes on the noise model of a fit; one that may hold misfit makes it doubtful."""
     notes = [Note(HARMLESS, text) for text in fit.notes()]
     if fit.noise_model is None:
         return notes
     residuals = fit.problem.residuals
     peak = np.max(np.abs(residuals.response(np.log(fit.found.parameters))))
-    share = float(fit.found.misfit * np.sqrt(fit.noise_model.ar1) / peak)
-    misfit = find_slow_misfit(fit.noise_model, residuals.duration_s, share, residuals.instrument)
+    slow = fit.noise_model.ar1 + fit.noise_model.walk
+    share = float(fit.found.misfit * np.sqrt(slow) / peak)
+    given = fit.noise_model, fit.time_error, residuals.duration_s, share
+    misfit = find_slow_misfit(*given, residuals.instrument)
     return [misfit, *notes] if misfit else notes
 
 
