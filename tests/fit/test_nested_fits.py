@@ -14,6 +14,7 @@ from biogrip.fit.nested_fits import (
     deepen,
     fit_models,
     is_within,
+    preferred,
     ranked,
 )
 from biogrip.fit.problem import Fit, TraceProblem
@@ -109,17 +110,25 @@ READINGS = 1000
     ("gained", "said"),
     [
         # chi-squared by which four parameters, and the others, fit better than a spring's one.
-        ({"generalized_maxwell": 103.0, "liquid_drop": 102.0}, "is richer than the trace asks for"),
+        ({"generalized_maxwell": 103.0, "liquid_drop": 102.0}, "A simpler model, Maxwell liqui"),
         ({"generalized_maxwell": 50.0, "fractional_maxwell": 400.0}, "is not adequate: fractional"),
         ({"generalized_maxwell": 50.0, "generalized_maxwell_2": 90.0}, "is not adequate: "),
         ({"generalized_maxwell": 50.0, "burgers": 90.0}, "suits the trace less well: Burgers"),
         ({"generalized_maxwell": 90.0, "burgers": 89.0}, "none of the 2 models tried suits"),
+        # By chance another model of as many parameters, or a richer one, fits a little better.
+        ({"generalized_maxwell": 90.0, "burgers": 95.9}, "none of the 2 models tried suits"),
+        ({"generalized_maxwell": 90.0, "burgers": 96.1}, "less well: Burgers"),
     ],
 )
 def test_the_sentence_is_that_of_the_numbers(gained: dict[str, float], said: str) -> None:
     misfits = [float(np.exp(-gain / (2 * READINGS))) for gain in gained.values()]
     tried = ranked(list(gained), misfits, READINGS)
     assert said in advice(tried, "generalized_maxwell")
+    other = preferred(tried, "generalized_maxwell")
+    assert (other is None) == ("none of" in said)
+    words = "None of the 2 models tried is adequate: the best of them, "
+    inadequate = advice(tried, "generalized_maxwell", adequate=False)
+    assert inadequate.startswith(words) == (other is not None)
 
 
 @pytest.mark.parametrize(("gained", "taken"), [(0.005, False), (0.02, True), (5.0, True)])

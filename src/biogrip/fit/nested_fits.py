@@ -6,7 +6,7 @@ these still fits better, because its optimum lies outside the richer model's sea
 optimum is the richer model's result, with elements that have vanished (`biogrip.physics.models`).
 
 Models are compared by the information criteria AIC [1]_ and BIC [2]_; differences in BIC below
-`WORTH_A_MENTION` prefer none [3]_.
+`WORTH_A_MENTION` prefer none, and below `STRONG` none that is not simpler [3]_.
 
 References
 ----------
@@ -221,8 +221,8 @@ def is_within(parameters: Array, problem: TraceProblem) -> bool:
     return bool(np.all((x >= problem.low) & (x <= problem.high)))
 
 
-WORTH_A_MENTION = 2.0
-"""Difference of BIC below which neither of two models is preferred."""
+WORTH_A_MENTION, STRONG = 2.0, 6.0
+"""Differences of BIC from which on a simpler model is preferred, and any other."""
 
 
 @dataclass(frozen=True)
@@ -267,9 +267,17 @@ def ranked(candidates: Sequence[str], misfits: Sequence[float], samples: int) ->
 
 
 def _own_and_best(tried: Sequence[FittedModel], chosen: str) -> tuple[FittedModel, FittedModel]:
-    """Return the chosen model and the one of lowest BIC."""
+    """Return the chosen model and the one that BIC prefers to it, or itself."""
     own = next(each for each in tried if each.candidate == chosen)
-    return own, min(tried, key=lambda each: each.delta_bic)
+    best = min(tried, key=lambda each: each.delta_bic)
+    simpler = len(best.model.names) < len(own.model.names)
+    return own, best if own.delta_bic >= (WORTH_A_MENTION if simpler else STRONG) else own
+
+
+def preferred(tried: Sequence[FittedModel], chosen: str) -> str | None:
+    """Return the candidate that BIC prefers to the chosen model by more than chance, or None."""
+    own, best = _own_and_best(tried, chosen)
+    return None if best is own else best.candidate
 
 
 def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
@@ -278,28 +286,42 @@ def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
     more = len(own.model.names) - len(best.model.names)
     # Difference of n ln(misfit^2), which leaves the number of parameters aside.
     worse = own.delta_aic - best.delta_aic - 2 * more
-    worth_it = own.delta_bic >= WORTH_A_MENTION
-    return best.candidate if worth_it and more > 0 and worse <= WORTH_A_MENTION else None
+    return best.candidate if more > 0 and worse <= WORTH_A_MENTION else None
 
 
 def fits_far_better(tried: Sequence[FittedModel], chosen: str) -> bool:
     """Return True if BIC prefers another model, simpler or richer, and not for its size alone."""
-    own, _ = _own_and_best(tried, chosen)
-    return own.delta_bic >= WORTH_A_MENTION and preferred_simpler(tried, chosen) is None
+    return preferred(tried, chosen) is not None and preferred_simpler(tried, chosen) is None
 
 
-def advice(tried: Sequence[FittedModel], chosen: str) -> str:
-    """State in a sentence whether BIC prefers another of the models tried to the chosen one."""
+def one_branch_more(tried: Sequence[FittedModel]) -> str | None:
+    """Return the candidate with one branch more than the best, if it was not tried; else None."""
+    best = min(tried, key=lambda each: each.delta_bic).candidate
+    names = (name for name in CANDIDATES if CANDIDATES[name].model.free_branches)
+    richer = (name for name in names if list(CANDIDATES[name].model.contains)[:1] == [best])
+    name = next(richer, None)
+    return None if name in {each.candidate for each in tried} else name
+
+
+def advice(tried: Sequence[FittedModel], chosen: str, *, adequate: bool = True) -> str:
+    """State in a sentence whether BIC prefers another of the models tried to the chosen one.
+
+    If what is preferred is not `adequate`, none of them is.
+    """
     own, best = _own_and_best(tried, chosen)
     title = own.model.title[0].upper() + own.model.title[1:]
-    if own.delta_bic < WORTH_A_MENTION:
+    if best is own:
         return f"{title}: none of the {len(tried)} models tried suits the trace better."
-    lead = (
-        f"{best.model.title} (--model {best.candidate}) is preferred, with a BIC lower by "
-        f"{plain(own.delta_bic)}."
-    )
+    named = f"{best.model.title} (--model {best.candidate})"
+    lower = f"with a BIC lower by {plain(own.delta_bic)}"
+    if not adequate:
+        return (
+            f"None of the {len(tried)} models tried is adequate: the best of them, {named}, "
+            f"{lower}, leaves more than noise, too."
+        )
     if preferred_simpler(tried, chosen):
-        return f"{title} is richer than the trace asks for: {lead}"
+        return f"A simpler model, {named}, fits as well, {lower}."
+    lead = f"{named} is preferred, {lower}."
     if len(best.model.names) == len(own.model.names):
         return f"{title} suits the trace less well: {lead}"
     return f"{title} is not adequate: {lead}"

@@ -54,10 +54,6 @@ from biogrip.traces.reader import form_in_words, is_usual
 
 # Most traces of a batch, and most readings that are fitted together, of short traces.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
-_NOT_COMPARED = (
-    "With fixed parameters no other sample models are tried: a value that is known in this model "
-    "says nothing of theirs, and without it they would fit better for their freedom alone."
-)
 
 T = TypeVar("T")
 
@@ -246,7 +242,11 @@ def _data(
     case, problem, recorded = trace.case, trace.problem, trace.recorded
     instrument = problem.instrument
     best = diagnosis.likelihood.best
-    assumptions = [Note(HARMLESS, _NOT_COMPARED)] if problem.fixed else []
+    assumptions = []
+    if problem.fixed:
+        names, verb = " and ".join(problem.fixed), "were" if len(problem.fixed) > 1 else "was"
+        text = f"Other models are not compared, because {names} {verb} fixed."
+        assumptions.append(Note(HARMLESS, text))
     read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
     said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *notes], read)
     rejected, usual = said["fit"] == REJECTED, is_usual(recorded.form, case.columns)

@@ -18,12 +18,15 @@ from scipy.special import chdtrc
 
 from biogrip.digits import plain
 from biogrip.fit.fitted_onset import OnsetFits
+from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.nested_fits import (
     FittedModel,
     advice,
     fit_models,
     fits_far_better,
     is_within,
+    one_branch_more,
+    preferred,
     ranked,
     within_range,
 )
@@ -40,9 +43,11 @@ from biogrip.judging.doubts import (
     REJECTED,
     REJECTION,
     Note,
+    compute_status,
+    examine_residuals,
     one_in,
 )
-from biogrip.judging.likelihood import MISSED, compute_fall
+from biogrip.judging.likelihood import MISSED, compute_fall, make_likelihood
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.fractional import LONGEST_S
 from biogrip.physics.models import CANDIDATES
@@ -82,6 +87,8 @@ class FittedModels:
     """Rank of each model."""
     answers: dict[str, Fit] = field(default_factory=dict)
     """Fit of each by its name, in the same order."""
+    adequate: bool = True
+    """False if that of the model which BIC prefers is rejected for what it leaves."""
 
     @property
     def lead(self) -> float:
@@ -110,7 +117,9 @@ class FittedModels:
             for each in self.tried
         ]
         said = rows and (not rejected or fits_far_better(self.tried, self.chosen))
-        return {"models": rows, "advice": advice(self.tried, self.chosen) if said else None}
+        words = advice(self.tried, self.chosen, adequate=self.adequate) if said else None
+        best = preferred(self.tried, self.chosen) if rows and self.adequate else None
+        return {"models": rows, "preferred_model": best, "advice": words}
 
 
 def _vanished(candidate: str, answer: Fit) -> list[str]:
@@ -132,32 +141,74 @@ def models_tried(
     every = [FittedModels(chosen) for _ in traces]
     for names in filter(None, dict.fromkeys(candidates)):
         which = [index for index, own in enumerate(candidates) if own == names]
-        problems = {
-            name: [
-                traces[index].problem.for_model(fits[index].problem, CANDIDATES[name].model)
-                for index in which
-            ]
-            for name in names
-        }
-        cases = [traces[index].case for index in which]
-        streams = {
-            name: [stream(own.study.study_seed, own.name, 0, f"model {name}") for own in cases]
-            for name in names
-        }
-        near = {chosen: np.array([diagnoses[index].likelihood.best for index in which])}
-        found = fit_models(problems, budget, streams, lambda: None, near=near)
-        for place, index in enumerate(which):
-            answers = {name: found[name][place] for name in names}
-            if traces[index].problem.fit_start and not traces[index].problem.coloured:
-                answers = {
-                    name: _at_own_onset(traces[index], name, problems[name][place], answer)
-                    for name, answer in answers.items()
-                }
-            own = {name: problems[name][place] for name in names}
-            misfits = _misfits(diagnoses[index], own, answers)
-            samples = fits[index].problem.residuals.samples
-            every[index] = FittedModels(chosen, ranked(names, misfits, samples), answers)
+        own = [(traces[index], fits[index], diagnoses[index]) for index in which]
+        found = _tried(own, names, budget)
+        # Branches are added until a further one does not help.
+        while more := {_one_branch_more(*each) for each in zip(own, found, strict=True)} - {None}:
+            names = (*names, *sorted(name for name in more if name))
+            found = _tried(own, names, budget)
+        for index, models in zip(which, found, strict=True):
+            every[index] = models
     return every
+
+
+_Own = tuple[TraceCase, TraceFit, Diagnosis]
+
+
+def _one_branch_more(own: _Own, models: FittedModels) -> str | None:
+    """Return the model with one branch more than the best one, if it was not tried and may be."""
+    trace, fit, _ = own
+    name = None if trace.names_models else one_branch_more(models.tried)
+    return name if name and len(CANDIDATES[name].model.names) <= _most(trace, fit) else None
+
+
+def _tried(
+    own: Sequence[_Own], names: Sequence[str], budget: LeastSquaresSettings
+) -> list[FittedModels]:
+    """Fit sample models to traces, each with its fit and diagnosis by the chosen model."""
+    chosen = own[0][0].case.sample.candidate
+    problems = {
+        name: [
+            trace.problem.for_model(fit.problem, CANDIDATES[name].model) for trace, fit, _ in own
+        ]
+        for name in names
+    }
+    streams = {
+        name: [
+            stream(trace.case.study.study_seed, trace.case.name, 0, f"model {name}")
+            for trace, _, _ in own
+        ]
+        for name in names
+    }
+    near = {chosen: np.array([diagnosis.likelihood.best for _, _, diagnosis in own])}
+    found = fit_models(problems, budget, streams, lambda: None, near=near)
+    every = []
+    for place, (trace, fit, diagnosis) in enumerate(own):
+        posed = {name: problems[name][place] for name in names}
+        answers = {name: found[name][place] for name in names}
+        if trace.problem.fit_start and not trace.problem.coloured:
+            answers = {
+                name: _at_own_onset(trace, name, posed[name], answer)
+                for name, answer in answers.items()
+            }
+        misfits = _misfits(diagnosis, posed, answers)
+        tried = ranked(list(names), misfits, fit.problem.residuals.samples)
+        best = preferred(tried, chosen)
+        adequate = best is None or _leaves_noise(trace, posed[best], answers[best])
+        every.append(FittedModels(chosen, tried, answers, adequate))
+    return every
+
+
+def _leaves_noise(trace: TraceCase, problem: TraceProblem, answer: Fit) -> bool:
+    """Return True if what a model's fit leaves does not reject it."""
+    likelihood = make_likelihood(
+        problem,
+        within_range(answer.parameters, problem),
+        answer.misfit,
+        confidence=trace.case.confidence,
+        noise_sd=trace.problem.noise_sd,
+    )
+    return compute_status(examine_residuals(likelihood).notes) != REJECTED
 
 
 def _misfits(
@@ -202,11 +253,15 @@ def _candidates(trace: TraceCase, fit: TraceFit) -> tuple[str, ...]:
     few = residuals.samples <= _MOST_SAMPLES and trace.problem.torque.end_s <= LONGEST_S
     if few and not trace.names_models:
         every |= dict.fromkeys(_POWER_LAWS)
-    # A model with as many parameters as readings leaves nothing to tell noise by.
-    most = residuals.free - trace.problem.fit_start - 1
+    most = _most(trace, fit)
     names = (it for it in every if len(CANDIDATES[it].model.names) <= most or it == chosen)
     found = tuple(names)
     return found if len(found) > 1 else ()
+
+
+def _most(trace: TraceCase, fit: TraceFit) -> int:
+    """Return the most parameters of a model: one a reading leaves nothing to tell noise by."""
+    return fit.problem.residuals.free - trace.problem.fit_start - 1
 
 
 def judge_again(

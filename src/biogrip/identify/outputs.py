@@ -95,9 +95,10 @@ def write_table(outcome: Outcome, table: Path) -> None:
     rows: dict[str, dict[str, Any]] = {}
     for each in map(rounded_numbers, outcome.found):
         row = {name: each[name] for name in COLUMNS if name in each}
-        # The model of the lowest BIC, if others were compared.
-        best = [model["model"] for model in each["models"] if model["delta_bic"] == 0]
-        row |= {"preferred_model": "".join(best[:1]), "fixed": "; ".join(each.get("fixed", ()))}
+        row |= {
+            "preferred_model": each["preferred_model"] or "",
+            "fixed": "; ".join(each.get("fixed", ())),
+        }
         for own in each["quantities"]:
             for what in _OF_QUANTITY:
                 unit = own["unit"] if what != "verdict" else ""
