@@ -47,6 +47,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     ]
     lines += one_sided_in_words([found])
     lines += [found["limits"]] if found["fit"] != REJECTED else []
+    lines += [each["words"] for each in found["hidden"][:1]]
     lines += [trade["words"] for trade in found["trades"]]
     lines += fitted_in_words(found)
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]

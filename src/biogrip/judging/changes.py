@@ -22,6 +22,7 @@ References
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -55,12 +56,25 @@ class Steps:
         from scipy.special import betaincc, ndtr, ndtri
 
         alone = float(betaincc(0.5, 0.5 * (self.freedom - 1), min(share, 1.0)))
-        level = -float(ndtri(max(alone, 1e-300) / 2))
-        products = np.einsum("ij,ij->i", self.shapes[:-1], self.shapes[1:])
-        change = np.clip(1 - products / (self.norms[:-1] * self.norms[1:]), 0.0, 1.0)
+        level, change = -float(ndtri(max(alone, 1e-300) / 2)), self._change
         half = np.maximum(0.5 * level * np.sqrt(2 * change), 1e-9)
         walk = (ndtr(half) - 0.5) / (half * (half * ndtr(half) + _density(half)))
         return min(alone + float(2 * level * _density(level) * np.sum(change * walk)), 1.0)
+
+    @cached_property
+    def _change(self) -> Array:
+        """One minus the correlation of each with the next, (n_steps - 1,)."""
+        products = np.einsum("ij,ij->i", self.shapes[:-1], self.shapes[1:])
+        return np.clip(1 - products / (self.norms[:-1] * self.norms[1:]), 0.0, 1.0)
+
+    def critical(self, level: float) -> float:
+        """Return the distance in standard deviations at which a scan's chance is a level."""
+        from scipy.optimize import brentq
+        from scipy.special import betaincinv
+
+        most = float(betaincinv(0.5, 0.5 * (self.freedom - 1), 1 - 1e-12))
+        share = brentq(lambda share: self.chance(share) - level, 1e-9, most)
+        return float(np.sqrt(share * self.freedom))
 
 
 def _density(level: Array | float) -> Array:
@@ -120,14 +134,18 @@ def find_step(residual: Array, basis: Array, cleared: Callable[[Array], Array]) 
     )
 
 
+def parts_apart(basis: Array, split: int) -> Array:
+    """Return what fits to the parts before and after a reading absorb beside one to both."""
+    apart = without(basis, np.where(np.arange(basis.shape[1]) < split, basis, 0.0))
+    apart = apart[np.linalg.norm(apart, axis=1) > _MORE]
+    return absorbed(apart) if len(apart) else apart
+
+
 def compare_halves(residual: Array, basis: Array, split: int) -> float:
     """Return the chance that parts of white noise before and after a reading differ as much."""
     from scipy.special import fdtrc
 
-    first = np.where(np.arange(len(residual)) < split, basis, 0.0)
-    apart = without(basis, first)
-    apart = apart[np.linalg.norm(apart, axis=1) > _MORE]
-    more = absorbed(apart) if len(apart) else apart
+    more = parts_apart(basis, split)
     left = len(residual) - len(basis) - len(more)
     if not len(more) or left < 1:
         return 1.0

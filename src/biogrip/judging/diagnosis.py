@@ -13,6 +13,7 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from biogrip.judging.doubts import (
     compute_status,
     examine_residuals,
 )
+from biogrip.judging.hidden import Hidden, find_hidden
 from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.valley import compute_valley
@@ -74,6 +76,13 @@ class Diagnosis:
     def status(self) -> str:
         """Status of the fit by these notes: ok, doubtful or rejected."""
         return compute_status(self.notes)
+
+    @cached_property
+    def hidden(self) -> list[Hidden]:
+        """Errors that the trace could hide, none of a rejected fit, see `find_hidden`."""
+        if self.status == REJECTED:
+            return []
+        return find_hidden(self.likelihood, self.findings)
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""

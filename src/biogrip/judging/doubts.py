@@ -97,7 +97,7 @@ _NOISE_FREE, _NOISE_FREE_OF_PEAK, _NO_SCATTER, _UNRESOLVED = 0.01, 1e-3, 0.1, 1e
 # A misfit below this share of the given noise is reported: noise is rarely known better.
 _TOO_LITTLE = 0.5
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
-_MANY = 100_000
+MANY = 100_000
 # Smaller chances are not told apart.
 _NEVER = 1e-6
 CLEARLY = 3.0
@@ -184,7 +184,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
 
 def _left(residuals: Residuals, log_parameters: Array) -> tuple[Array, Array]:
     """Return residuals, and their slopes by the parameters, none of very many readings."""
-    if residuals.samples > _MANY:
+    if residuals.samples > MANY:
         return residuals.left(log_parameters), np.zeros((0, residuals.samples))
     return residuals(log_parameters)
 
@@ -334,7 +334,7 @@ def _about_changes(
             f"{size}{unit}, which white noise shows only {one_in(step.chance)} traces: the values "
             "may be far off. Leave out what is before or after (--from, --until)."
         ]
-    split = _middle(residuals)
+    split = middle_of(residuals)
     chance = 1.0 if coloured else compare_halves(residual, basis, split)
     if chance >= FALSE_ALARM:
         return []
@@ -352,7 +352,7 @@ def _is_coloured(step: Step) -> bool:
     return min(chances) < FALSE_ALARM
 
 
-def _middle(residuals: Residuals) -> int:
+def middle_of(residuals: Residuals) -> int:
     """Return the reading at which phases part a trace, or the middle one."""
     count = residuals.samples
     starts = np.searchsorted(residuals.trace.time_s, residuals.course.changes_s)

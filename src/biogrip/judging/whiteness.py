@@ -95,6 +95,21 @@ def wandering(residual: Array, basis: Array) -> float:
     return _chance_of_less(1 - observed, free - first, free - 2 * first + second, free, 1.0)
 
 
+def averaged(basis: Array) -> Array:
+    """Return orthonormal rows of means over stretches that a fit does not absorb."""
+    n = basis.shape[1]
+    count = min(_STRETCHES, n // _SHORTEST)
+    rows = np.zeros((max(count, 0), n))
+    for row, part in zip(
+        rows, np.array_split(np.arange(n), count) if count > 1 else (), strict=False
+    ):
+        row[part] = len(part) ** -0.5
+    rest = without(basis, rows)
+    _, shares, found = np.linalg.svd(rest, full_matrices=False)
+    kept: Array = found[shares > _TOLD]
+    return kept
+
+
 def _chance_of_less(observed: float, first: float, second: float, free: int, most: float) -> float:
     """Return the chance of a smaller ratio r^T A r / r^T r of what a fit leaves of white noise.
 

@@ -223,6 +223,11 @@ def exact_data(
         "threshold": likelihood.threshold,
         "certainty": likelihood.certainty,
         "quantities": [_finding(each, rejected=rejected) for each in diagnosis.findings],
+        "hidden": [
+            {"words": each.words(), "moves": each.moves}
+            for each in ([] if rejected else diagnosis.hidden)
+            if each.beyond[1] > 1
+        ],
         "trades": [
             {
                 "members": list(trade.members),
