@@ -178,7 +178,7 @@ def slow_branch() -> str:
         study_of(f"cases: {{liquid_drop_1: {{fixed: {fixed}}}}}").case("liquid_drop_1")
         for fixed in ("{}", f"{{c: {_SLOW}}}")
     )
-    posed = case.problem.to_identify(), slow.problem.to_identify()
+    posed = case.experiment.to_identify(), slow.experiment.to_identify()
     time_s = case.times_s
     given = case.gripper, case.network, case.torque, time_s
     (target,) = simulated_response(*given, nonlinear=False)
@@ -187,9 +187,7 @@ def slow_branch() -> str:
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
     identify = identifier("least_squares", case.block.least_squares)
     free, held = (
-        np.array(
-            [each.misfit for each in identify([it.of(time_s, t) for t in traces], rngs, silent)]
-        )
+        np.array([each.misfit for each in identify(it.of_each(time_s, traces), rngs, silent)])
         for it in posed
     )
     limit = chi2.ppf(case.confidence, 1)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.identify.notebook import identify_trace
+from biogrip.command.notebook import identify_trace
 
 TIMES = np.logspace(-1, 6, 46)
 # Four processes and an equilibrium.

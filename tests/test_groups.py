@@ -11,8 +11,8 @@ from scipy.stats import ttest_ind
 
 from biogrip.arrays import Array
 from biogrip.cli import main
+from biogrip.command.outputs import WRITTEN_BY
 from biogrip.groups import FEWEST_CELLS, Cell, adjusted, compare, estimate
-from biogrip.identify.outputs import WRITTEN_BY
 from tests.helpers.identified import FEW, identify
 from tests.helpers.places import ROOT
 

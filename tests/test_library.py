@@ -130,7 +130,10 @@ def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read() -> N
         ({"config": {"protocl": {}}}, "protocl"),
         ({"time_s": FRAME}, r"time_s: found the shape \(325, 2\), allowed is one column"),
         ({"time_s": ["a"]}, "time_s: could not convert .*; allowed are numbers"),
-        ({"time_s": FRAME["t"][::-1]}, "trace.csv, line 3, .* allowed are times that increase"),
+        (
+            {"time_s": FRAME["t"][::-1]},
+            r"time_s\[1\]: .* \(\[0\]\), allowed are times that increase",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_said_by_the_name_of_the_argument(
@@ -148,7 +151,8 @@ def test_all_of_the_library_can_be_had_from_the_package() -> None:
 
 def test_it_identifies_as_the_default_study() -> None:
     assert STUDY.ranges == library._RANGES
-    assert all(case.block.least_squares == library._BUDGET for case in STUDY.cases.values())
+    budgets = [case.block.least_squares for case in STUDY.cases.values()]
+    assert all(budget == CREEP.least_squares for budget in budgets)
 
 
 def test_what_is_not_there_is_said_as_everywhere() -> None:

@@ -19,11 +19,10 @@ import yaml
 
 from biogrip.arrays import Array
 from biogrip.cli import _parser, main
+from biogrip.command.outputs import WRITTEN_BY, check_output
+from biogrip.command.settings import Asked, Setting, case_of
+from biogrip.command.words import for_a_paper, side_by_side
 from biogrip.errors import BiogripError
-from biogrip.identify import one_trace
-from biogrip.identify.outputs import WRITTEN_BY, check_output
-from biogrip.identify.settings import Asked, Setting, case_of
-from biogrip.identify.words import for_a_paper, side_by_side
 from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.source import HOLD
@@ -159,9 +158,10 @@ def test_known_deviations_are_weights_of_the_fit(floor: float) -> None:
     times, rotation = clean("liquid_drop_2")
     sd = 0.04 * rotation[1:] + floor
     given: dict[str, Any] = {"config": {"measurement": {"noise_share": 0.04}}}
-    found = told(times[1:], rotation[1:], **({"sd": sd} if floor else given)).problem.sd
+    found = told(times[1:], rotation[1:], **({"sd": sd} if floor else given)).diagnosis.recording
     assert found is not None
-    np.testing.assert_allclose(found[100:], sd[100:], rtol=0.02)
+    assert found.sd is not None
+    np.testing.assert_allclose(found.sd[100:], sd[100:], rtol=0.02)
 
 
 # Arguments of `identify`, and what is said of them.
@@ -297,7 +297,7 @@ def test_a_trace_whose_fit_fails_costs_no_other_its_result(
             raise ValueError("min() arg is an empty sequence")
         return notes_on_start(problem, time_s, *given, **more)
 
-    monkeypatch.setattr(one_trace, "notes_on_start", fails)
+    monkeypatch.setattr("biogrip.identify.identify.notes_on_start", fails)
     table, options = tmp_path / "found.csv", ("--config", few, "--model", "liquid_drop")
     status, said, error = identify(bad, good, "--csv", table, *options)
     assert (status, "Traceback" in error) == (1, False)
@@ -415,8 +415,8 @@ def test_a_rejected_fit_names_a_better_model_though_it_is_simpler() -> None:
     assert found["fit"] == "rejected"
     assert '(model="springpot") is preferred' in found["advice"]
     lines = side_by_side([found, found | {"fit": "ok"}], {}).splitlines()
-    assert [line for line in lines if "springpot" in line] == [f"trace.csv: {found['advice']}"]
-    assert f"trace.csv: rejected: {found['reasons'][0]}" in lines
+    assert [line for line in lines if "springpot" in line] == [f"trace: {found['advice']}"]
+    assert f"trace: rejected: {found['reasons'][0]}" in lines
 
 
 def test_colours_are_not_for_all_terminals(

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import yaml
 
+from biogrip.command import files as command
+from biogrip.command.settings import Setting, is_table, read_table
 from biogrip.errors import BiogripError
-from biogrip.identify import identify as command
-from biogrip.identify.settings import Setting, is_table, read_table
 from biogrip.library import Sample, hold, set_up, simulate
 from tests.helpers.default import STUDY
 from tests.helpers.identified import identify as run
@@ -243,7 +243,7 @@ def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None
     # As a batch of a workflow.
     usual = [Setting("--model", ("sample", "model"), "kelvin_voigt")]
     given = ([Path("cells.tsv")], Path("few.yaml"), usual)
-    assert command.identify(*given, table=Path("some.csv"), rows=(2, 4)) == 0
+    assert command.identify_files(*given, table=Path("some.csv"), rows=(2, 4)) == 0
     assert [row["trace"] for row in listed("some.csv")] == [row[0] for row in rows[2:5]]
     assert not list(here.glob("*.json"))
     for row in rows:

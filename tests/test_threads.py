@@ -26,7 +26,7 @@ from threadpoolctl import threadpool_info
 
 import biogrip
 from biogrip import library
-from biogrip.identify import notebook
+from biogrip.command import notebook
 
 def threads():
     return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}

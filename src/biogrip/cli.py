@@ -267,10 +267,10 @@ def _design_parser(stages: Any) -> None:
 
 
 def _identify(options: argparse.Namespace) -> int:
-    from biogrip.identify.identify import identify
-    from biogrip.identify.settings import Setting
+    from biogrip.command.files import identify_files
+    from biogrip.command.settings import Setting
 
-    return identify(
+    return identify_files(
         options.traces,
         options.config,
         [Setting(*each) for each in options.settings],

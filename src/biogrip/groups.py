@@ -21,10 +21,10 @@ from scipy.special import ndtri, stdtr, stdtrit
 
 from biogrip import __version__
 from biogrip.arrays import Array
+from biogrip.command.outputs import FAILED, WRITTEN_BY, check_output
 from biogrip.digits import counted, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs
-from biogrip.identify.outputs import FAILED, WRITTEN_BY, check_output
 from biogrip.judging.doubts import DOUBTFUL, REJECTED
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED
 from biogrip.records.rows import read_rows, write_rows

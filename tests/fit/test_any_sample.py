@@ -15,7 +15,7 @@ CLEAN_S, CLEAN = clean("endothelial_cell", 2.0)
 
 
 def deviations(trace: Array, share: float = 0.05, **given: Any) -> Array:
-    problem = replace(STUDY.cases["endothelial_cell"].problem, noise_share=share, **given)
+    problem = replace(STUDY.cases["endothelial_cell"].experiment, noise_share=share, **given)
     return proportional_deviations(problem, CLEAN_S, trace)
 
 

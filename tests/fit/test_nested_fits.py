@@ -166,7 +166,7 @@ TRACE = RESPONSE * np.random.default_rng(3).normal(1.0, 0.1, len(TIMES))
 @pytest.mark.parametrize("block", ["", "{offset: true}"])
 def test_it_is_the_same_to_the_last_bit(name: str, block: str) -> None:
     experiment: Experiment = (
-        study_of(block and f"measurement: {block}").case("liquid_drop_2").problem
+        study_of(block and f"measurement: {block}").case("liquid_drop_2").experiment
     )
     model = CANDIDATES[name].model
     first = experiment.of(TIMES, TRACE)

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import f as fisher
 
 from biogrip.arrays import Array
+from biogrip.command.notebook import identify_trace
 from biogrip.fit.noise_model_fit import absorbed
-from biogrip.identify.notebook import identify_trace
 from biogrip.judging.changes import compare_halves, find_step, steps_of
 from biogrip.judging.doubts import DOUBTFUL, FALSE_ALARM
 

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from biogrip.arrays import Array
-from biogrip.identify.notebook import identify_trace
+from biogrip.command.notebook import identify_trace
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,

@@ -7,6 +7,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit.local_fits import FINE
+from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood
@@ -63,7 +64,8 @@ def test_an_optimum_that_was_missed_is_judged_again() -> None:
     right, again = (diagnose(experiment, maxwell, f, confidence=0.95) for f in (found, missed))
     assert again.likelihood.misfit == pytest.approx(right.likelihood.misfit, rel=1e-9)
     # Coverage is tested with limits of the same fit.
-    (alike,) = judge_quantities([(experiment, missed)], parameters_and_sum(maxwell), 0.95)
+    fit = TraceFit(experiment, missed, None, np.zeros(len(times), bool))
+    (alike,) = judge_quantities([fit], parameters_and_sum(maxwell), 0.95)
     assert alike.likelihood.misfit == again.likelihood.misfit
     for one, other in zip(alike.findings, again.findings, strict=True):
         assert (one.low, one.high) == (other.low, other.high)

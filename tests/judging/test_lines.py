@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.identify.notebook import identify_trace
+from biogrip.command.notebook import identify_trace
 from biogrip.judging.doubts import DOUBTFUL
-from biogrip.judging.lines import find_line
+from biogrip.judging.whiteness import find_line
 
 
 def test_white_noise_has_a_line_as_often_as_its_level_says() -> None:
@@ -16,7 +16,7 @@ def test_white_noise_has_a_line_as_often_as_its_level_says() -> None:
     rng, times = np.random.default_rng(0), np.arange(100.0)
     found = [find_line(rng.standard_normal(100), times) for _ in range(2000)]
     # The ten lowest of 49 frequencies are not looked at.
-    alarms = np.mean([line is not None and line.chance < 0.02 for line in found])
+    alarms = np.mean([chance < 0.02 for _, chance, _ in found])
     assert alarms == pytest.approx(0.02 * 40 / 49, abs=0.012)
 
 
@@ -26,12 +26,13 @@ def test_a_line_has_the_frequency_and_amplitude_of_its_sine(frequency: float) ->
     times = np.arange(2000) / 100
     sine = 1.5 * np.sin(2 * np.pi * frequency * times + 1)
     noise = np.random.default_rng(1).standard_normal(2000)
-    line = find_line(sine + noise, times)
-    assert line
-    assert line.frequency_Hz == pytest.approx(frequency, abs=0.003)
-    assert line.amplitude == pytest.approx(1.5, abs=4 * np.sqrt(2 / 2000))
-    assert np.std(line.left) == pytest.approx(1, rel=0.1)
-    assert find_line(sine + noise, times**1.1) is None
+    found, chance, basis = find_line(sine + noise, times)
+    assert found == pytest.approx(frequency, abs=0.003)
+    assert chance < 1e-9
+    along = basis @ (sine + noise)
+    assert np.linalg.norm(along) * np.sqrt(2 / 2000) == pytest.approx(1.5, abs=4 * np.sqrt(1e-3))
+    assert np.std(sine + noise - along @ basis) == pytest.approx(1, rel=0.1)
+    assert find_line(sine + noise, times**1.1)[1] == 1
 
 
 def creep(parts: Array, times: Array) -> Any:

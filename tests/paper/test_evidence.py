@@ -9,9 +9,9 @@ import pytest
 from biogrip.fit.genome import GeneRange
 from biogrip.physics.gripper import torque
 from biogrip.physics.models import Published
-from biogrip.tables.mechanics import mechanics
 from tests.helpers.default import STUDY, seen
 from workflow.paper.evidence import evidence, printed_values, sampling_evidence
+from workflow.paper.mechanics import mechanics
 
 CASES: Any = STUDY.of(STUDY.published)
 

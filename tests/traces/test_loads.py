@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.command.settings import Asked, Setting, case_of
 from biogrip.errors import BiogripError
-from biogrip.identify.settings import Asked, Setting, case_of
 from biogrip.physics.protocol import evaluate
 from biogrip.traces.loads import ramps
 from biogrip.traces.reader import read_recording
@@ -74,7 +74,7 @@ def test_a_column_of_the_load_is_the_protocol_of_all_rows(tmp_path: Path, start_
     asked = written(tmp_path / "t.csv", start_s)
     rows = Setting("--set", ("measurement", "rows"), {"Segment": "dwell"})
     case = case_of(Asked(asked.trace, None, (*asked.settings, rows)))
-    history = case.problem.torque
+    history = case.experiment.torque
     assert history.deforms
     np.testing.assert_allclose(evaluate(history, EVEN[:-1]), 5e-6 * load_at(EVEN[:-1]), atol=2e-9)
     assert not [start for start, order, _ in history.jumps if order == 0]

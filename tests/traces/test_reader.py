@@ -75,7 +75,7 @@ def test_a_kept_file_is_read_or_refused_as_its_table_says(
     form: dict[str, Any] = PLAIN_FORM | kept.get("form", {})
     form["columns"] = dict(zip(columns.named, names_and_units, strict=True))
     assert found.form == {key: it for key, it in form.items() if it is not None}
-    assert found.without_number == form["gaps"]
+    assert found.gaps == form["gaps"]
     assert found.time_s[[0, -1]].tolist() == [form["first_s"], form["last_s"]]
     assert first_last_sum(found.readings) == pytest.approx(kept["reading"], rel=1e-14)
     if "sd" in kept:
@@ -92,7 +92,7 @@ def test_a_row_with_a_gap_is_left_out_and_counted(tmp_path: Path) -> None:
     text = "\n".join(["time_s,rotation_rad", *ROWS[:3], *gaps, "# note", "", "  ", *ROWS[3:]])
     (tmp_path / "t.csv").write_text(text.replace("nan, ,1", "nan,1"))
     found = read_recording(tmp_path / "t.csv", PLAIN)
-    assert found.without_number == len(gaps)
+    assert found.gaps == len(gaps)
     np.testing.assert_array_equal(found.time_s, np.arange(12))
     assert found.lines.tolist() == [2, 3, 4, *range(len(gaps) + 8, len(gaps) + 17)]
 
@@ -159,7 +159,7 @@ def test_what_pandas_writes_is_read_to_the_last_bit(
     assert found.form["encoding"] == ENCODINGS[encoding]
     np.testing.assert_array_equal(found.time_s, times)
     np.testing.assert_array_equal(found.readings, np.array(values) * 1e-6)
-    assert found.without_number == 1
+    assert found.gaps == 1
     for line, time in zip(found.lines, times, strict=True):
         assert repr(float(time)).replace(".", decimal) in lines[line - 1]
 

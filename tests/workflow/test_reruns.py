@@ -27,20 +27,25 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     "noise": (
         {"measurement": {"noise": {"level": 0.2}}},
         {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
-        | {"recorded_judgement": 1, "model_errors": 1}
+        | {"recorded_judgement": 1, "mechanics": 1}
         | RECORDED
         | STUDY,
+    ),
+    "models to compare": (
+        {"model_selection": {"models": ["maxwell"]}},
+        {"model_fits": 2, "recorded_judgement": 1, "case_tables": 1, "recorded_case_figures": 1}
+        | {"tables": 1, "claims": 1, "page": 1},
     ),
     "a case, and the title of another": (
         {"cases": {"new": CELL, "liquid_drop_2": {"title": "A drop"}}},
         {"target": 1, "measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1}
-        | {"judgement": 1, "model_errors": 1, "case_tables": 2}
+        | {"judgement": 1, "mechanics": 1, "linearisation": 1, "case_tables": 2}
         | {"case_figures": 1, "case_figures_without_valley": 1, "gripper_figures": 1}
         | STUDY,
     ),
     "seeds": (
         {"seeds": 7},
-        {"measurement": 3, "identification": 6, "model_fits": 3, "model_errors": 1}
+        {"measurement": 3, "identification": 6, "model_fits": 3, "mechanics": 1}
         | {"case_tables": 1, "case_figures": 1}
         | STUDY,
     ),

@@ -204,7 +204,7 @@ def sampling_evidence(study: Study) -> ShownTable:
 def _errors_and_bounds(case: Case) -> list[tuple[Any, ...]]:
     """Return a row of each quantity that is determined at some rate and that the paper reports."""
     truth, identified = case.parameters, case.published.identified
-    problem, noise = case.problem, case.noise
+    problem, noise = case.experiment, case.noise
     names = list(problem.searched.names)
     times = [sample_times(problem.torque.end_s, rate) for rate in _RATES_HZ]
     at_truth = [bounds_percent(problem, noise, truth, time_s) for time_s in times]

@@ -96,20 +96,21 @@ ANSWERED = [name for name in STUDY.gripped if STUDY.case(name).has_valley][-1:]
 calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 
 # Tables and figures of the study, of what there is in it, and those of a case.
-TABLES = ["errors", "gene_ranges", "parameter_ranges"]
-TABLES += ["gripper", "actuator", "contact", "left_out"] if STUDY.has_gripper else []
-TABLES += ["linearisation", "mechanics"] if STUDY.gripped else []
+TABLES = ["errors"]
 TABLES += ["methods"] if STUDY.simulated else []
 TABLES += ["coverage"] if STUDY.covered else []
 TABLES += ["models"] if SELECTING else []
 TABLES += ["verdict_counts"] if STUDY.counted else []
+# The search ranges of recorded traces follow from them.
+INPUTS = ["gene_ranges", "parameter_ranges"] if STUDY.simulated else []
+INPUTS += ["gripper", "actuator"] if STUDY.has_gripper else []
 EVIDENCE = ["evidence", "printed_values", "sampling_evidence"]
-OTHER_TABLES = ["contact_loss"] if STUDY.gripped else []
+OTHER_TABLES = [*INPUTS, *(["contact", "left_out"] if STUDY.has_gripper else [])]
+OTHER_TABLES += ["linearisation", "mechanics", "contact_loss"] if STUDY.gripped else []
 OTHER_TABLES += ["claims", *EVIDENCE] if STUDY.published else []
 OTHER_TABLES += ["interpretations", "interpretations_jointly"] * bool(STUDY.config.interpretations)
 GRIPPER_FIGURES = ["comb", "linkage", "torque"] if STUDY.has_gripper else []
-FIGURES = ["linearisation"] if STUDY.gripped else []
-FIGURES += ["answer"] if ANSWERED else []
+FIGURES = ["answer"] if ANSWERED else []
 FIGURES += ["moduli", "overview"] if STUDY.simulated else []
 
 
@@ -129,6 +130,7 @@ SHOWN = {
     ],
     "figures": [
         *((name, "") for name in [*GRIPPER_FIGURES, *FIGURES]),
+        *(("linearisation", "") for _ in STUDY.gripped[:1]),
         *(
             (name, case)
             for case, its in STUDY.cases.items()

@@ -66,7 +66,6 @@ rule figures:
         expected=files("results/identifiability/expected/{case}.json", STUDY.simulated),
         measurements=files("results/measurements/{case}/{batch}.npz", STUDY.simulated[:1]),
         calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
-        differences="results/linearisation.csv" if STUDY.gripped else [],
         answered=[*files("results/identifiability/{case}.json", ANSWERED), *first_traces(ANSWERED)],
     output:
         pictures=[picture(name) for name in FIGURES],

@@ -1,9 +1,10 @@
-"""What only the study of the paper has: its gripper drawn, evidence, interpretations, and claims."""
+"""What only the study of the paper has: its inputs, its gripper, evidence, interpretations, claims."""
 
 from biogrip.physics.models import SINGLE_BRANCH
 
 # Simulated cases whose model has the paper's parameters, and what is read of each.
 OURS = {parameter.name for parameter in SINGLE_BRANCH}
+GRIPPED = STUDY.of(STUDY.gripped)
 INTERPRETED = [n for n in STUDY.simulated if set(STUDY.case(n).sample.model.names) <= OURS]
 
 
@@ -29,6 +30,65 @@ rule gripper_figures:
         "Drawing the gripper"
     script:
         "../paper/gripper.py"
+
+
+rule inputs:
+    output:
+        tables=expand("results/tables/{name}.csv", name=INPUTS),
+        pages=[page_of_table(name) for name in INPUTS],
+    log:
+        "results/logs/inputs.log",
+    params:
+        **settings_of("gripper", "actuator", "search_range", "reconstructed"),
+    message:
+        "Writing the paper's Tables 1 to 4"
+    script:
+        "../paper/inputs.py"
+
+
+rule mechanics:
+    output:
+        contact="results/tables/contact.csv",
+        left_out="results/tables/left_out.csv",
+        pages=[page_of_table(name) for name in ("contact", "left_out")],
+        gripped=(
+            ["results/tables/mechanics.csv", "results/tables/contact_loss.csv"]
+            + [page_of_table(name) for name in ("mechanics", "contact_loss")]
+            if STUDY.gripped
+            else []
+        ),
+    log:
+        "results/logs/mechanics.log",
+    benchmark:
+        "results/benchmarks/mechanics.tsv"
+    params:
+        **settings_of(
+            *"study_seed seeds actuator gripper protocol".split(),
+            *keys_of_cases(GRIPPED, *FIT, "title", "models", *SAMPLING, NOISE, "least_squares"),
+        ),
+    message:
+        "Computing what the gripper does to its samples, and what its model leaves out"
+    script:
+        "../paper/mechanics.py"
+
+
+rule linearisation:
+    output:
+        differences="results/linearisation.csv",
+        table="results/tables/linearisation.csv",
+        page=page_of_table("linearisation"),
+        figure=picture("linearisation"),
+        print="results/figures/linearisation.pdf",
+    log:
+        "results/logs/linearisation.log",
+    benchmark:
+        "results/benchmarks/linearisation.tsv"
+    params:
+        **settings_of("actuator", *keys_of_cases(GRIPPED, "gripper", "title", *SAMPLE)),
+    message:
+        "Comparing the linear model with the nonlinear one"
+    script:
+        "../paper/linearisation.py"
 
 
 # Of the cases whose axis the paper shows, the traces.

@@ -30,26 +30,6 @@ rule case_tables:
         "../scripts/case_tables.py"
 
 
-rule model_errors:
-    output:
-        differences="results/linearisation.csv",
-        contact_loss="results/tables/contact_loss.csv",
-        contact_loss_page=page_of_table("contact_loss"),
-    log:
-        "results/logs/model_errors.log",
-    benchmark:
-        "results/benchmarks/model_errors.tsv"
-    params:
-        **settings_of(
-            *("study_seed", "seeds", "actuator"),
-            *keys_of_cases(STUDY, *FIT, "models", *SAMPLING, NOISE, "least_squares"),
-        ),
-    message:
-        "Comparing the linear model with the nonlinear one, and with loss of contact"
-    script:
-        "../scripts/model_errors.py"
-
-
 rule tables:
     input:
         fits=files("results/selection/{case}/{batch}.csv", SELECTING),
@@ -57,7 +37,6 @@ rule tables:
         targets=files("results/targets/{case}.csv", STUDY.simulated),
         intervals=files("results/coverage/{case}/{batch}.csv", STUDY.covered),
         calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
-        differences="results/linearisation.csv" if STUDY.gripped else [],
     output:
         tables=expand("results/tables/{name}.csv", name=TABLES),
         pages=[page_of_table(name) for name in TABLES],
@@ -67,8 +46,7 @@ rule tables:
         "results/benchmarks/tables.tsv"
     params:
         **settings_of(
-            *"methods evaluation actuator gripper protocol search_range".split(),
-            *("model_selection", "reconstructed"),
+            *"methods evaluation actuator model_selection".split(),
             *keys_of_cases(STUDY, *FIT, "title", "published", "models", *SAMPLING, NOISE),
             *keys_of_cases(STUDY, "identifiability"),
         ),

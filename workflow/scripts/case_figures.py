@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from biogrip.figures import course, fit, likelihood, scatter
-from biogrip.figures import mechanics as force
+from biogrip.figures import course, fit, force, likelihood, scatter
 from biogrip.figures.style import save, styled
 from biogrip.page.page import write_summary
 from biogrip.stages.job import job_case, logged, paths

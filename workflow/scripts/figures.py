@@ -1,6 +1,6 @@
 """Draw the figures of the study, as far as it has what they show."""
 
-from biogrip.figures import mechanics, moduli, overview
+from biogrip.figures import moduli, overview
 from biogrip.figures.overview import draw_answer, shown_cases
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
@@ -8,7 +8,7 @@ from biogrip.stages.job import job_study, logged, paths
 with logged(snakemake):
     study = job_study(snakemake)
     given = {name: paths(files) for name, files in snakemake.input.items()}
-    gripped, shown = study.of(study.gripped), study.of(shown_cases(study))
+    shown = study.of(shown_cases(study))
     first = next(iter(shown.cases), None)
     answered = given["answered"][0].stem if given["answered"] else None
 
@@ -22,7 +22,6 @@ with logged(snakemake):
         "answer": lambda: draw_answer(
             study.cases[answered], *given["answered"], calibrated_of(answered)
         ),
-        "linearisation": lambda: mechanics.draw_linearisation(gripped, *given["differences"]),
         "moduli": lambda: moduli.draw_moduli(shown, of("identifications"), of("targets")),
         "overview": lambda: overview.draw_overview(
             shown,

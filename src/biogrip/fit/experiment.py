@@ -9,12 +9,13 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.fit.genome import GeneRange
+from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.problem import TraceProblem, make_problem
-from biogrip.physics.calibration import read_calibrated_arms
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
+from biogrip.physics.noise import stream
 from biogrip.physics.protocol import Course, Phase, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
@@ -53,7 +54,7 @@ class Experiment:
     noise_sd: float | None = None
     """Standard deviation of the noise, if it is known."""
     noise_share: float | None = None
-    """Standard deviation of the noise as a share of the readings; read by `read_checked`."""
+    """Standard deviation of the noise as a share of the readings, see `proportional_deviations`."""
     sd: Array | None = field(default=None, compare=False)
     """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
     coloured: bool = False
@@ -63,6 +64,29 @@ class Experiment:
     ``gripper`` itself; and ``share`` of the ``torque``."""
     fit_start: bool = False
     """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
+    undeclared: frozenset[str] = frozenset()
+    """Which of ``offset`` and ``drift`` nothing is said of: a noise model brings them along."""
+    given_ranges: frozenset[str] = frozenset()
+    """Names of the ranges that are kept; for a recorded trace others follow from the trace."""
+    start_given: bool = True
+    """False if nothing says when the protocol of a recorded trace starts."""
+    simulated: bool = False
+    """True if traces follow this experiment, so that neither start, offset, drift nor model are
+    doubted."""
+    models: tuple[str, ...] = ()
+    """Sample models to compare, as in `CANDIDATES`."""
+    cheap_models: bool = True
+    """True to compare power laws, too, where that takes little time."""
+    least_squares: LeastSquaresSettings = field(
+        default_factory=lambda: LeastSquaresSettings(candidates=1000, starts=16)
+    )
+    """Budget of the fits."""
+    confidence: float = 0.95
+    """Of the limits."""
+    name: str = "trace"
+    """Name that random numbers go by, with `study_seed`."""
+    study_seed: int = 0
+    """Seed of all random numbers."""
 
     @cached_property
     def torque(self) -> Course:
@@ -95,9 +119,18 @@ class Experiment:
         return replace(self, sd=sd, noise_sd=float(np.sqrt(np.mean(sd**2))))
 
     @property
+    def offset_and_drift(self) -> int:
+        """Number of the instrument's terms that are fitted along."""
+        return self.offset + self.drift
+
+    def stream(self, purpose: str, seed: int = 0) -> np.random.Generator:
+        """Return the random numbers of a trace for one purpose."""
+        return stream(self.study_seed, self.name, seed, purpose)
+
+    @property
     def unknowns(self) -> int:
         """Number of parameters that are fitted to a trace, those of the instrument included."""
-        return len(self.searched.names) + self.offset + self.drift + self.fit_start
+        return len(self.searched.names) + self.offset_and_drift + self.fit_start
 
     @property
     def uncertain(self) -> list[tuple[str, str, float]]:
@@ -121,6 +154,9 @@ class Experiment:
         """
         if not files:
             return self
+        # Imported here: a recorded trace has no such file.
+        from biogrip.physics.calibration import read_calibrated_arms
+
         gripper, uncertainty = read_calibrated_arms(files[0], self.gripper)
         return replace(self, gripper=gripper, uncertainty={**self.uncertainty, **uncertainty})
 

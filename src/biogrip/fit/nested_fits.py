@@ -18,7 +18,8 @@ References
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -325,3 +326,55 @@ def advice(tried: Sequence[FittedModel], chosen: str, *, adequate: bool = True) 
     if len(best.model.names) == len(own.model.names):
         return f"{title} suits the trace less well: {lead}"
     return f"{title} is not adequate: {lead}"
+
+
+@dataclass(frozen=True)
+class FittedModels:
+    """Best fits of sample models to a trace."""
+
+    chosen: str
+    """Sample model that the trace was identified with."""
+    tried: list[FittedModel] = field(default_factory=list)
+    """Rank of each model."""
+    answers: dict[str, Fit] = field(default_factory=dict)
+    """Fit of each by its name, in the same order."""
+    adequate: bool = True
+    """False if that of the model which BIC prefers is rejected for what it leaves."""
+
+    @property
+    def lead(self) -> float:
+        """How much lower than that of the chosen model the BIC of another is."""
+        return max(
+            (own.delta_bic for own in self.tried if own.candidate == self.chosen), default=0.0
+        )
+
+    def data(self, *, rejected: bool) -> dict[str, Any]:
+        """Return one row per model, and advice in words, as plain data.
+
+        If the fit of the chosen model is rejected, advice is only another model, simpler or richer,
+        that may suit the trace.
+        """
+        rows = [
+            {
+                "model": each.candidate,
+                "title": each.model.title,
+                "parameters": len(each.model.names),
+                "misfit_rad": self.answers[each.candidate].misfit,
+                "vanished": vanished(each.candidate, self.answers[each.candidate]),
+                "converged": self.answers[each.candidate].converged,
+                "delta_aic": each.delta_aic,
+                "delta_bic": each.delta_bic,
+            }
+            for each in self.tried
+        ]
+        said = rows and (not rejected or fits_far_better(self.tried, self.chosen))
+        words = advice(self.tried, self.chosen, adequate=self.adequate) if said else None
+        best = preferred(self.tried, self.chosen) if rows and self.adequate else None
+        return {"models": rows, "preferred_model": best, "advice": words}
+
+
+def vanished(candidate: str, answer: Fit) -> list[str]:
+    """Name the elements that vanish in the best fit: parameters that are zero or infinite."""
+    gone = (answer.parameters == 0) | np.isinf(answer.parameters)
+    elements = zip(CANDIDATES[candidate].model.parameters, gone, strict=True)
+    return [each.name for each, is_gone in elements if is_gone and each.kind != "exponent"]

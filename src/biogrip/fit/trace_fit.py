@@ -14,9 +14,10 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment, pose
-from biogrip.fit.least_squares import fit_from
+from biogrip.fit.least_squares import fit_from, identify_many
+from biogrip.fit.nested_fits import deepen
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
-from biogrip.fit.problem import Fit, TraceProblem
+from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, drift_is_flow
 
@@ -160,6 +161,26 @@ def fit_traces(
 
             found[trace] = _fit_in_noise(experiment, *traces[trace], find_alone)
     return [found[trace] for trace in range(len(traces))]
+
+
+def fit_least_squares(
+    experiments: Sequence[Experiment],
+    traces: Sequence[tuple[Array, Array]],
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
+) -> list[TraceFit]:
+    """Fit traces by least squares from many starts, each with random numbers of its own.
+
+    See `fit_traces`; all experiments have the same budget.
+    """
+
+    def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
+        of_traces = [rngs[trace] for trace in which]
+        found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
+        pairs = zip(problems, deepen(problems, found), strict=True)
+        return [fit.in_order(problem.residuals.model) for problem, fit in pairs]
+
+    return fit_traces(experiments, traces, find)
 
 
 def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: Find) -> TraceFit:

@@ -14,14 +14,17 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import plain
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from
+from biogrip.fit.nested_fits import FittedModels
 from biogrip.fit.problem import Fit, TraceProblem
+from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.doubts import (
     DOUBT,
     HARMLESS,
@@ -31,10 +34,8 @@ from biogrip.judging.doubts import (
     compute_status,
     examine_residuals,
 )
-from biogrip.judging.hidden import Hidden, find_hidden
 from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
-from biogrip.judging.valley import compute_valley
 from biogrip.judging.verdicts import (
     DETERMINED,
     Finding,
@@ -44,6 +45,10 @@ from biogrip.judging.verdicts import (
 )
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
+from biogrip.traces.reader import Recording
+
+if TYPE_CHECKING:
+    from biogrip.judging.hidden import Hidden
 
 # Decrease of chi^2 beyond an end that is more than chance: three standard deviations squared.
 _NOTICEABLE = 9.0
@@ -71,6 +76,16 @@ class Diagnosis:
     """Force of the jaws on the sample of the best fit."""
     notes: list[Note] = field(default_factory=list)
     """Notes on the result, with weights."""
+    recording: Recording | None = None
+    """The trace as it was fitted, of a trace that was identified."""
+    experiment: Experiment | None = None
+    """What was assumed of it, with what follows from the trace."""
+    fit: TraceFit | None = None
+    """The fit that was judged first, with the model of its noise."""
+    models: FittedModels | None = None
+    """Fits of other sample models."""
+    onset_limits_s: tuple[float, float] | None = None
+    """Limits of a fitted onset, from it."""
 
     @property
     def status(self) -> str:
@@ -78,11 +93,13 @@ class Diagnosis:
         return compute_status(self.notes)
 
     @cached_property
-    def hidden(self) -> list[Hidden]:
+    def hidden(self) -> list["Hidden"]:
         """Errors that the trace could hide, none of a rejected fit, see `find_hidden`."""
-        if self.status == REJECTED:
-            return []
-        return find_hidden(self.likelihood, self.findings)
+        # Imported here: only those who ask for it need it.
+        from biogrip.judging.hidden import find_hidden
+
+        rejected = self.status == REJECTED
+        return [] if rejected else find_hidden(self.likelihood, self.findings)
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""
@@ -193,6 +210,9 @@ def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade
 
 def _with_valley(judged: Diagnosis, model: SampleModel) -> Diagnosis:
     """Return a diagnosis with its valley, whose lowest point counts if no profile is lower."""
+    # Imported here: only a study has valleys.
+    from biogrip.judging.valley import compute_valley
+
     valley, missed = compute_valley(judged.likelihood, model)
     return replace(judged, valley=valley, lowest=missed if judged.lowest is None else judged.lowest)
 

@@ -3,7 +3,7 @@
 The heaviest note decides the status of a fit: ok, doubtful or rejected (`compute_status`).
 Residuals are tested for white noise (`biogrip.judging.whiteness`), each test at the level
 `FALSE_ALARM`: correlation of neighbours, the cumulative periodogram, means over stretches,
-outliers, a line in the spectrum (`biogrip.judging.lines`), a step at any time, parts that differ
+outliers, a line in the spectrum, a step at any time, parts that differ
 (`biogrip.judging.changes`). A line or a step that explains the others is named in their place.
 Noise that grows with the rotation is told first, and the other tests are of what it leaves.
 
@@ -31,12 +31,12 @@ from biogrip.fit.noise_model_fit import (
 )
 from biogrip.judging.changes import Step, compare_halves, find_step
 from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.lines import Line, find_line
 from biogrip.judging.whiteness import (
     as_correlated,
     by_leverage,
     correlated,
     far_out,
+    find_line,
     uneven,
     wandering,
 )
@@ -293,27 +293,24 @@ def _about_colour(
 
 def _lines(residual: Array, basis: Array, residuals: Residuals, scale: float) -> Iterator[str]:
     """Yield a sentence on lines in the spectrum of residuals, if these have no other misfit."""
-    rest, taken, found = residual, basis, list[Line]()
-    time_s = residuals.trace.time_s
-    while len(found) < _MOST_LINES:
-        line = find_line(rest, time_s)
-        if line is None or line.chance >= FALSE_ALARM:
+    rest, taken, named = residual, basis, list[str]()
+    unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf
+    while len(named) < _MOST_LINES:
+        frequency, chance, line = find_line(rest, residuals.trace.time_s)
+        if chance >= FALSE_ALARM:
             break
-        found.append(line)
-        taken = absorbed(np.vstack((taken, line.basis)))
+        amplitude = float(np.linalg.norm(line @ rest)) * np.sqrt(2 / len(rest))
+        named.append(f"{plain(frequency, 3)} Hz ({plain(amplitude, 2)}{unit})")
+        slowest = min(slowest, frequency)
+        taken = absorbed(np.vstack((taken, line)))
         rest = without(taken, residual)
     size = float(np.sqrt(np.mean(rest**2)))
     misfit = correlated(rest, taken)[1] < CERTAIN_MISFIT and size > _TOO_MUCH * scale
-    if misfit or not found:
-        return
-    unit = f" {residuals.instrument.read.unit}".rstrip()
-    named = " and ".join(
-        f"{plain(each.frequency_Hz, 3)} Hz ({plain(each.amplitude, 2)}{unit})" for each in found
-    )
-    yield (
-        f"The residual has a line in its spectrum, at {named}, as of hum or a vibration. Filter "
-        f"it out, or average the readings over {plain(1 / found[0].frequency_Hz, 3)} s."
-    )
+    if named and not misfit:
+        yield (
+            f"The residual has a line in its spectrum, at {' and '.join(named)}, as of hum or a "
+            f"vibration. Filter it out, or average the readings over {plain(1 / slowest, 3)} s."
+        )
 
 
 def _about_changes(

@@ -59,8 +59,6 @@ def notes_on_start(
     time_s: Array,
     readings: Array,
     diagnosis: Diagnosis,
-    *,
-    may_be_late: bool,
 ) -> list[Note]:
     """Return notes on another start of the protocol than at 0, on a tare, and on a hidden ramp.
 
@@ -77,9 +75,8 @@ def notes_on_start(
         The trace, times ascending.
     diagnosis
         That of the best fit with that protocol.
-    may_be_late
-        True if the user says nothing of the start.
     """
+    may_be_late = not experiment.start_given
     fits, ramp = OnsetFits(experiment, time_s, readings), _with_ramp(experiment, time_s)
     notes: list[Note] = []
     if may_be_late and ramp and is_cut_off(time_s):

@@ -24,6 +24,8 @@ DETERMINED = "determined"
 BOUNDED_BELOW = "bounded below"
 BOUNDED_ABOVE = "bounded above"
 NOT_DETERMINED = "not determined"
+FIT_REJECTED = "fit rejected"
+"""Verdict on every quantity of a fit that is rejected."""
 
 WIDE = 3.0
 """Limits further than this factor from their middle tell little more than an order of magnitude:

@@ -25,6 +25,8 @@ References
    Biometrics Bulletin 2 (1946), 110-114.
 .. [6] H. Akaike, A new look at the statistical model identification, IEEE Transactions on Automatic
    Control 19 (1974), 716-723.
+.. [7] R. A. Fisher, Tests of significance in harmonic analysis, Proceedings of the Royal Society
+   of London A 125 (1929), 54-59.
 """
 
 import numpy as np
@@ -43,6 +45,9 @@ _TWO_MORE = 4.0
 _FEWEST, _LEAST_FREEDOM = 0.3, 3.0
 # Least share of its variance that a fit leaves of a reading whose noise can be told.
 _TOLD = 0.03
+# Fewest periods of a line, since what is slower may be a misfit; its frequencies are so much finer
+# than the periodogram's; and the largest difference of intervals, as a share, that is none.
+_PERIODS, _FINER, _EVEN = 10, 16, 0.01
 
 
 def correlated(residual: Array, basis: Array) -> tuple[float, float]:
@@ -147,6 +152,25 @@ def uneven(residual: Array, basis: Array) -> float:
     reached = np.cumsum(power)[:-1] / np.sum(power)
     shares = np.cumsum(expected)[:-1] / np.sum(expected)
     return float(kolmogorov(np.sqrt(len(power)) * np.max(np.abs(reached - shares))))
+
+
+def find_line(residual: Array, time_s: Array) -> tuple[float, float, Array]:
+    """Return the frequency of the strongest sine, its chance in white noise, and its directions.
+
+    The chance is that of the largest ordinate of the periodogram [7]_, one where times are not
+    evenly spaced; directions are cosine and sine as orthonormal rows, (2, n_samples).
+    """
+    n, apart = len(residual), np.diff(time_s)
+    if n < 4 * _PERIODS or np.ptp(apart) > _EVEN * np.median(apart):
+        return 0.0, 1.0, np.zeros((0, n))
+    fine = np.abs(np.fft.rfft(residual, _FINER * n)[: _FINER * ((n + 1) // 2)]) ** 2
+    power = fine[_FINER::_FINER]
+    share = np.max(power[_PERIODS - 1 :]) / np.sum(power)
+    slowest = _FINER * _PERIODS
+    frequency = (slowest + np.argmax(fine[slowest:])) / (_FINER * n * np.mean(apart))
+    angle = 2 * np.pi * frequency * time_s
+    basis = np.linalg.qr(np.column_stack((np.cos(angle), np.sin(angle))))[0].T
+    return float(frequency), min(len(power) * float(1 - share) ** (len(power) - 1), 1.0), basis
 
 
 def by_leverage(residual: Array, basis: Array) -> Array:

@@ -17,7 +17,6 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper, displacement_of_tip
 from biogrip.physics.modes import relaxation
-from biogrip.physics.nonlinear import correction, nonlinear_rotation
 from biogrip.physics.protocol import Course
 from biogrip.physics.response import (
     LEFT,
@@ -47,6 +46,8 @@ def jaw_force(
     response = jaw_force_response(gripper, network, inertia=inertia)
     force = linear_jaw_force(response, course, time_s)
     if nonlinear:
+        from biogrip.physics.nonlinear import correction
+
         # Arms with inertia have not moved yet at the instant of a step.
         instants = np.nextafter(time_s, -np.inf) if inertia else time_s
         more = correction(gripper, network, course).checked().force_at(instants)
@@ -120,6 +121,9 @@ def simulated_response(
     or the linear one, (4)-(6), at ascending times.
     """
     if nonlinear:
+        # Imported here, as elsewhere: only a study simulates by it.
+        from biogrip.physics.nonlinear import nonlinear_rotation
+
         return nonlinear_rotation(gripper, network, course, time_s)
     if course.deforms:
         return relaxation(network, course, time_s)
@@ -132,6 +136,8 @@ def simulated_shortening(
 ) -> Array:
     """Simulate the shortening of samples in m, (n, n_times); see `simulated_response`."""
     if nonlinear:
+        from biogrip.physics.nonlinear import nonlinear_rotation
+
         turns = (nonlinear_rotation(gripper, network, course, time_s, a) for a in (LEFT, RIGHT))
         left, right = (displacement_of_tip(gripper, turn) for turn in turns)
         return left + right

@@ -1,14 +1,11 @@
 """What is simulated of a case: its response, noisy traces of it, and a test without sample.
 
 A target is the response without noise: what the instrument reads and, of the gripper, the force of
-the jaws. A measurement adds noise to it, a trace a seed. A calibration identifies the gripper's
-arms by a test without sample. The difference of the linear from the
-nonlinear model is computed on a grid of angles and torques: at every point the largest over the
-protocol is compared with the peak rotation.
+the jaws. A measurement adds noise to it, a trace a seed; of a recorded trace it is what was read of
+the user's file. A calibration identifies the gripper's arms by a test without sample.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -16,25 +13,24 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
+from biogrip.identify.prepare import prepare
 from biogrip.physics.calibration import FreeMotion, calibrate, calibration_yaml, free_motion
-from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import Noise, add_noise, stream
-from biogrip.physics.nonlinear import correction
-from biogrip.physics.protocol import Course, evaluate, sample_times
-from biogrip.physics.response import step_response, superpose
-from biogrip.physics.sample_model import Network
+from biogrip.physics.protocol import evaluate, sample_times
 from biogrip.physics.simulation import compute_grip, jaw_force, simulated_response
 from biogrip.physics.unilateral import unilateral_response
-from biogrip.records.identifications import DIFFERENCES
 from biogrip.records.rows import write_arrays
 from biogrip.records.traces import (
     Measurements,
+    of_recording,
     read_target,
     write_measurements,
     write_target,
 )
-from biogrip.study.study import Case, Study
+from biogrip.study.study import Case
 from biogrip.terminal import warn
+from biogrip.traces.columns import place
+from biogrip.traces.reader import read_recording
 
 
 def simulate(case: Case, target: Path) -> None:
@@ -122,48 +118,11 @@ def run(case: Case, gripper: Path, records: Path) -> None:
     write_text(gripper, calibration_yaml(found["left"], found["right"]))
 
 
-ANGLES_DEG = np.arange(40.0, 91.0, 5.0)
-FACTORS = np.geomspace(0.25, 32.0, 15)
-
-
-def compare(study: Study, differences: Path) -> None:
-    """Write a row per case, angle and torque factor, CSV."""
-    DIFFERENCES.write(differences, _rows(study))
-
-
-def _rows(study: Study) -> Iterator[tuple[str, ...]]:
-    for name, case in study.cases.items():
-        model = case.sample.model
-        values = [case.parameters[p] for p in model.names]
-        network = model.network(np.tile(values, (len(FACTORS), 1)))
-        for angle in ANGLES_DEG:
-            turned = replace(case.gripper, reference_angle_deg=float(angle))
-            shares = difference_over_peak(turned, network, case.torque, FACTORS)
-            for factor, share in zip(FACTORS, shares, strict=True):
-                yield name, f"{angle:g}", f"{factor:.4g}", f"{share:.4g}"
-
-
-def difference_over_peak(
-    gripper: Gripper, network: Network, torque: Course, factors: Array
-) -> Array:
-    """Return the largest difference of the models as a share of the nonlinear peak rotation, (n,).
-
-    Factors of the torque are one per sample, (n,). NaN where the torque closes the arms beyond the
-    model's validity.
-    """
-    time_s = _times(torque)
-    found = correction(gripper, network, torque, factors)
-    response = step_response(gripper, network, inertia=False)
-    difference = found.at(time_s)
-    nonlinear = factors[:, None] * superpose(response, torque, time_s) + difference
-    share = np.max(np.abs(difference), axis=1) / np.max(np.abs(nonlinear), axis=1)
-    return np.where(found.converged, share, np.nan)
-
-
-def _times(torque: Course) -> Array:
-    """Return times that are dense after every jump and reach up to the next."""
-    ends = np.append(torque.time_s[1:], torque.end_s)
-    lasting = zip(torque.time_s, ends - torque.time_s, strict=True)
-    return np.concatenate(
-        [start + np.geomspace(min(0.1, lasts / 2), lasts, 60) for start, lasts in lasting]
-    )
+def record(case: Case, recorded: Path, measurements: Path) -> None:
+    """Read, check and convert the user's file; errors name file, line and column."""
+    if case.columns.load is not None:
+        raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
+    trace, _ = prepare(read_recording(recorded, case.columns), case.experiment)
+    for remark in trace.remarks():
+        warn(f"{place(recorded)}: {remark}")
+    write_measurements(measurements, of_recording(trace))

@@ -58,7 +58,7 @@ def coverage(
     rows: list[Row] = []
     estimated = pd.concat([INTERVALS.read(it) for it in intervals], ignore_index=True)
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
-        experiment = case.problem.calibrated([next(calibrations)] if case.is_calibrated else [])
+        experiment = case.experiment.calibrated([next(calibrations)] if case.is_calibrated else [])
         log_truth = experiment.logs(case.parameters)
         found = estimated[estimated["case"] == name]
         time_s, _, rotation = read_target(target)
@@ -158,7 +158,7 @@ def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
     estimated = pd.concat([INTERVALS.read(it) for it in intervals], ignore_index=True)
     for name, case in study.cases.items():
         found = estimated[estimated["case"] == name]
-        for quantity in parameters_and_sum(case.problem.searched):
+        for quantity in parameters_and_sum(case.experiment.searched):
             mine = found[(found["quantity"] == quantity.label) & found["verdict"].notna()]
             target = target_of(quantity.label, case.parameters)
             head: Row = {"case": name, "quantity": quantity.label, "unit": quantity.unit}

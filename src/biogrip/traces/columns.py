@@ -132,7 +132,7 @@ def _option(key: str) -> str:
 
 
 def unit_of(
-    path: Path,
+    path: Path | None,
     column: str,
     given: str | None,
     allowed: Mapping[str, float],
@@ -228,8 +228,10 @@ def _bare(cell: str) -> str:
     return plain[1:-1].strip() if in_brackets(plain) else plain
 
 
-def place(path: Path, line: int | None = None, column: str | None = None) -> str:
-    """Return the file, line and column at the beginning of a message."""
+def place(path: Path | None, line: int | None = None, column: str | None = None) -> str:
+    """Return the file, line and column at the beginning of a message; of an array its index."""
+    if path is None:
+        return "the trace" if column is None else column + f"[{line}]" * (line is not None)
     at = "" if line is None else f", line {line}"
     of = "" if column is None else f", column '{visible(column)}'"
     return f"{visible(path)}{at}{of}"

@@ -1,12 +1,12 @@
 """What the gripper does to a sample, and what its model leaves out.
 
 Tables: the closed gripper at contact with samples of several sizes; strain, force, stiffness
-and apparent modulus of every sample; effects that the model leaves out, estimated; the torque
-up to which the paper's linearisation is accurate; and errors of identifications that wrongly assume
-bilateral contact.
+and apparent modulus of every sample; effects that the model leaves out, estimated; and errors of
+identifications that wrongly assume bilateral contact.
 """
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -34,10 +34,13 @@ from biogrip.physics.simulation import (
     simulated_shortening,
 )
 from biogrip.physics.unilateral import unilateral_response
-from biogrip.records.identifications import DIFFERENCES
 from biogrip.records.traces import as_written
+from biogrip.stages.job import job_study, logged
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, ShownTable
+from biogrip.tables.layout import Column, Row, ShownTable, write
+
+if TYPE_CHECKING:
+    snakemake: Any
 
 _CONTACT_COLUMNS = (
     Column("size_um", "Sample (um)"),
@@ -211,47 +214,6 @@ def _damping(case: Case) -> float:
     return float(case.network.c_p[0] + case.network.c[0].sum())
 
 
-LIMIT_PERCENT = 1.0
-"""Difference up to which the linear model counts as accurate, as a share of the peak."""
-
-_LINEARISATION_COLUMNS = (
-    Column("case", "Case"),
-    Column("reference_angle_deg", "Reference angle (deg)"),
-    Column("difference_percent", "Difference at the protocol's torque (%)", 2),
-    Column(f"factor_for_{LIMIT_PERCENT:g}_percent", f"Torque factor for {LIMIT_PERCENT:g} %", 3),
-)
-
-
-def linearisation(differences: Path) -> ShownTable:
-    """Return, for every case and angle, the torque factor that reaches `LIMIT_PERCENT`."""
-    rows = []
-    for (case, angle), group in DIFFERENCES.read(differences).groupby(
-        ["case", "reference_angle_deg"], sort=False
-    ):
-        factor = group["torque_factor"].to_numpy(float)
-        share = group["difference_over_peak"].to_numpy(float)
-        known = np.isfinite(share)
-        at_one = np.exp(np.interp(0.0, np.log(factor[known]), np.log(share[known])))
-        cells = case, float(angle), 100 * at_one, _crossing(factor, share)
-        rows.append({c.name: x for c, x in zip(_LINEARISATION_COLUMNS, cells, strict=True)})
-    caption = (
-        "Largest difference of the linear from the nonlinear model, as a share of the peak, at the "
-        "torque of the case's protocol, and the multiple of that torque at which it reaches "
-        f"{LIMIT_PERCENT:g} % (empty: not up to {factor[-1]:g})."
-    )
-    return ShownTable(caption, _LINEARISATION_COLUMNS, rows)
-
-
-def _crossing(factor: Array, share: Array) -> float | None:
-    """Return the factor at which a share first reaches the limit, interpolated in logarithms."""
-    limit = LIMIT_PERCENT / 100
-    above = np.flatnonzero(share >= limit)
-    if not len(above) or above[0] == 0:
-        return float(factor[0]) if len(above) else None
-    pair = slice(above[0] - 1, above[0] + 1)
-    return float(np.exp(np.interp(np.log(limit), np.log(share[pair]), np.log(factor[pair]))))
-
-
 _MOST_SEEDS = 20
 # Error in percent beyond which a number means little.
 _LARGEST_PERCENT = 1000.0
@@ -332,7 +294,7 @@ def _medians(
 
     Noise has the shape (n_seeds, n_samples).
     """
-    problem = case.problem.to_identify()
+    problem = case.experiment.to_identify()
     searched = problem.searched
     if len(time_s) <= len(searched.names) + problem.offset + problem.drift + 1:
         return {}
@@ -355,3 +317,14 @@ def _medians(
 def _error_percent(target: float, value: float | None) -> float | None:
     error = 100 * (target - value) / target if target and value is not None else None
     return None if error is None or abs(error) > _LARGEST_PERCENT else error
+
+
+if __name__ == "__main__":
+    with logged(snakemake):
+        study_held = job_study(snakemake)
+        write(contacts(study_held), Path(snakemake.output.contact))
+        write(left_out(study_held), Path(snakemake.output.left_out))
+        if study_held.gripped:
+            of_gripped, of_loss = map(Path, snakemake.output.gripped[:2])
+            write(mechanics(study_held.of(study_held.gripped)), of_gripped)
+            write(contact_loss(study_held), of_loss)

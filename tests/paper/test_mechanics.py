@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from biogrip.physics.models import Sample
-from biogrip.records.identifications import DIFFERENCES
-from biogrip.tables.mechanics import contact_loss, left_out, linearisation, mechanics
 from tests.helpers.default import STUDY, seen, study_of
+from workflow.paper.linearisation import DIFFERENCES, linearisation
+from workflow.paper.mechanics import contact_loss, left_out, mechanics
 
 
 def test_springs_alone_tell_what_statics_says() -> None:

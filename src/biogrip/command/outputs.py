@@ -38,7 +38,7 @@ class Outcome:
     """Results of several traces."""
 
     found: list[dict[str, Any]]
-    """Result of each usable trace, as `Identified.data`."""
+    """Result of each usable trace, see `data_of`."""
     refused: dict[str, str]
     """Message of each other trace, which could not be read or whose fit failed, by file."""
     pictures: dict[str, list[str]] = field(default_factory=dict)

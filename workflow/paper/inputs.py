@@ -1,8 +1,15 @@
 """Tables 1 to 4: inputs of the study, from its config."""
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 from biogrip.physics.sample_model import SINGLE_BRANCH
+from biogrip.stages.job import job_study, logged
 from biogrip.study.study import Study
-from biogrip.tables.layout import Column, ShownTable
+from biogrip.tables.layout import Column, ShownTable, write
+
+if TYPE_CHECKING:
+    snakemake: Any
 
 _LEGEND = (
     " Stated: by the paper, or by whoever changed the config. "
@@ -114,3 +121,16 @@ def _quantities(
 def _source(study: Study, key: str) -> str:
     marked = any(key == name or key.startswith(f"{name}.") for name in study.config.reconstructed)
     return "reconstructed" if marked else "stated"
+
+
+if __name__ == "__main__":
+    with logged(snakemake):
+        the_study = job_study(snakemake)
+        tables = {
+            "gripper": gripper,
+            "actuator": actuator,
+            "gene_ranges": gene_ranges,
+            "parameter_ranges": parameter_ranges,
+        }
+        for file in map(Path, snakemake.output.tables):
+            write(tables[file.stem](the_study), file)

@@ -4,22 +4,20 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from biogrip.arrays import as_column
+from biogrip.command.files import data_of
+from biogrip.command.settings import MODEL, Asked, Setting, read_trace
+from biogrip.command.words import in_words
 from biogrip.errors import BiogripError
-from biogrip.identify.one_trace import Identified, identify_alike
-from biogrip.identify.settings import MODEL, Asked, Setting
-from biogrip.identify.trace_case import read_trace
-from biogrip.identify.words import in_words
+from biogrip.identify.identify import identify
+from biogrip.judging.diagnosis import Diagnosis
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS
 from biogrip.study.source import HOLD
-from biogrip.terminal import Progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,6 +30,7 @@ one_blas_thread: Callable[[_Function], _Function] = threadpool_limits.wrap(
 )
 """Decorator of what fits: its matrices are small, and BLAS threads cost more than they bring."""
 
+_TRACE = "trace"
 # Options of the command in what it says, and the arguments and keys that they are here.
 _ARGUMENTS = (
     ("--start fit", 'start="fit"'),
@@ -58,8 +57,13 @@ def _with_arguments(said: Any) -> Any:
 
 
 @dataclass(frozen=True, repr=False)
-class TraceResult(Identified):
+class TraceResult:
     """What a trace tells; ``print`` says all that the command says."""
+
+    diagnosis: Diagnosis
+    """The fit and all that was tested."""
+    data: dict[str, Any]
+    """The same as plain data, not rounded, with the keys of the command's JSON file."""
 
     @property
     def status(self) -> str:
@@ -83,9 +87,9 @@ class TraceResult(Identified):
 
     def plot(self) -> "Figure":
         """Draw the trace, its fit and the residuals."""
-        from biogrip.identify.page import draw_best
+        from biogrip.command.page import draw_best
 
-        return draw_best(self)
+        return draw_best(self.diagnosis)
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""
@@ -170,17 +174,11 @@ def identify_trace(
         ("fixed", "fixed", fixed and {**fixed}),
     ]
     settings = [Setting(by, tuple(key.split(".")), it) for by, key, it in chosen if it is not None]
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "trace.csv"
-        rows, header = np.transpose([*columns.values()]), ",".join(columns)
-        np.savetxt(file, rows, "%.17g", ",", header=header, comments="")
-        asked = Asked(file, None, tuple(settings), file.name)
-        try:
-            trace = read_trace(asked)
-            with Progress("", 5, live=False, quiet=True) as progress:
-                (result,) = identify_alike([Path(file.name)], [trace], progress)
-        except BiogripError as error:
-            said = _with_arguments(str(error).replace(str(file), file.name))
-            raise BiogripError(said) from None
-    result.data["assumed"]["measurement"]["file"] = file.name
-    return TraceResult(**{**vars(result), "data": _with_arguments(result.data)})
+    asked = Asked(Path(_TRACE), None, tuple(settings), "arguments", arrays=(*columns.values(),))
+    try:
+        recording, case = read_trace(asked)
+        diagnosis = identify(recording, case.judged_experiment)
+    except BiogripError as error:
+        raise BiogripError(_with_arguments(str(error))) from None
+    data = data_of(diagnosis, case, _TRACE, asked.given)
+    return TraceResult(diagnosis, _with_arguments(data))

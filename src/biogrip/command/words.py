@@ -13,9 +13,9 @@ from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
     DETERMINED,
+    FIT_REJECTED,
     NOT_DETERMINED,
 )
-from biogrip.records.identifications import FIT_REJECTED
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
 

@@ -18,16 +18,17 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from biogrip import __version__
+from biogrip.command import words
+from biogrip.command.outputs import WRITTEN_BY, Outcome
 from biogrip.digits import with_unit
 from biogrip.figures.fit import draw_fit
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.figures.results import fit_of
 from biogrip.figures.style import BLUE, COLUMN_IN, figure, is_over_decades, save_png, styled
 from biogrip.files import write_text
-from biogrip.identify import words
-from biogrip.identify.one_trace import Identified
-from biogrip.identify.outputs import WRITTEN_BY, Outcome
+from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
+from biogrip.records.traces import of_recording
 from biogrip.terminal import visible, visible_lines
 
 _MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
@@ -35,23 +36,25 @@ _MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
 _WIDE = 5.0
 
 
-def draw(identified: Identified) -> list[str]:
+def draw(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
     """Return pictures of a trace as data URLs: the fit with its residuals, and all profiles."""
-    drawn = draw_best(identified)
+    drawn = draw_best(diagnosis)
     with styled():
-        return [_address(drawn), _address(draw_profiles_of(identified.data))]
+        return [_address(drawn), _address(draw_profiles_of(data))]
 
 
-def draw_best(identified: Identified) -> Figure:
+def draw_best(diagnosis: Diagnosis) -> Figure:
     """Draw a trace, its best fit and the residuals over the time of the file's clock.
 
     Where readings spread over decades after the protocol's start, time is counted from there.
     """
-    problem, recorded = identified.problem, identified.recorded
-    found = {item["quantity"]: item["value"] for item in identified.data["quantities"]}
-    values = {name: found[name] for name in problem.searched.names}
-    fit = fit_of(problem, {**problem.fixed, **values}, recorded, 0)
-    start_s = recorded.onset_s or 0.0
+    experiment, recording = diagnosis.experiment, diagnosis.recording
+    assert experiment is not None
+    assert recording is not None
+    found = {finding.quantity.label: finding.value for finding in diagnosis.findings}
+    values = {name: found[name] for name in experiment.searched.names}
+    fit = fit_of(experiment, {**experiment.fixed, **values}, of_recording(recording), 0)
+    start_s = recording.onset_s or 0.0
     spread = is_over_decades(fit.time_s)
     if not spread:
         fit = replace(fit, time_s=fit.time_s + start_s)

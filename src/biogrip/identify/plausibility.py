@@ -18,7 +18,7 @@ from biogrip.fit.experiment import Experiment
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import Course, evaluate
 from biogrip.physics.whitening import nuisance_basis, without
-from biogrip.traces.columns import TIME_UNITS, place
+from biogrip.traces.columns import TIME_UNITS
 from biogrip.traces.reader import Recording
 
 # Plausible rotations over that of the free arm. No sample makes the arm turn further than without
@@ -45,9 +45,8 @@ _ABSURD = 1e9
 
 def check_recording(
     recording: Recording,
-    problem: Experiment,
+    experiment: Experiment,
     noise_sd: float | None = None,
-    onset_s: float | None = None,
 ) -> str | None:
     """Refuse a trace that is impossible with the instrument and protocol.
 
@@ -60,14 +59,13 @@ def check_recording(
     Parameters
     ----------
     recording
-        Trace, its times counted from the start of the protocol.
-    problem
+        Trace, its times counted from the start of the protocol; if that is known, readings before
+        it are allowed.
+    experiment
         What it was recorded with.
     noise_sd
         Typical standard deviation of the noise, if it is given: a small rotation passes if that is
         far smaller still.
-    onset_s
-        Time of the clock at which the protocol starts; if given, readings before it are allowed.
 
     Returns
     -------
@@ -79,16 +77,16 @@ def check_recording(
     BiogripError
         With file, line, column, what was found and allowed, and a unit that would be plausible.
     """
-    torque, instrument = problem.torque, problem.instrument
-    _check_times(recording, torque, onset_s)
+    torque, instrument = experiment.torque, experiment.instrument
+    _check_times(recording, torque)
     time_s, trace = recording.time_s, recording.readings
-    free, largest = free_rotation(problem.gripper, torque), float(np.abs(trace).max())
+    free, largest = free_rotation(experiment.gripper, torque), float(np.abs(trace).max())
     if largest > _ABSURD * free:
         return _check_turn(recording, largest, free, None)
-    responses = extreme_responses(problem, _LAG_SHARES)(time_s)
-    nuisance = problem.nuisance(time_s)
+    responses = extreme_responses(experiment, _LAG_SHARES)(time_s)
+    nuisance = experiment.nuisance(time_s)
     (amplitudes, rest), (_, mirrored) = _either_sign(trace, responses, nuisance)
-    where = _extent(recording, recording.read.reading)
+    where = recording.extent(recording.read.reading)
     read, controlled = recording.read.quantity, instrument.controlled.name
     least = min(rest, mirrored)
     is_constant = not instrument.deforms and len(trace) * np.var(trace) <= least
@@ -101,7 +99,7 @@ def check_recording(
             f"from zero that follows the {controlled} and stands out of the noise."
         )
     # An undeclared offset may look like the wrong sign.
-    also = nuisance_basis(time_s, offset=True, drift=problem.drift)
+    also = nuisance_basis(time_s, offset=True, drift=experiment.drift)
     (_, beside), (_, mirrored_beside) = _either_sign(trace, responses, also)
     likelier = rest > mirrored * math.exp(_FAR_LIKELIER / len(trace))
     if likelier and beside > mirrored_beside:
@@ -148,8 +146,9 @@ def free_rotation(gripper: Gripper, torque: Course) -> float:
     return float(largest / gripper.left.stiffness_Nm_per_rad)
 
 
-def _check_times(recording: Recording, torque: Course, onset_s: float | None) -> None:
+def _check_times(recording: Recording, torque: Course) -> None:
     columns, end_s, slack = recording.read, torque.end_s, _TIME_SLACK * torque.end_s
+    onset_s = recording.onset_s
     begins = onset_s or 0.0
     time_s, earliest = recording.time_s, -slack if onset_s is None else -np.inf
     clock_s = time_s + begins
@@ -169,12 +168,12 @@ def _check_times(recording: Recording, torque: Course, onset_s: float | None) ->
                 how = "start_s under measurement says when, or fit_start: true finds it"
             hint = f" If the protocol starts at another time of the clock than 0, {how}."
         raise BiogripError(
-            f"{place(recording.path, recording.lines[sample], columns.time)}: found "
+            f"{recording.place(sample, columns.time)}: found "
             f"{clock_s[sample]:.12g} s, allowed is the protocol's time, {begins:g} to "
             f"{begins + end_s:g} s.{hint}"
         )
     raise BiogripError(
-        f"{_extent(recording, columns.time)}: found only {clock_s[0]:g} to "
+        f"{recording.extent(columns.time)}: found only {clock_s[0]:g} to "
         f"{clock_s[-1]:g} s of the protocol's {end_s:g} s, allowed are at least {shortest:g} s of "
         f"it.{hint}"
     )
@@ -203,9 +202,9 @@ def _check_turn(
             f"at least {smallest:.3g} rad, or less with a given noise (--noise) {_FAR_ABOVE:g} "
             f"times smaller still, where {alone}"
         )
-    sample = np.argmax(np.abs(recording.readings))
+    sample = int(np.argmax(np.abs(recording.readings)))
     raise BiogripError(
-        f"{place(recording.path, recording.lines[sample], columns.reading)}: found "
+        f"{recording.place(sample, columns.reading)}: found "
         f"{recording.readings[sample]:.3g} rad as the largest rotation, and {turn:.3g} rad as "
         f"the largest with the noise smoothed out; allowed is {limit}.{hint}"
     )
@@ -217,8 +216,3 @@ def _other_units(unit: str, units: Mapping[str, float], fits: Callable[[float], 
     found = [f"{factor:.4g} times (is it in {name}?)" for factor, name in named if fits(factor)]
     found = found or [f"{factor:g} times" for factor in (1e-6, 1e-3, 1e3, 1e6) if fits(factor)]
     return f" It would fit if it were {' or '.join(found)}." if found else ""
-
-
-def _extent(recording: Recording, column: str) -> str:
-    first, last = recording.lines[[0, -1]]
-    return f"{place(recording.path)}, lines {first} to {last}, column '{column}'"

@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import StringIO
 from itertools import zip_longest
 from pathlib import Path
@@ -24,14 +24,14 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.command.outputs import COLUMNS
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
-from biogrip.identify.outputs import COLUMNS
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.experiment_blocks import LONGEST_S, SHORTEST_S
 from biogrip.study.load import load_study, read_configs
-from biogrip.study.measurement_block import READINGS, MeasurementBlock
+from biogrip.study.measurement_block import ARRAYS, READINGS, MeasurementBlock
 from biogrip.study.messages import checked, schema_of
 from biogrip.study.source import (
     HOLD,
@@ -44,8 +44,8 @@ from biogrip.study.source import (
 )
 from biogrip.study.study import Case
 from biogrip.terminal import visible
-from biogrip.traces.columns import listed, place, trace_file_problem
-from biogrip.traces.reader import Recording, read_recording
+from biogrip.traces.columns import Columns, listed, place, trace_file_problem
+from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
 
 MODEL = "generalized_maxwell"
 """Sample model of traces of which nothing says another."""
@@ -91,6 +91,8 @@ class Asked:
     """Row of a table that lists the trace, for messages."""
     copied: Mapping[str, str] = field(default_factory=dict)
     """Other cells of that row, by column."""
+    arrays: tuple[Array, ...] = ()
+    """Times, readings and perhaps standard deviations, (n_samples,) each, instead of a file."""
 
     @property
     def given(self) -> dict[str, Any]:
@@ -99,6 +101,12 @@ class Asked:
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
         return blocks
+
+    def read(self, columns: Columns) -> Recording:
+        """Read the trace; a `BiogripError` has file, line and column, or array and index."""
+        if self.arrays:
+            return recording_of_arrays(columns, *self.arrays)
+        return read_recording(self.trace, columns)
 
 
 def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
@@ -118,11 +126,27 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     return found
 
 
+def read_trace(asked: Asked) -> tuple[Recording, Case]:
+    """Read a trace, and return it with the case that it is.
+
+    A `BiogripError` has file, line and column, or setting, that cannot be used.
+    """
+    case, recording = _case_of(asked)
+    columns = replace(case.columns, by_options=True)
+    # What its protocol follows from was read before the protocol's start was known.
+    return replace(recording, read=columns) if recording else asked.read(columns), case
+
+
 def case_of(asked: Asked) -> Case:
-    """Return the case that a trace is, before its readings are looked at.
+    """Return the case that a trace is.
 
     A `BiogripError` has option, row, or file, line and key, if settings or config cannot be used.
     """
+    return _case_of(asked)[0]
+
+
+def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
+    """Return the case that a trace is, and the trace if its protocol follows from it."""
     files = [default_config(), *([asked.config] if asked.config else [])]
     below = read_configs(files)
     given = asked.given
@@ -130,7 +154,7 @@ def case_of(asked: Asked) -> Case:
         of_config = [*keys_in(read_configs([asked.config] if asked.config else []))]
         said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in found]
         raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
-    merged = _with_instrument(overlaid(below, given), given, asked.trace)
+    merged, recording = _with_instrument(overlaid(below, given), given, asked)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
         merged.pop(name, None)
@@ -143,7 +167,7 @@ def case_of(asked: Asked) -> Case:
     except BiogripError as error:
         _, *problems = str(error).replace(f"cases.{case}.", "").split("\n")
         raise BiogripError("\n".join(problems)) from error
-    return study.cases[case]
+    return study.cases[case], recording
 
 
 def _source(
@@ -161,29 +185,33 @@ def _source(
 
 
 def _with_instrument(
-    merged: dict[str, Any], given: Mapping[str, Any], trace: Path
-) -> dict[str, Any]:
-    """Return the blocks with the trace's file, its instrument, and a protocol of that."""
+    merged: dict[str, Any], given: Mapping[str, Any], asked: Asked
+) -> tuple[dict[str, Any], Recording | None]:
+    """Return the blocks with the trace's file, its instrument, and a protocol of that.
+
+    Where the protocol follows from the trace, it is returned, too.
+    """
     level = merged.pop(HOLD[0], None)
     if not isinstance(merged["measurement"], dict):
-        return merged
+        return merged, None
     instrument = _instrument(merged, given)
     usual = {"time": "time_s", instrument.read.name: instrument.read.column}
-    measurement = usual | merged["measurement"] | {"file": str(trace)}
+    file = ARRAYS if asked.arrays else str(asked.trace)
+    measurement = usual | merged["measurement"] | {"file": file}
     measurement = schema_of(MeasurementBlock).with_numbers(measurement)
     kind, controlled = given.get("instrument", instrument.kind), instrument.controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
     of_column = measurement.get(LOAD[-1]) is not None
     if level is None and not of_column:
         if "protocol" in given or instrument.has_jaws:
-            return found
+            return found, None
         if not instrument.relative:
             unit = f" in {controlled.unit}" if controlled.unit else ""
             raise BiogripError(
                 f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, a "
                 "column of it by --load, or a protocol in --config."
             )
-    own = _recording(trace, measurement)
+    own = _recording(asked, measurement)
     phases = [{"duration_s": 1.0, controlled.column: 1.0 if level is None else level}]
     start_s = measurement.get("start_s")
     if own is not None and own.load is not None:
@@ -196,11 +224,11 @@ def _with_instrument(
         phases[0]["duration_s"] = lasts if lasts > 0 else 1.0
         if lasts > 0 and not SHORTEST_S <= lasts <= LONGEST_S:
             raise BiogripError(
-                f"{place(trace)}: found {lasts:g} s from the protocol's start, at {first:g} s, to "
-                f"the last reading; allowed are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit of "
-                "time right? Or say when it started (--start)."
+                f"{place(own.path)}: found {lasts:g} s from the protocol's start, at {first:g} s, "
+                f"to the last reading; allowed are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit "
+                "of time right? Or say when it started (--start)."
             )
-    return {**found, "protocol": {"phases": phases}}
+    return {**found, "protocol": {"phases": phases}}, own
 
 
 def _phases(load: Array, start_s: float, key: str) -> list[dict[str, float]]:
@@ -222,11 +250,11 @@ def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrume
     return next((each for each in some if each.controlled.column in keys), some[0])
 
 
-def _recording(trace: Path, measurement: Mapping[str, Any]) -> Recording | None:
+def _recording(asked: Asked, measurement: Mapping[str, Any]) -> Recording | None:
     """Read a trace; return None if whoever uses it will say what is wrong."""
     block = checked(MeasurementBlock, measurement)[0]
     with suppress(BiogripError):
-        return None if block is None else read_recording(trace, block.columns)
+        return None if block is None else asked.read(block.columns)
     return None
 
 
