@@ -319,3 +319,16 @@ def test_a_ramp_before_the_first_reading_is_said_to_change_values(ramp_s: float)
         assert float(said[1]) == pytest.approx(200.0, rel=0.02)
     protocol = {"instrument": "relaxation", "protocol": {"phases": phases}}
     assert "If the load was no step" not in notes_on(times, values, config=protocol, **given)[1]
+
+
+@pytest.mark.parametrize("readings", [6, 12, 40])
+def test_an_onset_leaves_readings_to_fit(readings: int) -> None:
+    """Of a trace that is nearly constant any onset fits; three parameters take five readings."""
+    times: Array = 2.5 * np.arange(1.0, readings + 1)
+    values = 100 + 3.6 * np.random.default_rng(0).standard_normal(readings)
+    protocol, sample = (hold(float(times[-1]), 1.0),), Sample("zener_maxwell")
+    experiment = set_up(INSTRUMENTS["modulus"], protocol, sample)
+    fits = OnsetFits(experiment, times, values)
+    best = fits.best(float(times[-1]))
+    assert best.onset_s <= times[-5]
+    assert np.isfinite(best.misfit)

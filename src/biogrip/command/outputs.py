@@ -100,9 +100,10 @@ def write_table(outcome: Outcome, table: Path) -> None:
     rows: dict[str, dict[str, Any]] = {}
     for each in map(rounded_numbers, outcome.found):
         row = {name: each[name] for name in COLUMNS if name in each}
-        # The model of the lowest BIC, if others were compared.
-        best = [model["model"] for model in each["models"] if model["delta_bic"] == 0]
-        row |= {"preferred_model": "".join(best[:1]), "fixed": "; ".join(each.get("fixed", ()))}
+        row |= {
+            "preferred_model": each["preferred_model"] or "",
+            "fixed": "; ".join(each.get("fixed", ())),
+        }
         row[LINEAR] = "yes" if each["without_model"]["is_linear"] else "no"
         without = each["without_model"]["quantities"]
         if not each["assumed"]["identifiability"]["at_s"]:

@@ -54,6 +54,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines += [] if rejected else without_model_in_words(found)
     lines += one_sided_in_words([found], foremost(found))
     lines += [found["limits"]] if not rejected else []
+    lines += [each["words"] for each in found["hidden"][:1]]
     lines += [trade["words"] for trade in found["trades"]]
     lines += fitted_in_words(found)
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]

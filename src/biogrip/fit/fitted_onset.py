@@ -32,6 +32,8 @@ _DELAYS = 65
 _MOST_READINGS = 2000
 # Least share of the protocol that has to be after the onset.
 _LEAST_AFTER = 0.02
+# Readings after the latest onset, beside one for each parameter.
+_MORE_AFTER = 2
 # Fewest readings before an onset by which a late one is recognised.
 _FEWEST_BEFORE = 3
 # Standard deviation of readings that are constant, in noise, and in peaks of noise-free traces.
@@ -134,8 +136,15 @@ class OnsetFits:
         fit = fit_from([self.posed(onset_s)], near)
         return OnsetFit(onset_s, fit.x[0], float(fit.misfit[0]))
 
+    @cached_property
+    def _latest_s(self) -> float:
+        """Latest onset, which leaves readings enough to fit the sample."""
+        after = len(self._identified.searched.names) + _MORE_AFTER
+        return float(self.time_s[max(len(self.time_s) - after, 0)])
+
     def best(self, guess_s: float) -> OnsetFit:
         """Fit the onset along, beginning with a guess in s."""
+        guess_s = min(guess_s, self._latest_s)
         rngs = [np.random.default_rng(0)]
         (found,) = identify_many([self.posed(guess_s)], _BUDGET, rngs, silent)
         start = OnsetFit(guess_s, np.log(found.parameters), found.misfit)
@@ -153,7 +162,8 @@ class OnsetFits:
         for _ in range(_MOST_STEPS):
             if step_s < _LAST_STEP * min(interval_s, spacing_at(self.time_s, best.onset_s)):
                 break
-            sides = (self.at(best.onset_s + s, best.log_parameters) for s in (-step_s, step_s))
+            onsets = (min(best.onset_s + s, self._latest_s) for s in (-step_s, step_s))
+            sides = (self.at(onset_s, best.log_parameters) for onset_s in onsets)
             lower = min(sides, key=_misfit)
             if lower.misfit < best.misfit:
                 best = lower
@@ -165,7 +175,9 @@ class OnsetFits:
             tried.append(self.at(float(onset_s), best.log_parameters))
             return tried[-1].misfit
 
-        for low, high in self._smooth_intervals(best.onset_s):
+        for low, end in self._smooth_intervals(best.onset_s):
+            if (high := min(end, self._latest_s)) <= low:
+                continue
             accurate = {"xatol": _ACCURATE * (high - low)}
             minimize_scalar(misfit, bounds=(low, high), method="bounded", options=accurate)
         return min(tried, key=_misfit)

@@ -15,6 +15,7 @@ from biogrip.digits import counted, rounded
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment, pose
 from biogrip.fit.least_squares import fit_from, identify_many
+from biogrip.fit.nested_fits import deepen
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.physics.simulation import simulated_response
@@ -90,6 +91,8 @@ class TraceFit:
     """Autocorrelation model of the noise; None if the noise was assumed to be white."""
     outliers: BoolArray
     """True for readings that were left out, (n_samples,)."""
+    time_error: float = 0.0
+    """Standard deviation of the logarithm of the noise model's correlation time."""
     fitted_along: str = ""
     """Terms of the instrument that were fitted along, in words."""
 
@@ -113,6 +116,7 @@ class TraceFit:
         others = {
             f"correlated over some {noise_model.time_s:.2g} s": noise_model.ar1,
             "1/f": noise_model.flicker,
+            "a random walk": noise_model.walk,
             f"that grows with the {read}": noise_model.proportional,
         }
         parts = [f"{100 * noise_model.white:.0f} % white"]
@@ -135,10 +139,10 @@ def fit_traces(
     """Fit each of several traces and, if wanted, estimate the model of its noise.
 
     Traces of plain noise are fitted together. With a coloured noise model, outliers are removed,
-    and the noise is a sum of white, Ornstein-Uhlenbeck and 1/f noise. If it grows with the
-    rotation, so does a part of the white noise: the parts whose readings depend on each other are
-    of the instrument's zero. The effect of the gripper's uncertainty on the rotation is one more
-    component of the noise.
+    and the noise is a sum of white, Ornstein-Uhlenbeck and 1/f noise and a random walk. If it grows
+    with the rotation, so does a part of the white noise: the parts whose readings depend on each
+    other are of the instrument's zero. The effect of the gripper's uncertainty on the rotation is
+    one more component of the noise.
 
     `find` finds the global optima of the problems of given traces. A trace is its ascending times
     and readings, (n_samples,), and has assumptions of its own. Too many readings for a coloured
@@ -175,7 +179,7 @@ def fit_least_squares(
     def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
         of_traces = [rngs[trace] for trace in which]
         found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
-        pairs = zip(problems, found, strict=True)
+        pairs = zip(problems, deepen(problems, found), strict=True)
         return [fit.in_order(problem.residuals.model) for problem, fit in pairs]
 
     return fit_traces(experiments, traces, find)
@@ -194,12 +198,13 @@ def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: 
             )
         kept, plain, found = _without_outliers(experiment, time_s, readings, find)
     time_s, readings = time_s[kept], readings[kept]
-    problem, found, noise_model = _in_turn(experiment, time_s, readings, plain, found)
+    problem, found, noise_model, time_error = _in_turn(experiment, time_s, readings, plain, found)
     # Slow deviations now weigh less, so that another basin may be the deepest.
     other = find(problem)
     if np.float32(other.misfit) < np.float32(found.misfit):
         found = other
-    return TraceFit(problem, found, noise_model, ~kept, _fitted_along(experiment, time_s))
+    along = _fitted_along(experiment, time_s)
+    return TraceFit(problem, found, noise_model, ~kept, time_error, along)
 
 
 def _fitted_along(experiment: Experiment, time_s: Array) -> str:
@@ -236,7 +241,7 @@ def _in_turn(
     readings: Array,
     plain: TraceProblem,
     found: Fit,
-) -> tuple[TraceProblem, Fit, NoiseModel | None]:
+) -> tuple[TraceProblem, Fit, NoiseModel | None, float]:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, noise_model = plain, None
     logs = np.log(found.parameters)
@@ -263,16 +268,18 @@ def _in_turn(
         moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_sd
         if moved < _STAYED and _alike(before, noise_model):
             break
+    time_error = 0.0
     if noise_model is not None:
+        time_error = likelihood.time_error(noise_model)
         freedom = likelihood.freedom(noise_model, sensitivity / noise_sd, nuisance)
         problem = replace(problem, residuals=problem.residuals.with_freedom(freedom))
-    return problem, found, noise_model
+    return problem, found, noise_model, time_error
 
 
 def _alike(one: NoiseModel | None, other: NoiseModel | None) -> bool:
     if one is None or other is None:
         return one is other
-    names = ("ar1", "flicker", "proportional")
+    names = ("ar1", "flicker", "proportional", "walk")
     shares = sum(abs(getattr(one, name) - getattr(other, name)) for name in names)
     times = min(one.ar1, other.ar1) * abs(np.log(one.time_s / other.time_s))
     return bool(shares + times < _CONVERGED)

@@ -44,6 +44,11 @@ def judged_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "threshold": likelihood.threshold,
         "certainty": likelihood.certainty,
         "quantities": [_finding(each, rejected=rejected) for each in diagnosis.findings],
+        "hidden": [
+            {"words": each.words(), "moves": each.moves}
+            for each in ([] if rejected else diagnosis.hidden)
+            if each.beyond[1] > 1
+        ],
         "trades": [
             {
                 "members": list(trade.members),

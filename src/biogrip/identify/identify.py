@@ -33,11 +33,6 @@ from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit, name_suspec
 from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.traces.reader import Recording
 
-_NOT_COMPARED = (
-    "With fixed parameters no other sample models are tried: a value that is known in this model "
-    "says nothing of theirs, and without it they would fit better for their freedom alone."
-)
-
 STEPS = 4
 """Number of steps of an identification that `identify_alike` reports."""
 
@@ -134,7 +129,14 @@ def _notes_on_traces(
     notes = []
     for index, (recording, experiment) in enumerate(traces):
         said = [Note(HARMLESS, text) for text in recording.remarks()]
-        said += [Note(HARMLESS, _NOT_COMPARED)] if experiment.fixed else []
+        if experiment.fixed:
+            names, verb = (
+                " and ".join(experiment.fixed),
+                "were" if len(experiment.fixed) > 1 else "was",
+            )
+            said.append(
+                Note(HARMLESS, f"Other models are not compared, because {names} {verb} fixed.")
+            )
         said += on_fits[index]
         given = recording.time_s, recording.readings, judged[index]
         start = notes_on_start(experiment, *given)
@@ -148,13 +150,14 @@ def _notes_on_traces(
 
 
 def _notes_on_fit(fit: TraceFit, experiment: Experiment) -> list[Note]:
-    """Return notes on the noise model of a fit; one that holds much misfit rejects the fit."""
+    """Return notes on the noise model of a fit; one that may hold misfit makes it doubtful."""
     notes = [Note(HARMLESS, text) for text in fit.notes()]
     if fit.noise_model is None:
         return notes
     residuals = fit.problem.residuals
     peak = np.max(np.abs(residuals.response(np.log(fit.found.parameters))))
-    share = float(fit.found.misfit * np.sqrt(fit.noise_model.ar1) / peak)
+    slow = fit.noise_model.ar1 + fit.noise_model.walk
+    share = float(fit.found.misfit * np.sqrt(slow) / peak)
 
     def suspects() -> str:
         # A slow noise model would take misfit for noise again.
@@ -162,5 +165,6 @@ def _notes_on_fit(fit: TraceFit, experiment: Experiment) -> list[Note]:
         white = experiment.to_identify().of(trace.time_s, trace.readings).residuals
         return name_suspects(white, fit.found.misfit / white.noise_scale, white.noise_scale)
 
-    misfit = find_slow_misfit(fit.noise_model, residuals.duration_s, share, suspects)
+    given = fit.noise_model, fit.time_error, residuals.duration_s, share
+    misfit = find_slow_misfit(*given, suspects)
     return [misfit, *notes] if misfit else notes

@@ -23,6 +23,8 @@ from biogrip.fit.nested_fits import (
     FittedModels,
     fit_models,
     is_within,
+    one_branch_more,
+    preferred,
     ranked,
     vanished,
     within_range,
@@ -40,9 +42,11 @@ from biogrip.judging.doubts import (
     REJECTED,
     REJECTION,
     Note,
+    compute_status,
+    examine_residuals,
     one_in,
 )
-from biogrip.judging.likelihood import MISSED, compute_fall
+from biogrip.judging.likelihood import MISSED, compute_fall, make_likelihood
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.fractional import LONGEST_S
 from biogrip.physics.models import CANDIDATES
@@ -92,37 +96,76 @@ def models_tried(
 
     Best fits so far are among the starts.
     """
-    first = traces[0][1]
-    chosen = first.sample.candidate
+    chosen = traces[0][1].sample.candidate
     candidates = [_candidates(own[1], fit) for own, fit in zip(traces, fits, strict=True)]
     every = [FittedModels(chosen) for _ in traces]
     for names in filter(None, dict.fromkeys(candidates)):
         which = [index for index, own in enumerate(candidates) if own == names]
-        problems = {
-            name: [
-                traces[index][1].for_model(fits[index].problem, CANDIDATES[name].model)
-                for index in which
-            ]
-            for name in names
-        }
-        streams = {
-            name: [traces[index][1].stream(f"model {name}") for index in which] for name in names
-        }
-        near = {chosen: np.array([diagnoses[index].likelihood.best for index in which])}
-        found = fit_models(problems, first.least_squares, streams, lambda: None, near=near)
-        for place, index in enumerate(which):
-            answers = {name: found[name][place] for name in names}
-            recording, experiment = traces[index]
-            if experiment.fit_start and not experiment.coloured:
-                answers = {
-                    name: _at_own_onset(recording, experiment, name, problems[name][place], answer)
-                    for name, answer in answers.items()
-                }
-            own = {name: problems[name][place] for name in names}
-            misfits = _misfits(diagnoses[index], own, answers)
-            samples = fits[index].problem.residuals.samples
-            every[index] = FittedModels(chosen, ranked(names, misfits, samples), answers)
+        own = [(traces[index], fits[index], diagnoses[index]) for index in which]
+        found = _tried(own, names)
+        # Branches are added until a further one does not help.
+        while more := {_one_branch_more(*each) for each in zip(own, found, strict=True)} - {None}:
+            names = (*names, *sorted(name for name in more if name))
+            found = _tried(own, names)
+        for index, models in zip(which, found, strict=True):
+            every[index] = models
     return every
+
+
+_Own = tuple[Trace, TraceFit, Diagnosis]
+
+
+def _one_branch_more(own: _Own, models: FittedModels) -> str | None:
+    """Return the model with one branch more than the best one, if it was not tried and may be."""
+    (_, experiment), fit, _ = own
+    name = one_branch_more(models.tried) if experiment.cheap_models else None
+    return name if name and len(CANDIDATES[name].model.names) <= _most(experiment, fit) else None
+
+
+def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
+    """Fit sample models to traces, each with its fit and diagnosis by the chosen model."""
+    first = own[0][0][1]
+    chosen = first.sample.candidate
+    problems = {
+        name: [
+            experiment.for_model(fit.problem, CANDIDATES[name].model)
+            for (_, experiment), fit, _ in own
+        ]
+        for name in names
+    }
+    streams = {
+        name: [experiment.stream(f"model {name}") for (_, experiment), _, _ in own]
+        for name in names
+    }
+    near = {chosen: np.array([diagnosis.likelihood.best for _, _, diagnosis in own])}
+    found = fit_models(problems, first.least_squares, streams, lambda: None, near=near)
+    every = []
+    for place, ((recording, experiment), fit, diagnosis) in enumerate(own):
+        posed = {name: problems[name][place] for name in names}
+        answers = {name: found[name][place] for name in names}
+        if experiment.fit_start and not experiment.coloured:
+            answers = {
+                name: _at_own_onset(recording, experiment, name, posed[name], answer)
+                for name, answer in answers.items()
+            }
+        misfits = _misfits(diagnosis, posed, answers)
+        tried = ranked(list(names), misfits, fit.problem.residuals.samples)
+        best = preferred(tried, chosen)
+        adequate = best is None or _leaves_noise(experiment, posed[best], answers[best])
+        every.append(FittedModels(chosen, tried, answers, adequate))
+    return every
+
+
+def _leaves_noise(experiment: Experiment, problem: TraceProblem, answer: Fit) -> bool:
+    """Return True if what a model's fit leaves does not reject it."""
+    likelihood = make_likelihood(
+        problem,
+        within_range(answer.parameters, problem),
+        answer.misfit,
+        confidence=experiment.confidence,
+        noise_sd=experiment.noise_sd,
+    )
+    return compute_status(examine_residuals(likelihood).notes) != REJECTED
 
 
 def _misfits(
@@ -170,11 +213,15 @@ def _candidates(experiment: Experiment, fit: TraceFit) -> tuple[str, ...]:
     few = residuals.samples <= _MOST_SAMPLES and experiment.torque.end_s <= LONGEST_S
     if few and experiment.cheap_models:
         every |= dict.fromkeys(_POWER_LAWS)
-    # A model with as many parameters as readings leaves nothing to tell noise by.
-    most = residuals.free - experiment.fit_start - 1
+    most = _most(experiment, fit)
     names = (it for it in every if len(CANDIDATES[it].model.names) <= most or it == chosen)
     found = tuple(names)
     return found if len(found) > 1 else ()
+
+
+def _most(experiment: Experiment, fit: TraceFit) -> int:
+    """Return the most parameters of a model: one a reading leaves nothing to tell noise by."""
+    return fit.problem.residuals.free - experiment.fit_start - 1
 
 
 def judge_again(

@@ -13,7 +13,8 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,11 +37,20 @@ from biogrip.judging.doubts import (
 )
 from biogrip.judging.likelihood import MISSED, Likelihood, check_rows, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
-from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.verdicts import (
+    DETERMINED,
+    Finding,
+    Trade,
+    compute_findings,
+    find_trade_offs,
+)
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
 from biogrip.traces.reader import Recording
+
+if TYPE_CHECKING:
+    from biogrip.judging.hidden import Hidden
 
 # Decrease of chi^2 beyond an end that is more than chance: three standard deviations squared.
 _NOTICEABLE = 9.0
@@ -103,6 +113,15 @@ class Diagnosis:
         far_off = found.misfit**2 - residuals.noise_scale**2 > (FAR_OFF * residuals.peak) ** 2
         hopeless = far_off and not found.is_linear and self.status == REJECTED
         return replace(found, told=[]) if hopeless else found
+
+    @cached_property
+    def hidden(self) -> list["Hidden"]:
+        """Errors that the trace could hide, none of a rejected fit, see `find_hidden`."""
+        # Imported here: only those who ask for it need it.
+        from biogrip.judging.hidden import find_hidden
+
+        rejected = self.status == REJECTED
+        return [] if rejected else find_hidden(self.likelihood, self.findings)
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""
@@ -244,7 +263,7 @@ def _with_notes(judged: Diagnosis, model: SampleModel) -> Diagnosis:
         for finding in findings
         if finding.gaps
     ]
-    notes += [*_range_ends(likelihood, model), *judged.notes]
+    notes += [*_range_ends(likelihood, model), *judged.notes, *_too_slow(judged)]
     notes += _pulling(grip, residuals.duration_s)
     if not judged.converged:
         text = (
@@ -254,6 +273,17 @@ def _with_notes(judged: Diagnosis, model: SampleModel) -> Diagnosis:
         notes.append(Note(DOUBT, text))
     notes += _ringing(judged, rejected=compute_status(notes) == REJECTED)
     return replace(judged, grip=grip, notes=notes)
+
+
+def _too_slow(judged: Diagnosis) -> Iterator[Note]:
+    """Yield a note if limits that allow for a misfit as slow as the trace are too wide."""
+    wide = any(each.verdict == DETERMINED and each.is_wide for each in judged.findings)
+    if judged.likelihood.independent < 1 and wide:
+        yield Note(
+            REJECTION,
+            "What the fit leaves is as slow as the trace, and limits that allow for it tell hardly "
+            "more than an order of magnitude: what the trace determines cannot be judged.",
+        )
 
 
 def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:

@@ -3,8 +3,9 @@
 The heaviest note decides the status of a fit: ok, doubtful or rejected (`compute_status`).
 Residuals are tested for white noise (`biogrip.judging.whiteness`), each test at the level
 `FALSE_ALARM`: correlation of neighbours, the cumulative periodogram, means over stretches,
-outliers. Noise that grows with the rotation is told first, and the other tests are of what it
-leaves.
+outliers, a line in the spectrum, a step at any time, parts that differ
+(`biogrip.judging.changes`). A line or a step that explains the others is named in their place.
+Noise that grows with the rotation is told first, and the other tests are of what it leaves.
 
 What is correlated beyond chance (`CERTAIN_MISFIT`) and larger than the scatter of neighbouring
 readings may be noise all the same: if it is correlated for a short time (`has_fast_noise`), or if
@@ -30,12 +31,14 @@ from biogrip.fit.noise_model_fit import (
     compute_growth,
     outliers_of,
 )
+from biogrip.judging.changes import Step, compare_halves, find_step
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.whiteness import (
     as_correlated,
     by_leverage,
     correlated,
     far_out,
+    find_line,
     uneven,
     wandering,
 )
@@ -90,13 +93,13 @@ _TOO_MUCH = 1.2
 FAR_OFF = 0.02
 """Share of the peak from which on a misfit is far off."""
 
-# A misfit below these shares of the noise and of the peak is that of a trace without noise, and so
-# is one below what no sensor resolves.
-_NOISE_FREE, _NOISE_FREE_OF_PEAK, _UNRESOLVED = 0.01, 1e-3, 1e-6
+# A misfit below these shares of the noise and of the peak is that of a trace without noise, if
+# neighbours scatter by this share of it; and so is one below what no sensor resolves.
+_NOISE_FREE, _NOISE_FREE_OF_PEAK, _NO_SCATTER, _UNRESOLVED = 0.01, 1e-3, 0.1, 1e-6
 # A misfit below this share of the given noise is reported: noise is rarely known better.
 _TOO_LITTLE = 0.5
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
-_MANY = 100_000
+MANY = 100_000
 # Smaller chances are not told apart.
 _NEVER = 1e-6
 CLEARLY = 3.0
@@ -104,8 +107,8 @@ CLEARLY = 3.0
 
 # Share of readings that repeat the one before where a sensor is read less often than it is logged.
 _REPEATED = 0.45
-# Most outliers that are named.
-_NAMED = 5
+# Most outliers that are named, and lines of a spectrum.
+_NAMED, _MOST_LINES = 5, 3
 
 
 @dataclass(frozen=True)
@@ -122,11 +125,13 @@ class Remainder:
 def examine_residuals(likelihood: Likelihood) -> Remainder:
     """Test what the best fit of a trace leaves for noise, and for misfit."""
     residuals, misfit = likelihood.problem.residuals, likelihood.misfit
-    least = min(_NOISE_FREE * likelihood.noise_sd, _NOISE_FREE_OF_PEAK * residuals.peak)
-    if misfit < max(least, _UNRESOLVED * residuals.peak):
+    if misfit < _UNRESOLVED * residuals.peak:
         return Remainder([])
     residual, slopes = _left(residuals, likelihood.best)
     rounding = residuals.rounding
+    least = min(_NOISE_FREE * likelihood.noise_sd, _NOISE_FREE_OF_PEAK * residuals.peak)
+    if misfit < least and estimate_noise(residual, rounding) < _NO_SCATTER * misfit:
+        return Remainder([])
     growth = compute_growth(residual, residuals.response(likelihood.best), rounding)
     directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
     basis = absorbed(directions / growth)
@@ -137,29 +142,37 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     struck = outliers_of(by_leverage(standard, basis), rounding)
     if far_out(standard, struck, basis) >= FALSE_ALARM:
         struck[:] = False
+    whole = not struck.any()
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
     bulk = standard[~struck]
     basis = absorbed(basis[:, ~struck]) if struck.any() else basis
     scale = residuals.noise_scale
-    if np.ptp(growth):
+    if np.ptp(growth) or likelihood.freedom == np.inf:
         scale = max(scale, estimate_noise(standard, rounding))
     times = float(np.sqrt(np.mean(bulk**2))) / scale
     correlation, chance = correlated(bulk, basis)
-    notes: list[Note] = []
+    notes = list(_about_given(likelihood, bulk))
     found = None
-    if chance < CERTAIN_MISFIT and times > _TOO_MUCH:
+    lines = list(_lines(bulk, basis, residuals, scale)) if whole else []
+    if chance < CERTAIN_MISFIT and times > _TOO_MUCH and not lines:
         found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
+        notes.clear()
         notes += found.notes
         # What a misfit has in a row are no outliers.
         struck &= ~(np.convolve(struck, (1, 0, 1), "same") > 0)
+    elif compute_status(notes) == DOUBTFUL:
+        # With the wrong noise or unit, nothing else is known.
+        return Remainder(notes)
     doubts = [
         *_about_growth(growth, scale, residuals, likelihood.best),
         *_about_outliers(residuals, struck),
     ]
     # Outliers distort a fit, so that all that it leaves is correlated.
-    if not (found or struck.any()):
+    if whole:
         suspects = partial(name_suspects, residuals, times, scale)
-        doubts += _about_colour(bulk, basis, correlation, chance, suspects)
+        colour = list(_about_colour(bulk, basis, correlation, chance, suspects))
+        changes = _about_changes(residuals, bulk, basis, growth, coloured=bool(colour))
+        doubts += lines or changes or (colour if not found else [])
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         notes.append(
@@ -169,21 +182,12 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
                 "coloured, gives intervals that allow for such noise.",
             )
         )
-    if not found and _is_far_from_given(likelihood):
-        notes.append(
-            Note(
-                DOUBT,
-                "The noise that was given is "
-                f"{plain(likelihood.noise_sd / misfit, 2)} times what the fit leaves: its "
-                "value, or its unit, is not the right one.",
-            )
-        )
     return Remainder(notes, found.misfit if found else None)
 
 
 def _left(residuals: Residuals, log_parameters: Array) -> tuple[Array, Array]:
     """Return residuals, and their slopes by the parameters, none of very many readings."""
-    if residuals.samples > _MANY:
+    if residuals.samples > MANY:
         return residuals.left(log_parameters), np.zeros((0, residuals.samples))
     return residuals(log_parameters)
 
@@ -229,9 +233,12 @@ def _misfit(
         text = f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects}."
         return Remainder([Note(REJECTION, text)])
     misfit = as_correlated(*bulk)
-    count = f"{plain(misfit[0], 2)} independent ones" if misfit[0] > 1 else "less than one"
-    allowed = f"The limits count the {len(bulk[0])} residuals as {count}."
-    return Remainder([Note(DOUBT, f"{text} {allowed}")], misfit)
+    if misfit[0] < 1:
+        text += " It is as slow as the trace, which the limits allow for."
+    else:
+        counted_as = f"{plain(misfit[0], 2)} independent ones"
+        text += f" The limits count the {len(bulk[0])} residuals as {counted_as}."
+    return Remainder([Note(DOUBT, text)], misfit)
 
 
 def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
@@ -305,6 +312,72 @@ def _about_colour(
         )
 
 
+def _lines(residual: Array, basis: Array, residuals: Residuals, scale: float) -> Iterator[str]:
+    """Yield a sentence on lines in the spectrum of residuals, if these have no other misfit."""
+    rest, taken, named = residual, basis, list[str]()
+    unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf
+    while len(named) < _MOST_LINES:
+        frequency, chance, line = find_line(rest, residuals.trace.time_s)
+        if chance >= FALSE_ALARM:
+            break
+        amplitude = float(np.linalg.norm(line @ rest)) * np.sqrt(2 / len(rest))
+        named.append(f"{plain(frequency, 3)} Hz ({plain(amplitude, 2)}{unit})")
+        slowest = min(slowest, frequency)
+        taken = absorbed(np.vstack((taken, line)))
+        rest = without(taken, residual)
+    size = float(np.sqrt(np.mean(rest**2)))
+    misfit = correlated(rest, taken)[1] < CERTAIN_MISFIT and size > _TOO_MUCH * scale
+    if named and not misfit:
+        yield (
+            f"The residual has a line in its spectrum, at {' and '.join(named)}, as of hum or a "
+            f"vibration. Filter it out, or average the readings over {plain(1 / slowest, 3)} s."
+        )
+
+
+def _about_changes(
+    residuals: Residuals, residual: Array, basis: Array, growth: Array, *, coloured: bool
+) -> list[str]:
+    """Return a sentence on a change within the trace, if it explains what its fit leaves.
+
+    Residuals, (n_samples,), are over the growth of the noise; they may seem to be coloured.
+    """
+    trace = residuals.trace
+    step = find_step(residual, basis, lambda rows: trace.condensed.cleared(rows) / growth)
+    if step and step.chance < FALSE_ALARM and not (coloured and _is_coloured(step)):
+        before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
+        size = plain(-step.size, 2)
+        unit = f" {residuals.instrument.read.unit}".rstrip()
+        return [
+            f"The readings change at about {plain(0.5 * (before_s + after_s))} s, as by a step of "
+            f"{size}{unit}, which white noise shows only {one_in(step.chance)} traces: the values "
+            "may be far off. Leave out what is before or after (--from, --until)."
+        ]
+    split = middle_of(residuals)
+    chance = 1.0 if coloured else compare_halves(residual, basis, split)
+    if chance >= FALSE_ALARM:
+        return []
+    return [
+        f"The readings up to {plain(trace.time_s[split - 1])} s and those after it, each fitted "
+        f"by itself, differ as those with white noise do only {one_in(chance)} traces: the "
+        "sample, the instrument or the protocol changed, and the values may be far off."
+    ]
+
+
+def _is_coloured(step: Step) -> bool:
+    """Return True if what a fit leaves with a step is not white noise, either."""
+    given = step.left, step.basis
+    chances = correlated(*given)[1], uneven(*given), wandering(*given)
+    return min(chances) < FALSE_ALARM
+
+
+def middle_of(residuals: Residuals) -> int:
+    """Return the reading at which phases part a trace, or the middle one."""
+    count = residuals.samples
+    starts = np.searchsorted(residuals.trace.time_s, residuals.course.changes_s)
+    nearest = int(starts[np.argmin(np.abs(starts - count // 2))]) if len(starts) else 0
+    return nearest if count // 4 <= nearest <= count - count // 4 else count // 2
+
+
 def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
     """Yield a sentence that names outliers by their times."""
     far = residuals.trace.time_s[struck]
@@ -322,18 +395,32 @@ def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
         )
 
 
-def _is_far_from_given(likelihood: Likelihood) -> bool:
-    """Return True if the misfit is far from the noise that was given, by a chi-squared test."""
+def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
+    """Yield a note if the noise that was given is refuted by residuals, in a chi-squared test."""
     from scipy.special import chdtr, chdtrc
 
     if likelihood.freedom < np.inf:
-        return False
+        return
     residuals = likelihood.problem.residuals
-    share = likelihood.misfit / likelihood.noise_sd
-    left = max(residuals.free - len(likelihood.best), 1)
-    sum_of_squares = residuals.samples * share**2
-    too_little = share < _TOO_LITTLE and float(chdtr(left, sum_of_squares)) < FALSE_ALARM
-    return too_little or (share > _TOO_MUCH and float(chdtrc(left, sum_of_squares)) < FALSE_ALARM)
+    lost = residuals.samples - residuals.free + len(likelihood.best)
+    left = max(len(residual) - lost, 1)
+    chi_squared = float(residual @ residual) / likelihood.noise_sd**2
+    share = float(np.sqrt(chi_squared / left))
+    if share < _TOO_LITTLE and float(chdtr(left, chi_squared)) < FALSE_ALARM:
+        yield Note(
+            DOUBT,
+            f"The noise that was given is {plain(1 / share, 2)} times what the fit leaves: its "
+            "value, or its unit, is not the right one.",
+        )
+    if share > 1 and float(chdtrc(left, chi_squared)) < FALSE_ALARM:
+        much, so = share > _TOO_MUCH, "limits are too narrow by that"
+        if much:
+            suspects = name_suspects(residuals, share, likelihood.noise_sd)
+            so = f"its value or unit is not the right one, or {suspects}"
+        yield Note(
+            DOUBT if much else HARMLESS,
+            f"What the fit leaves is {plain(share, 3)} times the noise that was given: {so}.",
+        )
 
 
 def one_in(chance: float) -> str:
@@ -343,9 +430,10 @@ def one_in(chance: float) -> str:
     return f"once in {plain(1 / chance, 1)}"
 
 
-# Autocorrelated noise with most of the variance, and slower than this share of the trace, is
-# misfit. It may be misfit if it has a noticeable share and lasts for longer.
-_MOST, _SLOW, _NOTICEABLE, _LONG = 0.5, 0.02, 1 / 3, 0.2
+# Autocorrelated noise with most of the variance, and slower than this share of the trace, may be
+# misfit; so may such with a noticeable share that lasts for longer. Two standard deviations of its
+# time are sure.
+_MOST, _SLOW, _NOTICEABLE, _LONG, _SURE = 0.5, 0.02, 1 / 3, 0.2, 2.0
 # What scatters by so much more than noise that is correlated for this share would is smooth.
 _SMOOTH = 3.0
 # Of so many stretches of a trace with stationary noise, which is correlated for less than half a
@@ -359,26 +447,32 @@ _AS_THE_SCATTER = 1.44
 
 
 def find_slow_misfit(
-    noise_model: NoiseModel, duration_s: float, share_of_peak: float, suspects: Callable[[], str]
+    noise_model: NoiseModel,
+    time_error: float,
+    duration_s: float,
+    share_of_peak: float,
+    suspects: Callable[[], str],
 ) -> Note | None:
-    """Return a note if the autocorrelated part of a noise model is, or may be, misfit.
+    """Return a note if the slow parts of a noise model may be misfit.
 
-    `share_of_peak` is the standard deviation of that part over the largest response; `suspects`
-    says what is wrong if it is misfit.
+    Its correlation time counts less `_SURE` times the standard deviation of its logarithm.
+    `share_of_peak` is the standard deviation of those parts over the largest response; `suspects`
+    says what is wrong if they are misfit.
     """
     share, time_s = noise_model.ar1, noise_model.time_s
-    misfit = share > _MOST and time_s > _SLOW * duration_s
-    if not misfit and not (share > _NOTICEABLE and time_s > _LONG * duration_s):
+    least_s = time_s * float(np.exp(-_SURE * time_error))
+    slow = share > _MOST and least_s > _SLOW * duration_s
+    slow |= share > _NOTICEABLE and least_s > _LONG * duration_s
+    what = f"is correlated over {plain(time_s, 2)} s of a trace of {plain(duration_s)} s"
+    if noise_model.walk > max(_NOTICEABLE, share):
+        slow, share, what = True, noise_model.walk, "walks at random"
+    if not slow:
         return None
-    meaning = "that is misfit, not noise"
-    if not misfit:
-        meaning = "that may be misfit"
-    elif share_of_peak < FAR_OFF:
-        meaning += f", of {plain(100 * share_of_peak, 2)} % of the peak, which the limits allow for"
     return Note(
-        REJECTION if misfit and share_of_peak >= FAR_OFF else DOUBT,
-        f"What the fit leaves is correlated over {plain(time_s, 2)} s of a trace of "
-        f"{plain(duration_s)} s, {100 * share:.0f} % of its variance: {meaning}; {suspects()}.",
+        DOUBT,
+        f"What the fit leaves {what}, {100 * share:.0f} % of its variance and "
+        f"{plain(100 * share_of_peak, 2)} % of the peak. The limits allow for that; but it may be "
+        f"misfit, and then {suspects()}.",
     )
 
 

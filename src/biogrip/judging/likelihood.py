@@ -165,10 +165,11 @@ def find_thresholds(confidence: float, freedom: float) -> tuple[float, float]:
 def compute_fall(samples: int, before: float, after: float, noise_sd: float | None = None) -> float:
     """Compute the decrease of chi^2, twice the increase of log-likelihood, between RMS residuals.
 
-    If the standard deviation of the noise is not known, each fit's misfit estimates it.
+    If the standard deviation of the noise is not known, each fit's misfit estimates it; no noise is
+    less than what the better fit leaves.
     """
     if noise_sd is not None:
-        return samples * (before**2 - after**2) / noise_sd**2
+        return samples * (before**2 - after**2) / max(noise_sd, after) ** 2
     return 2 * samples * float(np.log(before / after))
 
 

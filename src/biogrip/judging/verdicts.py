@@ -81,6 +81,12 @@ class Finding:
         """True if the trace bounds the quantity on at least one side."""
         return self.verdict != NOT_DETERMINED
 
+    @property
+    def is_wide(self) -> bool:
+        """True if its two limits tell little more than an order of magnitude: see `WIDE`."""
+        low, high = self.low, self.high
+        return low is not None and high is not None and high > WIDE**2 * low
+
     def allows(self, log_parameters: Array) -> bool:
         """Return True if parameters, (n_parameters,), lie within the limits; NaN does."""
         value = self.quantity.log(log_parameters)
@@ -103,13 +109,16 @@ class Finding:
     def _limits_in_words(self) -> str:
         low, high, unit = self.low, self.high, self._unit
         if low is not None and high is not None:
-            factor = math.sqrt(high / low)
-            how = f" only within a factor of {plain(factor, 2)}" if factor > WIDE else ""
+            decades = plain(math.log10(high / low), 2)
+            how = f" only to {decades} decades" if self.is_wide else ""
             return f"determined{how}: {with_limits(self.value, low, high, self.quantity.unit)}"
         if low is not None:
             return f"only bounded below: at least {plain(low, 2)}{unit}"
         if high is not None:
             return f"only bounded above: at most {plain(high, 2)}{unit}"
+        if self.profile.slowest_s is not None:
+            slowest = f"a branch of the best fit relaxes in {plain(self.profile.slowest_s, 2)} s,"
+            return f"not stated: {slowest} longer than the trace lasts"
         if self.profile.certainty is None:
             return "not determined: the trace sets no limit within the search range"
         increase = max(self.profile.increases[[0, -1]])

@@ -32,6 +32,8 @@ class Trace:
     """Rows for the protocol and these times; specify nuisance functions and noise model."""
     known_noise: float | None = None
     """Standard deviation of the noise; None to estimate it from neighbouring readings."""
+    known_scatter: float | None = None
+    """That of neighbouring readings, if it is another trace's; None to estimate it."""
 
     @cached_property
     def cleared(self) -> Array:
@@ -46,8 +48,13 @@ class Trace:
     @cached_property
     def noise_sd(self) -> float:
         """Standard deviation of the noise, known or estimated."""
-        if self.known_noise is not None:
-            return self.known_noise
+        return self.scatter if self.known_noise is None else self.known_noise
+
+    @cached_property
+    def scatter(self) -> float:
+        """Standard deviation of the noise by neighbouring readings, whatever is known of it."""
+        if self.known_scatter is not None:
+            return self.known_scatter
         return estimate_noise(self.cleared, self.rounding)
 
     @cached_property
@@ -95,6 +102,11 @@ class Residuals:
         return self.trace.noise_sd
 
     @property
+    def scatter(self) -> float:
+        """Standard deviation of the noise by neighbouring readings, which scales fits."""
+        return self.trace.scatter
+
+    @property
     def rounding(self) -> float:
         """Step that the readings are multiples of, or zero."""
         return self.trace.rounding
@@ -131,7 +143,9 @@ class Residuals:
         """Return the residuals of the same trace for a protocol that starts later by some s."""
         trace = self.trace
         condensed = trace.condensed.later(change_s)
-        moved = Trace(condensed.all_s, trace.readings, condensed, trace.noise_sd)
+        moved = replace(
+            trace, time_s=condensed.all_s, condensed=condensed, known_scatter=trace.scatter
+        )
         return replace(self, trace=moved)
 
     def shares_responses(self, other: "Residuals") -> bool:

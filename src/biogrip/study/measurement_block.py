@@ -124,9 +124,9 @@ class MeasurementBlock(Block):
     model; false where the instrument is known not to drift, and the sample may flow."""
     noise_model: Annotated[str | None, OneOf(NOISE_MODELS)] = None
     """Model of the noise when a trace is judged. `white`: samples are independent; `coloured`:
-    noise may be autocorrelated (AR(1), 1/f) and grow with the rotation, and outliers are left out,
-    so that intervals are wider and keep their coverage; every identification, judged or not, then
-    fits an offset and a drift along, unless they are false. By default white."""
+    noise may be autocorrelated (AR(1), 1/f, a random walk) and grow with the rotation, and outliers
+    are left out, so that intervals are wider and keep their coverage; every identification, judged
+    or not, then fits an offset and a drift along, unless they are false. By default white."""
     noise: Noise
 
     @property
