@@ -139,7 +139,8 @@ def check_rows(likelihood: Likelihood) -> None:
     residuals, best = likelihood.problem.residuals, likelihood.best
     of_rows = float(residuals.misfit(np.exp(best)[None])[0])
     of_readings = float(np.sqrt(np.mean(residuals.left(best) ** 2)))
-    largest = float(np.max(np.abs(residuals.trace.readings)))
+    # Beside an offset a response may be far larger than what is read.
+    largest = float(np.max(np.abs(residuals.response(best))))
     rounding = _ROUNDING * residuals.samples * (largest / likelihood.noise_sd) ** 2
     apart = likelihood.increase(of_rows) - likelihood.increase(of_readings)
     if abs(apart) > MISSED + rounding:
