@@ -71,8 +71,8 @@ class Identifiability(Block):
     at_s: Annotated[
         tuple[Annotated[float, Field(ge=1e-12, le=1e12)], ...], Field(max_length=20)
     ] = ()
-    """Times after a step, and inverses of angular frequencies, at which `biogrip identify` tells what
-    any linear sample would show. By default one a decade."""
+    """Times after a step, and inverses of angular frequencies, at which `biogrip identify` tells
+    what any linear sample would show. By default one a decade."""
 
 
 @dataclass(frozen=True, kw_only=True)
