@@ -100,7 +100,7 @@ def test_pictures_are_small_and_in_the_page(page: Path) -> None:
     text = page.read_text()
     pictures = re.findall('src="data:image/png;base64,([^"]+)"', text)
     # Two a trace, and one a quantity.
-    assert len(pictures) == 2 * 12 + 6 == len(re.findall("<img", text))
+    assert len(pictures) == 3 * 12 + 6 == len(re.findall("<img", text))
     for encoded in pictures:
         content = base64.b64decode(encoded)
         assert len(content) < 60_000
