@@ -133,6 +133,7 @@ def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read() -> N
         ({"config": {"protocl": {}}}, "protocl"),
         ({"time_s": FRAME}, r"time_s: found the shape \(325, 2\), allowed is one column"),
         ({"time_s": ["a"]}, "time_s: could not convert .*; allowed are numbers"),
+        ({"time_s": pd.to_datetime(["2026-01-01"])}, "time_s: found datetime64.*; allowed are num"),
         (
             {"time_s": FRAME["t"][::-1]},
             r"time_s\[1\]: .* \(\[0\]\), allowed are times that increase",
@@ -146,6 +147,21 @@ def test_what_cannot_be_used_is_said_by_the_name_of_the_argument(
         library.identify_trace(
             **({"time_s": FRAME["t"], "readings": FRAME["strain"]} | HELD | given)
         )
+
+
+def test_times_of_pandas_are_seconds_and_masked_readings_are_gaps() -> None:
+    """Three readings are ten times too large; another is at the instant of the step."""
+    times = np.linspace(0.0, 10.0, 101)
+    strain = 0.1 * (1 - np.exp(-2 * times)) + 1e-4 * np.random.default_rng(1).normal(size=101)
+    clock = pd.to_timedelta(1e6 * times, unit="us").astype("timedelta64[us]")
+    wrong = np.arange(101) % 30 == 20
+    masked = np.ma.array(np.where(wrong, 10 * strain, strain), mask=wrong)
+    told = library.identify_trace(
+        pd.Series(clock), masked, reads="strain", hold=100.0, model="kelvin_voigt", **compared()
+    )
+    assert (told.status, told.data["samples"]) == ("ok", 97)
+    limits = told.to_frame().loc[["k_p", "c_p"]]
+    assert np.all((limits["low"] < [1000, 500]) & (limits["high"] > [1000, 500]))
 
 
 def test_all_of_the_library_can_be_had_from_the_package() -> None:

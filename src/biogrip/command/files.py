@@ -75,11 +75,12 @@ def identify_files(
     alone = len(files) == 1
     asked: list[Asked] = []
     for file in dict.fromkeys(files):
-        if trace_file_problem(file) is None and is_table(file):
+        own = Asked(file, config, tuple(settings))
+        if trace_file_problem(file) is None and is_table(own):
             asked += read_table(file, config, settings)
             alone = False
         else:
-            asked.append(Asked(file, config, tuple(settings)))
+            asked.append(own)
     if rows is not None:
         # The last may be beyond the end.
         asked = asked[rows[0] : rows[1] + 1]

@@ -12,12 +12,14 @@ modulus is read, a hold of 1 needs no option.
 import csv
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from io import StringIO
 from itertools import zip_longest
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +41,7 @@ from biogrip.study.source import (
     KeyPath,
     Source,
     default_config,
+    dotted,
     keys_in,
     overlaid,
     value_of,
@@ -47,21 +50,33 @@ from biogrip.study.study import Case
 from biogrip.terminal import visible
 from biogrip.traces.columns import Columns, held_unit, listed, place, trace_file_problem
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
+from biogrip.traces.tables import number_or_inf
 
 MODEL = "generalized_maxwell"
 """Sample model of traces of which nothing says another."""
 
-FILE = "file"
-"""The column that every table of traces has."""
+_FILES = ("file", "filename", "filepath", "path", "trace", "tracefile")
 
 LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
+# Options of the command that may be columns of a table, and the keys that they set.
+_OPTIONS: dict[str, tuple[str, ...]] = {
+    "model": ("sample", "model"),
+    "hold": HOLD,
+    "noise": ("measurement", "noise_rad"),
+    **{key: ("measurement", f"{key}_s") for key in ("start", "from", "until")},
+    **{key: ("measurement", key) for key in ("time", "sd", "load", "offset", "drift")},
+    **{key: ("measurement", key) for key in ("noise_model", "noise_share")},
+}
+_OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
 _SEPARATORS = ",;\t"
+# Blocks whose numbers are an instrument's.
+_INSTRUMENT = ("gripper", "actuator")
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
 _HEAD_BYTES = 100_000
 
@@ -299,13 +314,52 @@ def _refuse(problems: Sequence[str]) -> None:
         raise BiogripError("\n".join([*problems[:_MOST_SHOWN], *more]))
 
 
-def is_table(path: Path) -> bool:
-    """Return True if the first line of a file is a header with a column `file`."""
-    with path.open("rb") as stream:
-        first = stream.readline(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
-    # Another spelling, as File, is a table, too, whose reader says what is wrong.
-    names = [name.strip(' "\r\n').lower() for name in re.split(f"[{_SEPARATORS}]", first)]
-    return FILE in names
+def is_table(asked: Asked) -> bool:
+    """Return True if the first line of a file is a header with a column `file`, and no trace's.
+
+    Another name of that column, as `path`, counts above the name of a file that exists.
+    """
+    with asked.trace.open("rb") as stream:
+        lines = [stream.readline(_HEAD_BYTES).decode("utf-8-sig", "replace") for _ in range(2)]
+    names, cells = (
+        [cell.strip(' "\r\n') for cell in re.split(f"[{_SEPARATORS}]", line)] for line in lines
+    )
+    if (name := _file_column(names)) is None:
+        return False
+    measured = asked.given.get("measurement")
+    measured = measured if isinstance(measured, dict) else {}
+    readings = {measured[key] for key in READINGS if key in measured} or {"rotation_rad"}
+    if measured.get("time", "time_s") in names and readings & {*names}:
+        return False
+    below = dict(zip(names, cells, strict=False)).get(name)
+    exists = below and trace_file_problem(asked.trace.parent / below) is None
+    return bool(exists) or name.lower() == _FILES[0]
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[ -]+", "_", name.lower())
+
+
+def _file_column(names: Sequence[str]) -> str | None:
+    """Return the name of the column of files, or None."""
+    found = {_plain(name).replace("_", ""): name for name in reversed(names)}
+    return next((found[name] for name in _FILES if name in found), None)
+
+
+def _meant(name: str) -> str | None:
+    """Return the option or key that a column's name is, but for its prefix, unit or spelling."""
+    blocks = read_configs([default_config()])
+    known = {str(path[-1]): dotted(path) for path in keys_in(blocks) if path[0] in _INSTRUMENT}
+    known |= {each.controlled.column: "hold" for each in INSTRUMENTS.values()}
+    known |= {name: name for name in _OF_NUMBERS}
+    by_plain = {re.sub("_[^_]+$", "", key).lower(): meant for key, meant in known.items()}
+    by_plain |= {key.lower(): meant for key, meant in known.items()}
+    plain = _plain(name)
+    bare = re.sub(r"_?[(\[].*$|_[^_]+$", "", plain)
+    if plain in by_plain or bare in _OF_NUMBERS:
+        return by_plain.get(plain, bare)
+    close = get_close_matches(plain, [key for key in by_plain if "_" in key], n=1, cutoff=0.9)
+    return by_plain[close[0]] if close else None
 
 
 def read_table(
@@ -318,12 +372,14 @@ def read_table(
     are no YAML, a trace twice.
     """
     (_, header), *rows = _rows(path)
-    if FILE not in header:
+    if (file := _file_column(header)) is None:
         raise BiogripError(
-            f"{place(path, 1)}: found no column '{FILE}' among {listed(header)}; allowed is one."
-            f"{nearest(FILE, header)}"
+            f"{place(path, 1)}: found no column '{_FILES[0]}' among {listed(header)}; allowed is "
+            f"one.{nearest(_FILES[0], header)}"
         )
-    problems = list(_name_problems(path, header))
+    options_of = {name: _plain(name) for name in header if _plain(name) in _OPTIONS}
+    problems = list(_name_problems(path, header, [file, *options_of]))
+    problems += _unused(path, header, rows, {file, *options_of})
     found, lines = [], dict[str, int]()
     for line, row in rows:
         if not any(row):
@@ -332,23 +388,27 @@ def read_table(
             text = f"found {counted(len(row), 'cell')} in the row, allowed are the header's"
             problems.append(f"{place(path, line)}: {text} {len(header)}.")
         by_name = dict(zip_longest(header, row[: len(header)], fillvalue=""))
-        trace = path.parent / by_name.pop(FILE)
+        trace = path.parent / by_name.pop(file)
         # Resolved, so that links to one file are found.
         before = lines.setdefault(os.path.realpath(trace), line)
         if trace == path.parent:
-            problems.append(f"{place(path, line, FILE)}: found nothing, allowed is a trace.")
+            problems.append(f"{place(path, line, file)}: found nothing, allowed is a trace.")
         elif before != line:
             text = f"found '{visible(trace)}' again, as on line {before}; allowed is each"
-            problems.append(f"{place(path, line, FILE)}: {text} trace once.")
+            problems.append(f"{place(path, line, file)}: {text} trace once.")
         settings = list(options)
         for name, cell in by_name.items():
-            if "." in name and cell:
+            if ("." in name or name in options_of) and cell:
                 try:
-                    key = tuple(name.split("."))
-                    settings.append(Setting(place(path, line), key, value_of(cell, name)))
+                    key = _OPTIONS.get(options_of.get(name, ""), tuple(name.split(".")))
+                    value = value_of(cell, name)
+                    if key == _OPTIONS["start"] and value == "fit":
+                        key, value = ("measurement", "fit_start"), True
+                    settings.append(Setting(place(path, line), key, value))
                 except BiogripError as error:
                     problems.append(f"{place(path, line, name)}: {error}")
-        copied = {name: cell for name, cell in by_name.items() if name and "." not in name}
+        used = {"", *options_of, *(name for name in by_name if "." in name)}
+        copied = {name: cell for name, cell in by_name.items() if name not in used}
         found.append(Asked(trace, config, tuple(settings), place(path, line), copied))
     if not found:
         problems.append(f"{place(path)}: found no traces, allowed is a row for each.")
@@ -370,13 +430,30 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
         raise BiogripError(f"{place(path)}: cannot be read as a table: {error}.") from error
 
 
-def _name_problems(path: Path, header: Sequence[str]) -> Iterator[str]:
-    """Find names that stand twice, or would be taken for results."""
+def _unused(
+    path: Path, header: Sequence[str], rows: Sequence[tuple[int, list[str]]], used: set[str]
+) -> Iterator[str]:
+    """Find columns of numbers that look like settings, and would only be copied."""
+    for number, name in enumerate(header):
+        cells = [cell for _, row in rows for cell in row[number : number + 1] if cell]
+        numbers = cells and all(isfinite(number_or_inf(cell)) for cell in cells)
+        if not name or "." in name or name in used or not numbers:
+            continue
+        meant = _meant(name)
+        if meant and meant not in map(_plain, header):
+            yield (
+                f"{place(path, 1, name)}: looks like a setting and is none; allowed is "
+                f"'{meant}' for a column that sets it, in SI units, or a name unlike a setting's."
+            )
+
+
+def _name_problems(path: Path, header: Sequence[str], used: Collection[str]) -> Iterator[str]:
+    """Find names that stand twice, or, if they are not used, would be taken for results."""
     for number, name in enumerate(header):
         text = ""
         if name and name in header[:number]:
             text = "stands twice; allowed is each name once."
-        elif name in COLUMNS or _OF_RESULTS.fullmatch(name):
+        elif name not in used and (name in COLUMNS or _OF_RESULTS.fullmatch(name)):
             text = "is a column of the results; allowed is another name."
         if text:
             yield f"{place(path, 1, name)}: {text}"

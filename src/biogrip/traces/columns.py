@@ -47,6 +47,10 @@ _RECIPROCAL = re.compile(r"([A-Za-z]+)(?:\^|\*\*)?\(?[-\u2212]1\)?")
 _PURE = re.compile(
     r"[^\W\d_]+|(?:[\w.,-]*[\w.,]?[ _-])*(?:strain|deformation|gamma|epsilon|eps|[γεϵ])", re.I
 )
+# Of two lengths, as Lp/Rp, and units that no column here has.
+_RATIO = re.compile(r"[^\W\d_]+\d*\s*/\s*([^\W_]+)")
+_UNITS = {*TIME_UNITS, *["V", "mV", "uV", "A", "mA", "px", "pixel", "pixels", "counts"]}
+_UNITS |= {unit for each in INSTRUMENTS.values() for unit in each.read.units}
 _NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
 # A number with what may be its unit behind it.
 _SIZED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*?)\s*", re.I)
@@ -241,13 +245,23 @@ def _unit_at_end(column: str, allowed: Collection[str]) -> str | None:
 
 def _said_at_end(column: str) -> str | None:
     """Return what can be nothing but a unit at the end of a name, or None."""
+    if _is_ratio(column):
+        return None
     return next((end for end in _endings(column, *_SURELY) if end and not end.isdigit()), None)
 
 
 def _is_pure(column: str) -> bool:
     """Return True if a name has no ending, but perhaps a number, that could be a unit."""
     name = plain_name(column)
+    if _is_ratio(name):
+        return True
     return not name.isdigit() and _PURE.fullmatch(_NUMBERED.sub("", name)) is not None
+
+
+def _is_ratio(column: str) -> bool:
+    """Return True if a name is that of one thing over another, which is no unit."""
+    found = _RATIO.fullmatch(plain_name(column))
+    return found is not None and known_unit(found[1], _UNITS) is None
 
 
 def _bare(cell: str) -> str:

@@ -20,13 +20,27 @@ from biogrip.traces.columns import (
     shortened,
     unit_of,
 )
-from biogrip.traces.tables import BLANKS, Sheet, Table, find_tables, number_or_inf, read_sheet
+from biogrip.traces.tables import (
+    BLANKS,
+    Sheet,
+    Table,
+    find_marks,
+    find_tables,
+    is_clock,
+    number_or_inf,
+    read_sheet,
+    seconds_or_inf,
+)
 
 FEWEST_SAMPLES = 10
 
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
+_MARKS = {".": "point", ",": "comma"}
+# More seconds than there are in hours, minutes and seconds without a date.
+_DATED_S = 1e10
+_THOUSANDS = {".": "points", ",": "commas", " ": "blanks or apostrophes", "": None}
 
 
 def form_in_words(path: Path, form: Mapping[str, Any]) -> str:
@@ -117,6 +131,13 @@ class Recording:
                 f"scatters from row to row by {plain(100 * self.load_noise, 2)} % of the largest. "
                 "What is left counts as exact."
             )
+        if "unclear" in form:
+            said.append(
+                f"The {form['decimal']} of {form['unclear']} is read as a decimal mark; where it "
+                "is between thousands, numbers are 1000 times as large."
+            )
+        if "clock" in form:
+            said.append(f"Times are {form['clock']}.")
         if self.at_steps:
             times = ", ".join(f"{time_s:.6g} s" for time_s in self.at_steps)
             said.append(
@@ -130,10 +151,10 @@ class Recording:
 def is_usual(recording: Recording) -> bool:
     """Return True of arrays, and of a file with a table as biogrip itself would write."""
     form, columns = recording.form, recording.read
-    odd = ("units_line", "block", "preamble", "averaged", "outside", "others")
+    odd = ("units_line", "block", "preamble", "averaged", "outside", "others", "thousands")
     return recording.path is None or (
         (form["encoding"], form["separator"], form["decimal"]) == ("UTF-8", "commas", "point")
-        and not any(key in form for key in odd)
+        and not any(key in form for key in (*odd, "unclear", "clock"))
         and columns.block is None
         and columns.load is None
         and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
@@ -146,8 +167,10 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     The file is text in UTF-8, UTF-16 or Windows-1252. Empty lines and lines that start with ``#``
     are ignored. The header is the line that has the columns, or has a row of units below it; of
     several such tables, ``block`` says which. The header decides the separator: comma, semicolon or
-    tab. With the last two, numbers may have a decimal comma. Cells may be quoted and padded with
-    blanks, but a quoted cell ends on its line. Other columns may hold anything.
+    tab. With the last two, numbers may have a decimal comma; one table has one decimal mark, and
+    other marks are between thousands. Times may be hours:minutes:seconds, after a date or not.
+    Cells may be quoted and padded with blanks, but a quoted cell ends on its line. Other columns
+    may hold anything.
 
     An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
     row is left out and counted; nothing is interpolated. Other spreadsheet errors, as ``#REF!``,
@@ -165,8 +188,10 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     tables, index = find_tables(path, sheet, columns)
     table = tables[index]
     header_line = int(sheet.numbers[table.at]) or None
-    indices, units = _columns_of(path, header_line, table, columns)
-    values, decimal = _numbers(path, sheet, table, indices)
+    times = [sheet.cells[table.first : table.end, i] for i in table.indices(columns.time)[:1]]
+    clock = any(is_clock(cells.tolist()) for cells in times)
+    indices, units = _columns_of(path, header_line, table, columns, clock=clock)
+    values, form = _numbers(path, sheet, table, indices, clock=clock)
     lines, load = sheet.numbers[table.first : table.end], None
     if columns.load is not None:
         history, values = values[:, [0, -1]], values[:, :-1]
@@ -180,7 +205,7 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     form = {
         "encoding": sheet.encoding,
         "separator": _SEPARATORS[sheet.separator],
-        "decimal": decimal,
+        **form,
         "header_line": header_line,
         "units_line": None if table.units is None else int(sheet.numbers[table.first - 1]),
         "block": index + 1 if several else None,
@@ -266,7 +291,7 @@ def _checked(
 
 
 def _columns_of(
-    path: Path, line: int | None, table: Table, columns: Columns
+    path: Path, line: int | None, table: Table, columns: Columns, *, clock: bool
 ) -> tuple[list[int], list[str]]:
     """Return where the columns to read are in a table, and their units; or list what is wrong."""
     found: dict[int, str] = {}
@@ -296,7 +321,8 @@ def _columns_of(
         found[same[0]] = key
         below = table.units[same[0]] if table.units else ""
         try:
-            units.append(_unit(path, key, below, columns, units))
+            timed = clock and key == "time"
+            units.append("s" if timed else _unit(path, key, below, columns, units))
         except BiogripError as error:
             problems.append(str(error))
     if problems:
@@ -317,8 +343,13 @@ def _unit(path: Path | None, key: str, below: str, columns: Columns, units: list
     return unit_of(path, name, given, allowed, columns.said_by(unit_key), below)
 
 
-def _numbers(path: Path, sheet: Sheet, table: Table, indices: list[int]) -> tuple[Array, str]:
-    """Return the numbers of columns, (n_rows, n_columns), NaN for gaps, and the decimal sign."""
+def _numbers(
+    path: Path, sheet: Sheet, table: Table, indices: list[int], *, clock: bool
+) -> tuple[Array, dict[str, Any]]:
+    """Return the numbers of columns, (n_rows, n_columns), NaN for gaps, and what marks they have.
+
+    If the first column has a clock's times, they are in s, from the first if there are dates.
+    """
     rows, width = slice(table.first, table.end), len(table.names)
     cells, lines = sheet.cells[rows], sheet.numbers[rows]
     for index in indices:
@@ -335,19 +366,34 @@ def _numbers(path: Path, sheet: Sheet, table: Table, indices: list[int]) -> tupl
             f"row, allowed are the header's {width}. A decimal comma needs semicolons or tabs as "
             "separators."
         )
-    decimal, values = "point", np.empty((len(cells), len(indices)))
+    numbers = cells[:, indices[clock:]]
+    marks = find_marks(numbers.ravel().tolist(), sheet.separator)
+    if not marks.decimal:
+        one, other = marks.cells
+        row, column = np.argwhere(numbers == other)[0]
+        raise BiogripError(
+            f"{place(path, lines[row], table.names[indices[clock:][column]])}: found '{other}' "
+            f"beside '{one}', of which nothing tells which has the decimal mark; allowed is one "
+            "decimal mark in a table."
+        )
+    values = np.empty((len(cells), len(indices)))
     for column, index in enumerate(indices):
-        texts = cells[:, index].tolist()
-        if sheet.separator != "," and any("," in text for text in texts):
-            decimal, texts = "comma", [text.replace(",", ".") for text in texts]
-        values[:, column] = np.fromiter(map(number_or_inf, texts), float, len(cells))
+        number = seconds_or_inf if clock and column == 0 else marks.number
+        values[:, column] = np.fromiter(map(number, cells[:, index].tolist()), float, len(cells))
         for row in np.flatnonzero(np.isinf(values[:, column]))[:1]:
             raise BiogripError(
                 f"{place(path, lines[row], table.names[index])}: found "
                 f"'{shortened(cells[row, index])}', allowed is a finite number, or nan, NA, N/A, - "
                 "or nothing where there is none."
             )
-    return values, decimal
+    form = {"decimal": _MARKS[marks.decimal], "thousands": _THOUSANDS[marks.thousands]}
+    form |= {"unclear": "".join(marks.cells) or None}
+    if clock:
+        form["clock"] = "hours:minutes:seconds"
+        if (first := np.nanmin(values[:, 0])) > _DATED_S:
+            form["clock"] = "dates, from the first"
+            values[:, 0] -= first
+    return values, form
 
 
 def _chosen(path: Path, sheet: Sheet, table: Table, columns: Columns) -> BoolArray:
