@@ -87,7 +87,7 @@ def notes_on_start(
         # A constant that is not zero is an offset, with which the onset would be biased.
         free, onset_s = replace(experiment, offset=True), 0.0
         if may_be_late or experiment.fit_start:
-            onset_s = estimate_onset(free, time_s, readings)
+            onset_s = estimate_onset(experiment, time_s, readings)
         if begins_constant(time_s, readings, onset_s):
             if may_be_late:
                 notes += _about_late_onset(replace(fits, experiment=free), diagnosis, onset_s)
