@@ -33,7 +33,7 @@ _SHORTEST_SHARE = 0.02
 _FALSE_ALARM = 1e-3
 # Relative tolerance, since times are written with few digits.
 _TIME_SLACK = 1e-5
-_LAG_SHARES = (1e-6, 0.1, 10.0)
+_LAG_SHARES = (1e-9, 0.1, 10.0)
 # Log-likelihood ratio, times two, above which a trace counts as mirrored.
 _FAR_LIKELIER = -2 * math.log(_FALSE_ALARM)
 # Share of a function's norm that may be rounding error.

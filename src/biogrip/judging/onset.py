@@ -44,6 +44,9 @@ _FALSE_ALARM, _AS_GOOD = 1e-9, 1e-3
 # Intervals from a change to the first reading of a trace that is cut off, fewest readings by which
 # their growth is known, and its powers of the time if readings were spaced from the change on.
 _DELAYED, _FEWEST_APART, _PLANNED = 10.0, 3, (0.5, 1.5)
+# Starts that are compared, the last so much of an interval before the first reading; and how
+# unlikely is what fits worse.
+_STARTS, _NEAREST, _UNLIKE = 40, 0.01, 0.05
 # Change of a recorded load that is held, as a share of it.
 _HELD = 0.1
 # Misfit over the scatter of neighbours that a right fit does not exceed.
@@ -87,7 +90,7 @@ def notes_on_start(
         # A constant that is not zero is an offset, with which the onset would be biased.
         free, onset_s = replace(experiment, offset=True), 0.0
         if may_be_late or experiment.fit_start:
-            onset_s = estimate_onset(free, time_s, readings)
+            onset_s = estimate_onset(experiment, time_s, readings)
         if begins_constant(time_s, readings, onset_s):
             if may_be_late:
                 notes += _about_late_onset(replace(fits, experiment=free), diagnosis, onset_s)
@@ -148,39 +151,73 @@ def is_cut_off(time_s: Array) -> bool:
 
 
 def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
-    """Yield a note if a trace may be on another clock, with its step just before it."""
-    time_s, noise_sd = fits.time_s, estimate_noise(fits.readings)
-    later_s, best = 2 * time_s[0] - time_s[1], diagnosis.likelihood.best
-    given, rejected = fits.at(0.0, best), diagnosis.status == REJECTED
+    """Yield a note if a trace may be on another clock, with its step some time before it."""
+    time_s, best = fits.time_s, diagnosis.likelihood.best
+    later_s, given = 2 * time_s[0] - time_s[1], fits.at(0.0, best)
+    rejected = diagnosis.status == REJECTED
     other = fits.best(later_s) if rejected else fits.at(later_s, best)
+    alike = _as_good(fits, other)
+    starts_s = [min(fit.onset_s for fit in alike), max(fit.onset_s for fit in alike)]
+    told = starts_s[1] - starts_s[0] < time_s[1] - time_s[0]
+    when = f"at {other.onset_s:.4g} s" if told else "at any time from {:.4g} to {:.4g} s"
     fall = compute_fall(len(time_s), given.misfit, other.misfit, None)
     found = ""
-    if rejected and 0 < other.onset_s < time_s[0] and other.misfit < _WHITE * noise_sd:
-        far = fall > chdtri(1, _FALSE_ALARM)
-        found = f"the fit is far better (χ² falls by {plain(fall)})" if far else ""
+    white = other.misfit < _WHITE * estimate_noise(fits.readings)
+    if rejected and 0 < other.onset_s < time_s[0] and white:
+        if fall > chdtri(1, _FALSE_ALARM):
+            found = f"the fit is far better (χ² falls by {plain(fall)})"
+            found += "" if told else f", and values hang on it: {_moved(diagnosis, None, alike)}"
     elif not rejected and fall > -chdtri(1, _AS_GOOD):
-        moved = _moved(diagnosis, given, other, 0.5)
+        moved = _moved(diagnosis, given, alike, 0.5)
         found = f"the trace fits as well: {moved}" if moved else ""
     if found:
         yield Note(
             REJECTION if rejected else DOUBT,
             f"The readings begin {plain(time_s[0])} s after the step of the protocol. If it starts "
-            f"at {other.onset_s:.4g} s of the clock, {found}. Say when the protocol started "
+            f"{when.format(*starts_s)} of the clock, {found}. Say when the protocol started "
             "(--start, measurement.start_s), be it at 0, or what came before (--config, protocol).",
         )
 
 
-def _moved(diagnosis: Diagnosis, given: OnsetFit, other: OnsetFit, widths: float) -> str:
-    """Name what another fit moves beyond its limits, by more than so many of their widths."""
-    x = diagnosis.likelihood.best
-    moved = x + other.log_parameters - given.log_parameters
-    said = []
+def _as_good(fits: OnsetFits, best: OnsetFit) -> list[OnsetFit]:
+    """Return the best fit and others, of onsets from 0 to the first reading, that are as good.
+
+    Each begins with the values of its neighbour.
+    """
+    first_s, interval_s = fits.time_s[0], fits.time_s[1] - fits.time_s[0]
+    onsets_s = first_s - np.geomspace(_NEAREST * interval_s, first_s, _STARTS)
+    found = [best]
+    for side in (onsets_s[onsets_s < best.onset_s], onsets_s[onsets_s > best.onset_s][::-1]):
+        near = best
+        for onset_s in side.tolist():
+            near = fits.at(onset_s, near.log_parameters)
+            if compute_fall(len(fits.time_s), near.misfit, best.misfit, None) > chdtri(1, _UNLIKE):
+                break
+            found.append(near)
+    return found
+
+
+def _moved(
+    diagnosis: Diagnosis, given: OnsetFit | None, others: Sequence[OnsetFit], widths: float = 0.0
+) -> str:
+    """Name what other fits move beyond its limits, by more than so many of their widths.
+
+    Without a given fit to compare with, for one that is rejected has no limits, all is named.
+    """
+    x, said = diagnosis.likelihood.best, []
     for each in diagnosis.findings:
-        before, after = each.quantity.log(x), each.quantity.log(moved)
+        shift = x - given.log_parameters if given else 0.0
+        moved = [other.log_parameters + shift for other in others]
+        logs, before = [each.quantity.log(own) for own in moved], each.quantity.log(x)
         width = np.log(each.high / each.low) if each.high and each.low else 0.0
-        if not each.allows(moved) and abs(after - before) > widths * width:
+        far = [
+            not each.allows(own) and abs(after - before) > widths * width
+            for own, after in zip(moved, logs, strict=True)
+        ]
+        if given is None or any(far):
+            ends = dict.fromkeys(plain(float(np.exp(end))) for end in (min(logs), max(logs)))
             unit = f" {each.quantity.unit}".rstrip()
-            said.append(f"{each.quantity.label} would be {plain(np.exp(after))}{unit}")
+            said.append(f"{each.quantity.label} would be {' to '.join(ends)}{unit}")
     return "; ".join(said)
 
 
@@ -188,7 +225,7 @@ def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> It
     """Yield a note if a ramp up to the first reading moves a value by the width of its limits."""
     both = fits, replace(fits, experiment=ramped)
     given, other = (own.at(0.0, diagnosis.likelihood.best) for own in both)
-    if moved := _moved(diagnosis, given, other, 1.0):
+    if moved := _moved(diagnosis, given, [other], 1.0):
         yield Note(
             HARMLESS,
             "If the load was no step but a ramp that ends with the first reading, at "
