@@ -84,6 +84,17 @@ def test_a_late_start_is_a_stiffer_branch() -> None:
     assert late.moves["k_p"] == pytest.approx(0, abs=1e-3)
 
 
+def test_a_second_branch_moves_what_is_said() -> None:
+    """Added to the trace by hand, and fitted again with one branch: to second order."""
+    (branch,) = (each for each in JUDGED.hidden if "second branch" in each.words())
+    tau, share = map(float, re.findall(r"branch of (\S+) s with (\S+) %", branch.words())[0])
+    k, k_p, c = np.exp(best := JUDGED.likelihood.best)
+    response = k_p + k * np.exp(-TIMES * k / c) + share / 100 * k * np.exp(-TIMES / tau)
+    moved = fit_from([EXPERIMENT.of(TIMES, response)], best).x[0] - best
+    for label, move in zip(SAMPLE, moved, strict=True):
+        assert branch.moves[label] == pytest.approx(move, rel=0.2, abs=0.02)
+
+
 def test_less_noise_hides_less() -> None:
     quiet = diagnosed(CLEAN + (NOISY - CLEAN) / 10)
     (loud_jump,), (quiet_jump,) = (

@@ -32,7 +32,7 @@ _SHARES = np.linspace(0.1, 0.9, 9)
 _JUMP, _GAIN, _BRANCH = 0.2, 0.2, 0.5
 # Onsets and strengths of finite differences, as shares of the first interval and of the branch; and
 # relaxation times of a second branch over that of the first.
-_LATE, _WEAK, _TIMES = 1e-3, 1e-3, (0.1, 10.0)
+_LATE, _WEAK, _TIMES, _RICHER = 1e-3, 1e-3, (0.1, 10.0), "generalized_maxwell_2"
 
 
 @dataclass(frozen=True)
@@ -67,12 +67,12 @@ def find_hidden(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Hid
     _, slopes = residuals(best)
     nuisance = residuals.trace.condensed.nuisance
     basis = absorbed(np.vstack((slopes, nuisance)))
-    tests = _Tests(basis, steps_of(basis, residuals.trace.condensed.cleared), middle_of(residuals))
+    tests = basis, steps_of(basis, residuals.trace.condensed.cleared), middle_of(residuals)
     information = slopes @ slopes.T / likelihood.noise_sd**2 + np.eye(len(slopes))
     worst: dict[str, Hidden] = {}
     for kind, words, unit, most_size, shape in _planted(likelihood):
         changed = residuals.trace.condensed.cleared(shape)
-        told = tests.told(without(basis, changed) / likelihood.noise_sd)
+        told = _told(without(basis, changed) / likelihood.noise_sd, *tests)
         moved = np.linalg.solve(information, slopes @ changed) / likelihood.noise_sd**2
         of_one = [float(each.quantity.gradient(best) @ moved) for each in limited]
         twofold = max(map(abs, of_one)) / np.log(2)
@@ -94,29 +94,21 @@ def _beyond(finding: Finding, moves: dict[str, float]) -> float:
     return abs(moves[finding.quantity.label]) / max(min(low, high), 1e-12)
 
 
-@dataclass(frozen=True)
-class _Tests:
-    """Tests of what a fit leaves."""
+def _told(left: Array, basis: Array, steps: Steps, split: int) -> float:
+    """Return an error over the size that the most sensitive test just misses.
 
-    basis: Array
-    steps: Steps
-    split: int
+    What a fit leaves of it is in standard deviations of the noise, (n_samples,).
+    """
+    from scipy.special import chdtri
 
-    def told(self, left: Array) -> float:
-        """Return an error over the size that the most sensitive test just misses.
-
-        What a fit leaves of it is in standard deviations of the noise, (n_samples,).
-        """
-        from scipy.special import chdtri
-
-        scanned = np.abs(self.steps.shapes @ left) / self.steps.norms
-        found = [float(np.max(scanned, initial=0.0)) / self.steps.critical(FALSE_ALARM)]
-        for rows in (parts_apart(self.basis, self.split), averaged(self.basis)):
-            if len(rows):
-                # Of a sum of squares with as many degrees of freedom the mean is that of noise.
-                more = chdtri(len(rows), FALSE_ALARM) - len(rows)
-                found.append(float(np.linalg.norm(rows @ left) / np.sqrt(more)))
-        return max(found)
+    scanned = np.abs(steps.shapes @ left) / steps.norms
+    found = [float(np.max(scanned, initial=0.0)) / steps.critical(FALSE_ALARM)]
+    for rows in (parts_apart(basis, split), averaged(basis)):
+        if len(rows):
+            # Of a sum of squares with as many degrees of freedom the mean is that of noise.
+            more = chdtri(len(rows), FALSE_ALARM) - len(rows)
+            found.append(float(np.linalg.norm(rows @ left) / np.sqrt(more)))
+    return max(found)
 
 
 def _planted(likelihood: Likelihood) -> Iterator[tuple[str, str, float, float, Array]]:
@@ -135,26 +127,23 @@ def _planted(likelihood: Likelihood) -> Iterator[tuple[str, str, float, float, A
     later = residuals.later(late_s).response(best)
     apart_s = float(time_s[1] - time_s[0])
     yield "start", "a start that is late by {} s", 1, apart_s, (later - response) / late_s
-    for tau, shape in _second_branch(likelihood):
+    for tau, shape in _second_branch(likelihood, response):
         words = f"a second branch of {plain(tau, 2)} s with {{}} % of its stiffness"
         yield "branch", words, 100, _BRANCH, shape
 
 
-def _second_branch(likelihood: Likelihood) -> Iterator[tuple[float, Array]]:
+def _second_branch(likelihood: Likelihood, response: Array) -> Iterator[tuple[float, Array]]:
     """Yield relaxation times of a second branch, and its effect for the stiffness of the first."""
     residuals = likelihood.problem.residuals
-    richer = CANDIDATES["generalized_maxwell_2"].model
-    own = next((name for name, it in CANDIDATES.items() if it.model == residuals.model), "")
-    if own not in contained("generalized_maxwell_2"):
+    # Not the whole models: those of an instrument whose samples have moduli have other units.
+    name, names = residuals.model.name, residuals.model.names
+    alike = (it for it in contained(_RICHER) if CANDIDATES[it].model.name == name)
+    if not (own := next((it for it in alike if CANDIDATES[it].model.names == names), None)):
         return
-    values = as_richer("generalized_maxwell_2", own, np.exp(likelihood.best))
-    (first, damper), (second, other) = richer.free_branches
+    posed = replace(residuals, model=CANDIDATES[_RICHER].model)
+    (first, damper), second = posed.model.free_branches
+    values = as_richer(_RICHER, own, np.exp(likelihood.best))
     values = np.where(np.isfinite(values) & (values > 0), values, 1e-12 * np.max(values))
-    tau = values[damper] / values[first]
-    posed = replace(residuals, model=richer)
-    values[second], values[other] = 1e-12 * values[first], 1e-12 * values[damper]
-    without_it = posed.response(np.log(values))
-    for times in _TIMES:
-        with_it = values.copy()
-        with_it[second], with_it[other] = np.array([1.0, tau * times]) * _WEAK * values[first]
-        yield tau * times, (posed.response(np.log(with_it)) - without_it) / _WEAK
+    for tau in (times * values[damper] / values[first] for times in _TIMES):
+        values[[*second]] = _WEAK * values[first] * np.array([1.0, tau])
+        yield tau, (posed.response(np.log(values)) - response) / _WEAK

@@ -58,7 +58,7 @@ _MARKED = re.compile(r"[-+]?\d*[.,][\d.,]*(?:[eE][-+]?\d+)?")
 _IN_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*")
 # Thousands with blanks or apostrophes between them.
 _GAPPED = re.compile(r"(?<![\d.,])[1-9]\d{0,2}(?:['\u2019 \u00a0\u2009\u202f]\d{3})+(?!\d)")
-_CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[T ])?(\d+):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
+_CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[T ])?(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
 _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
 _PREAMBLE_LINES_SHOWN = 3
 _NAMES_SHOWN = 8
@@ -397,8 +397,9 @@ class Marks:
 
     def number(self, cell: str) -> float:
         """Return a cell's number: see `number_or_inf`."""
-        cell = _without_gaps(cell)
-        if self.thousands.strip():
+        if self.thousands == " ":
+            cell = _without_gaps(cell)
+        elif self.thousands:
             cell = re.sub(rf"(?<=\d)[{self.thousands}](?=\d{{3}}(?!\d))", "", cell)
         return number_or_inf(cell.replace(self.decimal, "."))
 
@@ -415,16 +416,16 @@ def find_marks(cells: Sequence[str], separator: str) -> Marks:
     """
     written = "\n".join(cells)
     text = _without_gaps(written)
-    cells, blank = text.split("\n"), " " * (text != written)
+    plain, blank = text.split("\n"), " " * (text != written)
     present = [mark for mark in ".," if mark in text]
     sure: dict[str, str] = {}
-    for cell in cells:
+    for cell, number in zip(cells, plain, strict=False):
         if len(sure) == len(present):
             break
-        if _MARKED.fullmatch(cell) and not _IN_THOUSANDS.fullmatch(cell):
-            sure.setdefault(max(present, key=cell.rfind), cell)
-    if separator == ",":
-        sure = {".": sure.get(".", "")} if present else {}
+        if _MARKED.fullmatch(number) and not _IN_THOUSANDS.fullmatch(number):
+            sure.setdefault(max(present, key=number.rfind), cell)
+    if separator == "," and present:
+        sure = {".": ""}
     if len(sure) == 1:
         (decimal,) = sure
         others = "".join(mark for mark in present if mark != decimal)
@@ -434,8 +435,7 @@ def find_marks(cells: Sequence[str], separator: str) -> Marks:
     either = tuple(sure.values()) or tuple(next(c for c in cells if m in c) for m in present)
     if len(present) > 1:
         return Marks("", blank, either)
-    twice = any(cell.count(present[0]) > 1 for cell in cells if _IN_THOUSANDS.fullmatch(cell))
-    if twice:
+    if any(it.count(present[0]) > 1 for it in plain if _IN_THOUSANDS.fullmatch(it)):
         return Marks(".,".replace(present[0], ""), present[0])
     return Marks(present[0], blank, either)
 
@@ -445,7 +445,10 @@ def seconds_or_inf(cell: str) -> float:
     if not (found := _CLOCK.fullmatch(cell)):
         return nan if cell.lower() in _GAPS else inf
     day, hours, minutes, seconds = found.groups()
-    days = date.fromisoformat(day).toordinal() if day else 0
+    try:
+        days = date.fromisoformat(day).toordinal() if day else 0
+    except ValueError:
+        return inf
     return 86400 * days + 3600 * int(hours) + 60 * int(minutes) + float(seconds.replace(",", "."))
 
 
