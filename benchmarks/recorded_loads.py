@@ -64,6 +64,18 @@ def _smooth(rng: np.random.Generator) -> tuple[Array, Course]:
     )
 
 
+def _steps(rng: np.random.Generator) -> tuple[Array, Course]:
+    """Return steps up and down, each at any time between two rows."""
+    at_s, sizes = 1.0 + 3.5 * np.arange(3) + rng.uniform(0, 1.5, 3), rng.uniform(0.5, 1.5, 3)
+    heights = sizes * [1, -0.7, 1]
+    return _rows(rng, 12.0, 0.1), lambda t: heights @ (np.asarray(t) >= at_s[:, None])
+
+
+def _late(rng: np.random.Generator) -> tuple[Array, Course]:
+    """Return a hold from 0 whose first row comes late."""
+    return rng.uniform(0.1, 1.0) + np.arange(200) * 0.05, lambda t: 1.0 + 0.0 * np.asarray(t)
+
+
 def _lines(*corners: tuple[float, float]) -> Callable[[np.random.Generator], tuple[Array, Course]]:
     """Return lines from corner to corner, which rows meet by chance only."""
     at_s, values = map(list, zip(*corners, strict=True))
@@ -76,6 +88,9 @@ SET_UPS = (
     SetUp("sine", _sine, creep=True),
     SetUp("sine, Kelvin-Voigt", _sine, creep=False),
     SetUp("sine, Kelvin-Voigt, noisy sensor", _sine, creep=False, sensor=0.002),
+    SetUp("steps", _steps, creep=True),
+    SetUp("steps, noisy sensor", _steps, creep=True, sensor=0.002),
+    SetUp("late clock", _late, creep=True),
     SetUp("smooth", _smooth, creep=True),
     SetUp("smooth, Kelvin-Voigt", _smooth, creep=False),
     SetUp("smooth, noisy sensor", _smooth, creep=True, sensor=0.002),
