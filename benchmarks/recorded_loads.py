@@ -68,7 +68,7 @@ def _steps(rng: np.random.Generator) -> tuple[Array, Course]:
     """Return steps up and down, each at any time between two rows."""
     at_s, sizes = 1.0 + 3.5 * np.arange(3) + rng.uniform(0, 1.5, 3), rng.uniform(0.5, 1.5, 3)
     heights = sizes * [1, -0.7, 1]
-    return _rows(rng, 12.0, 0.1), lambda t: heights @ (np.asarray(t) >= at_s[:, None])
+    return _rows(rng, 12.0, 0.1), lambda t: np.dot(heights, np.asarray(t) >= at_s[:, None])
 
 
 def _late(rng: np.random.Generator) -> tuple[Array, Course]:

@@ -17,7 +17,6 @@ from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
 from biogrip.physics.noise import stream
 from biogrip.physics.protocol import Course, Phase, join_phases
-from biogrip.physics.recorded_course import follow_rows
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.physics.whitening import (
@@ -68,7 +67,7 @@ class Experiment:
     """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
     record: Array | None = field(default=None, compare=False)
     """Times from the start and what was controlled at them, (n, 2), where that was recorded, see
-    `follow_rows`; the phases are then a hold as long and as high."""
+    `biogrip.physics.recorded_course`; the phases are then a hold as long and as high."""
     undeclared: frozenset[str] = frozenset()
     """Which of ``offset`` and ``drift`` nothing is said of: a noise model brings them along."""
     given_ranges: frozenset[str] = frozenset()
@@ -97,6 +96,9 @@ class Experiment:
     def torque(self) -> Course:
         """Torque of both arms, or what else is held, against time."""
         if self.record is not None:
+            # Imported here: few experiments have a record.
+            from biogrip.physics.recorded_course import follow_rows
+
             return follow_rows(*self.record.T, deforms=self.instrument.deforms)
         return join_phases(self.phases, deforms=self.instrument.deforms)
 
