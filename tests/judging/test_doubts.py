@@ -149,13 +149,16 @@ def test_fast_noise_is_neither_smooth_nor_in_one_place(noise: str, fast: bool) -
         (0.3, 400.0, 0.0, 0.0, ""),
         (0.1, 400.0, 0.0, 0.4, "walks at random, 40 % of its variance"),
         (0.1, 400.0, 0.0, 0.3, ""),
+        # Odds of two, of which two standard deviations leave 0.54, more than a half, or 0.49.
+        (0.1, 400.0, 0.65, 2 / 3, "walks at random, 67 % of its variance"),
+        (0.1, 400.0, 0.7, 2 / 3, ""),
     ],
 )
 def test_share_and_time_less_its_error_decide(
     share: float, time_s: float, error: float, walk: float, said: str
 ) -> None:
     noise_model = NoiseModel(share, time_s, 0.0, walk=walk)
-    note = find_slow_misfit(noise_model, error, 400.0, 0.03, lambda: "it is so")
+    note = find_slow_misfit(noise_model, (error, error), 400.0, 0.03, lambda: "it is so")
     assert (note is not None) == bool(said)
     assert note is None or (note.weight == DOUBT and said in note.text)
 

@@ -210,10 +210,11 @@ class NoiseModelLikelihood:
         spread = np.einsum("iq,iq->q", slopes, np.linalg.solve(self._information(x), slopes))
         return max(float(2 / max(spread.max(), 1e-12)), _LEAST_FREEDOM)
 
-    def time_error(self, noise_model: NoiseModel) -> float:
-        """Compute the standard deviation of the logarithm of the correlation time."""
+    def errors(self, noise_model: NoiseModel) -> tuple[float, float]:
+        """Compute standard deviations of logarithms: of the correlation time, and of walk odds."""
         information = self._information(_logarithms(noise_model))
-        return float(np.sqrt(np.linalg.inv(information)[1, 1]))
+        _, of_time, _, of_walk, *_ = np.sqrt(np.diagonal(np.linalg.inv(information))).tolist()
+        return of_time, of_walk
 
     def _information(self, x: Array) -> Array:
         """Return half the Hessian of the deviance, plus the precision of the prior."""

@@ -91,8 +91,8 @@ class TraceFit:
     """Autocorrelation model of the noise; None if the noise was assumed to be white."""
     outliers: BoolArray
     """True for readings that were left out, (n_samples,)."""
-    time_error: float = 0.0
-    """Standard deviation of the logarithm of the noise model's correlation time."""
+    errors: tuple[float, float] = (0.0, 0.0)
+    """Standard deviations of logarithms of the noise model: of its time, and of its walk's odds."""
     fitted_along: str = ""
     """Terms of the instrument that were fitted along, in words."""
 
@@ -198,13 +198,13 @@ def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: 
             )
         kept, plain, found = _without_outliers(experiment, time_s, readings, find)
     time_s, readings = time_s[kept], readings[kept]
-    problem, found, noise_model, time_error = _in_turn(experiment, time_s, readings, plain, found)
+    problem, found, noise_model, errors = _in_turn(experiment, time_s, readings, plain, found)
     # Slow deviations now weigh less, so that another basin may be the deepest.
     other = find(problem)
     if np.float32(other.misfit) < np.float32(found.misfit):
         found = other
     along = _fitted_along(experiment, time_s)
-    return TraceFit(problem, found, noise_model, ~kept, time_error, along)
+    return TraceFit(problem, found, noise_model, ~kept, errors, along)
 
 
 def _fitted_along(experiment: Experiment, time_s: Array) -> str:
@@ -241,7 +241,7 @@ def _in_turn(
     readings: Array,
     plain: TraceProblem,
     found: Fit,
-) -> tuple[TraceProblem, Fit, NoiseModel | None, float]:
+) -> tuple[TraceProblem, Fit, NoiseModel | None, tuple[float, float]]:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, noise_model = plain, None
     logs = np.log(found.parameters)
@@ -268,12 +268,12 @@ def _in_turn(
         moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_sd
         if moved < _STAYED and _alike(before, noise_model):
             break
-    time_error = 0.0
+    errors = 0.0, 0.0
     if noise_model is not None:
-        time_error = likelihood.time_error(noise_model)
+        errors = likelihood.errors(noise_model)
         freedom = likelihood.freedom(noise_model, sensitivity / noise_sd, nuisance)
         problem = replace(problem, residuals=problem.residuals.with_freedom(freedom))
-    return problem, found, noise_model, time_error
+    return problem, found, noise_model, errors
 
 
 def _alike(one: NoiseModel | None, other: NoiseModel | None) -> bool:

@@ -165,6 +165,6 @@ def _notes_on_fit(fit: TraceFit, experiment: Experiment) -> list[Note]:
         white = experiment.to_identify().of(trace.time_s, trace.readings).residuals
         return name_suspects(white, fit.found.misfit / white.noise_scale, white.noise_scale)
 
-    given = fit.noise_model, fit.time_error, residuals.duration_s, share
+    given = fit.noise_model, fit.errors, residuals.duration_s, share
     misfit = find_slow_misfit(*given, suspects)
     return [misfit, *notes] if misfit else notes

@@ -448,24 +448,28 @@ _AS_THE_SCATTER = 1.44
 
 def find_slow_misfit(
     noise_model: NoiseModel,
-    time_error: float,
+    errors: tuple[float, float],
     duration_s: float,
     share_of_peak: float,
     suspects: Callable[[], str],
 ) -> Note | None:
     """Return a note if the slow parts of a noise model may be misfit.
 
-    Its correlation time counts less `_SURE` times the standard deviation of its logarithm.
+    Its correlation time and the odds of its walk count less `_SURE` times the standard deviations
+    of their logarithms, `errors`.
     `share_of_peak` is the standard deviation of those parts over the largest response; `suspects`
     says what is wrong if they are misfit.
     """
     share, time_s = noise_model.ar1, noise_model.time_s
-    least_s = time_s * float(np.exp(-_SURE * time_error))
+    certain = np.exp(-_SURE * np.array(errors))
+    least_s = time_s * float(certain[0])
     slow = share > _MOST and least_s > _SLOW * duration_s
     slow |= share > _NOTICEABLE and least_s > _LONG * duration_s
     what = f"is correlated over {plain(time_s, 2)} s of a trace of {plain(duration_s)} s"
-    if noise_model.walk > max(_NOTICEABLE, share):
-        slow, share, what = True, noise_model.walk, "walks at random"
+    walk = noise_model.walk
+    certain_walk = certain[1] * walk / (1 - walk + certain[1] * walk)
+    if certain_walk > _NOTICEABLE and walk > share:
+        slow, share, what = True, walk, "walks at random"
     if not slow:
         return None
     return Note(
