@@ -73,7 +73,8 @@ def _steps(rng: np.random.Generator) -> tuple[Array, Course]:
 
 def _late(rng: np.random.Generator) -> tuple[Array, Course]:
     """Return a hold from 0 whose first row comes late."""
-    return rng.uniform(0.1, 1.0) + np.arange(200) * 0.05, lambda t: 1.0 + 0.0 * np.asarray(t)
+    first_s = float(rng.uniform(0.1, 1.0))
+    return np.linspace(first_s, first_s + 10, 201), lambda t: np.ones_like(t)
 
 
 def _lines(*corners: tuple[float, float]) -> Callable[[np.random.Generator], tuple[Array, Course]]:
