@@ -228,10 +228,9 @@ def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> It
     """
     best, delay_s = diagnosis.likelihood.best, float(fits.time_s[0])
     given, others = fits.at(0.0, best), replace(fits, experiment=ramped)
-    ends = {
-        f"with the first reading, at {plain(delay_s)} s": 0.0,
-        "at 0, and was as long": -delay_s,
-    }
+    ends = {f"with the first reading, at {plain(delay_s)} s": 0.0}
+    if ramped.record is None and len(fits.experiment.phases) == 1:
+        ends["at 0, and was as long"] = -delay_s
     moved = {
         end: said
         for end, onset_s in ends.items()
