@@ -68,13 +68,13 @@ def _steps(rng: np.random.Generator) -> tuple[Array, Course]:
     """Return steps up and down, each at any time between two rows."""
     at_s, sizes = 1.0 + 3.5 * np.arange(3) + rng.uniform(0, 1.5, 3), rng.uniform(0.5, 1.5, 3)
     heights = sizes * [1, -0.7, 1]
-    return _rows(rng, 12.0, 0.1), lambda t: np.dot(heights, np.asarray(t) >= at_s[:, None])
+    return _rows(rng, 12.0, 0.1), lambda t: heights @ (np.asarray(t) >= at_s[:, None])
 
 
 def _late(rng: np.random.Generator) -> tuple[Array, Course]:
     """Return a hold from 0 whose first row comes late."""
-    time_s: Array = rng.uniform(0.1, 1.0) + np.arange(200) * 0.05
-    return time_s, lambda t: 1.0 + 0.0 * np.asarray(t)
+    first_s = float(rng.uniform(0.1, 1.0))
+    return np.linspace(first_s, first_s + 10, 201), lambda t: np.ones_like(t)
 
 
 def _lines(*corners: tuple[float, float]) -> Callable[[np.random.Generator], tuple[Array, Course]]:

@@ -222,15 +222,26 @@ def _moved(
 
 
 def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> Iterator[Note]:
-    """Yield a note if a ramp up to the first reading moves a value by the width of its limits."""
-    both = fits, replace(fits, experiment=ramped)
-    given, other = (own.at(0.0, diagnosis.likelihood.best) for own in both)
-    if moved := _moved(diagnosis, given, [other], 1.0):
+    """Yield a note if a ramp up to the first reading, or one as long before, moves a value.
+
+    That is by the width of its limits or more.
+    """
+    best, delay_s = diagnosis.likelihood.best, float(fits.time_s[0])
+    given, others = fits.at(0.0, best), replace(fits, experiment=ramped)
+    ends = {f"with the first reading, at {plain(delay_s)} s": 0.0}
+    if ramped.record is None and len(fits.experiment.phases) == 1:
+        ends["at 0, and was as long"] = -delay_s
+    moved = {
+        end: said
+        for end, onset_s in ends.items()
+        if (said := _moved(diagnosis, given, [others.at(onset_s, best)], 1.0))
+    }
+    if moved:
+        said = "; or if it ends ".join(f"{end}: {values}" for end, values in moved.items())
         yield Note(
             HARMLESS,
-            "If the load was no step but a ramp that ends with the first reading, at "
-            f"{plain(fits.time_s[0])} s: {moved}. A ramp is given by a protocol (--config), or as "
-            "recorded (--load).",
+            f"If the load was no step but a ramp that ends {said}. A ramp is given by a protocol "
+            "(--config), or as recorded (--load).",
         )
 
 
