@@ -288,7 +288,7 @@ class _Profile:
 
         It is found roughly, and then with closer lags on either side of those that it needs.
         """
-        if not self._stride > 0 or side in self._open:
+        if not 0 < self._stride < math.inf or side in self._open:
             return None
         lags, value, accuracy = self._fit.lags, self.best + side * self._stride, _ROUGH
         for _ in range(_MOST_DIVISIONS):
