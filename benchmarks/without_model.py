@@ -292,7 +292,11 @@ def main() -> None:
             if model not in set_up.hidden:
                 parts.append(measure(name, model, traces))
                 print(name, model, flush=True)
-    rows = pd.concat(parts)
+        _write(pd.concat(parts), traces)
+
+
+def _write(rows: pd.DataFrame, traces: int) -> None:
+    """Write what has been measured."""
     keys = ["set-up", "model", "quantity"]
     kept = rows.groupby(keys, sort=False).agg(_KEPT)
     write_text(_RESULTS, kept.to_csv(float_format="%.4g"))

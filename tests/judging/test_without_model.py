@@ -261,6 +261,18 @@ def test_a_misfit_of_any_sample_widens_limits() -> None:
     assert wavy.high - wavy.low > 10 * (clear.high - clear.low)
 
 
+@pytest.mark.parametrize("count", [4, 6, 10])
+@pytest.mark.parametrize("size", [1e-7, 1e-3])
+def test_few_readings_are_no_error(count: int, size: float) -> None:
+    """As many lags as readings leave nothing to test; limits hold the best fit."""
+    time_s = np.linspace(10.0, 100.0, count)
+    creeps = (time_s / 100) ** 0.3 + noise(size, 0, count)
+    for each in tell(time_s, creeps, reads="strain").told:
+        if each.low is not None and each.high is not None:
+            assert each.value is not None
+            assert each.low <= each.value <= each.high
+
+
 def test_times_at_which_it_is_told() -> None:
     assert decades(0.1, 100.0) == [0.1, 1.0, 10.0, 100.0]
     assert decades(0.3, 80.0) == [1.0, 10.0]

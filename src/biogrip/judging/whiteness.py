@@ -54,9 +54,12 @@ def correlated(residual: Array, basis: Array) -> tuple[float, float]:
     """Return the correlation of neighbouring residuals, and the chance of as much in white noise.
 
     The statistic is that of Durbin and Watson, d = sum (r_i+1 - r_i)^2 / sum r_i^2 [1]_, the
-    correlation 1 - d/2 relative to the mean of d; the chance is that of a smaller d.
+    correlation 1 - d/2 relative to the mean of d; the chance is that of a smaller d. A fit that
+    absorbs all but one direction leaves nothing to chance.
     """
     n = len(residual)
+    if n - len(basis) < 2:
+        return 0.0, 1.0
     observed = float(np.sum(np.diff(residual) ** 2) / np.sum(residual**2))
     differences = np.diff(basis)
     # A Q^T, for the matrix A = D^T D of differences D.

@@ -288,7 +288,7 @@ class _Profile:
 
         It is found roughly, and then with closer lags on either side of those that it needs.
         """
-        if not self._stride > 0 or side in self._open:
+        if not 0 < self._stride < math.inf or side in self._open:
             return None
         lags, value, accuracy = self._fit.lags, self.best + side * self._stride, _ROUGH
         for _ in range(_MOST_DIVISIONS):
@@ -296,7 +296,8 @@ class _Profile:
             if found is None or (accuracy < _ROUGH and lags.are_close(needed)):
                 break
             lags, value, accuracy = lags.divided(needed), found, _ACCURATE
-        return found
+        # Where the excess jumps, Newton's method may end on the other side.
+        return found if found is not None and side * (found - self.best) >= 0 else None
 
     def _crossing(
         self, lags: Lags, side: int, value: float, accuracy: float
@@ -331,6 +332,8 @@ class _Profile:
             if abs(outer - inner) < _CLOSE * abs(inner - self.best):
                 return inner, amplitudes > 0
             far = outer if math.isfinite(outer) else self.best + _LARGER * (value - self.best)
+            if far == inner:
+                break
             share = (value + step - inner) / (far - inner)
             if far == outer and not _CLOSE < share < 1 - _CLOSE:
                 share = 0.5
