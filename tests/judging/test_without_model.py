@@ -261,6 +261,11 @@ def test_a_misfit_of_any_sample_widens_limits() -> None:
     assert wavy.high - wavy.low > 10 * (clear.high - clear.low)
 
 
+def test_a_damper_has_a_loss_tangent_without_an_upper_limit() -> None:
+    flows = by_name(tell(TIMES, TIMES / 200 + noise(0.01), reads="strain"))
+    assert flows["tan delta(0.1 rad/s)"].verdict == BOUNDED_BELOW
+
+
 @pytest.mark.parametrize("count", [4, 6, 10])
 @pytest.mark.parametrize("size", [1e-7, 1e-3])
 def test_few_readings_are_no_error(count: int, size: float) -> None:

@@ -65,6 +65,8 @@ _NONE = 1e-9
 
 # Share of a value below which a lower limit says no more than that it is positive.
 _LITTLE = 0.01
+# Ratio beyond which an upper limit hangs on the fastest lag that is tried.
+_MOST = 1e4
 # Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
 _UNITS = {False: ("N/m", "m/N", "m/(N s)", "N s/m"), True: ("Pa", "1/Pa", "1/(Pa s)", "Pa s")}
 
@@ -258,6 +260,8 @@ def _told(fit: AnySampleFit, quantity: _Quantity, root: float) -> Told:
     if (turned := quantity.turned) is not None:
         value, *ends = (turned(it) if it else None for it in (value, *ends[::-1]))
     low, high = (float(end) if end is not None and end > 0 else None for end in ends)
+    if quantity.below is not None and max(value or 0.0, high or 0.0) > _MOST:
+        value, high = None, None
     if low is not None and value is not None and low < _LITTLE * max(value, _LITTLE * (high or 0)):
         low = None
     value = None if low is None or high is None or value is None else float(value)
