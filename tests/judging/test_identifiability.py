@@ -14,12 +14,7 @@ from biogrip.judging.quantities import (
     parameters_and_sum,
 )
 from biogrip.judging.valley import compute_valley
-from biogrip.judging.verdicts import (
-    BOUNDED_ABOVE,
-    BOUNDED_BELOW,
-    DETERMINED,
-    NOT_DETERMINED,
-)
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.models import CANDIDATES, MODELS, Sample
 from biogrip.physics.response import step_response, superpose
 from tests.helpers.problems import (

@@ -13,7 +13,8 @@ import numpy as np
 
 from biogrip.digits import counted
 from biogrip.fit.genome import nearest_encodable
-from biogrip.judging.likelihood import DETERMINED_PERCENT, bounds_percent
+from biogrip.judging.levels import DETERMINED_PERCENT
+from biogrip.judging.likelihood import bounds_percent
 from biogrip.judging.quantities import Quantity
 from biogrip.physics import gripper as actuator
 from biogrip.physics.protocol import sample_times

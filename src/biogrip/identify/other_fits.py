@@ -35,9 +35,7 @@ from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.prepare import flow_of, for_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import (
-    CLEARLY,
     DOUBT,
-    FALSE_ALARM,
     HARMLESS,
     REJECTED,
     REJECTION,
@@ -46,7 +44,16 @@ from biogrip.judging.doubts import (
     examine_residuals,
     one_in,
 )
-from biogrip.judging.likelihood import MISSED, compute_fall, make_likelihood
+from biogrip.judging.levels import (
+    CLEARLY,
+    FALSE_ALARM,
+    FAR_BETTER,
+    FEWEST_VALUES,
+    MISSED,
+    MORE_OFTEN,
+    SATURATED,
+)
+from biogrip.judging.likelihood import compute_fall, make_likelihood
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.fractional import LONGEST_S
 from biogrip.physics.models import CANDIDATES
@@ -55,13 +62,8 @@ from biogrip.physics.whitening import drift_is_flow, without
 from biogrip.traces.reader import Recording
 
 _MOST_SAMPLES = 50_000
-# Difference of BIC by which a model is far better than another (Kass and Raftery).
-_FAR_BETTER = 10.0
 # Most terms of the instrument that are fitted along: an offset and a drift.
 _TERMS = 2
-# Share of readings at an end of their scale from which on they are saturated, how many times as
-# often as each of the next values, and fewest values.
-_SATURATED, _MORE_OFTEN, _VALUES = 0.05, 5, 5
 # Each of the others would take half a second to five; they are tried where the config names them.
 _POWER_LAWS = ["fractional_kelvin_voigt", "fractional_maxwell"]
 
@@ -276,7 +278,7 @@ def second_opinions(traces: Sequence[Trace], diagnoses: Sequence[Diagnosis]) -> 
         judged = _diagnosed(other.trace[1], other.fit, other.fit.found, valley=False)
         terms = np.log(len(traces[index][0].time_s)) * other.added
         models = diagnoses[index].models
-        led = models is not None and models.lead > other.fall - terms + _FAR_BETTER
+        led = models is not None and models.lead > other.fall - terms + FAR_BETTER
         if not (led or diagnoses[index].status == judged.status == REJECTED):
             notes[index].append(_note(traces[index], diagnoses[index], other, judged))
     return notes
@@ -388,10 +390,13 @@ def note_saturated(recording: Recording, experiment: Experiment) -> list[Note]:
     """
     values, counts = np.unique(recording.readings[recording.time_s > 0], return_counts=True)
     unit, notes = f" {experiment.instrument.read.unit}".rstrip(), []
-    for end, at, near in (("largest", -1, slice(-_VALUES, -1)), ("smallest", 0, slice(1, _VALUES))):
-        if len(values) < _VALUES or counts[at] <= _SATURATED * np.sum(counts):
+    for end, at, near in (
+        ("largest", -1, slice(-FEWEST_VALUES, -1)),
+        ("smallest", 0, slice(1, FEWEST_VALUES)),
+    ):
+        if len(values) < FEWEST_VALUES or counts[at] <= SATURATED * np.sum(counts):
             continue
-        if counts[at] > _MORE_OFTEN * np.max(counts[near]):
+        if counts[at] > MORE_OFTEN * np.max(counts[near]):
             text = (
                 f"{counts[at]} of {np.sum(counts)} readings are exactly the {end}, "
                 f"{plain(values[at])}{unit}: the instrument looks saturated, and what it cut off "

@@ -15,6 +15,13 @@ from biogrip.digits import plain
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import fit_responses
 from biogrip.fit.experiment import Experiment
+from biogrip.judging.levels import (
+    FAR_ABOVE,
+    LARGEST_SHARE,
+    NO_RESPONSE,
+    SHORTEST_SHARE,
+    SMALLEST_SHARE,
+)
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lag_course
 from biogrip.physics.protocol import Course, evaluate
@@ -22,24 +29,13 @@ from biogrip.physics.whitening import nuisance_basis, without
 from biogrip.traces.columns import TIME_UNITS
 from biogrip.traces.reader import Recording
 
-# Plausible rotations over that of the free arm. No sample makes the arm turn further than without
-# it: the excess allows for errors of the fit and of the gripper's stiffness. The paper's stiffest
-# sample turns it by 8e-3. The ratio, 750, is below 1000, so that no trace passes both in its unit
-# and in one a thousand times larger or smaller.
-_SMALLEST_SHARE, _LARGEST_SHARE = 2e-3, 1.5
-# Least share of the protocol that a trace must cover: more than min/h = s/min = 1/60.
-_SHORTEST_SHARE = 0.02
-# Share of traces of pure noise that are accepted as a response.
-_FALSE_ALARM = 1e-3
 # Relative tolerance, since times are written with few digits.
 _TIME_SLACK = 1e-5
 _LAG_SHARES = (1e-9, 0.1, 10.0)
 # Log-likelihood ratio, times two, above which a trace counts as mirrored.
-_FAR_LIKELIER = -2 * math.log(_FALSE_ALARM)
+_FAR_LIKELIER = -2 * math.log(NO_RESPONSE)
 # Share of a function's norm that may be rounding error.
 _ROUNDING = 1e-9
-# Multiple of a given noise from which a rotation is seen, however small it is.
-_FAR_ABOVE = 10.0
 # Multiple of the free rotation beyond which its square could overflow.
 _ABSURD = 1e9
 
@@ -132,7 +128,7 @@ def _responds(trace: Array, nuisance: Array, rest: float, unknowns: int) -> bool
 
     freedom = len(trace) - unknowns
     explained = float(np.sum(without(nuisance, trace) ** 2)) - rest
-    return bool(explained > unknowns * fdtri(unknowns, freedom, 1 - _FALSE_ALARM) * rest / freedom)
+    return bool(explained > unknowns * fdtri(unknowns, freedom, 1 - NO_RESPONSE) * rest / freedom)
 
 
 def free_rotation(gripper: Gripper, torque: Course) -> float:
@@ -153,7 +149,7 @@ def _check_times(recording: Recording, torque: Course) -> None:
     begins = onset_s or 0.0
     time_s, earliest = recording.time_s, -slack if onset_s is None else -np.inf
     clock_s = time_s + begins
-    shortest = _SHORTEST_SHARE * end_s
+    shortest = SHORTEST_SHARE * end_s
 
     def fits(factor: float) -> bool:
         first, last = factor * clock_s[[0, -1]] - begins
@@ -183,7 +179,7 @@ def _check_times(recording: Recording, torque: Course) -> None:
 def _check_turn(
     recording: Recording, turn: float, free: float, noise_sd: float | None
 ) -> str | None:
-    columns, smallest, largest = recording.read, _SMALLEST_SHARE * free, _LARGEST_SHARE * free
+    columns, smallest, largest = recording.read, SMALLEST_SHARE * free, LARGEST_SHARE * free
 
     def fits(factor: float) -> bool:
         return smallest <= factor * turn <= largest
@@ -192,7 +188,7 @@ def _check_turn(
         return None
     hint = _other_units(recording.units[1], columns.quantity.units, fits)
     alone = f"without any sample the arm turns by {free:.3g} rad"
-    if noise_sd is not None and _FAR_ABOVE * noise_sd < turn < smallest:
+    if noise_sd is not None and FAR_ABOVE * noise_sd < turn < smallest:
         return (
             f"The largest rotation is {turn:.3g} rad, where {alone}: the sample is very stiff, or "
             f"the unit is not the right one.{hint}"
@@ -200,7 +196,7 @@ def _check_turn(
     limit = f"at most {largest:.3g} rad: {alone}"
     if turn < smallest:
         limit = (
-            f"at least {smallest:.3g} rad, or less with a given noise (--noise) {_FAR_ABOVE:g} "
+            f"at least {smallest:.3g} rad, or less with a given noise (--noise) {FAR_ABOVE:g} "
             f"times smaller still, where {alone}"
         )
     sample = int(np.argmax(np.abs(recording.readings)))

@@ -20,7 +20,8 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit.levenberg_marquardt import Minima, Normal
 from biogrip.fit.local_fits import LocalFits
-from biogrip.judging.likelihood import MISSED, Likelihood
+from biogrip.judging.levels import MISSED
+from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
 
 # E-folds from a bound at which a member counts as free, and by which rounding may exceed it.

@@ -27,7 +27,6 @@ from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.doubts import (
     DOUBT,
-    FAR_OFF,
     HARMLESS,
     REJECTED,
     REJECTION,
@@ -35,15 +34,10 @@ from biogrip.judging.doubts import (
     compute_status,
     examine_residuals,
 )
-from biogrip.judging.likelihood import MISSED, Likelihood, check_rows, make_likelihood
+from biogrip.judging.levels import BEYOND_THE_RANGE, FAR_OFF, MISSED
+from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
-from biogrip.judging.verdicts import (
-    DETERMINED,
-    Finding,
-    Trade,
-    compute_findings,
-    find_trade_offs,
-)
+from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
@@ -52,8 +46,6 @@ from biogrip.traces.reader import Recording
 if TYPE_CHECKING:
     from biogrip.judging.hidden import Hidden
 
-# Decrease of chi^2 beyond an end that is more than chance: three standard deviations squared.
-_NOTICEABLE = 9.0
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
 _WIDER, _BEYOND, _AT_END = np.log(1e3), 1.0, 1e-9
 
@@ -303,7 +295,7 @@ def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
             start[index] += outward * _BEYOND
             (low if outward < 0 else high)[index] += outward * _WIDER
             wider = fit_from([replace(problem, low=low, high=high)], start, roughly=True)
-            if likelihood.increase(float(wider.misfit[0])) < -_NOTICEABLE:
+            if likelihood.increase(float(wider.misfit[0])) < -BEYOND_THE_RANGE:
                 unit = f" {parameter.unit}" if parameter.unit else ""
                 yield Note(
                     REJECTION,

@@ -32,6 +32,27 @@ from biogrip.fit.noise_model_fit import (
     outliers_of,
 )
 from biogrip.judging.changes import Step, compare_halves, find_step
+from biogrip.judging.levels import (
+    AS_THE_SCATTER,
+    CERTAIN_MISFIT,
+    CLEARLY,
+    FALSE_ALARM,
+    FAR_OFF,
+    LONG,
+    MOSTLY,
+    NO_SCATTER,
+    NOISE_FREE,
+    NOISE_FREE_OF_PEAK,
+    NOTICEABLE,
+    REPEATED,
+    SLOW,
+    SMOOTH,
+    SURE,
+    TOO_LITTLE,
+    TOO_MUCH,
+    UNEVEN,
+    UNRESOLVED,
+)
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.whiteness import (
     as_correlated,
@@ -82,31 +103,10 @@ def find_reasons(notes: Sequence[Note]) -> list[str]:
     return [note.text for note in notes if _STATUS[note.weight] == status != OK]
 
 
-FALSE_ALARM = 0.003
-"""Significance level of each test: share of traces with white noise that fail it."""
-
-CERTAIN_MISFIT = 0.001
-"""Significance level of the test that tells misfit from noise."""
-
-# A misfit larger than the scatter of neighbouring readings by this factor changes limits.
-_TOO_MUCH = 1.2
-FAR_OFF = 0.02
-"""Share of the peak from which on a misfit is far off."""
-
-# A misfit below these shares of the noise and of the peak is that of a trace without noise, if
-# neighbours scatter by this share of it; and so is one below what no sensor resolves.
-_NOISE_FREE, _NOISE_FREE_OF_PEAK, _NO_SCATTER, _UNRESOLVED = 0.01, 1e-3, 0.1, 1e-6
-# A misfit below this share of the given noise is reported: noise is rarely known better.
-_TOO_LITTLE = 0.5
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
 MANY = 100_000
 # Smaller chances are not told apart.
 _NEVER = 1e-6
-CLEARLY = 3.0
-"""Growth of noise from which on its share is known, and unweighted fits are not compared."""
-
-# Share of readings that repeat the one before where a sensor is read less often than it is logged.
-_REPEATED = 0.45
 # Most outliers that are named, and lines of a spectrum.
 _NAMED, _MOST_LINES = 5, 3
 
@@ -125,12 +125,12 @@ class Remainder:
 def examine_residuals(likelihood: Likelihood) -> Remainder:
     """Test what the best fit of a trace leaves for noise, and for misfit."""
     residuals, misfit = likelihood.problem.residuals, likelihood.misfit
-    if misfit < _UNRESOLVED * residuals.peak:
+    if misfit < UNRESOLVED * residuals.peak:
         return Remainder([])
     residual, slopes = _left(residuals, likelihood.best)
     rounding = residuals.rounding
-    least = min(_NOISE_FREE * likelihood.noise_sd, _NOISE_FREE_OF_PEAK * residuals.peak)
-    if misfit < least and estimate_noise(residual, rounding) < _NO_SCATTER * misfit:
+    least = min(NOISE_FREE * likelihood.noise_sd, NOISE_FREE_OF_PEAK * residuals.peak)
+    if misfit < least and estimate_noise(residual, rounding) < NO_SCATTER * misfit:
         return Remainder([])
     growth = compute_growth(residual, residuals.response(likelihood.best), rounding)
     directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
@@ -154,7 +154,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     notes = list(_about_given(likelihood, bulk))
     found = None
     lines = list(_lines(bulk, basis, residuals, scale)) if whole else []
-    if chance < CERTAIN_MISFIT and times > _TOO_MUCH and not lines:
+    if chance < CERTAIN_MISFIT and times > TOO_MUCH and not lines:
         found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
         notes.clear()
         notes += found.notes
@@ -214,7 +214,7 @@ def _misfit(
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak
     of_peak = f"{plain(100 * share, 2)} % of the peak"
     suspects = name_suspects(residuals, times, scale)
-    if not residuals.rounding and np.mean(read[1:] == read[:-1]) > _REPEATED:
+    if not residuals.rounding and np.mean(read[1:] == read[:-1]) > REPEATED:
         text = (
             "Most readings repeat the one before, as of a sensor that is read less often than it "
             "is logged: keep one of each."
@@ -252,7 +252,7 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
     if correlated(*fit.left_of_readings())[1] >= FALSE_ALARM:
         return inadequate
-    if other * _TOO_MUCH < times:
+    if other * TOO_MUCH < times:
         return f"{inadequate}; what that leaves is of load, clock, contact or drift"
     return (
         "no linear sample gives this trace under this protocol, but leaves at least "
@@ -265,7 +265,7 @@ def _about_growth(
 ) -> Iterator[str]:
     """Yield a sentence on noise that grows with what is read, (n_samples,) in units of a scale."""
     times = compare_extremes(growth)
-    if not np.ptp(growth) or times < _TOO_MUCH:
+    if not np.ptp(growth) or times < TOO_MUCH:
         return
     instrument = residuals.instrument
     read = instrument.read.name
@@ -326,7 +326,7 @@ def _lines(residual: Array, basis: Array, residuals: Residuals, scale: float) ->
         taken = absorbed(np.vstack((taken, line)))
         rest = without(taken, residual)
     size = float(np.sqrt(np.mean(rest**2)))
-    misfit = correlated(rest, taken)[1] < CERTAIN_MISFIT and size > _TOO_MUCH * scale
+    misfit = correlated(rest, taken)[1] < CERTAIN_MISFIT and size > TOO_MUCH * scale
     if named and not misfit:
         yield (
             f"The residual has a line in its spectrum, at {' and '.join(named)}, as of hum or a "
@@ -406,14 +406,14 @@ def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
     left = max(len(residual) - lost, 1)
     chi_squared = float(residual @ residual) / likelihood.noise_sd**2
     share = float(np.sqrt(chi_squared / left))
-    if share < _TOO_LITTLE and float(chdtr(left, chi_squared)) < FALSE_ALARM:
+    if share < TOO_LITTLE and float(chdtr(left, chi_squared)) < FALSE_ALARM:
         yield Note(
             DOUBT,
             f"The noise that was given is {plain(1 / share, 2)} times what the fit leaves: its "
             "value, or its unit, is not the right one.",
         )
     if share > 1 and float(chdtrc(left, chi_squared)) < FALSE_ALARM:
-        much, so = share > _TOO_MUCH, "limits are too narrow by that"
+        much, so = share > TOO_MUCH, "limits are too narrow by that"
         if much:
             suspects = name_suspects(residuals, share, likelihood.noise_sd)
             so = f"its value or unit is not the right one, or {suspects}"
@@ -430,20 +430,11 @@ def one_in(chance: float) -> str:
     return f"once in {plain(1 / chance, 1)}"
 
 
-# Autocorrelated noise with most of the variance, and slower than this share of the trace, may be
-# misfit; so may such with a noticeable share that lasts for longer. Two standard deviations of its
-# time are sure.
-_MOST, _SLOW, _NOTICEABLE, _LONG, _SURE = 0.5, 0.02, 1 / 3, 0.2, 2.0
-# What scatters by so much more than noise that is correlated for this share would is smooth.
-_SMOOTH = 3.0
 # Of so many stretches of a trace with stationary noise, which is correlated for less than half a
 # stretch, none has so large a share of the sum of squares.
 _SLOW_STRETCHES, _IN_ONE = 20, 0.3
-# Of stretches with fewer readings the scatter is hardly known. Scales of white noise in twenty of
-# them differ by more once in hundreds of traces.
-_IN_A_STRETCH, _FEWEST_STRETCHES, _UNEVEN = 50, 3, 3.0
-# Mean square over that of the scatter: of white noise 1.05 to 1.4, as the scatter is uncertain.
-_AS_THE_SCATTER = 1.44
+# Of stretches with fewer readings the scatter is hardly known.
+_IN_A_STRETCH, _FEWEST_STRETCHES = 50, 3
 
 
 def find_slow_misfit(
@@ -455,20 +446,20 @@ def find_slow_misfit(
 ) -> Note | None:
     """Return a note if the slow parts of a noise model may be misfit.
 
-    Its correlation time and the odds of its walk count less `_SURE` times the standard deviations
+    Its correlation time and the odds of its walk count less `SURE` times the standard deviations
     of their logarithms, `errors`.
     `share_of_peak` is the standard deviation of those parts over the largest response; `suspects`
     says what is wrong if they are misfit.
     """
     share, time_s = noise_model.ar1, noise_model.time_s
-    certain = np.exp(-_SURE * np.array(errors))
+    certain = np.exp(-SURE * np.array(errors))
     least_s = time_s * float(certain[0])
-    slow = share > _MOST and least_s > _SLOW * duration_s
-    slow |= share > _NOTICEABLE and least_s > _LONG * duration_s
+    slow = share > MOSTLY and least_s > SLOW * duration_s
+    slow |= share > NOTICEABLE and least_s > LONG * duration_s
     what = f"is correlated over {plain(time_s, 2)} s of a trace of {plain(duration_s)} s"
     walk = noise_model.walk
     certain_walk = certain[1] * walk / (1 - walk + certain[1] * walk)
-    if certain_walk > _NOTICEABLE and walk > share:
+    if certain_walk > NOTICEABLE and walk > share:
         slow, share, what = True, walk, "walks at random"
     if not slow:
         return None
@@ -493,11 +484,11 @@ def has_fast_noise(residuals: Residuals, residual: Array, slopes: Array) -> bool
     if max(float(np.sum(each)) for each in stretches) > _IN_ONE * float(residual @ residual):
         return False
     noise_model = NoiseModelLikelihood(time_s, residual, slopes).best()
-    fast = noise_model.time_s <= _SLOW * residuals.duration_s
+    fast = noise_model.time_s <= SLOW * residuals.duration_s
     # Neighbours of such noise differ by a root of its readings less than all of it scatters.
     scatter = np.sqrt(np.mean(residual**2)) / max(residuals.noise_scale, 1e-300)
-    rough = scatter < _SMOOTH * np.sqrt(max(_SLOW * len(time_s), 1.0))
-    return fast and bool(rough) and noise_model.ar1 > _NOTICEABLE
+    rough = scatter < SMOOTH * np.sqrt(max(SLOW * len(time_s), 1.0))
+    return fast and bool(rough) and noise_model.ar1 > NOTICEABLE
 
 
 def has_uneven_noise(residual: Array, rounding: float) -> bool:
@@ -511,7 +502,7 @@ def has_uneven_noise(residual: Array, rounding: float) -> bool:
         return False
     stretches = np.array_split(residual, count)
     scales = [estimate_noise(each, rounding) for each in stretches]
-    if max(scales) < _UNEVEN * min(scales):
+    if max(scales) < UNEVEN * min(scales):
         return False
     own = np.concatenate([each / scale for each, scale in zip(stretches, scales, strict=True)])
-    return bool(np.mean(own**2) < _AS_THE_SCATTER)
+    return bool(np.mean(own**2) < AS_THE_SCATTER)

@@ -18,7 +18,8 @@ from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.judging.changes import Steps, parts_apart, steps_of
-from biogrip.judging.doubts import FALSE_ALARM, MANY, middle_of
+from biogrip.judging.doubts import MANY, middle_of
+from biogrip.judging.levels import FALSE_ALARM
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.verdicts import Finding
 from biogrip.judging.whiteness import averaged

@@ -29,19 +29,10 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import TraceProblem
+from biogrip.judging.levels import CERTAIN, DETERMINED_PERCENT, MISSED
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import Noise, standard_deviation
-
-CERTAIN = 0.999
-"""Confidence that a profile must reach at an end of the range to have a limit on that side."""
-
-MISSED = 0.05
-"""Largest increase of chi^2 that the weak prior of local fits may cause.
-
-A fit that is deeper than an optimum by more shows that the optimum is not the global one.
-"""
-
 
 # Error of sums of squares, as a share of those of the largest reading.
 _ROUNDING = 1e-12
@@ -225,10 +216,6 @@ def bound(sensitivity: Array, noise_sd: float | Array, log_parameters: Array, q:
     if np.any(np.isinf(found)):
         return float("inf")
     return float(np.sqrt(slope[members] @ found @ slope[members]))
-
-
-DETERMINED_PERCENT = 100.0
-"""Bound in percent from which on a quantity does not count as determined."""
 
 
 def bounds_percent(

@@ -15,6 +15,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import plain, with_limits, within_limits
+from biogrip.judging.levels import WIDE, WORTH_A_PROFILE
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations
@@ -26,14 +27,6 @@ BOUNDED_ABOVE = "bounded above"
 NOT_DETERMINED = "not determined"
 FIT_REJECTED = "fit rejected"
 """Verdict on every quantity of a fit that is rejected."""
-
-WIDE = 3.0
-"""Limits further than this factor from their middle tell little more than an order of magnitude:
-moduli of cells of one kind scatter by a factor of about 2 to 3."""
-
-# A combination of undetermined parameters is profiled if the first-order standard
-# deviation of its logarithm is below this.
-_WORTH_A_LOOK = 0.5
 
 
 @dataclass(frozen=True)
@@ -195,7 +188,7 @@ def find_trade_offs(
         for pair in combinations(left, 2):
             candidates = find_combinations(model, list(pair))
             deviations = [likelihoods[trace].deviation(quantity) for quantity in candidates]
-            if min(deviations, default=np.inf) < _WORTH_A_LOOK:
+            if min(deviations, default=np.inf) < WORTH_A_PROFILE:
                 pairs.append((trace, pair, candidates[int(np.argmin(deviations))]))
     profiled: dict[tuple[int, Quantity], Finding] = {}
     for quantity in dict.fromkeys(quantity for _, _, quantity in pairs):

@@ -39,13 +39,12 @@ from scipy.special import chdtrc
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
 from biogrip.fit.any_sample import AnySampleFit, Lags, fit_any_sample
+from biogrip.judging.levels import CERTAIN_MISFIT, TOO_MUCH
 from biogrip.judging.likelihood import find_thresholds
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
 
-# Chance below which what a fit leaves is no noise, and how much larger than the noise it then is.
-_CHANCE, _TOO_MUCH = 0.001, 1.2
 # First digits of the times at which quantities are told and, where these are too few, of more.
 _DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2
 # Weight of the row that holds a quantity, in the inverse of its standard deviation; accuracies of
@@ -188,9 +187,9 @@ def tell_without_model(
     if noise_sd is not None:
         too_large = float(chdtrc(free, free * times**2))
         chance = min(chance, too_large)
-        if too_large >= _CHANCE:
+        if too_large >= CERTAIN_MISFIT:
             sd, freedom = noise_sd, math.inf
-    is_linear = chance >= _CHANCE or times <= _TOO_MUCH
+    is_linear = chance >= CERTAIN_MISFIT or times <= TOO_MUCH
     if not is_linear:
         independent, freedom = as_correlated(*left)
         sd = fit.sd * math.sqrt(free / independent)

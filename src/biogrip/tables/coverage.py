@@ -7,15 +7,10 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
+from biogrip.judging.levels import WIDE
 from biogrip.judging.likelihood import bound
 from biogrip.judging.quantities import parameters_and_sum
-from biogrip.judging.verdicts import (
-    BOUNDED_ABOVE,
-    BOUNDED_BELOW,
-    DETERMINED,
-    NOT_DETERMINED,
-    WIDE,
-)
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.noise import standard_deviation
 from biogrip.records.identifications import INTERVALS
 from biogrip.records.traces import read_target
