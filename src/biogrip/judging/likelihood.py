@@ -43,7 +43,7 @@ A fit that is deeper than an optimum by more shows that the optimum is not the g
 """
 
 
-# Error of sums of squares, as a share of those of the largest reading.
+# Error of sums of squares, as a share of those of the largest reading or response.
 _ROUNDING = 1e-12
 
 
@@ -139,7 +139,9 @@ def check_rows(likelihood: Likelihood) -> None:
     residuals, best = likelihood.problem.residuals, likelihood.best
     of_rows = float(residuals.misfit(np.exp(best)[None])[0])
     of_readings = float(np.sqrt(np.mean(residuals.left(best) ** 2)))
-    largest = float(np.max(np.abs(residuals.trace.readings)))
+    # A spring beside an offset may be as stiff as its range allows.
+    both = residuals.trace.readings, residuals.response(best)
+    largest = max(float(np.max(np.abs(each))) for each in both)
     rounding = _ROUNDING * residuals.samples * (largest / likelihood.noise_sd) ** 2
     apart = likelihood.increase(of_rows) - likelihood.increase(of_readings)
     if abs(apart) > MISSED + rounding:
