@@ -10,7 +10,9 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.fit.fitted_onset import OnsetFits, begins_constant, estimate_onset
-from biogrip.judging.onset import is_cut_off
+from biogrip.judging.diagnosis import RING
+from biogrip.judging.doubts import DOUBT, Note
+from biogrip.judging.onset import is_cut_off, profile_over_onset
 from biogrip.library import Sample, TraceResult, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import Phase, hold, ramp
@@ -139,6 +141,16 @@ def test_a_fitted_onset_widens_limits_that_hold_the_truth() -> None:
     wide, narrow = (own["high"] - own["low"] for own in limits)
     assert (wide / narrow)["c_p"] > 1.05
     assert (wide / narrow).min() > 0.99
+
+
+def test_readings_near_a_fitted_onset_are_not_said_to_show_a_ring() -> None:
+    """Of milliseconds, where the onset is known to tenths of a second."""
+    times, values = late(2)
+    given = gripped(times, values, start=ONSET_S).diagnosis
+    kept, ring = Note(DOUBT, "Something else."), Note(DOUBT, f"{RING}: what inertia does.")
+    found, ends = profile_over_onset(replace(given, notes=[kept, ring]), times - ONSET_S)
+    assert ends[1] - ends[0] > 0.05
+    assert found.notes == [kept]
 
 
 def test_padding_before_the_onset_is_no_measurement() -> None:

@@ -49,6 +49,9 @@ if TYPE_CHECKING:
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
 _WIDER, _BEYOND, _AT_END = np.log(1e3), 1.0, 1e-9
 
+RING = "The arms ring"
+"""Beginning of the note on ringing."""
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -323,7 +326,7 @@ def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
     if ring := residuals.ring(network, noise_sd):
         yield Note(
             REJECTION if rejected else DOUBT,
-            "The arms ring: their inertia, which fits leave out, changes readings of this sample "
+            f"{RING}: their inertia, which fits leave out, changes readings of this sample "
             f"by up to {plain(ring.largest, 2)} times the noise. Leave out the readings of the "
             f"first {_rounded_up(1e3 * ring.lasts_s)} ms after each change of the torque.",
         )

@@ -34,7 +34,7 @@ from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import Noise, standard_deviation
 
-# Error of sums of squares, as a share of those of the largest reading.
+# Error of sums of squares, as a share of those of the largest reading or response.
 _ROUNDING = 1e-12
 
 
@@ -130,8 +130,9 @@ def check_rows(likelihood: Likelihood) -> None:
     residuals, best = likelihood.problem.residuals, likelihood.best
     of_rows = float(residuals.misfit(np.exp(best)[None])[0])
     of_readings = float(np.sqrt(np.mean(residuals.left(best) ** 2)))
-    # Beside an offset a response may be far larger than what is read.
-    largest = float(np.max(np.abs(residuals.response(best))))
+    # A spring beside an offset may be as stiff as its range allows.
+    both = residuals.trace.readings, residuals.response(best)
+    largest = max(float(np.max(np.abs(each))) for each in both)
     rounding = _ROUNDING * residuals.samples * (largest / likelihood.noise_sd) ** 2
     apart = likelihood.increase(of_rows) - likelihood.increase(of_readings)
     if abs(apart) > MISSED + rounding:

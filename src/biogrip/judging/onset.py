@@ -31,7 +31,7 @@ from biogrip.fit.fitted_onset import (
     spacing_at,
 )
 from biogrip.fit.least_squares import fit_from
-from biogrip.judging.diagnosis import Diagnosis
+from biogrip.judging.diagnosis import RING, Diagnosis
 from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
@@ -55,6 +55,8 @@ _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
 # First change of the onset over how far readings are apart there, and most of it as a share of the
 # trace.
 _FIRST_STEP, _MOST = 1 / 64, 0.25
+# Share of that to which an onset has to be known for readings to be of a ring after it.
+_TOLD = 0.1
 # Accuracy of an end of the onset's interval, as a share of its distance.
 _ACCURACY = 0.01
 
@@ -285,6 +287,10 @@ def profile_over_onset(
     """
     best = diagnosis.likelihood
     ends = onset_limits(best, time_s)
+    if ends[1] - ends[0] > _TOLD * spacing_at(time_s, 0.0):
+        # Nothing tells how soon after a change of the torque a reading came.
+        notes = [note for note in diagnosis.notes if not note.text.startswith(RING)]
+        diagnosis = replace(diagnosis, notes=notes)
     others = [_at(best, float(change_s)) for end in ends for change_s in end * _SHARES]
     others = [each for each in others if each.threshold > 0]
     if not others:

@@ -88,7 +88,8 @@ class MeasurementBlock(Block):
     load: _Name = None
     """Name of the file's column of what was controlled: torques, or the forces, stresses,
     displacements or strains under which the readings were taken. The protocol follows it from row
-    to row, from its first one or from start_s on. Only for `biogrip identify`."""
+    to row, from start_s on; without that from its first row or, if there it is not zero, from 0.
+    Only for `biogrip identify`."""
     load_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
     """Unit of that column, where its name does not end in it."""
     average_repeated: bool = False
