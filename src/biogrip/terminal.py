@@ -106,8 +106,8 @@ class Progress:
             print(f"{CLEARED}{said}", end="", file=sys.stderr, flush=True)
         elif now - self._said >= _EVERY_S and not self._quiet:
             self._said = now
-            # Of a job to standard output, so that it does not fill the log; a command prints results
-            # there.
+            # Of a job to standard output, so that it does not fill the log; there a command prints
+            # its results.
             print(said, file=sys.stderr if self._alone else sys.stdout, flush=True)
 
 
