@@ -38,13 +38,13 @@ from biogrip.judging.levels import BEYOND_THE_RANGE, FAR_OFF, MISSED
 from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
-from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
 from biogrip.traces.reader import Recording
 
 if TYPE_CHECKING:
     from biogrip.judging.hidden import Hidden
+    from biogrip.judging.without_model import WithoutModel
 
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
 _WIDER, _BEYOND, _AT_END = np.log(1e3), 1.0, 1e-9
@@ -90,19 +90,22 @@ class Diagnosis:
         return compute_status(self.notes)
 
     def without_model(
-        self, at_s: Sequence[float] = (), kinds: Collection[str] = KINDS
-    ) -> WithoutModel:
+        self, at_s: Sequence[float] = (), kinds: Collection[str] | None = None
+    ) -> "WithoutModel":
         """Tell what any linear sample would show, see `tell_without_model`.
 
         Where none gives the trace, as the best of them would be rejected, nothing is told.
         """
+        # Imported here, as below: only those who ask for it need it.
+        from biogrip.judging.without_model import KINDS, tell_without_model
+
         residuals, experiment = self.likelihood.problem.residuals, self.experiment
         found = tell_without_model(
             residuals,
             confidence=self.likelihood.confidence,
             noise_sd=experiment.noise_sd if experiment else None,
             at_s=at_s,
-            kinds=kinds,
+            kinds=KINDS if kinds is None else kinds,
         )
         # Beyond the noise.
         far_off = found.misfit**2 - residuals.noise_scale**2 > (FAR_OFF * residuals.peak) ** 2
@@ -112,7 +115,6 @@ class Diagnosis:
     @cached_property
     def hidden(self) -> list["Hidden"]:
         """Errors that the trace could hide, none of a rejected fit, see `find_hidden`."""
-        # Imported here: only those who ask for it need it.
         from biogrip.judging.hidden import find_hidden
 
         rejected = self.status == REJECTED
