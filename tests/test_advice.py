@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+import pytest
 
 from biogrip.arrays import Array
 from biogrip.command.notebook import identify_trace
@@ -28,6 +29,7 @@ def told(model: str, **compared: list[str]) -> dict[str, Any]:
     return identify_trace(TIMES, curve(), reads="modulus", model=model, config=config).data
 
 
+@pytest.mark.nightly
 def test_branches_are_added_until_a_further_one_does_not_help() -> None:
     found = told("generalized_maxwell")
     assert found["fit"] == "rejected"

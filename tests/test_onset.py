@@ -110,6 +110,7 @@ def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
     assert best.misfit <= true.misfit * (1 + 1e-9)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("last_s", [1e3, pytest.param(1e4, marks=pytest.mark.nightly)])
 def test_a_trace_over_many_decades_of_time_has_an_answer(last_s: float) -> None:
     """A liquid on which no reading of the first decades moves, and exact times."""
@@ -143,6 +144,7 @@ def test_a_fitted_onset_widens_limits_that_hold_the_truth() -> None:
     assert (wide / narrow).min() > 0.99
 
 
+@pytest.mark.nightly
 def test_readings_near_a_fitted_onset_are_not_said_to_show_a_ring() -> None:
     """Of milliseconds, where the onset is known to tenths of a second."""
     times, values = late(2)
@@ -244,6 +246,7 @@ def test_a_late_start_is_advised_with_its_limits_and_with_the_tare() -> None:
     assert f"({low:.2f} to {high:.2f}) of the clock, as fitted" in str(found)
 
 
+@pytest.mark.nightly
 def test_models_are_compared_each_at_its_own_onset() -> None:
     """At that of one without a power law, a third branch would seem the best."""
     times = np.arange(0, 60, 0.5)

@@ -163,6 +163,7 @@ def test_share_and_time_less_its_error_decide(
     assert note is None or (note.weight == DOUBT and said in note.text)
 
 
+@pytest.mark.nightly
 def test_noise_that_grows_over_decades_is_weighed_and_its_share_advised() -> None:
     """A Maxwell liquid, whose first readings hardly count without weights; then all holds."""
     times = np.geomspace(1e-4, 1e4, 90)

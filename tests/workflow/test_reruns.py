@@ -90,6 +90,7 @@ def test_an_edited_trace_is_read_again(tiny_copy: Path) -> None:
     assert planned(tiny_copy, "results/identifications/mine.csv", config=TINY) == again
 
 
+@pytest.mark.nightly
 def test_five_seeds_more_keep_what_there_is(tiny_copy: Path) -> None:
     """And the rows of the seeds that were there have the same bytes."""
     file = tiny_copy / "results/identifications/liquid_drop_2.csv"
