@@ -41,6 +41,16 @@ def test_a_parameter_that_is_told_to_less_than_an_e_fold_counts() -> None:
     assert found == pytest.approx(np.array([[2.0, -1.0], [-1.0, 2.0]]) / 3)
 
 
+def test_what_a_trace_without_noise_tells_may_outweigh_every_prior() -> None:
+    """Two parameters of which it tells the sum, to 1e-12: their prior is lost in rounding."""
+    rows = np.array([[[0.0], [1e12], [1e12]]])
+    residuals = seen(samples=100, free=100, freedom=np.inf, condensed_responses=lambda best: rows)
+    given = seen(residuals=residuals), np.zeros(2), 1.0
+    likelihood = make_likelihood(*given, confidence=0.95, noise_sd=1.0)
+    total = seen(gradient=lambda best: np.ones(2))
+    assert likelihood.deviation(total) == pytest.approx(1e-12)
+
+
 def test_noise_that_grows_has_the_covariance_of_unweighted_fits() -> None:
     """Of a slope from readings at 10 and 20: (10^2 + 20^2 3^2) / (10^2 + 20^2)^2."""
     found = covariance(np.array([[10.0, 20.0]]), np.array([1.0, 3.0]))

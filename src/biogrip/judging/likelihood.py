@@ -98,7 +98,12 @@ class Likelihood:
         relative = rows[1:] / self.noise_sd
         slope = quantity.gradient(self.best)
         information = relative @ relative.T + np.eye(len(slope))
-        return float(np.sqrt(slope @ np.linalg.solve(information, slope)))
+        try:
+            solved = np.linalg.solve(information, slope)
+        except np.linalg.LinAlgError:
+            # Without noise the trace may outweigh the prior by more than numbers have digits.
+            solved = np.linalg.lstsq(information, slope)[0]
+        return float(np.sqrt(np.maximum(slope @ solved, 0.0)))
 
 
 def make_likelihood(
