@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from biogrip import __version__
+from biogrip.command.options import KEYS
 from biogrip.errors import BiogripError
 from biogrip.terminal import visible, visible_lines
 
@@ -149,13 +150,13 @@ def _any_key(text: str) -> tuple[tuple[str, ...], Any]:
 
 _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
     "the file's columns": [
-        ("--time", "measurement.time", "COLUMN", "of times [time_s]"),
+        ("--time", KEYS["time"], "COLUMN", "of times [time_s]"),
         (
             *("--reading", _reading, "[QUANTITY=]COLUMN"),
             "of readings [rotation=rotation_rad]; or displacement, strain, compliance (creep), "
             "force, stress, modulus (relaxation)",
         ),
-        ("--sd", "measurement.sd", "COLUMN", "of the readings' standard deviations"),
+        ("--sd", KEYS["sd"], "COLUMN", "of the readings' standard deviations"),
     ],
     "what was done": [
         (
@@ -164,25 +165,25 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
             "a displacement, and the reverse, as in '20 pN', 5mbar or 5%%, or in SI units; 1 for a "
             "compliance or a modulus",
         ),
-        ("--load", "measurement.load", "COLUMN", "of what was held, as recorded, instead"),
+        ("--load", KEYS["load"], "COLUMN", "of what was held, as recorded, instead"),
         ("--start", _start, "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
-        ("--from", "measurement.from_s", "SECONDS", "first time of the clock to use [all]"),
-        ("--until", "measurement.until_s", "SECONDS", "last time of the clock to use [all]"),
+        ("--from", KEYS["from"], "SECONDS", "first time of the clock to use [all]"),
+        ("--until", KEYS["until"], "SECONDS", "last time of the clock to use [all]"),
     ],
     "the noise and the instrument": [
-        ("--noise", "measurement.noise_rad", "SD", "known noise, in the readings' SI unit"),
-        ("--noise-model", "measurement.noise_model", "NAME", "white, or coloured: autocorrelated"),
+        ("--noise", KEYS["noise"], "SD", "known noise, in the readings' SI unit"),
+        ("--noise-model", KEYS["noise_model"], "NAME", "white, or coloured: autocorrelated"),
         (
             "--noise-share",
-            "measurement.noise_share",
+            KEYS["noise_share"],
             "SHARE",
             "known noise, as a share of the readings",
         ),
-        ("--offset", "measurement.offset", "", "fit an offset along, or not"),
-        ("--drift", "measurement.drift", "", "fit a linear drift along, or not"),
+        ("--offset", KEYS["offset"], "", "fit an offset along, or not"),
+        ("--drift", KEYS["drift"], "", "fit a linear drift along, or not"),
     ],
     "the sample": [
-        ("--model", "sample.model", "NAME", "sample model [generalized_maxwell]"),
+        ("--model", KEYS["model"], "NAME", "sample model [generalized_maxwell]"),
         ("--fix", _fix, "NAME=VALUE", "known parameter, SI units; 0 for no element; repeatable"),
         ("--at", _at, "SECONDS,...", "times after a step at which to tell what any model would"),
     ],

@@ -58,11 +58,11 @@ def draw(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
     """
     drawn = draw_best(diagnosis)
     with styled():
-        more = [draw_level(diagnosis)] if data["without_model"]["quantities"] else []
+        more = [draw_level(diagnosis, data)] if data["without_model"]["quantities"] else []
         return [_address(each) for each in (drawn, draw_profiles_of(data), *more)]
 
 
-def draw_level(diagnosis: Diagnosis) -> Figure:
+def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
     """Draw what limits any linear sample has at times after a step, and the best fit.
 
     Where one level was held, readings over it are drawn, too.
@@ -70,7 +70,8 @@ def draw_level(diagnosis: Diagnosis) -> Figure:
     experiment, recording = diagnosis.experiment, diagnosis.recording
     assert experiment is not None
     assert recording is not None
-    times = np.geomspace(*diagnosis.without_model(kinds=()).covered_s, _BAND)
+    first_s, last_s = data["without_model"]["covered_s"]
+    times = np.geomspace(first_s, last_s, _BAND)
     told = diagnosis.without_model(times.tolist(), [LEVEL]).told
     step = join_phases((hold(2 * times[-1], 1.0),), deforms=experiment.instrument.deforms)
     network = experiment.searched.network(np.exp(diagnosis.likelihood.best))

@@ -27,6 +27,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.command.held import remarks_on_hold
+from biogrip.command.options import KEYS
 from biogrip.command.outputs import COLUMNS
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
@@ -62,12 +63,9 @@ LOAD = ("measurement", "load")
 
 # Options of the command that may be columns of a table, and the keys that they set.
 _OPTIONS: dict[str, tuple[str, ...]] = {
-    "model": ("sample", "model"),
     "hold": HOLD,
-    "noise": ("measurement", "noise_rad"),
-    **{key: ("measurement", f"{key}_s") for key in ("start", "from", "until")},
-    **{key: ("measurement", key) for key in ("time", "sd", "load", "offset", "drift")},
-    **{key: ("measurement", key) for key in ("noise_model", "noise_share")},
+    "start": ("measurement", "start_s"),
+    **{name: tuple(key.split(".")) for name, key in KEYS.items()},
 }
 _OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))

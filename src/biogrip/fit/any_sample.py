@@ -25,11 +25,12 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.physics.modes import Modes, lag_course, mode_responses
+from biogrip.physics.protocol import Course
 from biogrip.physics.residuals import Residuals
 
-# Retardation times a decade; shortest over the sampling interval, longest over the protocol, and
-# that of what does not relax.
-_A_DECADE, _SHORTEST, _LONGEST, _LASTING = 4, 0.01, 10.0, 1e6
+# Lags: shortest over the time between the closest readings, longest over the protocol; how many a
+# decade smooth a trace, and that of what does not relax.
+_SHORTEST, _LONGEST, _A_DECADE, _LASTING = 0.01, 10.0, 4, 1e6
 # The smooth rotation and the weights are found in turn.
 _ROUNDS = 4
 # Share of the readings whose scatter bounds the noise from below, and fewest of them.
@@ -150,9 +151,6 @@ class AnySampleFit:
         """Return what it leaves of the readings, (n_samples,), and a basis of what it absorbs."""
         own, lags, residuals = self.amplitudes > 0, self.lags, self.lags.residuals
         trace, course = residuals.trace, residuals.course
-        if not own.any():
-            # Readings that go against the load.
-            return trace.cleared, absorbed(trace.condensed.nuisance)
         shown = mode_responses(-lags.rates[own][None], course, trace.time_s)[0][0]
         shown *= (1.0 if course.deforms else -1.0) / lags.sizes[own, None]
         shown = trace.condensed.cleared(shown)
@@ -196,6 +194,17 @@ def spread_rates(
     return np.unique(np.concatenate((ends, inner, [middle, middle * (1 + 1e-9)])))
 
 
+def spread_lags(course: Course, time_s: Array, a_decade: int) -> list[float]:
+    """Return lags over a protocol's duration, see `lag_course`, so many a decade.
+
+    They are for readings at ascending times, (n_samples,).
+    """
+    shortest = _SHORTEST * float(np.diff(time_s).min()) / course.end_s
+    count = 2 + int(a_decade * np.log10(_LONGEST / shortest))
+    lags: list[float] = np.geomspace(shortest, _LONGEST, count).tolist()
+    return lags
+
+
 def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:
     """Fit non-negative amplitudes of responses, (n, n_rows), to a trace, (n_rows,).
 
@@ -225,10 +234,8 @@ def proportional_deviations(problem: Experiment, time_s: Array, readings: Array)
     """
     share, noise_sd = problem.noise_share or 0.0, problem.noise_sd
     nuisance = problem.nuisance(time_s)
-    shortest = _SHORTEST * float(np.diff(time_s).min()) / problem.torque.end_s
-    count = 2 + int(_A_DECADE * np.log10(_LONGEST / shortest))
-    lags = np.append(np.geomspace(shortest, _LONGEST, count), _LASTING)
-    family = lag_course(problem.torque, lags.tolist())(time_s)
+    lags = [*spread_lags(problem.torque, time_s, _A_DECADE), _LASTING]
+    family = lag_course(problem.torque, lags)(time_s)
     functions = np.vstack((family, nuisance, -nuisance))
     deviations = np.full(len(time_s), share * np.max(np.abs(readings)))
     for _ in range(_ROUNDS):

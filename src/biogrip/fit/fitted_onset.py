@@ -16,16 +16,14 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.any_sample import fit_responses
+from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import TraceProblem, silent
 from biogrip.physics.modes import lag_course
 from biogrip.physics.whitening import estimate_noise, nuisance_basis, without
 
-# Relaxation times: longest over the protocol's duration, shortest over the time between the closest
-# readings, and how many a decade.
-_LONGEST, _SHORTEST, _A_DECADE = 10.0, 0.01, 2
+_LAGS_A_DECADE = 2
 # Delays on the first grid; finer ones have as many between the neighbours of the best.
 _DELAYS = 65
 # Most readings that an estimate takes of the whole trace, and as many of what the grid spans.
@@ -69,9 +67,7 @@ def _estimate(
     """Return the onset, and the mean square that is left."""
     torque, last = problem.torque, len(time_s) - 1
     shortest = float(np.min(np.diff(time_s)))
-    least = _SHORTEST * shortest / torque.end_s
-    shares = np.geomspace(least, _LONGEST, 2 + int(_A_DECADE * np.log10(_LONGEST / least)))
-    responses = lag_course(torque, shares.tolist())
+    responses = lag_course(torque, spread_lags(torque, time_s, _LAGS_A_DECADE))
 
     def square_sum(onset_s: float, some: IntArray) -> float:
         nuisance = nuisance_basis(time_s[some], offset=offset, drift=problem.drift)

@@ -23,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.fit.any_sample import fit_responses
+from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.physics.modes import lag_course
 from biogrip.physics.whitening import without
@@ -31,8 +31,7 @@ from biogrip.physics.whitening import without
 # Weights that are tried; change of a row over the median's that is no scatter; fewest rows.
 _WEIGHTS = 10.0 ** np.arange(-2, 13)
 _FAR, _FEWEST = 8.0, 20
-# Relaxation times: longest over the protocol's duration, shortest over the interval, a decade.
-_LONGEST, _SHORTEST, _A_DECADE = 10.0, 0.01, 2
+_LAGS_A_DECADE = 2
 # Most readings that are compared, and by how much χ² has to fall: by less than a tenth it does
 # where nothing is smoothed out, and if it hardly falls, both courses will do.
 _MOST_READINGS, _BETTER = 5000, 1.0
@@ -63,9 +62,7 @@ def without_noise(experiment: Experiment, time_s: Array, readings: Array) -> tup
     if not noise:
         return smooth, noise
     some = np.unique(np.linspace(0, len(time_s) - 1, _MOST_READINGS).astype(np.int64))
-    shortest = _SHORTEST * float(np.min(np.diff(time_s))) / experiment.torque.end_s
-    decades = np.log10(_LONGEST / shortest)
-    lags = np.geomspace(shortest, _LONGEST, 2 + int(_A_DECADE * decades)).tolist()
+    lags = spread_lags(experiment.torque, time_s, _LAGS_A_DECADE)
     nuisance = experiment.nuisance(time_s[some])
     rest = []
     for own in (experiment, replace(experiment, record=smooth)):

@@ -446,10 +446,9 @@ def find_slow_misfit(
 ) -> Note | None:
     """Return a note if the slow parts of a noise model may be misfit.
 
-    Its correlation time and the odds of its walk count less `SURE` times the standard deviations
-    of their logarithms, `errors`.
-    `share_of_peak` is the standard deviation of those parts over the largest response; `suspects`
-    says what is wrong if they are misfit.
+    Its correlation time and the odds of its walk count less `SURE` times the standard deviations of
+    their logarithms, `errors`. `share_of_peak` is the standard deviation of those parts over the
+    largest response; `suspects` says what is wrong if they are misfit.
     """
     share, time_s = noise_model.ar1, noise_model.time_s
     certain = np.exp(-SURE * np.array(errors))

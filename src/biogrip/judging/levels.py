@@ -1,51 +1,54 @@
 """Every level and threshold that decides a status, or whether a limit is said, with its reason.
 
-Levels of significance say how often a right fit is blamed by chance; that they are kept is
-simulated in `docs/levels.md` and by the tests of each module. Tolerances of numerical methods stand
-beside the loops that they end.
+Levels of significance say how often a right fit is blamed by chance; `docs/levels.md` has how often
+all tests together do. What has no such reason is chosen, and said to be. Tolerances of numerical
+methods stand beside the loops that they end.
 """
 
 # What a fit leaves.
 
 FALSE_ALARM = 0.003
-"""Level of each test that makes a fit doubtful: a right one fails all together in some 1 %."""
+"""Level of each test that makes a fit doubtful: with some five tests, few in a hundred right ones
+are."""
 
 CERTAIN_MISFIT = 0.001
 """Level of the test that tells misfit from noise, stricter as it may reject a fit."""
 
 TOO_MUCH = 1.2
-"""Misfit over the scatter of neighbouring readings from which on it changes limits: by less, limits
-of the noise alone hold the truth nearly as often as they say."""
+"""Misfit over the scatter of neighbouring readings from which on it changes limits. Chosen: by less
+it would widen them by a fifth at most."""
 
 FAR_OFF = 0.02
-"""Share of the peak from which on a certain misfit rejects a fit: below, limits that allow for it
-still hold known parameters (simulated in `tests/judging/test_whiteness.py`)."""
+"""Share of the peak from which on a certain misfit rejects a fit. Chosen: up to there limits allow
+for a misfit, which `tests/judging/test_whiteness.py` simulates."""
 
 NOISE_FREE, NOISE_FREE_OF_PEAK, NO_SCATTER, UNRESOLVED = 0.01, 1e-3, 0.1, 1e-6
 """A misfit below these shares of the noise and of the peak is that of a trace without noise, if
 neighbours scatter by this share of it; and so is one below what no sensor resolves."""
 
 TOO_LITTLE = 0.5
-"""Misfit over a given noise below which that is doubted: noise is rarely known better."""
+"""Misfit over a given noise below which that is doubted. Chosen: noise is rarely known better."""
 
 CLEARLY = 3.0
 """Growth of noise from which on its share is known, and unweighted fits are not compared."""
 
 REPEATED = 0.45
-"""Share of readings that repeat the one before if a sensor is logged at least twice as often as it
-is read, for which chance leaves half."""
+"""Share of readings that repeat the one before if a sensor is logged more often than it is read:
+half or more if it is logged twice as often."""
 
 # Slow noise, which may be misfit.
 
 MOSTLY, SLOW, NOTICEABLE, LONG = 0.5, 0.02, 1 / 3, 0.2
 """Correlated noise may be misfit if it has most of the variance and lasts for more than a fiftieth
-of the trace, or a noticeable share and a fifth: there a trace has hardly five independent parts."""
+of the trace, or a noticeable share and a fifth: a trace then has fewer than five independent parts.
+Chosen."""
 
 SURE = 2.0
-"""Standard deviations by which estimates of slow noise count less: 98 % of white noise stays ok."""
+"""Standard deviations by which estimates of slow noise count less: one in forty is lower still."""
 
 SMOOTH = 3.0
-"""Scatter over that of noise which is correlated for `SLOW` from which on it is no such noise."""
+"""Scatter over that of noise which is correlated for `SLOW` from which on it is no such noise.
+Chosen."""
 
 UNEVEN = 3.0
 """Ratio of the scatter of stretches, which white noise exceeds in 20 of them once in hundreds."""

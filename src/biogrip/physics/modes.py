@@ -279,7 +279,7 @@ def responses_in_turn(
 
     The end of a phase is the initial state of the next, so that phases cost no more than readings.
     """
-    at_once = max(1, _NUMBERS_AT_ONCE // rates.size)
+    at_once = max(1, _NUMBERS_AT_ONCE // max(rates.size, 1))
     lengths = np.diff(course.time_s, append=course.end_s)
     # What precedes a step is read at its instant.
     firsts = np.append(time_s.searchsorted(course.time_s, side="right"), len(time_s))
@@ -379,8 +379,8 @@ def _recursion(first: Array, factors: Array, terms: Array) -> Array:
     for k in range(blocks):
         starts[k + 1] = scale[-1, k] * starts[k] + within[-1, k]
     within += scale * starts[:-1]
-    reached = np.moveaxis(within, (0, 1), (-1, -2)).reshape(*first.shape, -1)[..., :count]
-    return np.concatenate((first[..., None], reached), axis=-1)
+    reached = np.moveaxis(within, (0, 1), (-1, -2)).reshape(*first.shape, blocks * block)
+    return np.concatenate((first[..., None], reached[..., :count]), axis=-1)
 
 
 def respond(
