@@ -1,6 +1,8 @@
 """What a trace could hide: the errors planted in it, fitted again, move its results as is said."""
 
 import re
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,9 +25,13 @@ EXPERIMENT = set_up(INSTRUMENTS["modulus"], (hold(100.0, 1.0),), Sample("zener_m
 CLEAN = simulate(EXPERIMENT, SAMPLE, TIMES)
 
 
-def diagnosed(readings: Array, experiment: Experiment = EXPERIMENT) -> Diagnosis:
+def diagnosed(
+    readings: Array,
+    experiment: Experiment = EXPERIMENT,
+    sample: Mapping[str, float] = SAMPLE,
+) -> Diagnosis:
     problem = experiment.of(TIMES, readings)
-    found = identify_from(problem, experiment.logs(SAMPLE))
+    found = identify_from(problem, experiment.logs(sample))
     return diagnose(problem, experiment.searched, found, confidence=0.95)
 
 
@@ -93,6 +99,20 @@ def test_a_second_branch_moves_what_is_said() -> None:
     moved = fit_from([EXPERIMENT.of(TIMES, response)], best).x[0] - best
     for label, move in zip(SAMPLE, moved, strict=True):
         assert branch.moves[label] == pytest.approx(move, rel=0.2, abs=0.02)
+
+
+def test_a_sample_in_kelvins_form_has_a_second_branch_as_in_maxwells() -> None:
+    """Both are one solid, with other names of its parameters, and hide the same."""
+    kelvin = replace(EXPERIMENT, sample=Sample("zener_kelvin"))
+    k, k_p, c = SAMPLE.values()
+    ratio = (k + k_p) / k
+    values = {"k_s": k + k_p, "k_v": k_p * ratio, "c_v": c * ratio**2}
+    other = diagnosed(NOISY, kelvin, values)
+    words, same = (
+        [each.words().split(", which")[0] for each in own.hidden if "second" in each.words()]
+        for own in (JUDGED, other)
+    )
+    assert words == same
 
 
 def test_less_noise_hides_less() -> None:

@@ -33,7 +33,9 @@ _SHARES = np.linspace(0.1, 0.9, 9)
 _JUMP, _GAIN, _BRANCH = 0.2, 0.2, 0.5
 # Onsets and strengths of finite differences, as shares of the first interval and of the branch; and
 # relaxation times of a second branch over that of the first.
-_LATE, _WEAK, _TIMES, _RICHER = 1e-3, 1e-3, (0.1, 10.0), "generalized_maxwell_2"
+_LATE, _WEAK, _TIMES = 1e-3, 1e-3, (0.1, 10.0)
+# Models that may have one branch more than another.
+_RICHER = "generalized_maxwell_2", "generalized_maxwell_3"
 
 
 @dataclass(frozen=True)
@@ -138,13 +140,22 @@ def _second_branch(likelihood: Likelihood, response: Array) -> Iterator[tuple[fl
     residuals = likelihood.problem.residuals
     # Not the whole models: those of an instrument whose samples have moduli have other units.
     name, names = residuals.model.name, residuals.model.names
-    alike = (it for it in contained(_RICHER) if CANDIDATES[it].model.name == name)
-    if not (own := next((it for it in alike if CANDIDATES[it].model.names == names), None)):
+    for richer in _RICHER:
+        model = CANDIDATES[richer].model
+        alike = (it for it in contained(richer) if CANDIDATES[it].model.name == name)
+        if not (own := next((it for it in alike if CANDIDATES[it].model.names == names), None)):
+            continue
+        values = as_richer(richer, own, np.exp(likelihood.best))
+        there = [branch for branch in model.free_branches if values[branch[0]] > 0]
+        gone = [branch for branch in model.free_branches if values[branch[0]] == 0]
+        # Of a solid in Kelvin's form one branch is the spring beside the other.
+        if there and gone and np.all(np.isfinite(values)):
+            break
+    else:
         return
-    posed = replace(residuals, model=CANDIDATES[_RICHER].model)
-    (first, damper), second = posed.model.free_branches
-    values = as_richer(_RICHER, own, np.exp(likelihood.best))
-    values = np.where(np.isfinite(values) & (values > 0), values, 1e-12 * np.max(values))
+    posed, (first, damper), second = replace(residuals, model=model), there[0], gone[0]
+    scales = [values[first if each.startswith("k") else damper] for each in model.names]
+    values = np.where(values > 0, values, 1e-12 * np.array(scales))
     for tau in (times * values[damper] / values[first] for times in _TIMES):
         values[[*second]] = _WEAK * values[first] * np.array([1.0, tau])
         yield tau, (posed.response(np.log(values)) - response) / _WEAK
