@@ -94,7 +94,7 @@ check-overlays: $(READY)
 	@$(call overlaid,check)
 
 publish: $(READY)
-	$(BIN)/snakemake -j$(JOBS) publish
+	$(BIN)/snakemake -j$(JOBS) --config pdf=true -- publish
 
 # What the overlays give that the documentation speaks of; takes longer than the study.
 publish-overlays: $(READY)

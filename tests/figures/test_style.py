@@ -30,6 +30,15 @@ def test_a_matplotlibrc_changes_no_figure(tmp_path: Path) -> None:
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
+def test_a_figure_for_print_has_fonts_that_publishers_take(tmp_path: Path) -> None:
+    with styled():
+        save(draw_torque(STUDY), tmp_path / "torque.png", tmp_path / "torque.pdf")
+    content = (tmp_path / "torque.pdf").read_bytes()
+    assert content.startswith(b"%PDF-")
+    assert b"/CIDFontType2" in content
+    assert b"/Type3" not in content
+
+
 @pytest.mark.parametrize("title", [r"$\frac{$", "5$ a day, 10$ a week", r"a_b ^ \ % # & < {"])
 def test_a_title_sets_no_mathematics(tmp_path: Path, title: str) -> None:
     with styled():

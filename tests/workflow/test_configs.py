@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 import yaml
 
 from tests.helpers.places import ROOT
@@ -58,11 +60,20 @@ def test_a_wrong_config_stops_with_one_message(tmp_path: Path) -> None:
     assert len(run.output.splitlines()) < 16
 
 
-def test_batches_of_another_size_are_no_other_study(tmp_path: Path) -> None:
-    """As `profiles/slurm` has them: all that is published is made and compared."""
-    run = snakemake(tmp_path, "-n", "--quiet", "rules", "--config", "batch_size=9", "--", "check")
+@pytest.mark.parametrize("key", ["batch_size=9", "pdf=true"])
+def test_what_changes_no_result_is_no_other_study(tmp_path: Path, key: str) -> None:
+    """Batches as `profiles/slurm` has them, say: all that is published is made and compared."""
+    run = snakemake(tmp_path, "-n", "--quiet", "rules", "--config", key, "--", "check")
     assert run.status == 0, run.output
     assert run.jobs["tables"] == run.jobs["claims"] == run.jobs["check"] == 1
+
+
+def test_figures_for_print_are_made_where_they_are_asked_for(tmp_path: Path) -> None:
+    file = "results/figures/comb.pdf"
+    refused = snakemake(tmp_path, "-n", "--", file)
+    assert "MissingRuleException" in refused.output
+    run = snakemake(tmp_path, "-n", "--config", "pdf=true", "--", file)
+    assert run.jobs == {"gripper_figures": 1}
 
 
 def test_what_has_no_name_has_nothing_published(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,7 +32,7 @@ from biogrip.physics import gripper as actuator
 from biogrip.physics.gripper import LARGEST_M, SMALLEST_M, CombDrive, Gripper
 from biogrip.physics.protocol import evaluate, join_phases
 from biogrip.physics.simulation import simulated_response
-from biogrip.stages.job import job_study, logged
+from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Study
 
 if TYPE_CHECKING:
@@ -389,6 +388,6 @@ def _damper(axes: Axes, x0: float, x1: float, y: float, label: str, size: float 
 if __name__ == "__main__":
     with logged(snakemake), styled():
         of_job, made = job_study(snakemake), snakemake.output
-        save(draw_comb(of_job), Path(made.comb))
-        save(draw_torque(of_job), Path(made.torque))
-        save(draw_linkage(of_job.of(of_job.gripped)), Path(made.linkage))
+        save(draw_comb(of_job), *paths(made.comb))
+        save(draw_torque(of_job), *paths(made.torque))
+        save(draw_linkage(of_job.of(of_job.gripped)), *paths(made.linkage))

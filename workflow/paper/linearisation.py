@@ -22,7 +22,7 @@ from biogrip.physics.protocol import Course
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import Network
 from biogrip.records.rows import RowFile
-from biogrip.stages.job import job_study, logged
+from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
 from biogrip.tables.layout import Column, ShownTable, write
 
@@ -182,4 +182,4 @@ if __name__ == "__main__":
         compare(gripped, Path(made.differences))
         write(linearisation(Path(made.differences)), Path(made.table))
         with styled():
-            save(draw_linearisation(gripped, Path(made.differences)), Path(made.figure))
+            save(draw_linearisation(gripped, Path(made.differences)), *paths(made.figure))

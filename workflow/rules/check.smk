@@ -1,8 +1,8 @@
 """The results beside those that are published: compared, or put in their place."""
 
 # A config of the same name has its published results in a folder of its own. What has no name, on
-# the command line or of a module, has nothing published; the size of batches changes no result.
-UNNAMED = "unnamed" if config.keys() - {"batch_size"} else ""
+# the command line or of a module, has nothing published; batches and files for print change no result.
+UNNAMED = "unnamed" if config.keys() - {"batch_size", "pdf"} else ""
 OVERLAYS = [UNNAMED, *(file.stem for file in CONFIGS)]
 OVERLAY = OVERLAYS[-1]
 PUBLISHED = shipped("results/published") / OVERLAY
@@ -37,7 +37,7 @@ rule check:
 rule publish:
     input:
         tables=published("tables", ".csv", ".html"),
-        figures=published("figures", ".png", ".pdf"),
+        figures=published("figures", ".png", *[".pdf"] * STUDY.config.pdf),
     log:
         "results/logs/publish.log",
     localrule: True

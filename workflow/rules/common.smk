@@ -163,9 +163,10 @@ def page_of_table(name, whose=""):
     return shown(f"results/tables/{stem(name, whose)}.html", "tables", name, whose)
 
 
-def picture(name, whose=""):
-    """The picture of a figure, in Snakemake's report."""
-    return shown(f"results/figures/{stem(name, whose)}.png", "figures", name, whose)
+def drawing(name, whose=""):
+    """The files of a figure: the picture, in Snakemake's report, and for print if that is asked."""
+    file = f"results/figures/{stem(name, whose)}"
+    return [shown(f"{file}.png", "figures", name, whose), *[f"{file}.pdf"] * STUDY.config.pdf]
 
 
 wildcard_constraints:

@@ -5,8 +5,7 @@ def case_figures(simulated, valley):
     """The files of the figures of a case, and its summary."""
     drawn = case_figure_names(simulated, valley)
     summary = shown("results/summaries/{case}.html", "pages", "summary", "{case}")
-    prints = [f"results/figures/{name}_{{case}}.pdf" for name in drawn]
-    return [*(picture(name, "{case}") for name in drawn), *prints, summary]
+    return [*(file for name in drawn for file in drawing(name, "{case}")), summary]
 
 
 # Of a recorded trace nobody knows the target; a valley has who searches for c and c_p.
@@ -68,8 +67,7 @@ rule figures:
         calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
         answered=[*files("results/identifiability/{case}.json", ANSWERED), *first_traces(ANSWERED)],
     output:
-        pictures=[picture(name) for name in FIGURES],
-        prints=expand("results/figures/{name}.pdf", name=FIGURES),
+        **{name: drawing(name) for name in FIGURES},
     log:
         "results/logs/figures.log",
     benchmark:

@@ -22,8 +22,7 @@ rule sweep:
         points="results/robustness/{sweep}.csv",
         table="results/tables/robustness_{sweep}.csv",
         page=page_of_table("robustness", "{sweep}"),
-        figure=picture("robustness", "{sweep}"),
-        print="results/figures/robustness_{sweep}.pdf",
+        figure=drawing("robustness", "{sweep}"),
     log:
         "results/logs/sweep/{sweep}.log",
     benchmark:

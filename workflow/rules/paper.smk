@@ -10,10 +10,9 @@ INTERPRETED = [n for n in STUDY.simulated if set(STUDY.case(n).sample.model.name
 
 rule gripper_figures:
     output:
-        comb=picture("comb"),
-        torque=picture("torque"),
-        linkage=picture("linkage"),
-        prints=expand("results/figures/{name}.pdf", name=GRIPPER_FIGURES),
+        comb=drawing("comb"),
+        torque=drawing("torque"),
+        linkage=drawing("linkage"),
     log:
         "results/logs/gripper_figures.log",
     benchmark:
@@ -77,8 +76,7 @@ rule linearisation:
         differences="results/linearisation.csv",
         table="results/tables/linearisation.csv",
         page=page_of_table("linearisation"),
-        figure=picture("linearisation"),
-        print="results/figures/linearisation.pdf",
+        figure=drawing("linearisation"),
     log:
         "results/logs/linearisation.log",
     benchmark:

@@ -23,12 +23,12 @@ with logged(snakemake):
         "force": lambda: force.draw_force(case, *target),
         "scatter": lambda: scatter.draw_scatter(case, found, *target, *expected, calibrated),
     }
+    *figures, summary = paths(snakemake.output)
     drawn = {}
-    for file in map(Path, snakemake.output):
-        name = file.stem.removesuffix(f"_{case.name}")
-        if file.suffix == ".png":
+    for name, draw in drawings.items():
+        if files := [file for file in figures if file.stem == f"{name}_{case.name}"]:
             with styled():
-                save(drawings[name](), file)
-            drawn[name] = file
+                save(draw(), *files)
+            drawn[name] = files[0]
     shown = [drawn[name] for name in ("judged_fit", "profiles", "valley") if name in drawn]
-    write_summary(case, verdicts, shown, Path(snakemake.output[-1]))
+    write_summary(case, verdicts, shown, summary)

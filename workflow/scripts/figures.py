@@ -31,6 +31,6 @@ with logged(snakemake):
             calibrated_of(first),
         ),
     }
-    for file in paths(snakemake.output.pictures):
+    for name, files in snakemake.output.items():
         with styled():
-            save(drawings[file.stem](), file)
+            save(drawings[name](), *paths(files))

@@ -16,4 +16,4 @@ with logged(snakemake):
     judge(study, sweep, identifications, paths(snakemake.input.calibrated), points)
     write(robustness(study, sweep, points), Path(snakemake.output.table))
     with styled():
-        save(draw_robustness(study, sweep, points), Path(snakemake.output.figure))
+        save(draw_robustness(study, sweep, points), *paths(snakemake.output.figure))

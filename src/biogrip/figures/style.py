@@ -140,12 +140,13 @@ def points_within(
             axes.plot(*at_edge, **edge, label=labels[1] or None)
 
 
-def save(drawn: Figure, output: Path) -> None:
-    """Write a figure as PNG and PDF, without dates, so that files are reproducible."""
+def save(drawn: Figure, output: Path, *prints: Path) -> None:
+    """Write a figure as PNG, and as PDF for print, without dates, so that files are reproducible."""
     with atomic_write(output) as scratch:
         save_png(drawn, scratch)
-    with atomic_write(output.with_suffix(".pdf")) as scratch:
-        drawn.savefig(scratch, format="pdf", metadata={"CreationDate": None, "Creator": None})
+    for file in prints:
+        with atomic_write(file) as scratch:
+            drawn.savefig(scratch, format="pdf", metadata={"CreationDate": None, "Creator": None})
 
 
 def save_png(drawn: Figure, output: Path | BinaryIO) -> None:

@@ -112,6 +112,8 @@ class StudyConfig(Shared):
     batch_size: Annotated[int, Field(ge=1, le=100_000)] = 500
     """Number of seeds per job, by default 500. Changes no result, only how much of a job is
     start-up."""
+    pdf: bool = False
+    """Whether figures are also written as PDF. Changes no result."""
     actuator: CombDrive
     """The rotary comb drive (Table 2)."""
     methods: Annotated[
