@@ -141,7 +141,7 @@ def points_within(
 
 
 def save(drawn: Figure, output: Path, *prints: Path) -> None:
-    """Write a figure as PNG, and as PDF for print, without dates, so that files are reproducible."""
+    """Write a figure as PNG, and as PDF for print; without dates, so that both are reproducible."""
     with atomic_write(output) as scratch:
         save_png(drawn, scratch)
     for file in prints:

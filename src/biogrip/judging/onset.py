@@ -157,7 +157,9 @@ def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
     time_s, best = fits.time_s, diagnosis.likelihood.best
     later_s, given = 2 * time_s[0] - time_s[1], fits.at(0.0, best)
     rejected = diagnosis.status == REJECTED
-    other = fits.best(later_s) if rejected else fits.at(later_s, best)
+    level, other = chdtri(1, _FALSE_ALARM), fits.at(later_s, best)
+    if rejected or compute_fall(len(time_s), given.misfit, other.misfit, None) > level:
+        other = fits.best(later_s)
     alike = _as_good(fits, other)
     starts_s = [min(fit.onset_s for fit in alike), max(fit.onset_s for fit in alike)]
     told = starts_s[1] - starts_s[0] < time_s[1] - time_s[0]
@@ -165,10 +167,9 @@ def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
     fall = compute_fall(len(time_s), given.misfit, other.misfit, None)
     found = ""
     white = other.misfit < _WHITE * estimate_noise(fits.readings)
-    if rejected and 0 < other.onset_s < time_s[0] and white:
-        if fall > chdtri(1, _FALSE_ALARM):
-            found = f"the fit is far better (χ² falls by {plain(fall)})"
-            found += "" if told else f", and values hang on it: {_moved(diagnosis, None, alike)}"
+    if fall > level and 0 < other.onset_s < time_s[0] and white:
+        found = f"the fit is far better (χ² falls by {plain(fall)})"
+        found += "" if told else f", and values hang on it: {_moved(diagnosis, None, alike)}"
     elif not rejected and fall > -chdtri(1, _AS_GOOD):
         moved = _moved(diagnosis, given, alike, 0.5)
         found = f"the trace fits as well: {moved}" if moved else ""

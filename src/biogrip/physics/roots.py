@@ -167,6 +167,10 @@ def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -
     return Zeros(found.pole, found.beyond - 1j * change / slope)
 
 
+# Up to so many points a matrix of poles and points is faster than a loop over the poles.
+_FEW_POINTS = 1000
+
+
 @dataclass(frozen=True)
 class _Sides:
     """Sums over the poles below given points and over those above, and derivatives of the sums."""
@@ -255,6 +259,17 @@ def _sides(weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Ze
     Points are given by the index of the last pole below, `zero`, in ascending order, and by that of
     their function.
     """
+    # A lone column would be summed by halves.
+    if 1 < len(zero) <= _FEW_POINTS:
+        terms = weights[:, which] / (slopes := (at.pole - poles[:, which]) + at.beyond)
+        slopes = terms / slopes
+        under = np.arange(len(poles))[:, np.newaxis] <= zero
+        return _Sides(
+            np.add.reduce(terms, axis=0, where=under),
+            0.0 - np.add.reduce(slopes, axis=0, where=under),
+            np.add.reduce(terms, axis=0, where=~under),
+            0.0 - np.add.reduce(slopes, axis=0, where=~under),
+        )
     below, below_slope, above, above_slope = np.zeros((4, len(zero)))
     term, slope = np.empty((2, len(zero)))
     firsts = np.searchsorted(zero, np.arange(len(poles))).tolist()

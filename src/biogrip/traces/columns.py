@@ -226,7 +226,11 @@ def held_unit(value: float | str, controlled: Channel) -> tuple[float, str]:
     if unit is None:
         allowed = ", ".join(controlled.units)
         found = f"found the unit '{shortened(written)}' of a {controlled.name}"
-        raise BiogripError(f"--hold: {found}, allowed are {allowed}.")
+        others = [
+            name for name, it in INSTRUMENTS.items() if known_unit(written, it.controlled.units)
+        ]
+        other = f" Or say what is read, as by --reading {others[0]}=COLUMN." if others else ""
+        raise BiogripError(f"--hold: {found}, allowed are {allowed}.{other}")
     return number, unit
 
 

@@ -1,6 +1,6 @@
 """Reader of recorded traces in the user's own files, with gaps, units and line numbers."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
@@ -11,6 +11,7 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
+from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.terminal import visible
 from biogrip.traces.columns import (
     TIME_UNITS,
@@ -290,6 +291,12 @@ def _checked(
     )
 
 
+def _as_in(names: Sequence[str]) -> str:
+    """Return the option for a column that is named after what is read, or nothing."""
+    found = ((name, own) for name in INSTRUMENTS for own in names if own.lower().startswith(name))
+    return next((f", as --reading {name}={own}" for name, own in found), "")
+
+
 def _columns_of(
     path: Path, line: int | None, table: Table, columns: Columns, *, clock: bool
 ) -> tuple[list[int], list[str]]:
@@ -298,6 +305,7 @@ def _columns_of(
     units: list[str] = []
     problems: list[str] = []
     ways = columns.said_by(*columns.named)
+    example = _as_in(table.names) if columns.by_options else ""
     if not any(table.indices(it) for it in columns.named.values()) and all(
         isfinite(number_or_inf(name.replace(",", "."))) for name in table.names if name
     ):
@@ -310,7 +318,7 @@ def _columns_of(
         if not same:
             problems.append(
                 f"{where}: found no such column, allowed are {listed(table.names)}."
-                f"{nearest(column, table.names)} Say which is which by {ways}."
+                f"{nearest(column, table.names)} Say which is which by {ways}{example}."
             )
             continue
         if len(same) > 1:
