@@ -119,6 +119,33 @@ def test_a_table_is_told_by_its_column(tmp_path: Path, name: str, separator: str
     ]
 
 
+def test_traces_side_by_side_are_a_row_each(here: Path) -> None:
+    """Each with the options of its row, and results by its column's name."""
+    times, readings = np.loadtxt(here / "usual.csv", delimiter=",", skiprows=1).T
+    both = np.column_stack((times, readings, 2 * readings))
+    np.savetxt("both.csv", both, delimiter=",", header="time_s,A 1,A/2", comments="")
+    fixed = "k=0.001 c=0.001 c_p=150"
+    write(
+        here / "wells.tsv",
+        [
+            ["file", "reading", "model", "fix", "well"],
+            ["both.csv", "rotation=A 1", "", "", "x"],
+            ["both.csv", "A/2", "generalized_maxwell", fixed, "y"],
+        ],
+    )
+    unit = "--set", "measurement.rotation_unit=rad"
+    assert identify("wells.tsv", "--csv", "found.csv", *unit)[0] == 0
+    with Path("found.csv").open(newline="") as stream:
+        one, other = csv.DictReader(stream)
+    assert one["trace"] == "both.csv rotation=A 1"
+    assert other["trace"] == f"both.csv A/2 generalized_maxwell {fixed}"
+    assert float(one["k_p value (N/m)"]) == pytest.approx(10, rel=0.05)
+    assert float(other["k_p value (N/m)"]) == pytest.approx(5, rel=0.05)
+    assert other["fixed"] == "k = 0.001 N/m; c = 0.001 N s/m; c_p = 150 N s/m"
+    assert Path("both.rotation_A_1.identified.json").exists()
+    assert Path("both.A_2_generalized_maxwell_k_0.001_c_0.001_c_p_150.identified.json").exists()
+
+
 @pytest.mark.parametrize("text", ["", "time_s,rotation_rad\n1,2\n", "profile\n1\n", "\0\xff"])
 def test_a_trace_is_no_table(tmp_path: Path, text: str) -> None:
     (tmp_path / "a.csv").write_text(text)
@@ -128,18 +155,20 @@ def test_a_trace_is_no_table(tmp_path: Path, text: str) -> None:
 def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
     path = tmp_path / "cells.tsv"
     header = ["file", "dish", "dish", "fit", "k value", "measurement.skip"]
-    write(path, [header, ["a.csv", *[""] * 4, "1:30"], ["./a.csv", *[""] * 4, "[1"]])
-    *lines, last = [line.removeprefix(f"{path}, line ") for line in refused(path)]
+    rows = ["a.csv", *[""] * 4, "1:30"], ["./a.csv", *[""] * 4, "[1"], ["a.csv", *[""] * 4, "[1"]
+    write(path, [header, *rows])
+    lines = [line.removeprefix(f"{path}, line ") for line in refused(path)]
+    below = [lines.pop(4).split(":")[:2] for _ in range(2)]
     assert lines == [
         "1, column 'dish': stands twice; allowed is each name once.",
         "1, column 'fit': is a column of the results; allowed is another name.",
         "1, column 'k value': is a column of the results; allowed is another name.",
         "2, column 'measurement.skip': found 1:30, which YAML reads in base 60; allowed is a "
         "number without colons, or text in quotes.",
-        f"3, column 'file': found '{tmp_path}/a.csv' again, as on line 2; allowed is each trace "
+        f"4, column 'file': found '{tmp_path}/a.csv' again, as on line 3; allowed is each trace "
         "once.",
     ]
-    assert last.startswith("3, column 'measurement.skip': not valid YAML: ")
+    assert below == [[f"{n}, column 'measurement.skip'", " not valid YAML"] for n in (3, 4)]
     write(path, [["file", "fixed.c"], *([f"{number}.csv", "[1"] for number in range(30))])
     assert refused(path)[10:] == ["... and 20 more."]
 

@@ -1,18 +1,16 @@
 """The ``biogrip`` command."""
 
 import argparse
-import math
 import os
 import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
 from biogrip import __version__
-from biogrip.command.options import KEYS
+from biogrip.command.options import OPTIONS
 from biogrip.errors import BiogripError
 from biogrip.terminal import visible, visible_lines
 
@@ -91,113 +89,77 @@ def _examples(*commands: str, cost: str = "") -> str:
     return "\n".join([*lines, cost, ""] if cost else lines)
 
 
-def _reading(text: str) -> tuple[tuple[str, ...], Any]:
-    from biogrip.physics.instruments import INSTRUMENTS
-
-    quantity, found, column = text.partition("=")
-    if found:
-        return ("measurement", quantity), column
-    return ("measurement", text if text in INSTRUMENTS else "rotation"), text
-
-
-def _start(text: str) -> tuple[tuple[str, ...], Any]:
-    if text == "fit":
-        return ("measurement", "fit_start"), True
-    with suppress(ValueError):
-        float(text)
-        return ("measurement", "start_s"), text
-    raise argparse.ArgumentTypeError(f"found '{text}', allowed is a number of seconds, or fit")
-
-
-def _hold(text: str) -> tuple[tuple[str, ...], Any]:
-    from biogrip.study.source import HOLD
-    from biogrip.traces.columns import number_and_unit
-
-    with suppress(ValueError):
-        number, unit = number_and_unit(text)
-        if number and math.isfinite(number):
-            return HOLD, text if unit else number
-    form = "allowed is a number, and not 0, with its unit or in SI units"
-    raise argparse.ArgumentTypeError(f"found '{text}', {form}")
-
-
-def _fix(text: str) -> tuple[tuple[str, ...], Any]:
-    name, _, value = text.partition("=")
-    with suppress(ValueError):
-        if name:
-            return ("fixed", name), float(value)
-    raise argparse.ArgumentTypeError(f"found '{text}', allowed is NAME=VALUE, as in k_p=0")
-
-
-def _at(text: str) -> tuple[tuple[str, ...], Any]:
-    with suppress(ValueError):
-        return ("identifiability", "at_s"), [float(each) for each in text.split(",")]
-    raise argparse.ArgumentTypeError(f"found '{text}', allowed are times in s, as in 1,10,100")
-
-
 def _any_key(text: str) -> tuple[tuple[str, ...], Any]:
     from biogrip.study.source import value_of
 
     key, found, value = text.partition("=")
     if not (key and found):
-        text = f"found '{text}', allowed is KEY=VALUE, as in measurement.time_unit=ms"
-        raise argparse.ArgumentTypeError(text)
+        raise ValueError(f"found '{text}', allowed is KEY=VALUE, as in measurement.time_unit=ms")
     try:
         return tuple(key.split(".")), value_of(value, key)
     except BiogripError as error:
-        raise argparse.ArgumentTypeError(f"{key}: {error}") from error
+        raise ValueError(f"{key}: {error}") from error
 
 
-_SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
+def _read(reader: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Return a reader whose message argparse shows."""
+
+    def read(text: str) -> Any:
+        try:
+            return reader(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return read
+
+
+_SETTINGS: dict[str, list[tuple[str, str, str]]] = {
     "the file's columns": [
-        ("--time", KEYS["time"], "COLUMN", "of times [time_s]"),
+        ("--time", "COLUMN", "of times [time_s]"),
         (
-            *("--reading", _reading, "[QUANTITY=]COLUMN"),
+            *("--reading", "[QUANTITY=]COLUMN"),
             "of readings [rotation=rotation_rad]; or displacement, strain, compliance (creep), "
             "force, stress, modulus (relaxation)",
         ),
-        ("--sd", KEYS["sd"], "COLUMN", "of the readings' standard deviations"),
+        ("--sd", "COLUMN", "of the readings' standard deviations"),
     ],
     "what was done": [
         (
-            *("--hold", _hold, "VALUE"),
+            *("--hold", "VALUE"),
             "what was held from 0 to the end, without a config: a stress for a strain, a force for "
             "a displacement, and the reverse, as in '20 pN', 5mbar or 5%%, or in SI units; 1 for a "
             "compliance or a modulus",
         ),
-        ("--load", KEYS["load"], "COLUMN", "of what was held, as recorded, instead"),
-        ("--start", _start, "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
-        ("--from", KEYS["from"], "SECONDS", "first time of the clock to use [all]"),
-        ("--until", KEYS["until"], "SECONDS", "last time of the clock to use [all]"),
+        ("--load", "COLUMN", "of what was held, as recorded, instead"),
+        ("--start", "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
+        ("--from", "SECONDS", "first time of the clock to use [all]"),
+        ("--until", "SECONDS", "last time of the clock to use [all]"),
     ],
     "the noise and the instrument": [
-        ("--noise", KEYS["noise"], "SD", "known noise, in the readings' SI unit"),
-        ("--noise-model", KEYS["noise_model"], "NAME", "white, or coloured: autocorrelated"),
+        ("--noise", "SD", "known noise, in the readings' SI unit"),
+        ("--noise-model", "NAME", "white, or coloured: autocorrelated"),
         (
             "--noise-share",
-            KEYS["noise_share"],
             "SHARE",
             "known noise, as a share of the readings",
         ),
-        ("--offset", KEYS["offset"], "", "fit an offset along, or not"),
-        ("--drift", KEYS["drift"], "", "fit a linear drift along, or not"),
+        ("--offset", "", "fit an offset along, or not"),
+        ("--drift", "", "fit a linear drift along, or not"),
     ],
     "the sample": [
-        ("--model", KEYS["model"], "NAME", "sample model [generalized_maxwell]"),
-        ("--fix", _fix, "NAME=VALUE", "known parameter, SI units; 0 for no element; repeatable"),
-        ("--at", _at, "SECONDS,...", "times after a step at which to tell what any model would"),
+        ("--model", "NAME", "sample model [generalized_maxwell]"),
+        ("--fix", "NAME=VALUE", "known parameter, SI units; 0 for no element; repeatable"),
+        ("--at", "SECONDS,...", "times after a step at which to tell what any model would"),
     ],
     "any other key of the config": [
         (
             "--set",
-            _any_key,
             "KEY=VALUE",
             "as in measurement.time_unit=ms or measurement.block=2, YAML; repeatable",
         ),
     ],
 }
-"""Options of `identify` by what they are about: name; key of the config, or what reads the value
-and returns the key's path and value; what is given, nothing for a switch; and help."""
+"""Options of `identify` by what they are about: name; what is given, nothing for a switch; help."""
 
 
 class _Set(argparse.Action):
@@ -236,9 +198,10 @@ def _identify_parser(stages: Any) -> None:
 
     for title, options in _SETTINGS.items():
         group = identify.add_argument_group(title)
-        for name, key, metavar, text in options:
+        for name, metavar, text in options:
             names = [name] if metavar else [name, name.replace("--", "--no-")]
-            of_key: dict[str, Any] = {"dest": key} if isinstance(key, str) else {"type": key}
+            key = OPTIONS.get(name[2:].replace("-", "_"), _any_key)
+            of_key: dict[str, Any] = {"dest": key} if isinstance(key, str) else {"type": _read(key)}
             of_key |= {"metavar": metavar} if metavar else {"nargs": 0}
             group.add_argument(*names, action=_Set, help=text, **of_key)
         if title == "what was done":

@@ -14,7 +14,7 @@ WEIGHTS, LEVEL = RANDOM.lognormal(0, 2, (9, 200)), RANDOM.lognormal(0, 1, 200)
 
 
 def test_zeros_are_those_of_a_bracketing_search() -> None:
-    found = interlaced_zeros(WEIGHTS[:, :3], POLES[:, :3], LEVEL[:3]).from_pole(0.0)
+    found = interlaced_zeros(WEIGHTS[:, :3], POLES[:, :3], LEVEL[:3]).from_pole(np.zeros(3))
     for zeros, weights, poles, level in zip(found.T, WEIGHTS.T, POLES.T, LEVEL, strict=False):
         ends = [*poles, poles[-1] + 2 * np.sum(weights) / level]
         for zero, low, high in zip(zeros, ends, ends[1:], strict=False):

@@ -85,18 +85,18 @@ def identify_files(
         # The last may be beyond the end.
         asked = asked[rows[0] : rows[1] + 1]
     absent = {
-        str(own.trace): f"{own.place}: {problem}"
+        own.name: f"{own.place}: {problem}"
         for own in asked
         if (problem := trace_file_problem(own.trace))
     }
-    every = [own for own in asked if str(own.trace) not in absent]
+    every = [own for own in asked if own.name not in absent]
     if alone and absent:
         raise BiogripError(absent[str(files[0])])
     if output is not None and not alone:
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
     # Errors of options and config concern all traces: they are raised once, here.
     check_settings(every)
-    outputs = [output or own.trace.with_suffix(".identified.json") for own in every]
+    outputs = [output or own.output for own in every]
     outputs = outputs if rows is None else []
     written = [*outputs, *filter(None, (report, table))]
     if len({path.absolute() for path in written}) < len(written):
@@ -108,7 +108,7 @@ def identify_files(
     outcome = _identify_traces(every, outputs or None, drawn=drawn)
     if alone and outcome.refused:
         raise BiogripError(outcome.refused[str(files[0])])
-    copied = {str(own.trace): own.copied for own in asked}
+    copied = {own.name: own.copied for own in asked}
     outcome = replace(outcome, refused=outcome.refused | absent, copied=copied)
     if table is not None:
         write_table(outcome, table)
@@ -118,7 +118,7 @@ def identify_files(
         write_page(outcome, report)
     print(in_words(outcome.found[0]) if alone else side_by_side(outcome.found, outcome.refused))
     pairs = zip(every, outputs, strict=False)
-    made = [path for own, path in pairs if str(own.trace) not in outcome.refused]
+    made = [path for own, path in pairs if own.name not in outcome.refused]
     if said := [visible(path) for path in (*made, report, table) if path]:
         print(f"Written to {', '.join(said)}.")
     return 1 if outcome.refused else 0
@@ -149,7 +149,7 @@ def _identify_traces(
             every.refused.update(outcome.refused)
             every.pictures.update(outcome.pictures)
             for number, each in enumerate(asked[own], start=own.start + 1):
-                print(f"{number} of {len(asked)}: {visible(each.trace)}", file=sys.stderr)
+                print(f"{number} of {len(asked)}: {visible(each.name)}", file=sys.stderr)
     return every
 
 
@@ -158,16 +158,16 @@ def identify_batch(
 ) -> Outcome:
     """Identify the traces of one batch, see `identify_files`; None to write no JSON files."""
     alone = len(asked) == 1 and outputs is not None
-    name, count = str(asked[0].trace) if alone else "", 1 + STEPS
+    name, count = asked[0].name if alone else "", 1 + STEPS
     with Progress(name, count, live=alone, quiet=not alone) as progress:
         cases, traces, refused = _read_batch(asked, progress)
         judged = _judge_batch(asked, traces, refused, progress)
     outcome = Outcome([], {})
     for index, own in enumerate(asked):
         if index in refused:
-            outcome.refused[str(own.trace)] = str(refused[index])
+            outcome.refused[own.name] = str(refused[index])
             continue
-        data = data_of(judged[index], cases[index], str(own.trace), own.given)
+        data = data_of(judged[index], cases[index], own.name, own.given)
         outcome.found.append(data)
         if outputs is not None:
             # Assumptions, which must be repeatable, are not rounded.
@@ -180,7 +180,7 @@ def identify_batch(
 
             pictures = _tried(own, draw, judged[index], data)
             if not isinstance(pictures, BiogripError):
-                outcome.pictures[str(own.trace)] = pictures
+                outcome.pictures[own.name] = pictures
     return outcome
 
 
@@ -253,7 +253,7 @@ def _tried(asked: Asked, work: Callable[..., T], *given: Any) -> T | BiogripErro
     except Exception as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
         return BiogripError(
-            f"{visible(asked.trace)}: the fit failed, which is a fault of biogrip and not of the "
+            f"{visible(asked.name)}: the fit failed, which is a fault of biogrip and not of the "
             f"trace: {type(error).__name__}: {error} ({Path(where.filename).name}, line "
             f"{where.lineno}). Please report it, with the trace if it may be shared."
         )

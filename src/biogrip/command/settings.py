@@ -12,6 +12,7 @@ modulus is read, a hold of 1 needs no option.
 import csv
 import os
 import re
+from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
@@ -27,7 +28,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.command.held import remarks_on_hold
-from biogrip.command.options import KEYS
+from biogrip.command.options import OPTIONS
 from biogrip.command.outputs import COLUMNS
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
@@ -61,12 +62,6 @@ _FILES = ("file", "filename", "filepath", "path", "trace", "tracefile")
 LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
-# Options of the command that may be columns of a table, and the keys that they set.
-_OPTIONS: dict[str, tuple[str, ...]] = {
-    "hold": HOLD,
-    "start": ("measurement", "start_s"),
-    **{name: tuple(key.split(".")) for name, key in KEYS.items()},
-}
 _OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 # Of each group of keys of the measurement, the one that is set last replaces the others.
@@ -105,8 +100,21 @@ class Asked:
     """Row of a table that lists the trace, for messages."""
     copied: Mapping[str, str] = field(default_factory=dict)
     """Other cells of that row, by column."""
+    part: str = ""
+    """What tells the trace from others of its file: cells of its row."""
     arrays: tuple[Array, ...] = ()
     """Times, readings and perhaps standard deviations, (n_samples,) each, instead of a file."""
+
+    @property
+    def name(self) -> str:
+        """The file, and which of its traces."""
+        return f"{self.trace} {self.part}".rstrip()
+
+    @property
+    def output(self) -> Path:
+        """The usual JSON file."""
+        part = re.sub(r"[^\w.-]+", "_", f".{self.part}").rstrip(".")
+        return self.trace.with_name(f"{self.trace.stem}{part}.identified.json")
 
     @property
     def given(self) -> dict[str, Any]:
@@ -375,10 +383,11 @@ def read_table(
             f"{place(path, 1)}: found no column '{_FILES[0]}' among {listed(header)}; allowed is "
             f"one.{nearest(_FILES[0], header)}"
         )
-    options_of = {name: _plain(name) for name in header if _plain(name) in _OPTIONS}
+    options_of = {name: _plain(name) for name in header if _plain(name) in OPTIONS}
     problems = list(_name_problems(path, header, [file, *options_of]))
     problems += _unused(path, header, rows, {file, *options_of})
-    found, lines = [], dict[str, int]()
+    found: list[Asked] = []
+    set_by: list[tuple[int, dict[str, str]]] = []
     for line, row in rows:
         if not any(row):
             continue
@@ -387,31 +396,51 @@ def read_table(
             problems.append(f"{place(path, line)}: {text} {len(header)}.")
         by_name = dict(zip_longest(header, row[: len(header)], fillvalue=""))
         trace = path.parent / by_name.pop(file)
-        # Resolved, so that links to one file are found.
-        before = lines.setdefault(os.path.realpath(trace), line)
         if trace == path.parent:
             problems.append(f"{place(path, line, file)}: found nothing, allowed is a trace.")
-        elif before != line:
-            text = f"found '{visible(trace)}' again, as on line {before}; allowed is each"
-            problems.append(f"{place(path, line, file)}: {text} trace once.")
         settings = list(options)
         for name, cell in by_name.items():
             if ("." in name or name in options_of) and cell:
                 try:
-                    key = _OPTIONS.get(options_of.get(name, ""), tuple(name.split(".")))
-                    value = value_of(cell, name)
-                    if key == _OPTIONS["start"] and value == "fit":
-                        key, value = ("measurement", "fit_start"), True
-                    settings.append(Setting(place(path, line), key, value))
-                except BiogripError as error:
+                    settings += _settings_of(cell, name, options_of.get(name), place(path, line))
+                except (BiogripError, ValueError) as error:
                     problems.append(f"{place(path, line, name)}: {error}")
         used = {"", *options_of, *(name for name in by_name if "." in name)}
         copied = {name: cell for name, cell in by_name.items() if name not in used}
         found.append(Asked(trace, config, tuple(settings), place(path, line), copied))
+        set_by.append((line, {name: cell for name, cell in by_name.items() if name in used}))
     if not found:
         problems.append(f"{place(path)}: found no traces, allowed is a row for each.")
+    of_file = defaultdict[str, list[int]](list)
+    for index, own in enumerate(found):
+        # Resolved, so that links to one file are found.
+        of_file[os.path.realpath(own.trace)].append(index)
+    for rows_of_file in of_file.values():
+        told = [
+            name
+            for name in set_by[rows_of_file[0]][1]
+            if len({set_by[index][1][name] for index in rows_of_file}) > 1
+        ]
+        parts = dict[str, int]()
+        for index in rows_of_file:
+            line, cells = set_by[index]
+            part = " ".join(cells[name] for name in told if cells[name])
+            if (before := parts.setdefault(part, line)) != line:
+                text = f"found '{visible(found[index].trace)}' again, as on line {before}; allowed"
+                problems.append(f"{place(path, line, file)}: {text} is each trace once.")
+            found[index] = replace(found[index], part=part)
     _refuse(problems)
     return found
+
+
+def _settings_of(cell: str, name: str, option: str | None, by: str) -> Iterator[Setting]:
+    """Yield what a cell sets, in a column named after an option, or after a key with dots."""
+    key = name if option is None else OPTIONS[option]
+    if isinstance(key, str):
+        yield Setting(by, tuple(key.split(".")), value_of(cell, name))
+        return
+    for part in cell.split() if option == "fix" else [cell]:
+        yield Setting(by, *key(part))
 
 
 def _rows(path: Path) -> list[tuple[int, list[str]]]:
