@@ -176,7 +176,7 @@ OPTIONS = {
     "--fix k=0": "--fix: fixed.k: found 0, allowed is at least 1e-18 and at most 1e+12 N/m.",
     "--fix kp=1": "--fix: fixed.kp: is no parameter of the sample, which has k, k_p, c, c_p. Did",
     "--model maxwel": "--model: sample.model: found 'maxwel'. Did you mean 'maxwell'?",
-    "--sd sd": "found no such column, allowed are time_s, rotation_rad.",
+    "--sd sd": "there is no column 'sd'. The file has: time_s, rotation_rad.",
     "--reading strian=x": "--reading: measurement.strian: unknown key. Did you mean 'strain'?",
     "--reading strain=x": "--hold: is missing; allowed is the stress in Pa that was held",
     "--reading strain=rotation_rad --hold 1e99": "phases[0].stress_Pa: found 1e+99, allowed is",
@@ -215,8 +215,8 @@ REFUSED = {
     **{f"identify a.csv --csv {name}": said for name, said in WRITTEN.items()},
     **dict.fromkeys(PIPES, "no regular file; allowed is one."),
     "identify .": "TRACE: found '.', which is no regular file; allowed is one.",
-    "identify tabel.csv": "found 'tabel.csv', allowed is a file that exists in the folder /",
-    f"identify {'x/' * 3000}": "allowed is a file that exists in",
+    "identify tabel.csv": "there is no file tabel.csv in /",
+    f"identify {'x/' * 3000}": "there is no file x/x/",
     "identify a.csv b.csv --output x.json": "--output: only for one trace",
     "identify table.csv --output x.json": "--output: only for one trace",
     "identify table.csv --csv a.csv": "a.csv: is read; allowed is another file to write.",
@@ -416,7 +416,8 @@ def test_a_rejected_fit_names_a_better_model_though_it_is_simpler() -> None:
     assert '(model="springpot") is preferred' in found["advice"]
     lines = side_by_side([found, found | {"fit": "ok"}], {}).splitlines()
     assert [line for line in lines if "springpot" in line] == [f"trace: {found['advice']}"]
-    assert f"trace: rejected: {found['reasons'][0]}" in lines
+    like = "The like holds for 1 more: trace."
+    assert f"trace: rejected: {found['reasons'][0]} {like}" in lines
 
 
 def test_colours_are_not_for_all_terminals(

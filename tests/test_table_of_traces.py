@@ -229,7 +229,7 @@ def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
         status, printed, _ = identify("cells.tsv", *given)
         assert status == 1
         assert f"Not identified, 1 of {few - 1}:" in printed
-        assert "cells.tsv, line 2: found 'gone.csv', allowed is a file that exists in" in printed
+        assert "cells.tsv, line 2: there is no file gone.csv in /" in printed
         whole = [("gone.csv", "lost", "failed", True), ("usual.csv", "left", "ok", False)]
         row = ((it["trace"], it["dish"], it["fit"], it["failed"] != "") for it in listed())
         assert [*row] == whole[: few - 1]

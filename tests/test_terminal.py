@@ -35,7 +35,7 @@ def test_text_is_shown_as_it_is_but_for_what_a_terminal_obeys() -> None:
     ("header", "row", "said"),
     [
         ("time_s,rotation_rad", f"1,{FOUND}", f"found '{visible(FOUND)}'"),
-        (f"time_s,{FOUND}", "1,2", f"allowed are time_s, {visible(FOUND)}"),
+        (f"time_s,{FOUND}", "1,2", f"The file has: time_s, {visible(FOUND)}"),
     ],
 )
 def test_a_message_shows_what_was_found(tmp_path: Path, header: str, row: str, said: str) -> None:
@@ -73,7 +73,7 @@ def test_names_of_traces_are_shown_wherever_they_are_said(tmp_path: Path) -> Non
         assert f"{visible(good.with_suffix('.identified.json'))}" in said
     assert several[2].splitlines() == [f"1 of 2: {visible(good)}", f"2 of 2: {visible(bad)}"]
     assert f"  {visible(bad)}, line 2, column" in several[1]
-    assert f"  TRACE: found '{visible(absent)}'"[:200] in several[1]
+    assert f"  TRACE: there is no file {visible(absent)}"[:200] in several[1]
     assert json.loads(good.with_suffix(".identified.json").read_text())["trace"] == str(good)
     assert f">{visible(good)}<" in page.read_text()
 

@@ -1,4 +1,4 @@
-"""The ``biogrip`` command."""
+"""Identify the viscoelastic parameters of samples in recorded traces."""
 
 import argparse
 import os
@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from biogrip import __version__
 from biogrip.command.options import OPTIONS
-from biogrip.errors import BiogripError
+from biogrip.errors import BiogripError, nearest
 from biogrip.terminal import visible, visible_lines
 
 _SHOWN = 200
@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Matrices are small: BLAS threads, which NumPy starts when it is imported, cost more than they
     # bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    options = _parser().parse_args(arguments)
+    options = _parser().parse_args(arguments or sys.argv[1:] or ["--help"])
     try:
         status: int = options.command(options)
         sys.stdout.flush()
@@ -58,6 +58,14 @@ class _Parser(argparse.ArgumentParser):
         """Return the help, with the sample models where one is to be named."""
         models = _models() if self.lists_models else ""
         return f"{super().format_help()}{models}{self.examples}"
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse unknown options with the usage of their command, and the nearest that there is."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            near = nearest(unknown[0].partition("=")[0], self._option_string_actions)
+            self.error(f"unrecognized arguments: {' '.join(unknown)}.{near}")
+        return found, unknown
 
     def error(self, message: str) -> NoReturn:
         """Print a usage error and exit."""

@@ -261,7 +261,7 @@ def test_an_unknown_unit_is_refused_without_one_of_another_size(
 def test_of_a_file_without_the_columns_the_names_above_numbers_are_said(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     path.write_text("made by,me\nat,noon\nseconds,twist\n0,1\n1,3\n")
-    assert "found no such column, allowed are seconds, twist." in refusal(path)
+    assert "The file has: seconds, twist." in refusal(path)
 
 
 @pytest.mark.parametrize("sd", [{"sd": "sd"}, {}])

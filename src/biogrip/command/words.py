@@ -3,7 +3,8 @@
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import log
 from textwrap import indent
 from typing import Any
@@ -31,7 +32,14 @@ _COLOURS = {
 
 # Most lines on what any linear sample would show.
 _LINES = 5
+# Most names of traces that are told what another one is.
+_MOST_NAMED = 5
 # What the notes of a weight do to the fit.
+_MEANS = {
+    OK: "what the model leaves looks like noise",
+    DOUBTFUL: "trust the limits only if you can rule out the reasons given",
+    REJECTED: "the model cannot give this trace, so that it has no limits",
+}
 _SAID = {HARMLESS: "note", DOUBT: DOUBTFUL, REJECTION: REJECTED}
 
 
@@ -40,7 +48,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     width = max(len(item["quantity"]) for item in found["quantities"])
     rejected = found["fit"] == REJECTED
     lines = [
-        f"{visible(found['trace'])}: fit {found['fit']}",
+        f"{visible(found['trace'])}: fit {found['fit']}: {_MEANS[found['fit']]}.",
         *(f"  {visible(reason)}" for reason in found["reasons"]),
         f"{found['samples']} samples, {noise_in_words(found)}, "
         f"misfit {in_unit(found['misfit_rad'], found)}",
@@ -188,18 +196,39 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
             rows.append([visible(each["trace"]), each["fit"], *own])
         lines.append(aligned(rows, ["trace", "fit", *columns.values()]))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
+        fits = {each["fit"] for each in found}
+        lines += [f"Fit {fit}: {means}." for fit, means in _MEANS.items() if fit in fits]
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)
         lines += _once(found, given_in_words)
+        every = []
         for each in found:
             said = [f"{_SAID[note['weight']]}: {note['text']}" for note in each["notes"]]
             said += [each["advice"]] if each["fit"] == REJECTED and each["advice"] else []
-            lines += [f"{visible(each['trace'])}: {visible(text)}" for text in said]
+            every += [(name := visible(each["trace"]), f"{name}: {visible(text)}") for text in said]
+        lines += _first_of_alike(every)
         lines += _once(found, lambda it: [taken_for_granted(it)] if it["by_default"] else [])
     if refused:
         lines.append(f"Not identified, {len(refused)} of {len(refused) + len(found)}:")
-        lines += [indent(visible_lines(reason), "  ") for reason in refused.values()]
+        reasons = [(visible(name), visible_lines(reason)) for name, reason in refused.items()]
+        lines += [indent(text, "  ") for text in _first_of_alike(reasons)]
     return "\n".join(lines)
+
+
+def _first_of_alike(said: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """Yield the first of each kind of texts on traces, and names of others that are told the like.
+
+    Texts are alike if, names and numbers apart, they are the same up to their third colon.
+    """
+    alike = defaultdict[str, list[tuple[str, str]]](list)
+    for trace, text in said:
+        bare = re.sub(r"\d[\d.e+-]*", "", text.replace(trace, ""))
+        alike[":".join(bare.split(":")[:3])].append((trace, text))
+    for (_, text), *others in alike.values():
+        names = [trace for trace, _ in others[:_MOST_NAMED]]
+        names += ["..."] if others[_MOST_NAMED:] else []
+        like = f" The like holds for {len(others)} more: {', '.join(names)}." if others else ""
+        yield text + like
 
 
 def _once(

@@ -297,8 +297,8 @@ def trace_file_problem(path: str | Path) -> str | None:
     """Return what is wrong with the path of a trace, or None if it is a file."""
     file, shown = Path(path), visible(path)
     shown = shown if len(shown) <= _LONGEST_PATH else f"{shown[:_LONGEST_PATH]}..."
-    folder = "" if file.is_absolute() else f" in the folder {visible(file.parent.absolute())}"
-    found = f"found '{shown}', allowed is a file that exists{folder[:_LONGEST_PATH]}."
+    folder = "" if file.is_absolute() else f" in {visible(file.parent.absolute())}"
+    found = f"there is no file {shown}{folder[:_LONGEST_PATH]}."
     try:
         if file.is_file():
             return None

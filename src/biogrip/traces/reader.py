@@ -291,6 +291,11 @@ def _checked(
     )
 
 
+def _no_column(path: Path, line: int | None, column: str, names: list[str]) -> str:
+    there = f"The file has: {listed(names)}.{nearest(column, names)}"
+    return f"{place(path, line)}: there is no column '{visible(column)}'. {there}"
+
+
 def _as_in(names: Sequence[str]) -> str:
     """Return the option for a column that is named after what is read, or nothing."""
     found = ((name, own) for name in INSTRUMENTS for own in names if own.lower().startswith(name))
@@ -315,11 +320,12 @@ def _columns_of(
         )
     for key, column in columns.named.items():
         same, where = table.indices(column), place(path, line, column)
+        if not same and column == columns.quantity.name:
+            # As by --reading modulus, of a column modulus_Pa.
+            same = table.indices(columns.quantity.column)
         if not same:
-            problems.append(
-                f"{where}: found no such column, allowed are {listed(table.names)}."
-                f"{nearest(column, table.names)} Say which is which by {ways}{example}."
-            )
+            said = _no_column(path, line, column, table.names)
+            problems.append(f"{said} Say which is which by {ways}{example}.")
             continue
         if len(same) > 1:
             problems += [f"{where}: found {len(same)} columns of this name, allowed is one."]
@@ -408,10 +414,10 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: Columns) -> BoolArr
     """Return which rows have the values of other columns that are asked for, (n_rows,)."""
     chosen = np.ones(table.end - table.first, bool)
     for column, wanted in (columns.rows or {}).items():
-        where = place(path, int(sheet.numbers[table.at]) or None, column)
+        line = int(sheet.numbers[table.at]) or None
+        where = place(path, line, column)
         if not (same := table.indices(column)):
-            text = f"found no such column, allowed are {listed(table.names)}."
-            raise BiogripError(f"{where}: {text}{nearest(column, table.names)}")
+            raise BiogripError(_no_column(path, line, column, table.names))
         cells = [str(cell) for cell in sheet.cells[table.first : table.end, same[0]]]
         values = [*dict.fromkeys(cells)]
         fits = {it for it in values if it == str(wanted) or number_or_inf(it) == wanted}
