@@ -145,7 +145,7 @@ def test_mere_noise_is_refused(rate_Hz: float, sigma_rad: float) -> None:
 def test_a_response_explains_more_than_noise_would(explained: float, responds: bool) -> None:
     """Ten readings, three unknowns: F(3, 7) at 99.9 % is 18.77, times 3 / 7 of the rest."""
     trace = np.sqrt(1 + explained) * np.eye(10)[0]
-    assert _responds(trace, np.zeros((0, 10)), 1.0, 3) == responds
+    assert _responds(trace, np.zeros((0, 10)), 1.0, 3, 7) == responds
 
 
 @pytest.mark.parametrize("value", [0.0, 1e-3, -1e-3, 5.0])

@@ -7,6 +7,7 @@ but enough to find its response under noise. The peak of the readings would be a
 
 import math
 from collections.abc import Callable, Mapping
+from operator import itemgetter
 
 import numpy as np
 
@@ -82,13 +83,15 @@ def check_recording(
         return _check_turn(recording, largest, free, None)
     responses = lag_course(torque, _LAG_SHARES)(time_s)
     nuisance = experiment.nuisance(time_s)
-    (amplitudes, rest), (_, mirrored) = _either_sign(trace, responses, nuisance)
+    either = (amplitudes, rest), (_, mirrored) = _either_sign(trace, responses, nuisance)
     where = recording.extent(recording.read.reading)
     read, controlled = recording.read.quantity, instrument.controlled.name
-    least = min(rest, mirrored)
+    combined, least = min(either, key=itemgetter(1))
+    used = int(np.count_nonzero(combined))
     is_constant = not instrument.deforms and len(trace) * np.var(trace) <= least
     # Without any scatter nothing tells noise from sample.
-    if is_constant or np.ptp(trace) == 0 or not _responds(trace, nuisance, least, len(responses)):
+    counts = len(responses), len(trace) - used
+    if is_constant or np.ptp(trace) == 0 or not _responds(trace, nuisance, least, *counts):
         unit = f" {read.unit}".rstrip()
         raise BiogripError(
             f"{where}: found no response to the {controlled}, but {plain(trace.mean())}{unit} "
@@ -122,11 +125,10 @@ def _either_sign(trace: Array, responses: Array, nuisance: Array) -> list[tuple[
     return [fit_responses(sign * without(nuisance, trace), cleared) for sign in (1, -1)]
 
 
-def _responds(trace: Array, nuisance: Array, rest: float, unknowns: int) -> bool:
+def _responds(trace: Array, nuisance: Array, rest: float, unknowns: int, freedom: int) -> bool:
     """Return True if responses explain more than they would of white noise, by an F test."""
     from scipy.special import fdtri
 
-    freedom = len(trace) - unknowns
     explained = float(np.sum(without(nuisance, trace) ** 2)) - rest
     return bool(explained > unknowns * fdtri(unknowns, freedom, 1 - NO_RESPONSE) * rest / freedom)
 

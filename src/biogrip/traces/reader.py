@@ -33,7 +33,7 @@ from biogrip.traces.tables import (
     seconds_or_inf,
 )
 
-FEWEST_SAMPLES = 10
+FEWEST_SAMPLES = 5
 
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
@@ -185,7 +185,10 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         that is neither a finite number nor a gap, a standard deviation is not positive, the time
         does not increase, or there are fewer than `FEWEST_SAMPLES` samples.
     """
-    sheet = read_sheet(path, columns)
+    sheet, quantity = read_sheet(path, columns), columns.quantity
+    if columns.reading == quantity.name and quantity.name not in sheet.cells:
+        # As by --reading modulus, of a column modulus_Pa.
+        columns = replace(columns, reading=quantity.column)
     tables, index = find_tables(path, sheet, columns)
     table = tables[index]
     header_line = int(sheet.numbers[table.at]) or None
@@ -320,9 +323,6 @@ def _columns_of(
         )
     for key, column in columns.named.items():
         same, where = table.indices(column), place(path, line, column)
-        if not same and column == columns.quantity.name:
-            # As by --reading modulus, of a column modulus_Pa.
-            same = table.indices(columns.quantity.column)
         if not same:
             said = _no_column(path, line, column, table.names)
             problems.append(f"{said} Say which is which by {ways}{example}.")
