@@ -114,7 +114,7 @@ def test_six_readings_determine_two_parameters() -> None:
     for seed in range(16):
         noise = 8 * np.random.default_rng(seed).standard_normal(6)
         readings = 450 * np.exp(-times * 450 / 3800) + noise
-        config = {"model_selection": {"models": []}}
+        config: dict[str, Any] = {"model_selection": {"models": []}}
         found = identify_trace(times, readings, reads="modulus", model="maxwell", config=config)
         k = next(item for item in found.data["quantities"] if item["quantity"] == "k")
         holds += found.data["fit"] != "rejected" and k["low"] <= 450 <= k["high"]
