@@ -15,7 +15,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.figures.style import BLUE, PAGE_IN, TARGET, figure, panel, save, styled
+from biogrip.figures.style import BLUE, COLUMN_IN, TARGET, figure, panel, save, styled
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.nonlinear import correction
 from biogrip.physics.protocol import Course
@@ -129,8 +129,10 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
     """Draw the difference for the last case at twenty times the torque, and maps of a few."""
     comparison = DIFFERENCES.read(differences)
     cases = dict(list(study.cases.items())[:_MOST_CASES])
-    drawn = figure(PAGE_IN, 2.6)
-    traces, *maps = drawn.subplots(1, 1 + len(cases), width_ratios=[1.2] + [1] * len(cases))
+    drawn = figure(COLUMN_IN, 3.6)
+    traces, *maps = drawn.subplots(2, 2).ravel()
+    for axes in maps[len(cases) :]:
+        axes.set_axis_off()
     last = list(cases)[-1]
     _difference(traces, cases[last])
     panel(traces, "a", f"{cases[last].title}, {_SHOWN_FACTOR:g} x torque")
@@ -148,11 +150,11 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
             axes.clabel(lines, fmt=f"{LIMIT_PERCENT:g} %%", fontsize=7)
         axes.set_yscale("log")
         ticks = [0.3, 1, 3, 10, 30]
-        axes.set_yticks(ticks, ["" if index else f"{tick:g}" for tick in ticks])
+        axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
         axes.minorticks_off()
         axes.set_xlabel(r"$\hat\theta_2$ (deg)")
-        if index == 0:
-            axes.set_ylabel("torque / protocol's torque")
+        if index != 1 or len(cases) == 1:
+            axes.set_ylabel("torque / protocol's")
         panel(axes, "bcd"[index], cases[name].title, most_letters=19)
     drawn.colorbar(mesh, ax=maps, label="difference (% of peak)", pad=0.01)
     return drawn
@@ -167,7 +169,7 @@ def _difference(axes: Axes, case: Case) -> None:
     difference = correction(gripper, network, torque).at(time_s)[0]
     axes.plot(time_s, 1e3 * difference, color=BLUE)
     axes.axhline(0, color=TARGET, linewidth=0.6)
-    axes.set(xlabel="time (s)", ylabel="nonlinear - linear rotation (mrad)")
+    axes.set(xlabel="time (s)", ylabel="nonlinear - linear (mrad)")
     bottom, top = axes.get_ylim()
     # Leave room for text above the curve.
     axes.set_ylim(bottom, top + 0.08 * (top - bottom))

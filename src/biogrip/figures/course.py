@@ -15,7 +15,6 @@ from biogrip.figures.results import first_of_basins, read_history, seeds_in_word
 from biogrip.figures.style import (
     ALL_SEEDS,
     COLUMN_IN,
-    PAGE_IN,
     PAPER,
     RUNS,
     TARGET,
@@ -115,8 +114,8 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
     parameters, identified = case.sample.model.parameters, case.published.identified
     columns = [parameter.column for parameter in parameters]
     history = read_history(histories, method.name, shown, columns)
-    drawn = figure(PAGE_IN, 3.9)
-    grid = drawn.subplots(2, -(-len(parameters) // 2), sharex=True).ravel()
+    drawn = figure(COLUMN_IN, 1.2 + 1.5 * (rows := -(-len(parameters) // 2)))
+    grid = drawn.subplots(rows, 2, sharex=True).ravel()
     for axes, parameter in zip(grid, parameters, strict=False):
         for seed, rows in history.groupby("seed"):
             style = _line_of_seed(seed, shown, 0.6)
@@ -132,18 +131,16 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
         axes.set_xlim(0, history["generation"].max())
     for axes in grid[len(parameters) :]:
         axes.set_axis_off()
-    half = len(grid) // 2
-    for axes, below in zip(grid[:half], grid[half:], strict=True):
-        lowest = below if below.axison else axes
-        lowest.set_xlabel(method.step)
-        lowest.tick_params(labelbottom=True)
+    for axes in grid[len(parameters) - 2 : len(parameters)]:
+        axes.set_xlabel(method.step)
+        axes.tick_params(labelbottom=True)
     _name_seeds(grid[0], len(found), first)
     if case.parameters:
         grid[0].plot([], [], color=TARGET, linestyle="--", label="target")
     if identified:
         grid[0].plot([], [], color=PAPER, linestyle=":", label="identified in the paper")
     handles, labels = grid[0].get_legend_handles_labels()
-    drawn.legend(handles, labels, loc="outside upper center", ncols=4)
+    drawn.legend(handles, labels, loc="outside upper center", ncols=2)
     drawn.suptitle(case.title, x=0.01, ha="left", fontsize=8)
     return drawn
 

@@ -8,9 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures.results import Fit, fit_of, fits_of_basins, scale_of_fit
 from biogrip.figures.style import (
+    BLUE,
     COLUMN_IN,
     FITTED,
     MEASURED,
@@ -26,6 +28,8 @@ from biogrip.stages.judgement import TRACE, experiment_for
 from biogrip.study.study import Case
 
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
+# Readings that are drawn in full colour; of more, residuals have means of so many parts.
+_FEW, _PALEST, _PARTS = 300, 0.25, 40
 
 
 def draw_fits(
@@ -60,15 +64,30 @@ def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:
     """Draw a trace, its target, its fit and others, by label; return factor and unit."""
     fit = next(iter(fits.values()))
     factor, unit = scale_of_fit(fit)
-    axes.plot(fit.time_s, factor * fit.measured, color=MEASURED, **_READINGS)
+    axes.plot(fit.time_s, factor * fit.measured, color=MEASURED, **_readings(len(fit.time_s)))
     kind = "recorded trace" if fit.target is None else "noisy measurement"
     axes.plot([], [], ".", color=MEASURED, markersize=4, label=kind)
     if fit.target is not None:
-        axes.plot(fit.time_s, factor * fit.target, color=TARGET, label="target")
+        axes.plot(fit.time_s, factor * fit.target, color=TARGET, linewidth=2.4, label="target")
     for (label, each), color in zip(fits.items(), RUNS, strict=False):
-        axes.plot(each.time_s, factor * each.fitted, "--", color=color, label=label)
+        axes.plot(each.time_s, factor * each.fitted, color=color, label=label)
     axes.set_ylabel(with_unit(fit.read.title, unit))
     return factor, unit
+
+
+def _readings(count: int) -> dict[str, Any]:
+    """Style of readings, the paler the more there are, for curves to be seen."""
+    return _READINGS | {"alpha": max(min(1.0, _FEW / count), _PALEST)}
+
+
+def _means(axes: Axes, time_s: Array, residual: Array) -> None:
+    """Draw means of a long trace's residuals, each with its standard error."""
+    if len(residual) <= _FEW:
+        return
+    times, parts = np.array_split(time_s, _PARTS), np.array_split(residual, _PARTS)
+    error = [part.std(ddof=1) / np.sqrt(len(part)) for part in parts]
+    at, mean = [part.mean() for part in times], [part.mean() for part in parts]
+    axes.errorbar(at, mean, error, fmt="o", color=BLUE, markersize=2, linewidth=0.8, zorder=3)
 
 
 def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
@@ -87,13 +106,14 @@ def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = 
     traces.set_title(literal(title))
     residual = fit.measured - fit.fitted
     residual = factor * residual if fit.sd is None else residual / fit.sd
-    residuals.plot(fit.time_s, residual, color=MEASURED, **_READINGS)
+    residuals.plot(fit.time_s, residual, color=MEASURED, **_readings(len(residual)))
+    _means(residuals, fit.time_s, residual)
     if fit.target is not None:
         residuals.plot(fit.time_s, factor * (fit.target - fit.fitted), color=TARGET)
     for other, color in zip(others, RUNS[1:], strict=False):
         left = factor * (np.asarray(other.target) - other.fitted)
         residuals.plot(other.time_s, left, color=color)
-    residuals.axhline(0, color=FITTED, linestyle="--", linewidth=0.8)
+    residuals.axhline(0, color=FITTED, linewidth=0.8)
     bound = 1.15 * float(np.max(np.abs(residual)))
     residuals.set_ylim(-bound, bound)
     residuals.set_ylabel(with_unit("residual", unit) if fit.sd is None else "residual / sd")

@@ -60,7 +60,8 @@ def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) 
     units = [case.experiment.model.stiffness_unit for case in study.cases.values()]
     for column, unit in enumerate(units):
         if column == 0 or unit != units[column - 1]:
-            axes[0, column].set_ylabel(f"modulus ({unit})")
+            kind = "stiffness" if unit == "N/m" else "modulus"
+            axes[0, column].set_ylabel(f"{kind} ({unit})")
     axes[1, 0].set_ylabel("sensitivity / noise")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside upper center", ncols=len(labels))
@@ -86,15 +87,22 @@ def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Arra
                 axes.plot(omega, part, **style | {"linestyle": dashed}, label=label)
                 label = None
     fitting = np.concatenate(near)
-    shown = np.flatnonzero(_agreed(fitting)) if len(fitting) else np.array([], dtype=np.int64)
-    for run in np.split(shown, np.flatnonzero(np.diff(shown) > 1) + 1) if len(shown) else []:
-        axes.axvspan(
-            omega[run[0]], omega[run[-1]], color=SHADE, linewidth=0, zorder=0,
-            label="seen by the experiment" if run[0] == shown[0] else None,
-        )  # fmt: skip
+    for part, above, name in ((fitting.real, 0.5, "storage"), (fitting.imag, 0.0, "loss")):
+        agreed = _agreed(part) if len(part) else np.zeros(len(omega), bool)
+        ends = {"ymin": above, "ymax": above + 0.5, "linewidth": 0, "zorder": 0}
+        # Above the loss modulus, in another shade.
+        ends |= (
+            {"color": SHADE}
+            if above
+            else {"facecolor": "none", "edgecolor": SHADE, "hatch": "////"}
+        )
+        shown = np.flatnonzero(agreed)
+        for run in np.split(shown, np.flatnonzero(np.diff(shown) > 1) + 1) if len(shown) else []:
+            label = f"{name} seen" if run[0] == shown[0] else None
+            axes.axvspan(omega[run[0]], omega[run[-1]], label=label, **ends)
     truth = _modulus(model.sample(case.parameters), omega)[0]
-    axes.plot(omega, truth.real, color=BLACK, label="truth, $G'$")
-    axes.plot(omega, truth.imag, "--", color=BLACK, label="truth, $G''$")
+    axes.plot(omega, truth.real, color=BLACK, label="truth, storage")
+    axes.plot(omega, truth.imag, "--", color=BLACK, label="truth, loss")
     axes.set(xscale="log", yscale="log")
     largest = float(np.max(np.abs(truth)))
     axes.set_ylim(1e-5 * largest, 5 * largest)
@@ -123,6 +131,6 @@ def _modulus(network: Network, omega: Array) -> Array:
 
 
 def _agreed(moduli: Array) -> BoolArray:
-    """Return True at frequencies where nine tenths of fits, (n, n_omega), agree on the modulus."""
-    low, high = np.quantile(np.abs(moduli), (0.05, 0.95), axis=0)
+    """Return True at frequencies where nine tenths of fits, (n, n_omega), agree on a modulus."""
+    low, high = np.quantile(moduli, (0.05, 0.95), axis=0)
     return high < (1 + NEAR) * low

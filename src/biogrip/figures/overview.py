@@ -39,8 +39,8 @@ from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.records.success import near_noise, near_noise_words
 from biogrip.study.study import Case, Study
 
-# End of the axis of identified over target values, on both sides of 1.
-_WORST = 1e3
+# Ends of the axes of identified over target values, of parameters in decades and of sums.
+_WORST, _SUM = 1e3, 0.1
 _TITLE_LETTERS = 19
 _MOST_CASES = 3
 _DOTS: dict[str, Any] = {
@@ -106,6 +106,9 @@ def _scatter(
     reached = near_noise(found, tolerance)
     identified = case.published.identified
     ticks: list[str] = []
+    # Sums are told so much better that on an axis of decades they are a line.
+    sums = axes.twinx()
+    sums.set(ylim=(1 - _SUM, 1 + _SUM), yticks=[])
     for group in case.sample.model.quantities:
         names = [parameter.name for parameter in group]
         target = sum(case.parameters[name] for name in names)
@@ -116,22 +119,29 @@ def _scatter(
         ratio = found[[parameter.column for parameter in group]].sum(axis=1).to_numpy(float)
         place = x + 0.5 * ((np.arange(len(ratio)) * 0.618034) % 1 - 0.5)
         points = np.column_stack([place, ratio / target])
+        own, ends = (
+            (axes, (1 / _WORST, _WORST)) if len(group) == 1 else (sums, (1 - _SUM, 1 + _SUM))
+        )
         for which, color, label in (
             (~reached, ALL_SEEDS, "other fits"),
             (reached, FITTED, f"fit {near_noise_words(tolerance)}"),
         ):
             style, labels = _DOTS | {"color": color}, (label, "")
-            ends = (-np.inf, 1 / _WORST), (np.inf, _WORST)
-            points_within(axes, points[which], *ends, style, edge_size=3.5, labels=labels)
+            low, high = ((sign * np.inf, end) for sign, end in zip((-1, 1), ends, strict=True))
+            points_within(own, points[which], low, high, style, edge_size=3.5, labels=labels)
         if set(names) <= set(identified):
             paper = sum(identified[name] for name in names) / target
-            shown = float(np.clip(paper, 1 / _WORST, _WORST))
-            axes.plot([x - 0.4, x + 0.4], [shown, shown], color=PAPER, label="paper")
+            shown = float(np.clip(paper, *ends))
+            own.plot([x - 0.4, x + 0.4], [shown, shown], color=PAPER, label="paper")
     axes.axhline(1, color=TARGET, linewidth=0.8, label="truth")
     axes.set_yscale("log")
     axes.plot([], [], "^", color=TARGET, markersize=1.6, label="beyond the axis")
     axes.set_ylim(1 / (2 * _WORST), 2 * _WORST)
     axes.set_xticks(range(len(ticks)), ticks)
+    sums.spines["right"].set_visible(True)
+    sums.set_yticks([1 - _SUM, 1, 1 + _SUM], [f"{1 - _SUM:g}", "1", f"{1 + _SUM:g}"])
+    if len(ticks) > 1:
+        axes.axvline(len(ticks) - 1.5, color=TARGET, linewidth=0.5)
 
 
 def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:
