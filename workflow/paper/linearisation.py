@@ -129,13 +129,13 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
     """Draw the difference for the last case at twenty times the torque, and maps of a few."""
     comparison = DIFFERENCES.read(differences)
     cases = dict(list(study.cases.items())[:_MOST_CASES])
-    drawn = figure(COLUMN_IN, 3.6)
+    drawn = figure(COLUMN_IN, 4.0)
     traces, *maps = drawn.subplots(2, 2).ravel()
     for axes in maps[len(cases) :]:
         axes.set_axis_off()
     last = list(cases)[-1]
     _difference(traces, cases[last])
-    panel(traces, "a", f"{cases[last].title}, {_SHOWN_FACTOR:g} x torque")
+    panel(traces, "a", f"{_SHOWN_FACTOR:g} × torque")
     for index, name in enumerate(cases):
         rows = comparison[comparison["case"] == name]
         grid = rows.pivot(
@@ -153,10 +153,10 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
         axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
         axes.minorticks_off()
         axes.set_xlabel(r"$\hat\theta_2$ (deg)")
-        if index != 1 or len(cases) == 1:
-            axes.set_ylabel("torque / protocol's")
-        panel(axes, "bcd"[index], cases[name].title, most_letters=19)
-    drawn.colorbar(mesh, ax=maps, label="difference (% of peak)", pad=0.01)
+        axes.set_ylabel("torque / protocol's" if index < 2 else "")
+        panel(axes, "bcd"[index], cases[name].title, most_letters=22)
+    style = {"location": "bottom", "aspect": 40, "pad": 0.02}
+    drawn.colorbar(mesh, ax=[traces, *maps], label="difference (% of peak)", **style)
     return drawn
 
 
@@ -172,8 +172,8 @@ def _difference(axes: Axes, case: Case) -> None:
     axes.set(xlabel="time (s)", ylabel="nonlinear - linear (mrad)")
     bottom, top = axes.get_ylim()
     # Leave room for text above the curve.
-    axes.set_ylim(bottom, top + 0.08 * (top - bottom))
-    peak = f"peak rotation {1e3 * np.max(np.abs(linear)):.3g} mrad"
+    axes.set_ylim(bottom, top + 0.35 * (top - bottom))
+    peak = f"{case.title}:\n{1e3 * np.max(np.abs(linear)):.3g} mrad at most"
     axes.annotate(peak, (0.98, 0.99), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 

@@ -140,7 +140,7 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
     if identified:
         grid[0].plot([], [], color=PAPER, linestyle=":", label="identified in the paper")
     handles, labels = grid[0].get_legend_handles_labels()
-    drawn.legend(handles, labels, loc="outside upper center", ncols=2)
+    drawn.legend(handles, labels, loc="outside lower center", ncols=2)
     drawn.suptitle(case.title, x=0.01, ha="left", fontsize=8)
     return drawn
 
