@@ -45,6 +45,10 @@ rule recording:
         case=names(STUDY.recorded),
     params:
         **settings_of("actuator", *FIT, *OF_FILE),
+        # Dates do not tell that an older file has taken the place of this one.
+        recorded=lambda wildcards: {
+            "recorded": digest_of(Path(STUDY.case(wildcards.case).block.measurement.file))
+        },
     message:
         "Reading the recorded trace of {wildcards.case}"
     script:

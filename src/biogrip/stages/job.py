@@ -7,17 +7,14 @@ cannot give a result that Snakemake would not renew. Each job has a batch of the
 (`batch_names`, `job_seeds`), and writes what it says to its log (`logged`).
 """
 
-import hashlib
 import re
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import MISSING, Field, fields
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ClassVar, get_type_hints
 
-import biogrip
 from biogrip.errors import BiogripError
 from biogrip.keys import built
 from biogrip.study.case_blocks import CaseBlock, Identifiability
@@ -130,18 +127,6 @@ def _typed(kind: Any, given: Mapping[str, Any]) -> dict[str, Any]:
             made = field.default_factory
             keys[field.name] = field.default if made is MISSING else made()
     return keys
-
-
-def software() -> dict[str, str]:
-    """Return versions of what computes results, and a digest of our source."""
-    folder = Path(biogrip.__file__).parent
-    digest = hashlib.sha256()
-    for file in sorted(folder.rglob("*")):
-        if file.suffix in (".py", ".j2", ".css"):
-            digest.update(f"{file.relative_to(folder)}\n".encode())
-            digest.update(file.read_bytes())
-    versions = {name: version(name) for name in ("numpy", "scipy")}
-    return {"biogrip": biogrip.__version__, **versions, "source": digest.hexdigest()[:12]}
 
 
 def seeds_of(batch: str) -> range:
