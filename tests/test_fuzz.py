@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from biogrip.identify.settings import check_settings, is_table, read_table
 
 from biogrip.cli import main
 from biogrip.errors import BiogripError
-from biogrip.identify.settings import check_settings, is_table, read_table
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config
 from tests.helpers.identified import FEW, identify

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 DIFFERENCES = RowFile(
     "a comparison",
     ("case", "reference_angle_deg", "torque_factor", "difference_over_peak"),
+    words=("case",),
 )
 _ANGLES_DEG = np.arange(40.0, 91.0, 5.0)
 _FACTORS = np.geomspace(0.25, 32.0, 15)

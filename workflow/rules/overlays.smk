@@ -94,6 +94,8 @@ if STUDY.config.traces:
             table="results/tables/traces.csv",
         log:
             "results/logs/traces.log",
+        params:
+            rows=len(ROWS),
         message:
             "Putting together the tables of all traces"
         script:

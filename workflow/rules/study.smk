@@ -27,7 +27,7 @@ rule measurement:
     wildcard_constraints:
         case=names(SIMULATED),
     params:
-        **settings_of("study_seed", NOISE),
+        **settings_of("study_seed", "actuator", NOISE, *SAMPLE, *SAMPLING),
     message:
         "Adding noise to {wildcards.case}, {wildcards.batch}"
     script:
@@ -111,7 +111,7 @@ rule judgement:
         runtime=60,
     params:
         **settings_of(
-            *("study_seed", "actuator", *FIT, NOISE),
+            *("study_seed", "actuator", *FIT, *SAMPLING, NOISE),
             *("identifiability.confidence", "least_squares"),
         ),
     message:
@@ -147,7 +147,7 @@ rule intervals:
         runtime=120,
     params:
         **settings_of(
-            *("study_seed", "actuator", *FIT, NOISE, "least_squares"),
+            *("study_seed", "actuator", *FIT, *SAMPLING, NOISE, "least_squares"),
             *("identifiability.confidence", "identifiability.verdicts_every"),
         ),
     message:

@@ -4,6 +4,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from biogrip.errors import BiogripError
 from biogrip.files import scratch_path, write_text
 from biogrip.judging.without_model import EXPONENT, LEVEL
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
-from biogrip.records.rows import write_rows
+from biogrip.records.rows import AGAIN, whole, write_rows
 from biogrip.terminal import visible, visible_lines
 
 WRITTEN_BY = "written_by_biogrip"
@@ -131,11 +132,15 @@ def write_table(outcome: Outcome, table: Path) -> None:
     )
 
 
-def join_tables(parts: Sequence[Path], table: Path) -> None:
+def join_tables(parts: Sequence[Path], table: Path, rows: int) -> None:
     """Write the rows of several tables of traces as one, as if `write_table` had written all."""
     # Imported here: loading pandas takes long.
     import pandas as pd
 
-    every = pd.concat([pd.read_csv(part, dtype=str, keep_default_na=False) for part in parts])
+    texts = (StringIO(whole(part), newline="") for part in parts)
+    every = pd.concat([pd.read_csv(text, dtype=str, keep_default_na=False) for text in texts])
+    if len(every) != rows:
+        text = f"found {len(every)} traces in the tables of its batches, wanted {rows}"
+        raise BiogripError(f"{parts[0].parent}: {text}. {AGAIN}")
     last = list(COLUMNS[-2:])
     write_text(table, every[[*every.columns.drop(last), *last]].to_csv(index=False))

@@ -47,7 +47,7 @@ def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) 
     axes = drawn.subplots(2, len(study.cases), squeeze=False, height_ratios=[1.35, 1])
     files = zip(study.cases.values(), identifications, targets, strict=True)
     for column, (case, identified, target) in enumerate(files):
-        time_s, _, rotation = read_target(target)
+        time_s, _, rotation = read_target(target, case.times_s)
         logs = case.experiment.logs(case.parameters)
         _, sensitivity = case.experiment.of(time_s, rotation).residuals(logs)
         sigma = standard_deviation(rotation, case.noise)
@@ -75,7 +75,7 @@ def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Arra
     model = case.experiment.model
     near = []
     for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():
-        found = first_seeds(read_identifications(identified, method.name))
+        found = first_seeds(read_identifications(identified, case, method.name))
         fits = found[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
         near.append(moduli[near_noise(found, study.near_noise_tolerance)])

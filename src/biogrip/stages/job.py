@@ -7,7 +7,6 @@ cannot give a result that Snakemake would not renew. Each job has a batch of the
 (`batch_names`, `job_seeds`), and writes what it says to its log (`logged`).
 """
 
-import re
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr
@@ -17,12 +16,12 @@ from typing import Any, ClassVar, get_type_hints
 
 from biogrip.errors import BiogripError
 from biogrip.keys import built
+from biogrip.records.rows import seeds_of
 from biogrip.study.case_blocks import CaseBlock, Identifiability
 from biogrip.study.config import StudyConfig
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.study import Case, Study
 
-_BATCH = re.compile(r"seeds_(\d+)-(\d+)")
 STUDY_KEYS = tuple(field.name for field in fields(StudyConfig))
 """All keys of a study."""
 CASE_KEYS = tuple(field.name for field in fields(CaseBlock))
@@ -77,7 +76,7 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
     if case:
         # What the case leaves at its default is not the study's: it has all of its blocks.
         blocks = {key: value for key, value in blocks.items() if key not in CASE_KEYS}
-        blocks |= study.case(case).plain
+        blocks |= study.case(case).plain | {"seeds": study.case(case).seeds}
     blocks = blocks | {"cases": {name: it.plain for name, it in study.cases.items()}}
 
     def value_of(block: Mapping[str, Any] | None, key: str) -> Any:
@@ -127,13 +126,6 @@ def _typed(kind: Any, given: Mapping[str, Any]) -> dict[str, Any]:
             made = field.default_factory
             keys[field.name] = field.default if made is MISSING else made()
     return keys
-
-
-def seeds_of(batch: str) -> range:
-    """Return the seeds of a batch, whose name has the first and the last, e.g. ``seeds_0-24``."""
-    found = _BATCH.fullmatch(batch)
-    assert found, batch
-    return range(int(found[1]), int(found[2]) + 1)
 
 
 def batch_names(seeds: int, size: int) -> list[str]:
