@@ -14,7 +14,7 @@ from biogrip.errors import BiogripError
 from biogrip.files import scratch_path, write_text
 from biogrip.judging.without_model import EXPONENT, LEVEL
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
-from biogrip.records.rows import AGAIN, whole, write_rows
+from biogrip.records.rows import AGAIN, read_object, whole, write_object, write_rows
 from biogrip.terminal import visible, visible_lines
 
 WRITTEN_BY = "written_by_biogrip"
@@ -76,13 +76,37 @@ def check_output(output: Path) -> None:
     raise BiogripError(f"{visible(output)}: {text}")
 
 
-def in_own_units(data: Any, read: Channel) -> Any:
-    """Return data whose keys end with the unit of what is read, instead of radians."""
+# Keys of a result that are in the unit of what is read.
+_OF_READINGS = ("misfit_rad", "noise_rad", "scatter_rad", "offset_rad", "drift_rad_per_s")
+
+
+def write_result(path: Path, data: Mapping[str, Any], made_from: str) -> None:
+    """Write the result of a trace, `data_of`, as JSON, with a digest of what it was made from."""
+    read = INSTRUMENTS[data["reads"]["quantity"]].read
+    # Assumptions, which must be repeatable, are neither rounded nor renamed.
+    names = {name: _in_units(name, read) for name in _OF_READINGS}
+    written = {**_renamed(rounded_numbers(data), names), "assumed": data["assumed"]}
+    write_object(path, written, made_from)
+
+
+def read_result(path: Path, made_from: str) -> dict[str, Any]:
+    """Read the result of a trace as `data_of` has it, but rounded.
+
+    If it was made from anything else, or is not as it was written, it is a `BiogripError`.
+    """
+    written = read_object(path, "the result of a trace", made_from)
+    read = INSTRUMENTS[written["reads"]["quantity"]].read
+    names = {_in_units(name, read): name for name in _OF_READINGS}
+    return {**_renamed(written, names), "assumed": written["assumed"]}
+
+
+def _renamed(data: Any, names: Mapping[str, str]) -> Any:
+    """Return plain data with other keys."""
     if isinstance(data, list):
-        return [in_own_units(each, read) for each in data]
+        return [_renamed(each, names) for each in data]
     if not isinstance(data, dict):
         return data
-    return {_in_units(key, read): in_own_units(each, read) for key, each in data.items()}
+    return {names.get(key, key): _renamed(each, names) for key, each in data.items()}
 
 
 def _in_units(name: str, read: Channel) -> str:
