@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from biogrip.identify.settings import check_settings, is_table, read_table
 
 from biogrip.cli import main
+from biogrip.command.settings import Asked, check_settings, is_table, read_table
 from biogrip.errors import BiogripError
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config
@@ -65,29 +65,9 @@ def test_a_damaged_trace_gives_an_answer_or_one_message(tmp_path: Path, seed: in
     assert "\x1b" not in said + text
 
 
-WORDS = [
-    "nan",
-    "inf",
-    "0",
-    "-1",
-    "10,1",
-    "",
-    "1e400",
-    "1e-400",
-    "1e308",
-    "determined",
-    "Determined",
-]
-WORDS += [
-    "bounded above",
-    "not determined",
-    "fit rejected",
-    "ok",
-    "doubtfull",
-    "rejected",
-    "failed",
-]
-WORDS += ["0.9", "2", "1_0", "٣", "<b>", "\x1b[31m", "=1+1", "b", "a1"]
+WORDS = [*NUMBERS, "0", "-1", "1e-400", "0.9", "2", "1_0", "b", "a1", "<b>", "\x1b[31m", "=1+1"]
+WORDS += ["determined", "Determined", "bounded above", "not determined", "fit rejected"]
+WORDS += ["ok", "doubtfull", "rejected", "failed"]
 
 
 def sheet(seed: int, header: list[str], rows: list[list[str]], words: list[str]) -> bytes:
@@ -149,34 +129,19 @@ def test_a_damaged_table_of_groups_gives_numbers_or_one_message(
 @pytest.mark.nightly
 @pytest.mark.filterwarnings("error")
 def test_a_damaged_sheet_asks_for_traces_or_is_refused(tmp_path: Path, seed: int) -> None:
-    header = [
-        "file",
-        "dish",
-        "measurement.time",
-        "fixed.c_p",
-        "protocol.phases",
-        "gripper.arm_length_m",
-    ]
+    header = ["file", "dish", "measurement.time", "fixed.c_p", "protocol.phases"]
+    header += ["gripper.arm_length_m"]
     rows = [[f"{n}.csv", "left", "time_s", "0", "[]", "3e-3"] for n in range(4)]
-    odd = [
-        *NUMBERS,
-        "1:30",
-        "[1",
-        "{a: 1}",
-        "&a [*a]",
-        "!!python/none",
-        "? x",
-        "off",
-        "0.csv",
-        ".",
-        "/",
-    ]
+    odd = [*NUMBERS, "1:30", "[1", "{a: 1}", "&a [*a]", "!!python/none", "? x", "off"]
+    odd += ["0.csv", ".", "/"]
     (tmp_path / "cells.csv").write_bytes(sheet(seed, header, rows, odd))
+    said = ""
     try:
         check_settings(read_table(tmp_path / "cells.csv"))
     except BiogripError as error:
-        assert 1 <= len(str(error).splitlines()) <= 8
-    assert isinstance(is_table(tmp_path / "cells.csv"), bool)
+        said = str(error)
+    assert len(said.splitlines()) <= 11
+    assert is_table(Asked(tmp_path / "cells.csv")) in (True, False)
 
 
 @pytest.mark.parametrize("seed", range(500))
@@ -206,8 +171,10 @@ def test_a_damaged_config_is_used_or_refused_with_its_line(tmp_path: Path, seed:
     (tmp_path / "mine.yaml").write_bytes(
         content if seed % 7 else content[: rng.integers(len(content))]
     )
+    said = ""
     try:
         files = [default_config(), tmp_path / "mine.yaml"]
         load_study(read_configs(files), files)
     except BiogripError as error:
-        assert str(tmp_path / "mine.yaml") in str(error)
+        said = str(error)
+    assert not said or "mine.yaml" in said

@@ -24,6 +24,9 @@ def atomic_write(path: Path) -> Iterator[Path]:
     unfinished.add(str(scratch))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        # A link that somebody has put there is not followed.
+        scratch.unlink(missing_ok=True)
+        scratch.touch(exist_ok=False)
         yield scratch
         os.replace(scratch, path)
     except OSError as error:
