@@ -105,6 +105,8 @@ def whole(path: Path, what: str = "a table") -> str:
     try:
         with path.open(encoding="utf-8", newline="") as stream:
             text = stream.read()
+        if "\0" in text:
+            raise ValueError("found a byte of 0")
         widths = [len(row) for row in csv.reader(StringIO(text, newline=""), strict=True)]
     except (OSError, ValueError, csv.Error) as error:
         raise BiogripError(f"{path}: cannot be read as {what}: {error}. {AGAIN}") from error
@@ -187,7 +189,7 @@ def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
 def read_arrays(path: Path) -> dict[str, Array]:
     """Read all arrays of an npz."""
     try:
-        with np.load(path) as arrays:
+        with path.open("rb") as stream, np.load(stream) as arrays:
             return dict(arrays)
     except (OSError, ValueError, EOFError, RuntimeError, BadZipFile, zlib.error) as error:
         # zipfile finds methods and passwords that we do not use: RuntimeError.

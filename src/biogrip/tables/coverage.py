@@ -52,7 +52,7 @@ def coverage(
     """
     calibrations = iter(calibrated)
     rows: list[Row] = []
-    estimated = pd.concat([_read(study, it) for it in intervals], ignore_index=True)
+    estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
         experiment = case.experiment.calibrated([next(calibrations)] if case.is_calibrated else [])
         log_truth = experiment.logs(case.parameters)
@@ -87,7 +87,7 @@ def coverage(
     return ShownTable(caption, _COLUMNS, rows)
 
 
-def _read(study: Study, path: Path) -> pd.DataFrame:
+def read_intervals(study: Study, path: Path) -> pd.DataFrame:
     """Read the intervals of a batch, which are of the same quantities in each of its seeds.
 
     Seeds that are judged in full have all quantities.
@@ -169,7 +169,7 @@ _COUNT_COLUMNS = (
 def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
     """Count verdicts of whole profiles, and those whose limits hold the true value."""
     rows: list[Row] = []
-    estimated = pd.concat([_read(study, it) for it in intervals], ignore_index=True)
+    estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
     for name, case in study.cases.items():
         found = estimated[estimated["case"] == name]
         for quantity in parameters_and_sum(case.experiment.searched):

@@ -81,7 +81,7 @@ _MODEL_COLUMNS = (
 
 def models(study: Study, fits: list[Path]) -> ShownTable:
     """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
-    found = pd.concat([_fits_of_batch(study, path) for path in fits])
+    found = pd.concat([read_fits(study, path) for path in fits])
     found["aic"], found["bic"] = aic_and_bic(found["misfit"], found["samples"], found["parameters"])
     rows = []
     for case, made in study.cases.items():
@@ -106,7 +106,7 @@ def models(study: Study, fits: list[Path]) -> ShownTable:
     return ShownTable(caption, _MODEL_COLUMNS, rows)
 
 
-def _fits_of_batch(study: Study, path: Path) -> pd.DataFrame:
+def read_fits(study: Study, path: Path) -> pd.DataFrame:
     """Read the fits of every model of a case, in the seeds of a batch."""
     case = study.cases[path.parent.name]
     return MODEL_FITS.read(path, case=[case.name], model=case.models, seed=seeds_of(path.stem))
