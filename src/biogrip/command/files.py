@@ -21,6 +21,7 @@ from biogrip.command.held import load_in_words
 from biogrip.command.outputs import (
     WRITTEN_BY,
     Outcome,
+    as_written,
     check_output,
     read_result,
     write_result,
@@ -145,22 +146,26 @@ def _identify_traces(
     """
     if len(asked) <= 1 or outputs is None:
         return identify_batch(asked, outputs, drawn=drawn)
-    made = dict(enumerate(zip(asked, outputs, strict=True)))
-    held = {} if drawn else {number: it for number, it in made.items() if _is_done(*it)}
-    if held:
-        text = f"{len(held)} of {len(asked)} traces are taken from their JSON files, as they and"
+    pairs = [*zip(asked, outputs, strict=True)]
+    found: dict[str, dict[str, Any]] = {}
+    for own, path in [] if drawn else pairs:
+        with suppress(BiogripError):
+            found[str(own.trace)] = read_result(path, _made_from(own))
+    if found:
+        text = f"{len(found)} of {len(asked)} traces are taken from their JSON files, as they and"
         print(f"{text} what is asked have not changed.", file=sys.stderr)
-    left = [number for number in made if number not in held]
+    left = [number for number, own in enumerate(asked) if str(own.trace) not in found]
     processors = len(os.sched_getaffinity(0))
     size = max(1, min(_MOST_IN_BATCH, -(-len(left) // processors)))
     batches = [left[start : start + size] for start in range(0, len(left), size)]
     every = Outcome([], {})
 
     def identify(batch: Sequence[int]) -> Outcome:
-        own, paths = zip(*(made[number] for number in batch), strict=True)
+        own, paths = zip(*(pairs[number] for number in batch), strict=True)
         return identify_batch(own, paths, drawn=drawn)
 
     def add(batch: Sequence[int], outcome: Outcome) -> None:
+        found.update({each["trace"]: as_written(each) for each in outcome.found})
         every.refused.update(outcome.refused)
         every.pictures.update(outcome.pictures)
         for number in batch:
@@ -177,17 +182,8 @@ def _identify_traces(
             trace = str(asked[single[0]].trace)
             text = f"{visible(trace)}: {_KILLED}, twice; the same command tries it again."
             add(single, alone or Outcome([], {trace: text}))
-    for own, path in made.values():
-        if str(own.trace) not in every.refused:
-            every.found.append(read_result(path, _made_from(own)))
+    every.found.extend(found[str(own.trace)] for own in asked if str(own.trace) in found)
     return every
-
-
-def _is_done(asked: Asked, output: Path) -> bool:
-    """Return True if a JSON file has the result of just what is asked."""
-    with suppress(BiogripError):
-        return bool(read_result(output, _made_from(asked)))
-    return False
 
 
 def _made_from(asked: Asked) -> str:
@@ -201,6 +197,8 @@ def identify_batch(
 ) -> Outcome:
     """Identify the traces of one batch, see `identify_files`; None to write no JSON files."""
     alone = len(asked) == 1 and outputs is not None
+    # Before anything is read: what is changed meanwhile is identified again.
+    made_from = [] if outputs is None else [*map(_made_from, asked)]
     name, count = str(asked[0].trace) if alone else "", 1 + STEPS
     with Progress(name, count, live=alone, quiet=not alone) as progress:
         cases, traces, refused = _read_batch(asked, progress)
@@ -213,7 +211,7 @@ def identify_batch(
         data = data_of(judged[index], cases[index], str(own.trace), own.given)
         outcome.found.append(data)
         if outputs is not None:
-            write_result(outputs[index], data, _made_from(own))
+            write_result(outputs[index], data, made_from[index])
         if drawn:
             # Imported here: loading Matplotlib takes long.
             from biogrip.command.page import draw

@@ -1,5 +1,6 @@
 """Files that biogrip writes of traces: their keys and columns, and which may be replaced."""
 
+import json
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -80,17 +81,24 @@ def check_output(output: Path) -> None:
 _OF_READINGS = ("misfit_rad", "noise_rad", "scatter_rad", "offset_rad", "drift_rad_per_s")
 
 
+def as_written(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the result of a trace, `data_of`, as it comes back from its JSON file."""
+    # Assumptions, which must be repeatable, are not rounded.
+    found: dict[str, Any] = json.loads(
+        json.dumps(rounded_numbers(data) | {"assumed": data["assumed"]})
+    )
+    return found
+
+
 def write_result(path: Path, data: Mapping[str, Any], made_from: str) -> None:
     """Write the result of a trace, `data_of`, as JSON, with a digest of what it was made from."""
     read = INSTRUMENTS[data["reads"]["quantity"]].read
-    # Assumptions, which must be repeatable, are neither rounded nor renamed.
-    names = {name: _in_units(name, read) for name in _OF_READINGS}
-    written = {**_renamed(rounded_numbers(data), names), "assumed": data["assumed"]}
-    write_object(path, written, made_from)
+    written, names = as_written(data), {name: _in_units(name, read) for name in _OF_READINGS}
+    write_object(path, {**_renamed(written, names), "assumed": written["assumed"]}, made_from)
 
 
 def read_result(path: Path, made_from: str) -> dict[str, Any]:
-    """Read the result of a trace as `data_of` has it, but rounded.
+    """Read the result of a trace, `as_written`.
 
     If it was made from anything else, or is not as it was written, it is a `BiogripError`.
     """
