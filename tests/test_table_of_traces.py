@@ -258,7 +258,13 @@ def test_a_killed_process_costs_a_batch_its_trace_alone(
     assert (here / "found.csv").read_bytes() == table
 
 
-@pytest.mark.parametrize("change", ["trace", "option", "config", "result", "page"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        *("trace", "result"),
+        *(pytest.param(it, marks=pytest.mark.nightly) for it in ("option", "config", "page")),
+    ],
+)
 def test_a_result_of_anything_else_is_not_taken(here: Path, change: str) -> None:
     assert identify("cells.tsv")[0] == 0
     file, options = here / "other.identified.json", list[str]()
@@ -279,6 +285,7 @@ def test_a_result_of_anything_else_is_not_taken(here: Path, change: str) -> None
     assert found("other.csv")["confidence"] == 0.95
 
 
+@pytest.mark.nightly
 def test_results_in_any_unit_are_read_as_they_were_written(tmp_path: Path) -> None:
     times = np.linspace(0.1, 10, 60)
     noise = 1e-3 * np.random.default_rng(1).standard_normal(60)
