@@ -61,7 +61,7 @@ quick: $(TEST_READY)
 test-nightly: $(TEST_READY)
 	$(BIN)/python -m pytest -m nightly -n $$(($(JOBS) + 1)) --dist worksteal
 
-# A small study and the quick tests, weekly and before a release: with the oldest versions that
+# A small study and the quick tests, weekly, nightly and before a release: with the oldest versions that
 # pyproject.toml allows, and with whichever other Pythons there are, at least one.
 test-lowest:
 	$(PYTHON) -m venv --clear .venv-lowest

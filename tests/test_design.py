@@ -159,7 +159,12 @@ def test_creep_and_relaxation_are_designed(
     ("block", "words"),
     [
         ("design: {stepps: 4}", "Did you mean 'steps'?"),
-        ("design: {duration_s: 0.1}", "found room for 1 readings"),
+        ("design: {duration_s: 0.1}", "my.yaml: design.duration_s: found 0.1 s, room for 1 "),
+        (
+            "design: {duration_s: 1.0e+9}",
+            "room for 10000000000 readings at 10 Hz; allowed are 5 to",
+        ),
+        ("measurement: {rate_Hz: 1.0e+4}", "room for 4000000 readings at 10000 Hz; allowed are"),
         ("measurement: {noise: {level: 0.1, reference: signal}}", "noise: allowed is white noise"),
     ],
 )

@@ -21,7 +21,7 @@ from biogrip.arrays import Array
 from biogrip.cli import _parser, main
 from biogrip.command.outputs import WRITTEN_BY, check_output
 from biogrip.command.settings import Asked, Setting, case_of
-from biogrip.command.words import for_a_paper, side_by_side
+from biogrip.command.words import for_a_paper, in_columns
 from biogrip.errors import BiogripError
 from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES
@@ -414,7 +414,7 @@ def test_a_rejected_fit_names_a_better_model_though_it_is_simpler() -> None:
     found = told(times, 0.01 * times**0.3 + noise, models, reads="strain", hold=1.0).data
     assert found["fit"] == "rejected"
     assert '(model="springpot") is preferred' in found["advice"]
-    lines = side_by_side([found, found | {"fit": "ok"}], {}).splitlines()
+    lines = in_columns([found, found | {"fit": "ok"}], {}).splitlines()
     assert [line for line in lines if "springpot" in line] == [f"trace: {found['advice']}"]
     like = "The like holds for 1 more: trace."
     assert f"trace: rejected: {found['reasons'][0]} {like}" in lines
@@ -426,7 +426,7 @@ def test_colours_are_not_for_all_terminals(
     assert "\x1b" not in example[0]
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
     monkeypatch.setenv("NO_COLOR", "1")
-    assert "\x1b" not in side_by_side([example[1]], {})
+    assert "\x1b" not in in_columns([example[1]], {})
 
 
 def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path, few: str) -> None:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from biogrip.files import scratch_path, write_text
+
 BEGIN = """
 import atexit, os, sys, time
 from pathlib import Path
@@ -60,6 +62,18 @@ def test_it_says_so_in_a_line_and_leaves_nothing(tmp_path: Path, place: str) -> 
     told = f"biogrip: {how}; no file was left half-written.\n"
     assert ended(code, tmp_path) == (128 + number, "said before\n", told)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_link_in_the_place_of_a_scratch_file_is_not_followed(tmp_path: Path) -> None:
+    """One that somebody else has put there, who can foresee its name; it may lead nowhere."""
+    for victim in ("victim.txt", "nothing.txt"):
+        (tmp_path / "victim.txt").write_text("precious")
+        scratch_path(tmp_path / "found.csv").symlink_to(victim)
+        write_text(tmp_path / "found.csv", "a,b\n")
+        assert (tmp_path / "victim.txt").read_text() == "precious"
+        assert (tmp_path / "found.csv").read_text() == "a,b\n"
+        assert not (tmp_path / "found.csv").is_symlink()
+        assert {it.name for it in tmp_path.iterdir()} == {"found.csv", "victim.txt"}
 
 
 def test_what_is_ignored_stays_so(tmp_path: Path) -> None:

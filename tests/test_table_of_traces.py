@@ -2,6 +2,8 @@
 
 import csv
 import json
+import os
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +12,14 @@ import pytest
 import yaml
 
 from biogrip.command import files as command
+from biogrip.command.outputs import read_result, write_result
 from biogrip.command.settings import Asked, Setting, is_table, read_table
+from biogrip.digits import rounded_numbers
 from biogrip.errors import BiogripError
 from biogrip.library import Sample, hold, set_up, simulate
 from tests.helpers.default import STUDY
 from tests.helpers.identified import identify as run
-from tests.helpers.identified import write_trace
+from tests.helpers.identified import told, write_trace
 
 SHORT = {"phases": [{"duration_s": 100.0, "torque_Nm": 2e-9}]}
 FEW = {"least_squares": {"candidates": 50, "starts": 2}, "model_selection": {"models": []}}
@@ -55,8 +59,9 @@ def identify(*arguments: str) -> tuple[int, str, str]:
 
 
 def found(trace: str) -> dict[str, Any]:
+    """Return what a JSON file says, whatever it was made from."""
     data: dict[str, Any] = json.loads(Path(trace).with_suffix(".identified.json").read_text())
-    return data
+    return {key: value for key, value in data.items() if key != "digest"}
 
 
 def listed(table: str = "found.csv") -> list[dict[str, str]]:
@@ -234,6 +239,98 @@ def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
         row = ((it["trace"], it["dish"], it["fit"], it["failed"] != "") for it in listed())
         assert [*row] == whole[: few - 1]
         assert "<td>lost</td>" in (here / "page.html").read_text()
+
+
+def killed_with(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kill every process that is to identify a trace, with all others of its batch."""
+    whole = command.identify_batch
+
+    def identify_batch(asked: Any, outputs: Any, *, drawn: bool) -> Any:
+        if any(own.trace.name == name for own in asked):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return whole(asked, outputs, drawn=drawn)
+
+    monkeypatch.setattr(command, "identify_batch", identify_batch)
+    # All are one batch.
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
+
+
+def test_a_killed_process_costs_a_batch_its_trace_alone(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And what is done is not done again: the next run says and writes what a first would."""
+    undisturbed = identify("cells.tsv", "--csv", "first.csv")
+    results = {name: found(name) for name in ("usual.csv", "other.csv")}
+    (here / "usual.identified.json").unlink()
+    (here / "other.identified.json").unlink()
+    with monkeypatch.context() as patched:
+        killed_with("other.csv", patched)
+        status, printed, said = identify("cells.tsv", "--csv", "found.csv")
+    assert status == 1
+    assert said.splitlines() == [
+        "biogrip: a process was killed, perhaps because memory ran out; its traces are identified "
+        "one by one.",
+        "1 of 2: usual.csv",
+        "2 of 2: other.csv",
+    ]
+    assert "other.csv: a process was killed, perhaps because memory ran out, twice" in printed
+    assert [row["fit"] for row in listed()] == [results["usual.csv"]["fit"], "failed"]
+    assert not (here / "other.identified.json").exists()
+    done = (here / "usual.identified.json").stat().st_mtime_ns
+    status, printed, said = identify("cells.tsv", "--csv", "first.csv")
+    assert "1 of 2 traces are taken from their JSON files" in said
+    assert (status, printed) == undisturbed[:2]
+    assert (here / "usual.identified.json").stat().st_mtime_ns == done
+    assert {name: found(name) for name in results} == results
+    table = (here / "first.csv").read_bytes()
+    assert identify("cells.tsv", "--csv", "found.csv")[2].startswith("2 of 2 traces are taken")
+    assert (here / "found.csv").read_bytes() == table
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *("trace", "result"),
+        *(pytest.param(it, marks=pytest.mark.nightly) for it in ("option", "config", "page")),
+    ],
+)
+def test_a_result_of_anything_else_is_not_taken(here: Path, change: str) -> None:
+    assert identify("cells.tsv")[0] == 0
+    file, options = here / "other.identified.json", list[str]()
+    if change == "trace":
+        (here / "other.csv").write_text((here / "other.csv").read_text() + "100.5,1e-3\n")
+    elif change == "option":
+        options = ["--at", "10"]
+    elif change == "config":
+        (here / "few.yaml").write_text(yaml.safe_dump({**FEW, "identifiability": {"at_s": [9]}}))
+    elif change == "result":
+        file.write_text(file.read_text().replace('"confidence": 0.95', '"confidence": 0.94'))
+    else:
+        options = ["--report", "page.html"]
+    said = identify("cells.tsv", *options)[2]
+    alone = change in ("trace", "result")
+    assert ("1 of 2 traces are taken" if alone else "") == said[: 23 * alone]
+    assert "2 of 2: other.csv" in said
+    assert found("other.csv")["confidence"] == 0.95
+
+
+@pytest.mark.nightly
+def test_results_in_any_unit_are_read_as_they_were_written(tmp_path: Path) -> None:
+    times = np.linspace(0.1, 10, 60)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(60)
+    for name, size, change in (("strain", 1, 0.4), ("displacement", 1e-6, 0.4), ("modulus", 9, -2)):
+        read = size * (3 - change * np.exp(-times) + noise)
+        given: dict[str, Any] = {"noise": size * 1e-3, "offset": True, "drift": True}
+        given |= {} if name == "modulus" else {"hold": 1.0}
+        data = told(times, read, reads=name, model="zener_maxwell", **given).data
+        data["assumed"] = {}
+        write_result(tmp_path / "a.json", data, "this")
+        again = read_result(tmp_path / "a.json", "this")
+        assert again.pop("assumed") == {}
+        whole = json.loads(json.dumps(rounded_numbers(data)))
+        assert {**again, "assumed": {}} == whole
+        with pytest.raises(BiogripError, match="its digest is another one"):
+            read_result(tmp_path / "a.json", "that")
 
 
 def test_what_a_row_says_goes_before_options(here: Path) -> None:

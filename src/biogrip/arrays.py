@@ -36,6 +36,6 @@ def as_column(values: ArrayLike, name: str) -> Array:
         raise BiogripError(
             f"{name}: {error}; allowed are numbers, or times since the start."
         ) from error
-    if found.ndim != 1 and found.shape != (len(found), 1):
+    if found.ndim != 1 and found.shape[1:] != (1,):
         raise BiogripError(f"{name}: found the shape {found.shape}, allowed is one column.")
     return found.ravel()

@@ -41,6 +41,7 @@ NO_BOUND = 10.0
 _SEED, _POPSIZE, _TRIED = 1, 5, 512
 # Least readings in a step, and least force of the jaws as a share of the largest in a train.
 _FEWEST, _KEPT = 5, 0.01
+_MOST = 100_000  # readings of a train
 _FINE = 10_000  # levels in the largest
 # Score of a train under which the jaws would have to pull: above all logarithms of bounds.
 _PULLS = 10.0
@@ -157,7 +158,10 @@ def design(config: Path, output: Path | None) -> None:
     check_output(output)
     files = [default_config(), config]
     study = load_study(read_configs(files), files)
-    limits, specimens = set_up(list(study.cases.values()), study.config.design)
+    try:
+        limits, specimens = set_up(list(study.cases.values()), study.config.design)
+    except BiogripError as error:
+        raise BiogripError(f"{config}: {error}") from error
     train, reached = search(specimens, limits)
     before = [rated(one, one.case.phases, one.case.block.measurement.rate_Hz) for one in specimens]
     after = [rated(one, train.phases, limits.rate_Hz) for one in specimens]
@@ -181,9 +185,12 @@ def set_up(cases: Sequence[Case], block: DesignBlock) -> tuple[Limits, list[Spec
     rate_Hz = min(case.block.measurement.rate_Hz for case in cases)
     duration_s = block.duration_s or min(case.experiment.torque.end_s for case in cases)
     intervals = int(duration_s * rate_Hz * (1 + 1e-12))
-    if intervals < _FEWEST:
-        text = f"found room for {intervals} readings at {rate_Hz:g} Hz, allowed are at least "
-        raise BiogripError(f"design: {text}{_FEWEST}; a longer duration_s or a higher rate_Hz.")
+    if not _FEWEST <= intervals <= _MOST:
+        text = f"design.duration_s: found {duration_s:g} s, room for {intervals} readings at "
+        text += (
+            f"{rate_Hz:g} Hz; allowed are {_FEWEST} to {_MOST}, by another duration_s or rate_Hz"
+        )
+        raise BiogripError(f"{text}.")
     limits = Limits(min(block.steps, intervals // _FEWEST), largest, rate_Hz, intervals)
     return limits, [_specimen(case, block, limits) for case in cases]
 

@@ -1,10 +1,14 @@
-"""Atomic writing of files."""
+"""Atomic writing of files, and digests of what is in files."""
 
+import hashlib
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 
+from biogrip import __version__
 from biogrip.errors import BiogripError
 from biogrip.processes import unfinished
 from biogrip.terminal import visible
@@ -20,6 +24,9 @@ def atomic_write(path: Path) -> Iterator[Path]:
     unfinished.add(str(scratch))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        # A link that somebody has put there is not followed.
+        scratch.unlink(missing_ok=True)
+        scratch.touch(exist_ok=False)
         yield scratch
         os.replace(scratch, path)
     except OSError as error:
@@ -42,6 +49,28 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file atomically."""
     with atomic_write(path) as scratch:
         scratch.write_text(text, encoding="utf-8", newline="\n")
+
+
+def digest_of(file: Path) -> str:
+    """Return a digest of what is in a file; nothing if it is not there."""
+    if not file.is_file():
+        return ""
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()[:12]
+
+
+@cache
+def software() -> dict[str, str]:
+    """Return versions of what computes results, and a digest of our source."""
+    folder = Path(__file__).parent
+    files = sorted(it for it in folder.rglob("*") if it.suffix in (".py", ".j2", ".css"))
+    source = "".join(f"{file.relative_to(folder)} {digest_of(file)}\n" for file in files)
+    versions = {name: version(name) for name in ("numpy", "scipy")}
+    return {
+        "biogrip": __version__,
+        **versions,
+        "source": hashlib.sha256(source.encode()).hexdigest()[:12],
+    }
 
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:

@@ -1,6 +1,5 @@
 """Which run a figure shows; what is drawn of fits, bounds, forces, profiles and valleys."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +17,10 @@ from biogrip.figures.scatter import draw_scatter
 from biogrip.figures.style import ALL_SEEDS, RUNS, figure, styled
 from biogrip.fit.methods import METHODS
 from biogrip.physics.instruments import MODULUS
-from biogrip.physics.models import MODELS
+from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import columns
-from biogrip.records.rows import write_arrays
+from biogrip.records.rows import write_arrays, write_object
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.stages import targets
 from tests.helpers.default import STUDY, seen, study_of
@@ -29,6 +28,8 @@ from tests.helpers.default import STUDY, seen, study_of
 CASE = "liquid_drop_2"
 TRUTH = [1.0, 1e-4, 10.0, 1e-3]
 TIME_S = np.arange(0.0, 400.5, 1.0)
+FEW = "seeds: 3\nmethods: [genetic]\n"
+MODEL = MODELS["generalized_maxwell"]
 
 
 def response(values: list[float]) -> Array:
@@ -50,7 +51,7 @@ def identifications(tmp_path: Path) -> Path:
             (2, 1e-6, 3e-5, 3e-5),
         )
     ]
-    frame = pd.DataFrame(rows, columns=columns(MODELS["generalized_maxwell"]))
+    frame = pd.DataFrame(rows, columns=columns(MODEL))
     frame.to_csv(tmp_path / f"{CASE}.csv", index=False)
     return tmp_path / f"{CASE}.csv"
 
@@ -73,7 +74,7 @@ def curve(found: Any, label: str) -> Array:
 
 def test_the_first_run_of_each_basin_is_drawn(identifications: Path, measurements: Path) -> None:
     with styled():
-        drawn = draw_fits(STUDY.cases[CASE], identifications, [measurements], [])
+        drawn = draw_fits(study_of(FEW).cases[CASE], identifications, [measurements], [])
     for label, k in (("seed 1, near the noise", 0.7), ("seed 0, above the noise", 9.0)):
         expected = 1e3 * response([k, *TRUTH[1:]])
         np.testing.assert_allclose(curve(drawn, label), expected, rtol=1e-9)
@@ -119,15 +120,21 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     numbers = np.arange(seeds)
     misfit = np.where(numbers < above, 1.0, 1.5)
     found = pd.DataFrame({"seed": numbers, "misfit": misfit, "noise_rms": 1.0})
-    found = found.assign(case=1, generations=1, evaluations=1, stop_reason=1, method="genetic")
+    found = found.assign(case="x", generations=1, evaluations=1, stop_reason=1, method="genetic")
+    found = found.assign(**{p.column: 1.0 for p in MODEL.parameters})
     found.to_csv(tmp_path / "found.csv", index=False)
     history = {"seed": np.tile(numbers, 4), "generation": np.repeat([0, 1, 0, 1], seeds)}
     history["best_misfit"] = np.tile(misfit, 4)
     history["method"] = np.repeat(["genetic", "least_squares"], 2 * seeds)
     write_arrays(tmp_path / "history.npz", history)
-    study = seen(shown_method=METHODS["genetic"], near_noise_tolerance=0.02)
+    study = seen(
+        shown_method=METHODS["genetic"],
+        near_noise_tolerance=0.02,
+        config=seen(methods=["genetic"]),
+    )
     block = seen(genetic_algorithm=seen(mutation_start=20))
-    case = seen(title="A cell", block=block, study=study)
+    known = {"name": "x", "seeds": seeds, "sample": Sample(MODEL.name)}
+    case = seen(title="A cell", block=block, study=study, **known)
     drawn = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.npz")
     (axes,), (legend,) = drawn.axes, drawn.legends
     colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]
@@ -137,13 +144,13 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
 
 def scattered(overlay: str, identifications: Path) -> Any:
     """Of a case of which the sum alone is determined."""
-    folder, case = identifications.parent, study_of(overlay).cases[CASE]
+    folder, case = identifications.parent, study_of(f"{FEW}{overlay}").cases[CASE]
     targets.simulate(case, folder / "target.csv")
     verdicts = dict.fromkeys(["k", "k_p", "c", "c_p"], "not determined")
     verdicts["c + c_p"] = "determined"
     items = [{"quantity": name, "verdict": verdict} for name, verdict in verdicts.items()]
     content = {"quantities": items, "trades": [], "notes": []}
-    (folder / "expected.json").write_text(json.dumps(content))
+    write_object(folder / "expected.json", content)
     with styled():
         return draw_scatter(
             case, identifications, folder / "target.csv", folder / "expected.json", []
@@ -192,14 +199,17 @@ def drawn_valley(
         "best": [9.0, 1.0],
     }
     path = folder / "v.json"
-    path.write_text(json.dumps({"quantities": [], "trades": [], "notes": [], "valley": found}))
-    rows = {f"{name}_Ns_per_m": values for name, values in fits.items()}
+    write_object(path, {"valley": found})
+    rows: dict[str, Any] = {p.column: 1.0 for p in MODEL.parameters}
+    rows |= {f"{name}_Ns_per_m": values for name, values in fits.items()}
     frame = pd.DataFrame(rows).assign(case="x", method="least_squares", misfit=1, noise_rms=1)
     frame = frame.assign(seed=range(len(frame)), generations=1, evaluations=1, stop_reason=1)
     frame.to_csv(folder / "found.csv", index=False)
     paper = seen(identified=known.get("paper", {}))
-    study = seen(fitting_method=METHODS["least_squares"])
-    case = seen(title="A drop", study=study, parameters=known.get("truth", {}), published=paper)
+    study = seen(fitting_method=METHODS["least_squares"], config=seen(methods=["least_squares"]))
+    known |= {"name": "x", "seeds": len(frame), "sample": Sample(MODEL.name)}
+    known |= {"parameters": known.get("truth", {}), "published": paper}
+    case = seen(title="A drop", study=study, **known)
     with styled():
         return draw_valley(case, path, folder / "found.csv").axes[0]
 

@@ -84,7 +84,19 @@ def called(folder: Path, *arguments: str | Path) -> Run:
     return ran(folder, sys.executable, "-m", "snakemake", *arguments)
 
 
-def snakemake(folder: Path, *arguments: str | Path, config: dict[str, Any] | None = None) -> Run:
+def clone(folder: Path) -> Path:
+    """Make another clone in a folder, and return its Snakefile."""
+    for name in ("src", "config", "workflow"):
+        shutil.copytree(ROOT / name, folder / name)
+    return Path(shutil.copy(ROOT / "Snakefile", folder))
+
+
+def snakemake(
+    folder: Path,
+    *arguments: str | Path,
+    config: dict[str, Any] | None = None,
+    snakefile: Path = ROOT / "Snakefile",
+) -> Run:
     """Run the workflow in a folder, over a config that is laid on the default study.
 
     Parameters
@@ -95,8 +107,10 @@ def snakemake(folder: Path, *arguments: str | Path, config: dict[str, Any] | Non
         Further ones of Snakemake's: targets, or `-n`.
     config
         The config, which is written to `overlay.yaml` in the folder; none by default.
+    snakefile
+        Of this clone, or of another.
     """
-    given: list[str | Path] = ["-s", ROOT / "Snakefile", "--directory", folder]
+    given: list[str | Path] = ["-s", snakefile, "--directory", folder]
     if config is not None:
         (folder / "overlay.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
         given += ["--configfile", folder / "overlay.yaml"]
@@ -105,14 +119,19 @@ def snakemake(folder: Path, *arguments: str | Path, config: dict[str, Any] | Non
     return called(folder, *given, *arguments)
 
 
-def dry_run(folder: Path, *arguments: str, config: dict[str, Any]) -> Run:
+def dry_run(
+    folder: Path,
+    *arguments: str,
+    config: dict[str, Any],
+    snakefile: Path = ROOT / "Snakefile",
+) -> Run:
     """Ask Snakemake what it would run."""
     # Other workers ask in the same folder.
     with NamedTemporaryFile("w", suffix=".yaml") as overlay:
         yaml.safe_dump(config, overlay)
         overlay.flush()
         options = ("--dry-run", "--configfile", overlay.name, "--workflow-profile", "none")
-        run = snakemake(folder, *options, *arguments)
+        run = snakemake(folder, *options, *arguments, snakefile=snakefile)
     assert run.status == 0, run.output
     return run
 

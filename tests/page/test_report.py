@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from biogrip.digits import legible
@@ -19,7 +20,6 @@ from biogrip.page.answers import (
 )
 from biogrip.page.explorer import explorer
 from biogrip.page.page import entry_of
-from biogrip.records.identifications import read_identifications
 from biogrip.records.rows import read_table
 from biogrip.records.traces import read_measurements
 from tests.helpers.browser import Opened
@@ -202,7 +202,7 @@ def test_the_explorer_shows_the_judged_trace_and_its_fits(
         assert measured.target is not None
         assert np.allclose(drawn.pop("target"), measured.target, rtol=1e-5, atol=0)
     assert set(drawn) == {"genetic algorithm", "multi-start least squares"}
-    found = read_identifications(results / "identifications" / f"{case}.csv").set_index("seed")
+    found = pd.read_csv(results / "identifications" / f"{case}.csv").set_index("seed")
     for misfit, method in found.loc[0, ["misfit", "method"]].itertuples(index=False):
         residual = measured.readings[0] - drawn[METHODS[method].title]
         assert np.sqrt(np.mean(residual**2)) == pytest.approx(misfit, rel=1e-4)

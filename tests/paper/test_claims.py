@@ -99,8 +99,8 @@ def test_shares_of_seeds_have_limits() -> None:
 def case_of(table: int) -> Any:
     published = Published(table=table, generation=70, identified=PRINTED, error_percent={})
     known = {"sample": Sample("generalized_maxwell"), "parameters": TRUE, "published": published}
-    study = seen(near_noise_tolerance=0.02)
-    return seen(name="mine", title="Mine", noise=seen(level=0.1), study=study, **known)
+    study = seen(near_noise_tolerance=0.02, config=seen(methods=["genetic"]))
+    return seen(name="mine", seeds=3, title="Mine", noise=seen(level=0.1), study=study, **known)
 
 
 def identified(

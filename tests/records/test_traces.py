@@ -27,7 +27,7 @@ def written(tmp_path: Path) -> Path:
 
 
 def test_a_target_is_read_back_to_nine_digits(tmp_path: Path) -> None:
-    time_s, torque, rotation = read_target(written(tmp_path))
+    time_s, torque, rotation = read_target(written(tmp_path), TIMES)
     np.testing.assert_array_equal(time_s, TIMES)
     np.testing.assert_array_equal(torque, 1e-9)
     np.testing.assert_allclose(rotation, 1e-5 * TIMES / 3, rtol=5e-9)
@@ -41,7 +41,15 @@ def test_a_damaged_target_is_explained(tmp_path: Path) -> None:
     path = written(tmp_path)
     path.write_text(path.read_text().replace("1e-09", "abc", 1))
     with pytest.raises(BiogripError, match="cannot be read as a target: could not convert string"):
-        read_target(path)
+        read_target(path, TIMES)
+
+
+@pytest.mark.parametrize("lines", [1, 3, 5])
+def test_a_target_that_lost_its_end_is_refused(tmp_path: Path, lines: int) -> None:
+    path = written(tmp_path)
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[: 1 + lines - 1]))
+    with pytest.raises(BiogripError, match=rf"t.csv: found {lines - 1} readings, wanted 5"):
+        read_target(path, TIMES)
 
 
 @pytest.mark.parametrize("known", [{}, {"target": TIMES - 1}, {"sd": TIMES + 0.1}])

@@ -37,7 +37,7 @@ def test_one_that_changes_nothing_finds_what_the_study_finds(tmp_path: Path) -> 
     identify(case, "genetic", range(3), measured, [], ours_file, tmp_path / "h.npz")
     interpreted = tmp_path / f"{CASE}.csv"
     identify_interpreted(case, target, interpreted)
-    ours = read_identifications(ours_file)
+    ours = read_identifications(ours_file, case)
     rows = INTERPRETATIONS.read(interpreted)
     same = rows[rows["interpretation"] == "printed"].reset_index(drop=True)
     for column in ("k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m", "misfit", "noise_rms"):

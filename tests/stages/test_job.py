@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
+from biogrip.records.rows import seeds_of
 from biogrip.stages.job import (
     CASE_KEYS,
     STUDY_KEYS,
@@ -16,7 +17,6 @@ from biogrip.stages.job import (
     case_of,
     keys_of_cases,
     logged,
-    seeds_of,
     settings,
     study_of,
 )

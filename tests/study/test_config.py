@@ -199,7 +199,11 @@ UNREADABLE: dict[str, tuple[str | bytes, str]] = {
     "two documents": ("seeds: 1\n---\nseeds: 2", r"line 2: not valid YAML: but found another docu"),
     "list of all": ("[1, 2]", r"line 1: found no keys, allowed is a config"),
     "given twice": ("seeds: 1\nseeds: 2", r"line 2: seeds: is given twice, first in line 1"),
-    "code": ("__use_yte__: true\nseeds: ?1+1", r"line 1: __use_yte__ makes Snakemake run code"),
+    "code": ("__use_yte__: true\nseeds: ?1+1", r"line 1: with __use_yte__ a config"),
+    "code, merged": (
+        "<<: {__use_yte__: true}\nseeds: ?1+1",
+        r"line 1: with __use_yte__ a config is a program.* has run by now",
+    ),
     "open": ("seeds: [1\n", r"line 2: not valid YAML"),
 }
 

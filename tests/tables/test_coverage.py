@@ -1,14 +1,19 @@
 """Coverage of intervals and of verdicts, counted by hand."""
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from scipy.stats import f
 
+from biogrip.errors import BiogripError
 from biogrip.records.identifications import INTERVALS
+from biogrip.records.rows import write_object
 from biogrip.stages import intervals as stage
 from biogrip.stages import targets
+from biogrip.study.source import overlaid
 from biogrip.tables.coverage import coverage, verdict_counts
 from tests.helpers.default import study_of
 
@@ -31,17 +36,21 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
         # Of k = 1 three intervals, two of which hold it; two seeds judged in full.
         (CASE, "k", 0, 1.01, 0.9, 1.1, 1.0, "determined", 1.005, 1.2),
         (CASE, "k", 1, 1.02, 0.9, 1.2, 1.01, "", "", ""),
-        (CASE, "k", 10, 1.3, 1.1, 1.5, 1.0, "bounded below", 0.95, ""),
+        (CASE, "k", 2, 1.3, 1.1, 1.5, 1.0, "bounded below", 0.95, ""),
         # c_p = 1e-3 is only judged in full.
         (CASE, "c_p", 0, 0.1, "", "", "", "bounded above", "", 0.5),
-        (CASE, "c_p", 10, 0.1, "", "", "", "bounded above", "", 0.5e-3),
+        (CASE, "c_p", 2, 0.1, "", "", "", "bounded above", "", 0.5e-3),
         # k_p = 1e-4 is below the range that is searched, and the limit between the two.
         (CASE, "k_p", 0, 0.1, "", "", "", "bounded above", "", 1.05e-4),
-        # Of c nothing is said.
-        (CASE, "c", 0, 0.1, "", "", "", "not determined", "", ""),
+        (CASE, "k_p", 2, 0.1, "", "", "", "not determined", "", ""),
     ]
-    INTERVALS.write(tmp_path / "i.csv", rows)
-    made = coverage(study_of(OVERLAY), [target], [tmp_path / "i.csv"], [])
+    # Of c nothing is said.
+    for seed, quantity in product((0, 2), ("c", "c + c_p")):
+        rows.append((CASE, quantity, seed, 0.1, "", "", "", "not determined", "", ""))
+    file = tmp_path / CASE / "seeds_0-2.csv"
+    INTERVALS.write(file, rows)
+    every_other = study_of(OVERLAY.replace("0.9}", "0.9, verdicts_every: 2}"))
+    made = coverage(every_other, [target], [file], [])
     found = {row["quantity"]: row for row in made.rows}
     assert list(found) == ["k", "k_p", "c_p"]
     assert (found["k_p"]["target"], found["k_p"]["shown_one_sided_true"]) == (1e-4, 1)
@@ -65,11 +74,13 @@ def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
         (CASE, "k", 2, *empty, "determined", 0.2, 2.0),
         (CASE, "k", 3, *empty, "bounded above", "", 0.99),
         (CASE, "k", 4, *empty, "not determined", "", ""),
-        # Not judged in full.
-        (CASE, "k", 5, 1.0, 0.9, 1.1, 1.0, "", "", ""),
     ]
-    INTERVALS.write(tmp_path / "i.csv", rows)
-    made = verdict_counts(study_of(OVERLAY), [tmp_path / "i.csv"])
+    file = tmp_path / CASE / "seeds_0-4.csv"
+    INTERVALS.write(file, rows)
+    k_alone = f"cases: {{{CASE}: {{fixed: {{k_p: 0, c: 1, c_p: 0}}}}}}"
+    overlay = overlaid(yaml.safe_load(OVERLAY), yaml.safe_load(k_alone))
+    overlay["identifiability"]["verdicts_every"] = 1
+    made = verdict_counts(study_of(yaml.safe_dump(overlay)), [file])
     found = {row["verdict"]: row for row in made.rows}
     assert list(found) == ["bounded above", "determined", "not determined"]
     assert [row["reached"] for row in found.values()] == [1, 3, 1]
@@ -93,10 +104,7 @@ def test_some_seeds_are_judged_in_full(
     """One in five by default, whatever the batch, and with the limits that whole profiles have."""
     overlay = OVERLAY if every == 5 else OVERLAY.replace("0.9}", f"0.9, verdicts_every: {every}}}")
     expected = tmp_path / "expected.json"
-    expected.write_text(
-        '{"quantities": [{"quantity": "k", "verdict": "determined"}], "trades": [], "notes": [], '
-        '"fit": "ok"}'
-    )
+    write_object(expected, {"quantities": [{"quantity": "k", "verdict": "determined"}]})
     case = study_of(overlay).case(CASE)
     stage.estimate(case, range(*seeds), target, expected, [], tmp_path / "i.csv")
     found = INTERVALS.read(tmp_path / "i.csv")
@@ -109,3 +117,19 @@ def test_some_seeds_are_judged_in_full(
     # There is but one basin.
     assert k["shown_low"] == pytest.approx(k["low"], rel=1e-3)
     assert k["shown_high"] == pytest.approx(k["high"], rel=1e-3)
+
+
+def test_a_batch_that_lost_its_end_is_refused(tmp_path: Path, target: Path) -> None:
+    """Of each number of rows but the whole: a seed, or a quantity of one."""
+    overlay = OVERLAY.replace("0.9}", "0.9, verdicts_every: 2}")
+    expected, file = tmp_path / "expected.json", tmp_path / CASE / "seeds_1-3.csv"
+    write_object(expected, {"quantities": [{"quantity": "k", "verdict": "determined"}]})
+    study = study_of(overlay)
+    stage.estimate(study.case(CASE), range(1, 4), target, expected, [], file)
+    lines = file.read_text().splitlines(keepends=True)
+    assert len(lines) == 1 + 1 + 5 + 1
+    assert coverage(study, [target], [file], []).rows
+    for kept in range(1, len(lines)):
+        file.write_text("".join(lines[:kept]))
+        with pytest.raises(BiogripError, match=r"seeds_1-3.csv: found \d rows, wanted .* delete"):
+            coverage(study, [target], [file], [])

@@ -1,6 +1,5 @@
 """Tables of errors, methods, models and verdicts, recomputed by hand."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import pytest
 from biogrip.fit.methods import METHODS
 from biogrip.physics.models import MODELS, Published, Sample
 from biogrip.records.identifications import MODEL_FITS, columns
+from biogrip.records.rows import write_object
 from biogrip.tables.cases import errors, errors_of_case, verdicts
 from biogrip.tables.methods import methods, models
 from tests.helpers.default import seen, study_of
@@ -20,6 +20,7 @@ PAPER = Published(
     identified={"k": 9.0, "k_p": 1.0, "c": 3.0, "c_p": 2.0},
     error_percent={"k": "10", "k_p": "-", "c": "25", "c_p": ">100"},
 )
+METHODS_TRIED = ("genetic", "least_squares")
 TRUE = {"k": 8.0, "k_p": 0.0, "c": 4.0, "c_p": 1.0}
 
 
@@ -42,9 +43,10 @@ def eleven_seeds(tmp_path: Path) -> Path:
 
 
 def case_of(near_noise_tolerance: float = 0.02) -> Any:
-    study = seen(shown="genetic", near_noise_tolerance=near_noise_tolerance)
+    config = seen(methods=["genetic"])
+    study = seen(shown="genetic", near_noise_tolerance=near_noise_tolerance, config=config)
     known = {"sample": Sample("generalized_maxwell"), "parameters": TRUE, "published": PAPER}
-    return seen(name="drop", title="A drop", study=study, **known)
+    return seen(name="drop", title="A drop", seeds=11, study=study, **known)
 
 
 def test_error_table_is_the_arithmetic_it_says(eleven_seeds: Path) -> None:
@@ -85,10 +87,11 @@ def test_joined_errors_are_within_the_tolerance_that_their_heading_names(
     assert printed == {"k": 10.0, "k_p": "-", "c": 25.0, "c_p": ">100", "c + c_p": 0.0}
 
 
-def study(parameters: dict[str, float], samples: int) -> Any:
+def study(parameters: dict[str, float], samples: int, *methods: str, seeds: int = 1) -> Any:
     """Of one case, a drop."""
-    sample = Sample("generalized_maxwell")
-    cases = {"drop": seen(sample=sample, parameters=parameters, samples=samples)}
+    known = {"sample": Sample("generalized_maxwell"), "parameters": parameters, "seeds": seeds}
+    own = seen(config=seen(methods=methods))
+    cases = {"drop": seen(name="drop", samples=samples, study=own, **known)}
     return seen(cases=cases, identifiers=METHODS, optimum_tolerance=1.0, near_noise_tolerance=0.02)
 
 
@@ -96,12 +99,14 @@ def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> No
     """1.03 has a chi-squared that is 61 above the optimum, and is all that the genes can hold."""
     rows = []
     for seed, genetic, polished in ((0, 1.2, 1.0), (1, 1.0304, 1.0), (2, 1.0306, 0.9)):
-        for method, misfit, n in (("genetic", genetic, 9), ("least_squares", polished, 10 + seed)):
+        for method, misfit, n in zip(
+            METHODS_TRIED, (genetic, polished), (9, 10 + seed), strict=True
+        ):
             rows.append([method, seed, 8.0, 1.0, 3.0, 2.0, misfit, 1.02, n])
     path = identified(tmp_path / "drop.csv", rows)
     pd.read_csv(path).assign(encodable_misfit=1.03).to_csv(path, index=False)
     parameters = {"k": 10.0, "k_p": 1.0, "c": 4.0, "c_p": 1.0}
-    first, second = methods(study(parameters, 1000), [path]).rows
+    first, second = methods(study(parameters, 1000, *METHODS_TRIED, seeds=3), [path]).rows
     # 1000 ((1.0304 / 1.03)^2 - 1) = 0.78, the only one of at most 1; 1.0306 has 1.17.
     assert (first["seeds"], first["reached_share"]) == (3, pytest.approx(1 / 3))
     assert second["reached_share"] == 1.0
@@ -119,7 +124,7 @@ def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> No
 def test_the_lowest_known_may_be_the_truth(tmp_path: Path) -> None:
     path = identified(tmp_path / "d.csv", [["genetic", 0, 8.0, 1.0, 3.0, 2.0, 1.1, 1.0, 100]])
     pd.read_csv(path).assign(encodable_misfit=1.1).to_csv(path, index=False)
-    (made,) = methods(study(TRUE, 100), [path]).rows
+    (made,) = methods(study(TRUE, 100, "genetic"), [path]).rows
     assert made["median_rise"] == pytest.approx(100 * (1.1**2 - 1))
 
 
@@ -129,10 +134,11 @@ def test_models_are_chosen_by_their_criteria(tmp_path: Path) -> None:
     for seed, gain in enumerate((1.0, 4.0, 20.0)):
         rows.append(("drop", "damper", seed, 1, n, 1.0))
         rows.append(("drop", "maxwell", seed, 2, n, float(np.exp(-gain / (2 * n)))))
-    MODEL_FITS.write(tmp_path / "fits.csv", rows)
+    fits = tmp_path / "drop" / "seeds_0-2.csv"
+    MODEL_FITS.write(fits, rows)
     tried = {name: Sample(name) for name in ("damper", "maxwell")}
-    drop = seen(recorded=False, sample=Sample("maxwell"), models=tried)
-    damper, maxwell = models(seen(cases={"drop": drop}), [tmp_path / "fits.csv"]).rows
+    drop = seen(name="drop", recorded=False, sample=Sample("maxwell"), models=tried)
+    damper, maxwell = models(seen(cases={"drop": drop}), [fits]).rows
     # A parameter costs 2 by AIC, ln 1000 = 6.9 by BIC.
     assert (damper["chosen_by_aic"], maxwell["chosen_by_aic"]) == (1, 2)
     assert (damper["chosen_by_bic"], maxwell["chosen_by_bic"]) == (2, 1)
@@ -148,8 +154,9 @@ cases:
   two: {sample: {model: generalized_maxwell, branches: 2,
                  k_1: 30, k_2: 10, k_p: 12.3, c_1: 150, c_2: 600, c_p: 0}}
 """).cases["two"]
-    MODEL_FITS.write(tmp_path / "f.csv", [("two", name, 0, 4, 1000, 1.0) for name in two.models])
-    found = models(seen(cases={"two": two}), [tmp_path / "f.csv"]).rows
+    fits = tmp_path / "two" / "seeds_0-0.csv"
+    MODEL_FITS.write(fits, [("two", name, 0, 4, 1000, 1.0) for name in two.models])
+    found = models(seen(cases={"two": two}), [fits]).rows
     assert ["made the traces" in row["model"] for row in found] == [False, False, True]
     assert [row["parameters"] for row in found] == [1, 4, 6]
 
@@ -169,7 +176,7 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     expected = {**measured, "quantities": [{**measured["quantities"][0], "high": 4.0}]}
     files = [tmp_path / "a.json", tmp_path / "b.json"]
     for file, content in zip(files, (measured, expected), strict=True):
-        file.write_text(json.dumps(content))
+        write_object(file, content)
     known = seen(name="x", title="X", parameters={"k": 2.5, "c": 1.0, "c_p": 0.5})
     table = verdicts(known, files[0], files[1:])
     k, total = table.rows

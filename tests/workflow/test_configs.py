@@ -1,12 +1,13 @@
 """Configs of every kind, and such as stop a run before any job with one message."""
 
+import re
 from pathlib import Path
 
 import pytest
 import yaml
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import TINY, called, snakemake
+from tests.helpers.runs import TINY, called, clone, snakemake
 
 CASES = {
     "crept": {
@@ -57,6 +58,26 @@ def test_a_wrong_config_stops_with_one_message(tmp_path: Path) -> None:
         assert said in run.output
     assert "Traceback" not in run.output
     assert len(run.output.splitlines()) < 16
+
+
+def test_another_clone_is_not_run_with_the_code_and_config_of_this_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its config has 7 seeds; a link to it is the same clone."""
+    snakefile = clone(tmp_path / "second")
+    file = tmp_path / "second" / "config" / "config.yaml"
+    text, seeds = re.subn(r"(?m)^seeds: \d+", "seeds: 7", file.read_text())
+    assert seeds == 1
+    file.write_text(text)
+    (tmp_path / "linked").symlink_to("second")
+    refused = snakemake(tmp_path, "-n", snakefile=snakefile)
+    assert refused.status == 1
+    assert f"The rules are those of {tmp_path / 'second'}, but the code" in refused.output
+    assert f"{ROOT / 'src' / 'biogrip'}, from which biogrip is installed" in refused.output
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "linked" / "src"))
+    planned = snakemake(tmp_path, "-n", snakefile=snakefile)
+    assert planned.status == 0, planned.output
+    assert {*re.findall(r"measurements/\w+/(\w+-\d+)", planned.output)} == {"seeds_0-6"}
 
 
 @pytest.mark.parametrize("key", ["batch_size=9", "pdf=true"])

@@ -76,7 +76,9 @@ rule mine:
 
 
 @pytest.mark.nightly
-def test_it_is_deployed_from_a_clone_and_runs_a_case(tmp_path: Path) -> None:
+def test_it_is_deployed_from_a_clone_and_runs_a_case(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """By snakedeploy, as the catalogue of workflows tells its readers to."""
     pytest.importorskip("snakedeploy")
     clone, place = tmp_path / "clone", tmp_path / "place"
@@ -89,6 +91,7 @@ def test_it_is_deployed_from_a_clone_and_runs_a_case(tmp_path: Path) -> None:
     text = (place / "workflow" / "Snakefile").read_text()
     assert '"workflow/Snakefile"' in text
     text = text.replace('"workflow/Snakefile"', f'"{clone}/workflow/Snakefile"')
+    monkeypatch.setenv("PYTHONPATH", str(clone / "src"))
     for arguments in (("-n",), ("--", ERRORS)):
         run = host(place, text, *arguments)
         assert run.status == 0, run.output

@@ -1,15 +1,14 @@
 """What runs again when something changes, as docs/reruns.md says, and what does not."""
 
+import os
 import re
-import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from biogrip.study.source import overlaid
-from tests.helpers.places import ROOT
-from tests.helpers.runs import TINY, dry_run, planned, results_of, snakemake
+from tests.helpers.runs import TINY, clone, dry_run, planned, results_of, snakemake
 
 # Of the study: what puts all cases together.
 STUDY = {"figures": 1, "tables": 1, "evidence": 1, "claims": 1, "page": 1}
@@ -90,6 +89,22 @@ def test_an_edited_trace_is_read_again(tiny_copy: Path) -> None:
     assert planned(tiny_copy, "results/identifications/mine.csv", config=TINY) == again
 
 
+def test_an_older_trace_in_the_place_of_another_is_read(tiny_copy: Path) -> None:
+    """As by `mv`, `cp -p`, or an archive: the date alone says that nothing has changed."""
+    trace, other = tiny_copy / "mine.csv", tiny_copy / "other.csv"
+    first, *lines = trace.read_text().splitlines(keepends=True)
+    other.write_text("".join([first, *lines[::2]]))
+    os.utime(other, (1.5e9, 1.5e9))
+    other.rename(trace)
+    told = dry_run(tiny_copy, "--", "results/measurements/mine/seeds_0-0.npz", config=TINY)
+    assert told.jobs == {"recording": 1}
+    assert re.search(r"before: \{'recorded': '\w+'\} now: \{'recorded': '\w+'\}", told.output)
+    # One with an earlier date and the same readings is the same trace.
+    trace.write_text("".join([first, *lines]))
+    os.utime(trace, (1.5e9, 1.5e9))
+    assert planned(tiny_copy, config=TINY) == {}
+
+
 @pytest.mark.nightly
 def test_five_seeds_more_keep_what_there_is(tiny_copy: Path) -> None:
     """And the rows of the seeds that were there have the same bytes."""
@@ -106,12 +121,11 @@ def test_five_seeds_more_keep_what_there_is(tiny_copy: Path) -> None:
 def test_an_edit_of_the_library_runs_everything_again_and_is_named(
     tiny: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("src", "config"):
-        shutil.copytree(ROOT / name, tmp_path / name)
+    clone(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "src"))
     with (tmp_path / "src" / "biogrip" / "arrays.py").open("a") as module:
         module.write("# An edit.\n")
-    told = dry_run(tiny, config=TINY)
+    told = dry_run(tiny, config=TINY, snakefile=tmp_path / "Snakefile")
     assert told.jobs["target"] == told.jobs["recording"] == 1
     assert re.search(r"before: .*'source': '\w+'.* now: .*'source': '\w+'", told.output)
 

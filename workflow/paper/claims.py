@@ -300,7 +300,7 @@ def read_runs(case: Case, identifications: Path, histories: Path) -> dict[str, p
     Parameters stand by name in the place of their columns.
     """
     names = {p.column: p.name for p in case.sample.model.parameters}
-    found = read_identifications(identifications, "genetic").rename(columns=names)
+    found = read_identifications(identifications, case, "genetic").rename(columns=names)
     best = read_histories(histories, "genetic", ["best_misfit", *names]).rename(columns=names)
     change = best.groupby("seed")["best_misfit"].diff()
     falls = best["generation"].where(change < 0, 0).groupby(best["seed"]).max()

@@ -58,7 +58,7 @@ def evidence(study: Study, identifications: list[Path], measurements: list[Path]
         told += _axis(case, [path for path in measurements if path.parent.name == name])
         if case.published.generation and study.shown == "genetic":
             for path in (path for path in identifications if path.stem == name):
-                median = read_identifications(path, "genetic")["generations"].median()
+                median = read_identifications(path, case, "genetic")["generations"].median()
                 remark = "median generation at which ours stops"
                 quantity = f"{case.title}: generation of the fit"
                 told.append((quantity, "", str(case.published.generation), median, remark))

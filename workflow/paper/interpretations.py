@@ -58,11 +58,17 @@ def _is_close(case: Case, found: pd.DataFrame, criterion: str) -> BoolArray:
     return np.all(_relative_errors(case, found) <= allowed[:, None], axis=0)
 
 
+def _read(study: Study, case: Case, path: Path) -> pd.DataFrame:
+    """Read the rows of a case, of every interpretation and seed."""
+    names, seeds = study.config.interpretations, range(case.seeds)
+    return INTERPRETATIONS.read(path, case=[case.name], interpretation=names, seed=seeds)
+
+
 def interpretations(study: Study, found: list[Path]) -> ShownTable:
     """Compare the interpretations from the rows of each case, CSV."""
     rows: list[Row] = []
     for path, case in zip(found, study.cases.values(), strict=True):
-        of_case = INTERPRETATIONS.read(path)
+        of_case = _read(study, case, path)
         for name, reading in study.config.interpretations.items():
             mine = of_case[of_case["interpretation"] == name]
             row = {
@@ -129,7 +135,7 @@ def interpretations_jointly(study: Study, found: list[Path]) -> ShownTable:
         "seeds for which, taken in the place of the paper's runs, it is not larger."
     )
     cases = [
-        (case, INTERPRETATIONS.read(path))
+        (case, _read(study, case, path))
         for path, case in zip(found, study.cases.values(), strict=True)
         if _compared(case)
     ]

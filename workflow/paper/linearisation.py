@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 DIFFERENCES = RowFile(
     "a comparison",
     ("case", "reference_angle_deg", "torque_factor", "difference_over_peak"),
+    words=("case",),
 )
 _ANGLES_DEG = np.arange(40.0, 91.0, 5.0)
 _FACTORS = np.geomspace(0.25, 32.0, 15)
@@ -155,8 +156,8 @@ def draw_linearisation(study: Study, differences: Path) -> Figure:
         axes.set_xlabel(r"$\hat\theta_2$ (deg)")
         axes.set_ylabel("torque / protocol's" if index < 2 else "")
         panel(axes, "bcd"[index], cases[name].title, most_letters=22)
-    style = {"location": "bottom", "aspect": 40, "pad": 0.02}
-    drawn.colorbar(mesh, ax=[traces, *maps], label="difference (% of peak)", **style)
+    label, below = "difference (% of peak)", [traces, *maps]
+    drawn.colorbar(mesh, ax=below, label=label, location="bottom", aspect=40, pad=0.02)
     return drawn
 
 

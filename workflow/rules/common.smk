@@ -7,11 +7,25 @@ from pathlib import Path
 import yaml
 from snakemake.exceptions import WorkflowError
 
+import biogrip
+
+# Rules of one clone and code of another give what neither does.
+TOP = Path(workflow.current_basedir.get_path_or_uri(secret_free=True)).parents[1]
+for package in (TOP / "src" / "biogrip", TOP.parent):
+    imported = Path(biogrip.__file__).parent
+    if (package / "study" / "source.py").is_file() and not package.samefile(imported):
+        raise WorkflowError(
+            f"The rules are those of {TOP}, but the code and the default config are those of "
+            f"{imported}, from which biogrip is installed. Use the environment of this clone "
+            f"(make study), or install it: python -m pip install -e {TOP}."
+        )
+
 from biogrip.errors import BiogripError
+from biogrip.files import digest_of, software
 from biogrip.fit.methods import METHODS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases
-from biogrip.stages.job import settings, software
+from biogrip.stages.job import settings
 from biogrip.study.load import load_given_study
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.source import default_config, shipped, snakefile
@@ -26,9 +40,11 @@ def usable(read, *given):
 
 
 # What is given is laid over the default study, in a run of its own and in a module alike. A file
-# of which nothing is in the config is that of a workflow which has this one as a module.
+# of which nothing is in the config is that of a workflow which has this one as a module, unless
+# Snakemake has made other keys of it by `__use_yte__`.
 CONFIGS = [Path(file) for file in workflow.configfiles]
-CONFIGS = [it for it in CONFIGS if config.keys() & yaml.safe_load(it.read_text("utf-8"))]
+KNOWN = {*config, "__use_yte__"}
+CONFIGS = [it for it in CONFIGS if KNOWN & {*yaml.safe_load(it.read_text("utf-8"))}]
 STUDY = usable(load_given_study, config, CONFIGS)
 SOFTWARE = software()
 # Config keys, of which each rule names those that its jobs use: what is controlled and read, and

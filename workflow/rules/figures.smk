@@ -28,7 +28,7 @@ rule case_figures:
         case=names(case for case in STUDY.simulated if STUDY.case(case).has_valley),
     params:
         **settings_of(
-            *"actuator methods evaluation title published contact models".split(),
+            *"actuator methods seeds evaluation title published contact models".split(),
             *("genetic_algorithm", "identifiability.confidence", *FIT, *SAMPLING, NOISE),
         ),
     message:
@@ -74,8 +74,8 @@ rule figures:
         "results/benchmarks/figures.tsv"
     params:
         **settings_of(
-            *"methods evaluation actuator gripper protocol".split(),
-            *keys_of_cases(STUDY, *FIT, "title", "published", NOISE),
+            *"methods seeds evaluation actuator gripper protocol".split(),
+            *keys_of_cases(STUDY, *FIT, "title", "published", *SAMPLING, NOISE),
         ),
     message:
         "Drawing the figures of the study"

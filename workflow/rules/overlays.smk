@@ -70,8 +70,12 @@ if STUDY.config.traces:
         params:
             **settings_of(),
             model=STUDY.config.traces.model,
+            configs=[digest_of(file) for file in (CONFIG, default_config()) if file],
             rows=lambda wildcards: [
-                [str(row.trace), [[s.path, s.value] for s in row.settings], row.copied]
+                [
+                    *(str(row.trace), digest_of(row.trace)),
+                    *([[s.path, s.value] for s in row.settings], row.copied),
+                ]
                 for row in rows_of(wildcards)
             ],
         message:
@@ -89,6 +93,8 @@ if STUDY.config.traces:
             table="results/tables/traces.csv",
         log:
             "results/logs/traces.log",
+        params:
+            rows=len(ROWS),
         message:
             "Putting together the tables of all traces"
         script:

@@ -108,7 +108,7 @@ rule evidence:
         "results/benchmarks/evidence.tsv"
     params:
         **settings_of(
-            *"methods evaluation actuator gripper search_range".split(),
+            *"methods seeds evaluation actuator gripper search_range".split(),
             *keys_of_cases(STUDY, *FIT, "title", "published", "models", *SAMPLING, NOISE),
         ),
     message:
@@ -151,7 +151,7 @@ rule interpretations:
         "results/logs/interpretations.log",
     params:
         **settings_of(
-            *("interpretations", "evaluation"),
+            *("interpretations", "seeds", "evaluation"),
             *keys_of_cases(STUDY, "published", *SAMPLE),
         ),
     message:
@@ -177,7 +177,7 @@ rule claims:
         "results/benchmarks/claims.tsv"
     params:
         **settings_of(
-            *"study_seed methods evaluation actuator gripper".split(),
+            *"study_seed methods seeds evaluation actuator gripper".split(),
             *keys_of_cases(STUDY, "title", "published", "gripper", "calibration", *SAMPLE, NOISE),
         ),
     message:

@@ -27,7 +27,7 @@ rule measurement:
     wildcard_constraints:
         case=names(SIMULATED),
     params:
-        **settings_of("study_seed", NOISE),
+        **settings_of("study_seed", "actuator", NOISE, *SAMPLE, *SAMPLING),
     message:
         "Adding noise to {wildcards.case}, {wildcards.batch}"
     script:
@@ -45,6 +45,10 @@ rule recording:
         case=names(STUDY.recorded),
     params:
         **settings_of("actuator", *FIT, *OF_FILE),
+        # Dates do not tell that an older file has taken the place of this one.
+        recorded=lambda wildcards: {
+            "recorded": digest_of(Path(STUDY.case(wildcards.case).block.measurement.file))
+        },
     message:
         "Reading the recorded trace of {wildcards.case}"
     script:
@@ -107,7 +111,7 @@ rule judgement:
         runtime=60,
     params:
         **settings_of(
-            *("study_seed", "actuator", *FIT, NOISE),
+            *("study_seed", "actuator", *FIT, *SAMPLING, NOISE),
             *("identifiability.confidence", "least_squares"),
         ),
     message:
@@ -143,7 +147,7 @@ rule intervals:
         runtime=120,
     params:
         **settings_of(
-            *("study_seed", "actuator", *FIT, NOISE, "least_squares"),
+            *("study_seed", "actuator", *FIT, *SAMPLING, NOISE, "least_squares"),
             *("identifiability.confidence", "identifiability.verdicts_every"),
         ),
     message:

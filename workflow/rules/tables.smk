@@ -23,7 +23,7 @@ rule case_tables:
     wildcard_constraints:
         case=names(STUDY.cases),
     params:
-        **settings_of("actuator", "methods", "evaluation", "title", "published", *FIT),
+        **settings_of("actuator", "methods", "seeds", "evaluation", "title", "published", *FIT),
     message:
         "Writing the tables of {wildcards.case}"
     script:
@@ -46,7 +46,7 @@ rule tables:
         "results/benchmarks/tables.tsv"
     params:
         **settings_of(
-            *"methods evaluation actuator model_selection".split(),
+            *"methods seeds evaluation actuator model_selection".split(),
             *keys_of_cases(STUDY, *FIT, "title", "published", "models", *SAMPLING, NOISE),
             *keys_of_cases(STUDY, "identifiability"),
         ),

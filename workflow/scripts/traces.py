@@ -6,4 +6,4 @@ from biogrip.command.outputs import join_tables
 from biogrip.stages.job import logged, paths
 
 with logged(snakemake):
-    join_tables(paths(snakemake.input.batches), Path(snakemake.output.table))
+    join_tables(paths(snakemake.input.batches), Path(snakemake.output.table), snakemake.params.rows)

@@ -1,15 +1,15 @@
 """The command ``biogrip identify``: the files it reads and writes, and the text it prints.
 
-Traces are identified in batches, several processes at once. One that fails costs no other its
-result.
+Traces are identified in batches, several processes at once. One that fails, or whose process is
+killed, costs no other its result, and what is done is not done again.
 """
 
-import json
 import os
 import sys
 import traceback
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
@@ -18,7 +18,15 @@ from typing import Any, TypeVar
 
 from biogrip import __version__
 from biogrip.command.held import load_in_words
-from biogrip.command.outputs import WRITTEN_BY, Outcome, check_output, in_own_units, write_table
+from biogrip.command.outputs import (
+    WRITTEN_BY,
+    Outcome,
+    as_written,
+    check_output,
+    read_result,
+    write_result,
+    write_table,
+)
 from biogrip.command.settings import (
     Asked,
     Setting,
@@ -27,10 +35,10 @@ from biogrip.command.settings import (
     read_table,
     read_trace,
 )
-from biogrip.command.words import in_words, side_by_side
-from biogrip.digits import rounded_numbers
+from biogrip.command.side_by_side import side_by_side
+from biogrip.command.words import in_columns, in_words
 from biogrip.errors import BiogripError
-from biogrip.files import refuse_inputs, write_text
+from biogrip.files import digest_of, refuse_inputs, software
 from biogrip.fit.genome import SearchRange
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import STEPS, budget, identify_alike
@@ -38,7 +46,7 @@ from biogrip.identify.other_fits import Trace
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
-from biogrip.processes import worker_processes
+from biogrip.study.source import default_config
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
 from biogrip.traces.columns import trace_file_problem
@@ -49,6 +57,8 @@ MOST_DRAWN = 50
 
 # Most traces of a batch, and most readings that are fitted together, of short traces.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
+
+_KILLED = "a process was killed, perhaps because memory ran out"
 
 T = TypeVar("T")
 
@@ -116,7 +126,7 @@ def identify_files(
         from biogrip.command.page import write_page
 
         write_page(outcome, report)
-    print(in_words(outcome.found[0]) if alone else side_by_side(outcome.found, outcome.refused))
+    print(in_words(outcome.found[0]) if alone else in_columns(outcome.found, outcome.refused))
     pairs = zip(every, outputs, strict=False)
     made = [path for own, path in pairs if own.name not in outcome.refused]
     if said := [visible(path) for path in (*made, report, table) if path]:
@@ -129,28 +139,56 @@ def _identify_traces(
 ) -> Outcome:
     """Identify traces in batches, several processes at once, and write a JSON file of each.
 
-    Errors of those that fail are collected. If `drawn`, there are pictures of each. Without JSON
+    What such files have of the same trace, settings and software is taken from there, but if
+    `drawn`, when there are pictures of each. Errors of those that fail are collected. Without JSON
     files, as a job of a workflow, it is one batch.
     """
     if len(asked) <= 1 or outputs is None:
         return identify_batch(asked, outputs, drawn=drawn)
+    pairs = [*zip(asked, outputs, strict=True)]
+    found: dict[str, dict[str, Any]] = {}
+    for own, path in [] if drawn else pairs:
+        with suppress(BiogripError):
+            found[own.name] = read_result(path, _made_from(own))
+    if found:
+        text = f"{len(found)} of {len(asked)} traces are taken from their JSON files, as they and"
+        print(f"{text} what is asked have not changed.", file=sys.stderr)
+    left = [number for number, own in enumerate(asked) if own.name not in found]
     processors = len(os.sched_getaffinity(0))
-    size = min(_MOST_IN_BATCH, -(-len(asked) // processors))
-    batches = [slice(start, start + size) for start in range(0, len(asked), size)]
+    size = max(1, min(_MOST_IN_BATCH, -(-len(left) // processors)))
+    batches = [left[start : start + size] for start in range(0, len(left), size)]
     every = Outcome([], {})
-    with worker_processes(min(processors, len(batches))) as processes:
-        jobs = [
-            processes.submit(identify_batch, asked[own], outputs[own], drawn=drawn)
-            for own in batches
-        ]
-        for own, job in zip(batches, jobs, strict=True):
-            outcome = job.result()
-            every.found.extend(outcome.found)
-            every.refused.update(outcome.refused)
-            every.pictures.update(outcome.pictures)
-            for number, each in enumerate(asked[own], start=own.start + 1):
-                print(f"{number} of {len(asked)}: {visible(each.name)}", file=sys.stderr)
+
+    def identify(batch: Sequence[int]) -> Outcome:
+        own, paths = zip(*(pairs[number] for number in batch), strict=True)
+        return identify_batch(own, paths, drawn=drawn)
+
+    def add(batch: Sequence[int], outcome: Outcome) -> None:
+        found.update({each["trace"]: as_written(each) for each in outcome.found})
+        every.refused.update(outcome.refused)
+        every.pictures.update(outcome.pictures)
+        for number in batch:
+            print(f"{number + 1} of {len(asked)}: {visible(asked[number].name)}", file=sys.stderr)
+
+    for batch, outcome in zip(batches, side_by_side(identify, batches, processors), strict=True):
+        if outcome is not None:
+            add(batch, outcome)
+            continue
+        # One of its traces may have asked for more memory than there is.
+        print(f"biogrip: {_KILLED}; its traces are identified one by one.", file=sys.stderr)
+        singles = [[number] for number in batch]
+        for single, alone in zip(singles, side_by_side(identify, singles, 1), strict=True):
+            trace = asked[single[0]].name
+            text = f"{visible(trace)}: {_KILLED}, twice; the same command tries it again."
+            add(single, alone or Outcome([], {trace: text}))
+    every.found.extend(found[own.name] for own in asked if own.name in found)
     return every
+
+
+def _made_from(asked: Asked) -> str:
+    """Return in one line what the result of a trace follows from."""
+    trace, default = digest_of(asked.trace), digest_of(default_config())
+    return repr((software(), default, str(asked.trace), trace, asked.given))
 
 
 def identify_batch(
@@ -158,6 +196,8 @@ def identify_batch(
 ) -> Outcome:
     """Identify the traces of one batch, see `identify_files`; None to write no JSON files."""
     alone = len(asked) == 1 and outputs is not None
+    # Before anything is read: what is changed meanwhile is identified again.
+    made_from = [] if outputs is None else [*map(_made_from, asked)]
     name, count = asked[0].name if alone else "", 1 + STEPS
     with Progress(name, count, live=alone, quiet=not alone) as progress:
         cases, traces, refused = _read_batch(asked, progress)
@@ -170,10 +210,7 @@ def identify_batch(
         data = data_of(judged[index], cases[index], own.name, own.given)
         outcome.found.append(data)
         if outputs is not None:
-            # Assumptions, which must be repeatable, are not rounded.
-            written = rounded_numbers(data) | {"assumed": data["assumed"]}
-            written = in_own_units(written, cases[index].instrument.read)
-            write_text(outputs[index], json.dumps(written, indent=1) + "\n")
+            write_result(outputs[index], data, made_from[index])
         if drawn:
             # Imported here: loading Matplotlib takes long.
             from biogrip.command.page import draw

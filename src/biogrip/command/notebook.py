@@ -164,7 +164,10 @@ def identify_trace(
     BiogripError
         If a setting or the trace cannot be used; the message says what is allowed.
     """
-    if reads not in INSTRUMENTS:
+    for name, block in (("fixed", fixed or {}), ("config", config or {})):
+        if not isinstance(block, Mapping) or not all(isinstance(it, str) for it in block):
+            raise BiogripError(f"{name}: found {block!r:.40}, allowed are values by name.")
+    if not isinstance(reads, str) or reads not in INSTRUMENTS:
         raise BiogripError(f"reads: found '{reads}', allowed are {', '.join(INSTRUMENTS)}.")
     column = INSTRUMENTS[reads].read.column
     given = {"time_s": time_s, column: readings, **({} if sd is None else {"sd": sd})}
@@ -172,7 +175,7 @@ def identify_trace(
     if len({len(values) for values in columns.values()}) > 1:
         found = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
         raise BiogripError(f"found {found}; allowed are as many of each.")
-    onset = ("fit_start", True) if start == "fit" else ("start_s", start)
+    onset = ("fit_start", True) if isinstance(start, str) and start == "fit" else ("start_s", start)
     chosen: list[tuple[str, str, Any]] = [
         *(("config", block, value) for block, value in (config or {}).items()),
         ("model", "sample.model", model),

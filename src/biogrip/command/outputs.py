@@ -1,9 +1,11 @@
 """Files that biogrip writes of traces: their keys and columns, and which may be replaced."""
 
+import json
 import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from biogrip.errors import BiogripError
 from biogrip.files import scratch_path, write_text
 from biogrip.judging.without_model import EXPONENT, LEVEL
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
-from biogrip.records.rows import write_rows
+from biogrip.records.rows import AGAIN, read_object, whole, write_object, write_rows
 from biogrip.terminal import visible, visible_lines
 
 WRITTEN_BY = "written_by_biogrip"
@@ -75,13 +77,44 @@ def check_output(output: Path) -> None:
     raise BiogripError(f"{visible(output)}: {text}")
 
 
-def in_own_units(data: Any, read: Channel) -> Any:
-    """Return data whose keys end with the unit of what is read, instead of radians."""
+# Keys of a result that are in the unit of what is read.
+_OF_READINGS = ("misfit_rad", "noise_rad", "scatter_rad", "offset_rad", "drift_rad_per_s")
+
+
+def as_written(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the result of a trace, `data_of`, as it comes back from its JSON file."""
+    # Assumptions, which must be repeatable, are not rounded.
+    found: dict[str, Any] = json.loads(
+        json.dumps(rounded_numbers(data) | {"assumed": data["assumed"]})
+    )
+    return found
+
+
+def write_result(path: Path, data: Mapping[str, Any], made_from: str) -> None:
+    """Write the result of a trace, `data_of`, as JSON, with a digest of what it was made from."""
+    read = INSTRUMENTS[data["reads"]["quantity"]].read
+    written, names = as_written(data), {name: _in_units(name, read) for name in _OF_READINGS}
+    write_object(path, {**_renamed(written, names), "assumed": written["assumed"]}, made_from)
+
+
+def read_result(path: Path, made_from: str) -> dict[str, Any]:
+    """Read the result of a trace, `as_written`.
+
+    If it was made from anything else, or is not as it was written, it is a `BiogripError`.
+    """
+    written = read_object(path, "the result of a trace", made_from)
+    read = INSTRUMENTS[written["reads"]["quantity"]].read
+    names = {_in_units(name, read): name for name in _OF_READINGS}
+    return {**_renamed(written, names), "assumed": written["assumed"]}
+
+
+def _renamed(data: Any, names: Mapping[str, str]) -> Any:
+    """Return plain data with other keys."""
     if isinstance(data, list):
-        return [in_own_units(each, read) for each in data]
+        return [_renamed(each, names) for each in data]
     if not isinstance(data, dict):
         return data
-    return {_in_units(key, read): in_own_units(each, read) for key, each in data.items()}
+    return {names.get(key, key): _renamed(each, names) for key, each in data.items()}
 
 
 def _in_units(name: str, read: Channel) -> str:
@@ -131,11 +164,15 @@ def write_table(outcome: Outcome, table: Path) -> None:
     )
 
 
-def join_tables(parts: Sequence[Path], table: Path) -> None:
+def join_tables(parts: Sequence[Path], table: Path, rows: int) -> None:
     """Write the rows of several tables of traces as one, as if `write_table` had written all."""
     # Imported here: loading pandas takes long.
     import pandas as pd
 
-    every = pd.concat([pd.read_csv(part, dtype=str, keep_default_na=False) for part in parts])
+    texts = (StringIO(whole(part), newline="") for part in parts)
+    every = pd.concat([pd.read_csv(text, dtype=str, keep_default_na=False) for text in texts])
+    if len(every) != rows:
+        text = f"found {len(every)} traces in the tables of its batches, wanted {rows}"
+        raise BiogripError(f"{parts[0].parent}: {text}. {AGAIN}")
     last = list(COLUMNS[-2:])
     write_text(table, every[[*every.columns.drop(last), *last]].to_csv(index=False))

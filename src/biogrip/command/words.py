@@ -181,7 +181,7 @@ def further_notes(found: Mapping[str, Any]) -> list[str]:
     return [note["text"] for note in found["notes"] if note["text"] not in found["reasons"]]
 
 
-def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -> str:
+def in_columns(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -> str:
     """Return several traces as a table with one row per trace, followed by refused traces."""
     lines = []
     if found:

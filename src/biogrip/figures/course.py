@@ -53,7 +53,7 @@ def _name_seeds(axes: Axes, seeds: int, first: Iterable[str]) -> None:
 def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting a run of each basin."""
     method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
-    found = read_identifications(identifications, method.name)
+    found = read_identifications(identifications, case, method.name)
     noise = found.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else pd.Series(found["misfit"].min(), index=noise.index)
@@ -108,7 +108,7 @@ def _mark_mutation(axes: Axes, start: int, last: int) -> None:
 def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw every parameter over generations for all seeds, highlighting a run of each basin."""
     method = case.study.shown_method
-    found = read_identifications(identifications, method.name)
+    found = read_identifications(identifications, case, method.name)
     first = first_of_basins(found, case.study.near_noise_tolerance)
     shown = [int(run["seed"]) for run in first.values()]
     parameters, identified = case.sample.model.parameters, case.published.identified
@@ -147,7 +147,7 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
 
 def draw_waterfall(case: Case, identifications: Path) -> Figure:
     """Draw sorted increases of chi-squared, of every method's runs and of best encodable points."""
-    found = read_identifications(identifications)
+    found = read_identifications(identifications, case)
     increase = np.maximum(chi_square_increase(found, case.samples), _LOWEST)
     reached = reached_encodable(found, case.samples, case.study.optimum_tolerance)
     drawn = figure(COLUMN_IN, 3.5)

@@ -22,7 +22,7 @@ from biogrip.study.study import Case
 
 def draw_force(case: Case, target: Path) -> Figure:
     """Draw the jaw force under bilateral contact, and the rotation with and without adhesion."""
-    time_s, _, rotation = read_target(target)
+    time_s, _, rotation = read_target(target, case.times_s)
     device = case.gripper, case.network, case.torque
     # Without inertia, since the jaws ring for less than a sampling interval after a step.
     sticking = jaw_force(*device, time_s, nonlinear=case.nonlinear_target, inertia=False)[0]

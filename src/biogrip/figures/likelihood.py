@@ -168,7 +168,7 @@ def draw_valley(case: Case, measured: Path, identifications: Path) -> Figure:
     found = read_verdicts(measured)
     valley = found["valley"]
     x, y = valley["x"], valley["y"]
-    identified = read_identifications(identifications, case.study.fitting_method.name)
+    identified = read_identifications(identifications, case, case.study.fitting_method.name)
     drawn = figure(COLUMN_IN, 3.1)
     axes = drawn.subplots()
     colours = colormaps["cividis_r"](np.linspace(0, 0.95, len(_LEVELS)))

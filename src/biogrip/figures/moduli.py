@@ -47,7 +47,7 @@ def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) 
     axes = drawn.subplots(2, len(study.cases), squeeze=False, height_ratios=[1.35, 1])
     files = zip(study.cases.values(), identifications, targets, strict=True)
     for column, (case, identified, target) in enumerate(files):
-        time_s, _, rotation = read_target(target)
+        time_s, _, rotation = read_target(target, case.times_s)
         logs = case.experiment.logs(case.parameters)
         _, sensitivity = case.experiment.of(time_s, rotation).residuals(logs)
         sigma = standard_deviation(rotation, case.noise)
@@ -76,7 +76,7 @@ def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Arra
     model = case.experiment.model
     near = []
     for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():
-        found = first_seeds(read_identifications(identified, method.name))
+        found = first_seeds(read_identifications(identified, case, method.name))
         fits = found[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
         near.append(moduli[near_noise(found, study.near_noise_tolerance)])
@@ -87,16 +87,11 @@ def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Arra
                 axes.plot(omega, part, **style | {"linestyle": dashed}, label=label)
                 label = None
     fitting = np.concatenate(near)
+    # In the upper half and, hatched, in the lower one.
     for part, above, name in ((fitting.real, 0.5, "storage"), (fitting.imag, 0.0, "loss")):
-        agreed = _agreed(part) if len(part) else np.zeros(len(omega), bool)
-        ends = {"ymin": above, "ymax": above + 0.5, "linewidth": 0, "zorder": 0}
-        # Above the loss modulus, in another shade.
-        ends |= (
-            {"color": SHADE}
-            if above
-            else {"facecolor": "none", "edgecolor": SHADE, "hatch": "////"}
-        )
-        shown = np.flatnonzero(agreed)
+        ends: dict[str, Any] = {"ymin": above, "ymax": above + 0.5, "linewidth": 0, "zorder": 0}
+        ends |= {"color": SHADE} if above else {"fill": False, "edgecolor": SHADE, "hatch": "////"}
+        shown = np.flatnonzero(_agreed(part)) if len(part) else np.array([], dtype=np.int64)
         for run in np.split(shown, np.flatnonzero(np.diff(shown) > 1) + 1) if len(shown) else []:
             label = f"{name} seen" if run[0] == shown[0] else None
             axes.axvspan(omega[run[0]], omega[run[-1]], label=label, **ends)

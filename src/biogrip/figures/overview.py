@@ -68,7 +68,7 @@ def draw_overview(
     _fits(axes[0], cases[0], fits)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
-        found = read_identifications(path, study.shown)
+        found = read_identifications(path, case, study.shown)
         quantities = read_verdicts(judged)["quantities"]
         bounded = {it["quantity"] for it in quantities if it["verdict"] != BOUNDED_ABOVE}
         _scatter(scatter, case, first_seeds(found), study.near_noise_tolerance, bounded)

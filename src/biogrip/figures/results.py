@@ -14,9 +14,9 @@ from biogrip.physics.instruments import ROTATION, Channel
 from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import within
 from biogrip.records.identifications import read_histories, read_identifications
+from biogrip.records.rows import seeds_of
 from biogrip.records.success import ALL, basins
 from biogrip.records.traces import Measurements, read_measurements
-from biogrip.stages.job import seeds_of
 from biogrip.stages.judgement import experiment_for
 from biogrip.study.study import Case
 
@@ -56,7 +56,7 @@ def fits_of_basins(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> dict[str, Fit]:
     """Return the fit of the first run of each basin, by label, from files of a case."""
-    found = read_identifications(identifications, case.study.shown)
+    found = read_identifications(identifications, case, case.study.shown)
     fits = {}
     for words, run in first_of_basins(found, case.study.near_noise_tolerance).items():
         seed = int(run["seed"])

@@ -46,9 +46,9 @@ def draw_scatter(
     """Draw identified over target for every quantity and method."""
     items = read_verdicts(expected)["quantities"]
     verdicts = {item["quantity"]: item["verdict"] for item in items}
-    found = read_identifications(identifications)
+    found = read_identifications(identifications, case)
     experiment = case.experiment.calibrated(calibrated)
-    time_s, _, rotation = read_target(target)
+    time_s, _, rotation = read_target(target, case.times_s)
     log_truth = experiment.logs(case.parameters)
     _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
     noise_sd = standard_deviation(rotation, case.noise)

@@ -47,7 +47,8 @@ def fits_of(
     experiment = experiment_for(case.experiment, recorded, calibrated)
     fits = []
     for method in methods:
-        found = read_identifications(identifications, method.name).set_index("seed").loc[TRACE]
+        runs = read_identifications(identifications, case, method.name)
+        found = runs.set_index("seed").loc[TRACE]
         values = {p.name: float(found[p.column]) for p in experiment.model.parameters}
         fits.append((method, fit_of(experiment, values, recorded, TRACE)))
     return fits

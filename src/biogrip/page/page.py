@@ -19,7 +19,7 @@ from biogrip.files import write_text
 from biogrip.page import answers
 from biogrip.page.explorer import explorer, fits_of
 from biogrip.records.identifications import read_verdicts
-from biogrip.records.rows import read_table
+from biogrip.records.rows import read_table, whole
 from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import target_of
@@ -90,7 +90,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
     )
     tables: list[Entry] = []
     for path, csv in zip(files["tables"], files["downloads"], strict=True):
-        entry, download = entry_of(path, owners, texts), _url("text/csv", csv.read_bytes())
+        entry, download = entry_of(path, owners, texts), _url("text/csv", whole(csv).encode())
         if entry.caption in (it.caption for it in tables):
             entry = replace(entry, caption="")
         tables.append(replace(entry, content=_table(path, titles), download=download))
@@ -178,8 +178,9 @@ def _images(paths: Sequence[Path]) -> Iterator[tuple[str | None, tuple[int, int]
         try:
             with PIL.Image.open(path) as image:
                 few = image.convert("RGB").quantize(256, dither=PIL.Image.Dither.NONE)
-        except OSError as error:
-            raise BiogripError(f"{path}: cannot be read: {error.strerror or error}.") from error
+        # The latter, too, is Pillow's for what is no PNG.
+        except (OSError, SyntaxError) as error:
+            raise BiogripError(f"{path}: cannot be read: {error}.") from error
         few.save(packed, "png")
         url = _url("image/png", packed.getvalue())
         room -= len(url)

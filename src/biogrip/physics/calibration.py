@@ -65,7 +65,10 @@ def read_calibrated_arms(
         If the file is missing or is no calibration.
     """
     try:
-        block = yaml.safe_load(path.read_text(encoding="utf-8"))["gripper"]
+        text = path.read_text(encoding="utf-8")
+        if not text.endswith("\n"):
+            raise ValueError("its end is missing")
+        block = yaml.safe_load(text)["gripper"]
         left, right = (_numbers(block[name]) for name in ("left", "right"))
         uncertainty = {name: _numbers(block["uncertainty"][name]) for name in ("left", "right")}
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:

@@ -14,18 +14,18 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import significant
-from biogrip.errors import BiogripError
 from biogrip.fit.problem import Fit
 from biogrip.physics.sample_model import SINGLE_BRANCH, Parameter, SampleModel
 from biogrip.records.rows import (
     RowFile,
     join_arrays,
     read_arrays,
-    read_frame,
     read_object,
+    seeds_of,
     write_arrays,
     write_rows,
 )
+from biogrip.study.study import Case
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,6 +42,7 @@ trace, see `lowest_encodable`; empty if it was recorded."""
 MODEL_FITS = RowFile(
     "fits of models",
     ("case", "model", "seed", "parameters", "samples", "misfit"),
+    words=("case", "model"),
 )
 
 INTERVALS = RowFile(
@@ -50,7 +51,7 @@ INTERVALS = RowFile(
         *("case", "quantity", "seed", "estimate", "low", "high", "estimate_rest_known"),
         *("verdict", "shown_low", "shown_high"),
     ),
-    words=("verdict",),
+    words=("case", "quantity", "verdict"),
 )
 """A row per quantity and seed. Quantities that traces should determine have an estimate, its
 limits, and the estimate with uninformed parameters fixed at their true values. For some seeds, all
@@ -63,7 +64,7 @@ INTERPRETATIONS = RowFile(
         *(parameter.column for parameter in SINGLE_BRANCH),
         *("misfit", "noise_rms", "last_improvement"),
     ),
-    words=("interpretation",),
+    words=("case", "interpretation"),
 )
 
 
@@ -149,15 +150,20 @@ def _history(record: Record) -> dict[str, Array]:
     }
 
 
-def read_identifications(path: Path, method: str | None = None) -> "pd.DataFrame":
-    """Read identifications by all methods or by one, of which there must be some."""
-    frame = read_frame(path, "identifications", (*LEADING, *TRAILING))
-    if method is None:
-        return frame
-    chosen = frame[frame["method"] == method].reset_index(drop=True)
-    if chosen.empty:
-        raise BiogripError(f"{path}: holds no identification by {method}.")
-    return chosen
+def read_identifications(path: Path, case: Case, method: str | None = None) -> "pd.DataFrame":
+    """Read identifications of a case by all methods of the study, or by one, in all seeds."""
+    frame = _read(path, case, case.study.config.methods, range(case.seeds))
+    return frame if method is None else frame[frame["method"] == method].reset_index(drop=True)
+
+
+def read_batch(path: Path, case: Case) -> "pd.DataFrame":
+    """Read identifications by the method and in the seeds that the path of a batch names."""
+    return _read(path, case, [path.parent.name], seeds_of(path.stem))
+
+
+def _read(path: Path, case: Case, methods: Sequence[str], seeds: range) -> "pd.DataFrame":
+    file = RowFile("identifications", columns(case.sample.model), ("case", "method", "stop_reason"))
+    return file.read(path, case=[case.name], method=methods, seed=seeds)
 
 
 def read_histories(path: Path, method: str, values: Sequence[str]) -> "pd.DataFrame":
@@ -171,4 +177,4 @@ def read_histories(path: Path, method: str, values: Sequence[str]) -> "pd.DataFr
 
 def read_verdicts(path: Path) -> dict[str, Any]:
     """Read a file of verdicts."""
-    return read_object(path, "verdicts", {"quantities", "trades", "notes"}, "holds no verdicts")
+    return read_object(path, "verdicts")

@@ -2,15 +2,19 @@
 
 They are written atomically. Text that a spreadsheet would take for a formula is written to CSV with
 an apostrophe before it, and read without. A reader raises a `BiogripError` that names a file which
-is missing, damaged or of another kind.
+is missing, damaged or of another kind. Cells of a CSV file may be edited; its lines have to be
+whole, and its rows all that whoever reads it knows of.
 """
 
 import csv
+import hashlib
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence, Set
+import zlib
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from io import StringIO
+from itertools import chain, product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -20,7 +24,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.files import atomic_write
+from biogrip.files import atomic_write, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,6 +36,13 @@ _FORMULA = re.compile(r"'*[=+@\t\r-]")
 _SIGNED = re.compile(r"[+-]\d+(\.\d+)?(e[+-]?\d+)?|-(inf)?")
 # With this end of a line, `csv` puts quotes around both of its characters in a cell.
 _END = "\r\n"
+_BATCH = re.compile(r"seeds_(\d+)-(\d+)")
+AGAIN = "It is damaged: delete it, and the same command makes it again."
+"""What to do about a result that is not as it was written."""
+
+
+DIGEST = "digest"
+"""Key of a JSON file, see `write_object`."""
 
 
 @dataclass(frozen=True)
@@ -43,15 +54,18 @@ class RowFile:
     columns: tuple[str, ...]
     """Column names."""
     words: tuple[str, ...] = ()
-    """Columns to read as text even if they look like numbers."""
+    """Columns of text, even if it looks like numbers."""
 
     def write(self, path: Path, rows: Iterable[Sequence[Any]]) -> None:
         """Write a header and rows, consuming an iterator row by row."""
         write_rows(path, self.columns, rows)
 
-    def read(self, path: Path) -> "pd.DataFrame":
-        """Read all rows."""
-        return read_frame(path, self.what, self.columns, self.words)
+    def read(self, path: Path, **known: Collection[Any]) -> "pd.DataFrame":
+        """Read all rows, which are those of every combination of what is known of columns."""
+        frame = read_frame(path, self.what, self.columns, self.words)
+        if known:
+            require_rows(path, frame, [*known], product(*known.values()))
+        return frame
 
 
 def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
@@ -79,22 +93,63 @@ def as_it_was(cell: Any) -> Any:
     return cell[1:] if ours else cell
 
 
+def seeds_of(batch: str) -> range:
+    """Return the seeds of a batch, whose name has the first and the last, e.g. ``seeds_0-24``."""
+    found = _BATCH.fullmatch(batch)
+    assert found, batch
+    return range(int(found[1]), int(found[2]) + 1)
+
+
+def whole(path: Path, what: str = "a table") -> str:
+    """Return the text of a CSV file, whose last line must have an end, and each row all cells."""
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            text = stream.read()
+        if "\0" in text:
+            raise ValueError("found a byte of 0")
+        widths = [len(row) for row in csv.reader(StringIO(text, newline=""), strict=True)]
+    except (OSError, ValueError, csv.Error) as error:
+        raise BiogripError(f"{path}: cannot be read as {what}: {error}. {AGAIN}") from error
+    short = [line for line, width in enumerate(widths, start=1) if width != widths[0]]
+    if short or not text.endswith("\n"):
+        line = short[0] if short else len(widths)
+        raise BiogripError(f"{path}, line {line}: part of the line is missing. {AGAIN}")
+    return text
+
+
+def require_rows(
+    path: Path, frame: "pd.DataFrame", columns: Sequence[str], wanted: Iterable[tuple[Any, ...]]
+) -> None:
+    """Refuse, by a `BiogripError`, a file without each row that is wanted once, or with others."""
+    found, known = [*frame[[*columns]].itertuples(index=False, name=None)], [*wanted]
+    if len(found) == len(known) and {*found} == {*known}:
+        return
+    lacking = [row for row in known if row not in {*found}]
+    text = f", and none of {', '.join(map(str, lacking[0]))}" if lacking else ""
+    raise BiogripError(f"{path}: found {len(found)} rows, wanted {len(known)}{text}. {AGAIN}")
+
+
 def read_frame(
     path: Path, what: str, columns: Sequence[str], words: Sequence[str] = ()
 ) -> "pd.DataFrame":
     """Read rows of a CSV file that have at least the given columns.
 
-    Columns of words are read as text even if they look like numbers; `what` says in messages what
-    the file holds.
+    Those of words are text even if it looks like numbers, all others numbers; `what` says in
+    messages what the file holds.
     """
     import pandas as pd
 
+    text = whole(path, what)
     try:
-        frame = pd.read_csv(path, dtype=dict.fromkeys(words, str))
-    except (OSError, ValueError) as error:
-        raise BiogripError(f"{path}: cannot be read as {what}: {error}.") from error
+        frame = pd.read_csv(StringIO(text, newline=""), dtype=dict.fromkeys(words, str))
+    except ValueError as error:
+        raise BiogripError(f"{path}: cannot be read as {what}: {error}. {AGAIN}") from error
     if not set(columns) <= set(frame.columns):
         raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(columns)}.")
+    for column in columns:
+        numbers = frame.empty or pd.api.types.is_numeric_dtype(frame[column])
+        if column not in words and not numbers:
+            raise BiogripError(f"{path}: {column}: not all are numbers. {AGAIN}")
     for column in frame.columns:
         if not pd.api.types.is_numeric_dtype(frame[column]):
             frame[column] = frame[column].map(as_it_was)
@@ -105,6 +160,8 @@ def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str
     """Read the header, which may have to be given columns, and all rows as text."""
     import pandas as pd
 
+    if columns is not None:
+        whole(path)
     try:
         frame = pd.read_csv(path, header=None, dtype=str, na_filter=False)
     except (OSError, ValueError) as error:
@@ -118,6 +175,7 @@ def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str
 
 def read_table(path: Path) -> list[dict[str, str]]:
     """Read the rows of a table as text by column."""
+    whole(path)
     header, *rows = read_rows(path)
     return [dict(zip(header, row, strict=True)) for row in rows]
 
@@ -131,10 +189,11 @@ def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
 def read_arrays(path: Path) -> dict[str, Array]:
     """Read all arrays of an npz."""
     try:
-        with np.load(path) as arrays:
+        with path.open("rb") as stream, np.load(stream) as arrays:
             return dict(arrays)
-    except (OSError, ValueError, EOFError, BadZipFile) as error:
-        raise BiogripError(f"{path}: cannot be read: {error}.") from error
+    except (OSError, ValueError, EOFError, RuntimeError, BadZipFile, zlib.error) as error:
+        # zipfile finds methods and passwords that we do not use: RuntimeError.
+        raise BiogripError(f"{path}: cannot be read: {error}. {AGAIN}") from error
 
 
 def join_arrays(several: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
@@ -142,12 +201,22 @@ def join_arrays(several: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
     return {name: np.concatenate([each[name] for each in several]) for name in several[0]}
 
 
-def read_object(path: Path, kind: str, keys: Set[str], lacking: str) -> dict[str, Any]:
-    """Read a JSON object of some kind, with a message if one of the required keys is lacking."""
+def write_object(path: Path, plain: Mapping[str, Any], made_from: str = "") -> None:
+    """Write plain data as JSON, with a digest of them and of what they were made from."""
+    write_text(path, json.dumps({**plain, DIGEST: _digest(plain, made_from)}, indent=1) + "\n")
+
+
+def read_object(path: Path, kind: str, made_from: str = "") -> dict[str, Any]:
+    """Read what `write_object` wrote; a `BiogripError` says that it is something else."""
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise BiogripError(f"{path}: cannot be read as {kind}: {error}.") from error
-    if not keys <= set(found):
-        raise BiogripError(f"{path}: {lacking}.")
-    return found
+        if found.pop(DIGEST) == _digest(found, made_from):
+            return found
+        problem = "its digest is another one"
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        problem = str(error)
+    raise BiogripError(f"{path}: cannot be read as {kind}: {problem}. {AGAIN}")
+
+
+def _digest(plain: Mapping[str, Any], made_from: str) -> str:
+    return hashlib.sha256(f"{json.dumps(plain)}{made_from}".encode()).hexdigest()[:16]

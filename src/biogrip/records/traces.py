@@ -9,7 +9,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import Instrument
-from biogrip.records.rows import read_arrays, write_arrays, write_rows
+from biogrip.records.rows import AGAIN, read_arrays, whole, write_arrays, write_rows
 from biogrip.traces.reader import Recording
 
 # More than any instrument gives, and few enough that results on different processors agree.
@@ -93,14 +93,18 @@ def as_written(readings: Array) -> Array:
     return np.array([float(_WRITTEN.format(value)) for value in readings])
 
 
-def read_target(path: Path) -> tuple[Array, Array, Array]:
-    """Read time, what is controlled and what is read of a target."""
+def read_target(path: Path, times_s: Array) -> tuple[Array, Array, Array]:
+    """Read time, what is controlled and what is read of a target, of just the times given, (n,)."""
     # Without pandas, which most jobs that read a target do not import.
+    lines = whole(path, "a target").splitlines()[1:]
     try:
-        values = np.loadtxt(path, delimiter=",", skiprows=1, usecols=(0, 1, 2), ndmin=2)
-    except (OSError, ValueError) as error:
-        raise BiogripError(f"{path}: cannot be read as a target: {error}.") from error
+        values = np.loadtxt(lines or ["nan,nan,nan"], delimiter=",", usecols=(0, 1, 2), ndmin=2)
+    except ValueError as error:
+        raise BiogripError(f"{path}: cannot be read as a target: {error}. {AGAIN}") from error
     time_s, controlled, read = values.T
+    if [*time_s] != [float(f"{t:.10g}") for t in times_s]:
+        text = f"found {len(lines)} readings, wanted {len(times_s)} at the times of the config"
+        raise BiogripError(f"{path}: {text}. {AGAIN}")
     return time_s, controlled, read
 
 

@@ -24,6 +24,7 @@ from biogrip.records.identifications import (
     MODEL_FITS,
     Record,
     columns,
+    read_batch,
     write_histories,
     write_identifications,
 )
@@ -84,6 +85,8 @@ def join(
     It is looked for around the end of every run, since these surround the continuous optimum.
     """
     header = columns(case.sample.model)
+    for batch in batches:
+        read_batch(batch, case)
     rows = [row for batch in batches for row in read_rows(batch, header)[1:]]
     searched = case.experiment.searched.parameters
     ends = defaultdict(list)

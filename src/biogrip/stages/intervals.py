@@ -47,7 +47,7 @@ def estimate(
     The noise of a seed is that of its measurement.
     """
     experiment = case.judged_experiment.calibrated(calibrated)
-    time_s, _, rotation = read_target(target)
+    time_s, _, rotation = read_target(target, case.times_s)
     found = read_verdicts(expected)["quantities"]
     determined = {item["quantity"] for item in found if item["verdict"] == DETERMINED}
     INTERVALS.write(intervals, _rows(case, experiment, seeds, time_s, rotation, determined))

@@ -7,25 +7,21 @@ cannot give a result that Snakemake would not renew. Each job has a batch of the
 (`batch_names`, `job_seeds`), and writes what it says to its log (`logged`).
 """
 
-import hashlib
-import re
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import MISSING, Field, fields
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ClassVar, get_type_hints
 
-import biogrip
 from biogrip.errors import BiogripError
 from biogrip.keys import built
+from biogrip.records.rows import seeds_of
 from biogrip.study.case_blocks import CaseBlock, Identifiability
 from biogrip.study.config import StudyConfig
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.study import Case, Study
 
-_BATCH = re.compile(r"seeds_(\d+)-(\d+)")
 STUDY_KEYS = tuple(field.name for field in fields(StudyConfig))
 """All keys of a study."""
 CASE_KEYS = tuple(field.name for field in fields(CaseBlock))
@@ -80,7 +76,7 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
     if case:
         # What the case leaves at its default is not the study's: it has all of its blocks.
         blocks = {key: value for key, value in blocks.items() if key not in CASE_KEYS}
-        blocks |= study.case(case).plain
+        blocks |= study.case(case).plain | {"seeds": study.case(case).seeds}
     blocks = blocks | {"cases": {name: it.plain for name, it in study.cases.items()}}
 
     def value_of(block: Mapping[str, Any] | None, key: str) -> Any:
@@ -130,25 +126,6 @@ def _typed(kind: Any, given: Mapping[str, Any]) -> dict[str, Any]:
             made = field.default_factory
             keys[field.name] = field.default if made is MISSING else made()
     return keys
-
-
-def software() -> dict[str, str]:
-    """Return versions of what computes results, and a digest of our source."""
-    folder = Path(biogrip.__file__).parent
-    digest = hashlib.sha256()
-    for file in sorted(folder.rglob("*")):
-        if file.suffix in (".py", ".j2", ".css"):
-            digest.update(f"{file.relative_to(folder)}\n".encode())
-            digest.update(file.read_bytes())
-    versions = {name: version(name) for name in ("numpy", "scipy")}
-    return {"biogrip": biogrip.__version__, **versions, "source": digest.hexdigest()[:12]}
-
-
-def seeds_of(batch: str) -> range:
-    """Return the seeds of a batch, whose name has the first and the last, e.g. ``seeds_0-24``."""
-    found = _BATCH.fullmatch(batch)
-    assert found, batch
-    return range(int(found[1]), int(found[2]) + 1)
 
 
 def batch_names(seeds: int, size: int) -> list[str]:

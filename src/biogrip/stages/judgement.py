@@ -4,13 +4,11 @@ A trace is judged as `biogrip identify` judges it; of a simulated one the experi
 that neither start, offset, drift nor model are doubted.
 """
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from biogrip.digits import rounded_numbers
-from biogrip.files import write_text
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_from
 from biogrip.identify.data import judged_data
@@ -18,6 +16,7 @@ from biogrip.identify.identify import identify_alike
 from biogrip.identify.prepare import for_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.physics.noise import rms, standard_deviation
+from biogrip.records.rows import write_object
 from biogrip.records.traces import Measurements, read_measurements, read_target
 from biogrip.study.study import Case
 
@@ -52,7 +51,7 @@ def expect(case: Case, target: Path, calibrated: list[Path], verdicts: Path) -> 
     target's digits takes its place.
     """
     experiment = case.experiment.to_identify().calibrated(calibrated)
-    time_s, _, rotation = read_target(target)
+    time_s, _, rotation = read_target(target, case.times_s)
     noise_sd = rms(standard_deviation(rotation, case.noise)) or None
     problem = experiment.of(time_s, rotation, noise_sd=noise_sd)
     found = identify_from(problem, experiment.logs(case.parameters))
@@ -69,4 +68,4 @@ def _write(path: Path, case: Case, diagnosis: Diagnosis, more: dict[str, Any]) -
         for key, value in rounded_numbers(judged_data(diagnosis)).items()
     }
     head = {"case": case.name, "model": case.sample.model.name, "confidence": case.confidence}
-    write_text(path, json.dumps(head | said | more, indent=1) + "\n")
+    write_object(path, head | said | more)

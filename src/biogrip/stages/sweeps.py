@@ -22,7 +22,7 @@ from biogrip.keys import built
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import simulated_response
-from biogrip.records.identifications import INTERPRETATIONS, read_identifications
+from biogrip.records.identifications import INTERPRETATIONS, read_batch
 from biogrip.records.rows import RowFile
 from biogrip.records.success import near_noise
 from biogrip.records.traces import read_target
@@ -40,7 +40,7 @@ POINTS = RowFile(
         *("near_noise_share", "basin_share"),
         *("median_absolute_error_percent", "basin_error_percent", "bound_percent"),
     ),
-    words=("row", "column"),
+    words=("point", "row", "column", "method", "quantity"),
 )
 
 # Log factor, and multiple of the bound, within which a value is in the basin of the truth.
@@ -86,7 +86,7 @@ def _rows(
         case = study.points[point.name]
         for method in study.config.methods:
             batches = files[point.name, method]
-            found = pd.concat([read_identifications(path, method) for path in batches])
+            found = pd.concat([read_batch(path, case) for path in batches])
             if case.noise.absent:
                 # Without noise, the misfit of the true values rounded to the genes' digits.
                 found = found.assign(noise_rms=_resolution(case, true))
@@ -164,7 +164,7 @@ def identify_interpreted(case: Case, target: Path, rows: Path) -> None:
 
 
 def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
-    time_s, _, rotation = read_target(target)
+    time_s, _, rotation = read_target(target, case.times_s)
     readings = case.study.config.interpretations
     progress = Progress(f"{case.name}, interpretations", len(readings) * case.seeds)
     for name, reading in readings.items():

@@ -74,7 +74,7 @@ class DesignBlock(Block):
 
     steps: Annotated[int, Field(ge=1, le=50)] = 8
     """Number of steps at most. By default 8."""
-    largest: Annotated[float | None, Field(gt=0, le=1e12)] = None
+    largest: Annotated[float | None, Field(ge=1e-50, le=1e12)] = None
     """Largest torque, or what else the protocol holds, in its SI unit. By default the protocol's
     largest."""
     duration_s: Annotated[float | None, Field(ge=1e-6, le=1e9)] = None

@@ -40,6 +40,7 @@ _MOST_UNCERTAIN = 0.5
 _OWN = ("arm_length_m", "reference_angle_deg")
 
 # A load or a deformation, either way.
+_SMALLEST = 1e-50
 _Signed = Annotated[float | None, Field(ge=-1e12, le=1e12)]
 _Uncertainties = Mapping[Annotated[str, OneOf(ARM_KEYS)], Annotated[float, Field(ge=0, le=1e3)]]
 
@@ -161,6 +162,10 @@ class PhaseBlock(Block):
         by = self.bases[0]
         for key in sorted(given.keys() - {"duration_s", by, f"to_{by}"}):
             yield (key,), f"does not go with {by}."
+        for key in (by, f"to_{by}"):
+            # Their squares would have no digits left.
+            if 0 < abs(given.get(key, 0)) < _SMALLEST:
+                yield (key,), f"found {given[key]:g}, allowed is 0, or at least {_SMALLEST:g}."
 
 
 @dataclass(frozen=True)

@@ -174,10 +174,13 @@ def _parsed(file: Path, text: str) -> tuple[Lines, dict[str, Any]]:
     if not isinstance(root, yaml.MappingNode):
         raise _wrong(file, 1, "found no keys, allowed is a config.")
     _walk(file, root, (), lines)
-    if line := lines.get(("__use_yte__",)):
-        text = "__use_yte__ makes Snakemake run code that stands in the file; allowed is a config "
-        raise _wrong(file, line, f"{text}without it.")
-    return lines, yaml.SafeLoader("").construct_document(root)
+    content = yaml.SafeLoader("").construct_document(root)
+    # It may come by a merge.
+    if "__use_yte__" in content:
+        text = "with __use_yte__ a config is a program. `snakemake --configfile` runs it before it "
+        text += "reads any rule: there it has run by now. `biogrip` has not run it. Allowed is a "
+        raise _wrong(file, lines.get(("__use_yte__",), 1), f"{text}config without it.")
+    return lines, content
 
 
 def _walk(file: Path, node: yaml.Node, path: KeyPath, lines: dict[KeyPath, int]) -> None:

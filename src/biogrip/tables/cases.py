@@ -50,7 +50,7 @@ def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:
 def errors_of_case(case: Case, identifications: Path) -> ShownTable:
     """Compare target and identified values of one case, given its identifications, CSV."""
     tolerance = case.study.near_noise_tolerance
-    found = read_identifications(identifications, case.study.shown)
+    found = read_identifications(identifications, case, case.study.shown)
     of_case: Row = {"case": case.name}
     if found["noise_rms"].notna().all():
         near = share_with_limits(int(near_noise(found, tolerance).sum()), len(found))

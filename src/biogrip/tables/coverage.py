@@ -13,6 +13,7 @@ from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.noise import standard_deviation
 from biogrip.records.identifications import INTERVALS
+from biogrip.records.rows import require_rows, seeds_of
 from biogrip.records.traces import read_target
 from biogrip.study.study import Study
 from biogrip.tables.cases import target_of
@@ -51,12 +52,12 @@ def coverage(
     """
     calibrations = iter(calibrated)
     rows: list[Row] = []
-    estimated = pd.concat([INTERVALS.read(it) for it in intervals], ignore_index=True)
+    estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
         experiment = case.experiment.calibrated([next(calibrations)] if case.is_calibrated else [])
         log_truth = experiment.logs(case.parameters)
         found = estimated[estimated["case"] == name]
-        time_s, _, rotation = read_target(target)
+        time_s, _, rotation = read_target(target, case.times_s)
         _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
         noise_sd = standard_deviation(rotation, case.noise)
         for quantity in parameters_and_sum(experiment.searched):
@@ -84,6 +85,24 @@ def coverage(
         "often than the confidence says."
     )
     return ShownTable(caption, _COLUMNS, rows)
+
+
+def read_intervals(study: Study, path: Path) -> pd.DataFrame:
+    """Read the intervals of a batch, which are of the same quantities in each of its seeds.
+
+    Seeds that are judged in full have all quantities.
+    """
+    case, found = study.cases[path.parent.name], INTERVALS.read(path)
+    every = [quantity.label for quantity in parameters_and_sum(case.experiment.searched)]
+    estimated = found.loc[found["estimate_rest_known"].notna(), "quantity"].unique()
+    often = case.block.identifiability.verdicts_every
+    wanted = (
+        (case.name, quantity, seed)
+        for seed in seeds_of(path.stem)
+        for quantity in (estimated if seed % often else every)
+    )
+    require_rows(path, found, ("case", "quantity", "seed"), wanted)
+    return found
 
 
 def _judged_seeds(study: Study) -> str:
@@ -150,7 +169,7 @@ _COUNT_COLUMNS = (
 def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
     """Count verdicts of whole profiles, and those whose limits hold the true value."""
     rows: list[Row] = []
-    estimated = pd.concat([INTERVALS.read(it) for it in intervals], ignore_index=True)
+    estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
     for name, case in study.cases.items():
         found = estimated[estimated["case"] == name]
         for quantity in parameters_and_sum(case.experiment.searched):

@@ -7,6 +7,7 @@ import pandas as pd
 
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.records.identifications import ENCODABLE, MODEL_FITS, read_identifications
+from biogrip.records.rows import seeds_of
 from biogrip.records.success import chi_square_increase, reached_encodable, share_with_limits
 from biogrip.study.study import Study
 from biogrip.tables.cases import error_percent, target_of
@@ -30,7 +31,7 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
     rows = []
     labels = {}
     for (name, case), path in zip(study.cases.items(), identifications, strict=True):
-        found = read_identifications(path)
+        found = read_identifications(path, case)
         found["increase"] = chi_square_increase(found, case.samples)
         found["least"] = chi_square_increase(found, case.samples, ENCODABLE)
         found["reached"] = reached_encodable(found, case.samples, study.optimum_tolerance)
@@ -80,7 +81,7 @@ _MODEL_COLUMNS = (
 
 def models(study: Study, fits: list[Path]) -> ShownTable:
     """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
-    found = pd.concat([MODEL_FITS.read(path) for path in fits])
+    found = pd.concat([read_fits(study, path) for path in fits])
     found["aic"], found["bic"] = aic_and_bic(found["misfit"], found["samples"], found["parameters"])
     rows = []
     for case, made in study.cases.items():
@@ -103,3 +104,9 @@ def models(study: Study, fits: list[Path]) -> ShownTable:
         "how many seeds it has the lowest."
     )
     return ShownTable(caption, _MODEL_COLUMNS, rows)
+
+
+def read_fits(study: Study, path: Path) -> pd.DataFrame:
+    """Read the fits of every model of a case, in the seeds of a batch."""
+    case = study.cases[path.parent.name]
+    return MODEL_FITS.read(path, case=[case.name], model=case.models, seed=seeds_of(path.stem))

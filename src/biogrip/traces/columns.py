@@ -221,7 +221,10 @@ def held_unit(value: float | str, controlled: Channel) -> tuple[float, str]:
 
     A `BiogripError` has the units that are allowed.
     """
-    number, written = number_and_unit(str(value))
+    try:
+        number, written = number_and_unit(str(value))
+    except ValueError as error:
+        raise BiogripError(f"--hold: {error}.") from error
     unit = known_unit(written, controlled.units) if written else controlled.si
     if unit is None:
         allowed = ", ".join(controlled.units)
