@@ -1,10 +1,15 @@
-"""Damaged traces: `biogrip identify` gives an answer or one message, and no traceback."""
+"""Damaged files: each command gives an answer or one message, and no traceback."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from biogrip.cli import main
+from biogrip.errors import BiogripError
+from biogrip.identify.settings import check_settings, is_table, read_table
+from biogrip.study.load import load_study, read_configs
+from biogrip.study.source import default_config
 from tests.helpers.identified import FEW, identify
 from tests.helpers.places import EXAMPLE
 
@@ -58,3 +63,151 @@ def test_a_damaged_trace_gives_an_answer_or_one_message(tmp_path: Path, seed: in
     assert said if status == 0 else f"\n{text}".count("\nbiogrip: ") == 1
     assert "fault of biogrip" not in text
     assert "\x1b" not in said + text
+
+
+WORDS = [
+    "nan",
+    "inf",
+    "0",
+    "-1",
+    "10,1",
+    "",
+    "1e400",
+    "1e-400",
+    "1e308",
+    "determined",
+    "Determined",
+]
+WORDS += [
+    "bounded above",
+    "not determined",
+    "fit rejected",
+    "ok",
+    "doubtfull",
+    "rejected",
+    "failed",
+]
+WORDS += ["0.9", "2", "1_0", "٣", "<b>", "\x1b[31m", "=1+1", "b", "a1"]
+
+
+def sheet(seed: int, header: list[str], rows: list[list[str]], words: list[str]) -> bytes:
+    """Return a CSV file with cells, columns, rows or bytes damaged in one to three ways."""
+    rng = np.random.default_rng([65, seed])
+    cells = np.array([header, *rows], object)
+    separator = ","
+    for way in rng.integers(0, 8, rng.integers(1, 4)):
+        row, column = rng.integers(1, len(cells)), rng.integers(cells.shape[1])
+        if way <= 2:
+            cells[row, column] = rng.choice(words)
+        elif way == 3:
+            cells[0, column] = rng.choice([*header, "", "x", f"{cells[0, column]}x"])
+        elif way == 4:
+            cells = np.delete(cells, column, axis=1)
+        elif way == 5:
+            other = rng.integers(cells.shape[1])
+            cells[1:, [column, other]] = cells[1:, [other, column]]
+        elif way == 6:
+            cells = cells[: row + 1]
+        else:
+            cells[rng.integers(1, len(cells), 3), column] += rng.choice(MARKS)
+    content = bytearray("\n".join(map(separator.join, cells)).encode() + b"\n")
+    if seed % 5 == 0:
+        content[rng.integers(len(content))] = rng.integers(256)
+    return bytes(content if seed % 7 else content[: rng.integers(len(content))])
+
+
+def found(trace: str, group: str, value: float) -> list[str]:
+    """Return a row of what `identify --csv` writes: k determined, c bounded or not told."""
+    numbers = [f"{it:.5g}" for it in (value, value / 1.1, value * 1.1)]
+    others = ["bounded above", "", "", "9"] if value > 20 else ["not determined", "", "", ""]
+    return [trace, group, trace, "ok", "0.95", "determined", *numbers, *others]
+
+
+@pytest.mark.parametrize("seed", range(2000))
+@pytest.mark.nightly
+@pytest.mark.filterwarnings("error")
+def test_a_damaged_table_of_groups_gives_numbers_or_one_message(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], seed: int
+) -> None:
+    header = ["trace", "dish", "cell", "fit", "confidence"]
+    for name in ("k", "c"):
+        header += [f"{name} verdict", *(f"{name} {it} (N/m)" for it in ("value", "low", "high"))]
+    rows = [
+        found(f"{group}{n}", group, 18 + n + 9 * (group == "b")) for group in "ab" for n in range(4)
+    ]
+    (tmp_path / "found.csv").write_bytes(sheet(seed, header, rows, WORDS))
+    status = main(["groups", str(tmp_path / "found.csv"), "--by", "dish"])
+    said, text = capsys.readouterr()
+    assert status in (0, 1)
+    assert text.count("\n") == status
+    assert "nan" not in said.replace(f"{tmp_path}", "")
+    assert "inf" not in said
+    assert "\x1b" not in said + text
+
+
+@pytest.mark.parametrize("seed", range(500))
+@pytest.mark.nightly
+@pytest.mark.filterwarnings("error")
+def test_a_damaged_sheet_asks_for_traces_or_is_refused(tmp_path: Path, seed: int) -> None:
+    header = [
+        "file",
+        "dish",
+        "measurement.time",
+        "fixed.c_p",
+        "protocol.phases",
+        "gripper.arm_length_m",
+    ]
+    rows = [[f"{n}.csv", "left", "time_s", "0", "[]", "3e-3"] for n in range(4)]
+    odd = [
+        *NUMBERS,
+        "1:30",
+        "[1",
+        "{a: 1}",
+        "&a [*a]",
+        "!!python/none",
+        "? x",
+        "off",
+        "0.csv",
+        ".",
+        "/",
+    ]
+    (tmp_path / "cells.csv").write_bytes(sheet(seed, header, rows, odd))
+    try:
+        check_settings(read_table(tmp_path / "cells.csv"))
+    except BiogripError as error:
+        assert 1 <= len(str(error).splitlines()) <= 8
+    assert isinstance(is_table(tmp_path / "cells.csv"), bool)
+
+
+@pytest.mark.parametrize("seed", range(500))
+@pytest.mark.nightly
+@pytest.mark.filterwarnings("error")
+def test_a_damaged_config_is_used_or_refused_with_its_line(tmp_path: Path, seed: int) -> None:
+    rng = np.random.default_rng([66, seed])
+    lines = default_config().read_text(encoding="utf-8").splitlines()
+    for way in rng.integers(0, 6, rng.integers(1, 4)):
+        at, other = rng.integers(len(lines), size=2)
+        key = lines[at].partition(":")[0]
+        if way == 0:
+            lines[at] = f"{key}: {rng.choice([*NUMBERS, '*a', '&a', '[', '{', '~', '!!set', 'no'])}"
+        elif way == 1:
+            lines[at] = rng.choice([" ", "\t", "- ", "# ", "? "]) + lines[at]
+        elif way == 2:
+            del lines[at : at + rng.integers(1, 6)]
+        elif way == 3:
+            lines[at], lines[other] = lines[other], lines[at]
+        elif way == 4:
+            lines[at] = lines[at].replace(key.strip()[-1:], "x", 1)
+        else:
+            lines.insert(at, lines[other])
+    content = bytearray("\n".join(lines).encode())
+    if seed % 4 == 0:
+        content[rng.integers(len(content))] = rng.integers(256)
+    (tmp_path / "mine.yaml").write_bytes(
+        content if seed % 7 else content[: rng.integers(len(content))]
+    )
+    try:
+        files = [default_config(), tmp_path / "mine.yaml"]
+        load_study(read_configs(files), files)
+    except BiogripError as error:
+        assert str(tmp_path / "mine.yaml") in str(error)

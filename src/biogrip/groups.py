@@ -12,7 +12,7 @@ compared by Welch's t, several with the first after Holm (Scandinavian Journal o
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import exp, log, sqrt
+from math import exp, inf, log, nan, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,13 @@ from biogrip.digits import counted, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs
 from biogrip.identify.outputs import FAILED, WRITTEN_BY, check_output
-from biogrip.judging.doubts import DOUBTFUL, REJECTED
-from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED
+from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
+from biogrip.judging.verdicts import (
+    BOUNDED_ABOVE,
+    BOUNDED_BELOW,
+    DETERMINED,
+    NOT_DETERMINED,
+)
 from biogrip.records.rows import read_rows, write_rows
 from biogrip.terminal import aligned, visible, visible_lines
 from biogrip.traces.columns import trace_file_problem
@@ -39,7 +44,17 @@ COLUMNS = "cells", "determined", "median", "low", "high", "ratio", "ratio_low", 
 
 Compared = dict[tuple[str, str], dict[str, Any]]
 
-_VALUE = re.compile(r"(.*) value(?: \((.*)\))?")
+_OF_QUANTITY = re.compile(r"(.*) (verdict|low|value|high)(?: \((.*)\))?")
+# By verdict the numbers that tell it, ascending.
+_NUMBERS: dict[str, tuple[str, ...]] = {
+    DETERMINED: ("low", "value", "high"),
+    BOUNDED_BELOW: ("low",),
+    BOUNDED_ABOVE: ("high",),
+    **{NOT_DETERMINED: (), "": ()},
+}
+_CONFIDENCES = 0.5, 0.99
+# Five digits know a logarithm no better; limits of traces without noise may be equal.
+_LEAST_WIDTH = 1e-4
 _ONE_SIDED = {BOUNDED_ABOVE: ("at most", "lower"), BOUNDED_BELOW: ("at least", "higher")}
 
 
@@ -138,26 +153,33 @@ def groups(found: Path, by: str, table: Path | None) -> None:
     if problem := trace_file_problem(found):
         raise BiogripError(f"FOUND: {problem}")
     header, *rows = read_rows(found)
-    traces = [dict(zip(header, map(visible, row), strict=False)) for row in rows]
-    for name in ("trace", "fit", "confidence", by):
-        if name not in header:
+    units = _units(header)
+    columns = [column for item in units.items() for column in _columns(*item).values()]
+    for name in ("trace", "fit", "confidence", by, *columns):
+        if header.count(name) != 1:
+            many, near = ("two", "") if name in header else ("no", nearest(name, header))
             raise BiogripError(
-                f"{visible(found)}: found no column '{name}'; allowed is a table that `biogrip "
-                f"identify --csv` wrote, and of --by a column of it.{nearest(name, header)}"
+                f"{visible(found)}: found {many} column '{name}'; allowed is a table that `biogrip "
+                f"identify --csv` wrote, and of --by a column of it.{near}"
             )
+    traces = [dict(zip(header, map(visible, row), strict=True)) for row in rows]
+    for number, own in enumerate(traces, start=2):
+        for column, allowed in _complaints(own, by, units):
+            where = f"{visible(found)}, row {number} ({own['trace']}), {column}"
+            raise BiogripError(f"{where}: found '{own[column]}'; allowed is {allowed}.")
     if table is not None:
         refuse_inputs([table], [found])
         check_output(table)
     used = [own for own in traces if own["fit"] not in (REJECTED, FAILED) and own[by]]
-    levels = sorted({own["confidence"] for own in used})
+    levels = sorted({float(own["confidence"]) for own in used})
     if len(levels) != 1:
+        of = " and ".join(map(str, levels)) or "no trace of a group"
         raise BiogripError(
-            f"{visible(found)}: found limits of {' and '.join(levels) or 'no trace of a group'}; "
-            "allowed are those of one confidence, of traces whose fits are not rejected."
+            f"{visible(found)}: found limits of {of}; allowed are those of one confidence, of "
+            "traces whose fits are not rejected."
         )
-    confidence = float(levels[0])
+    (confidence,) = levels
     names = list(dict.fromkeys(own[by] for own in traces if own[by]))
-    units = {it[1]: it[2] or "" for name in header if (it := _VALUE.fullmatch(name))}
     cells = _cells(used, by, units, confidence)
     compared = compare(cells, names, confidence)
     lines = [
@@ -177,6 +199,57 @@ def groups(found: Path, by: str, table: Path | None) -> None:
         print(f"Written to {visible(table)}.")
 
 
+def _units(header: Sequence[str]) -> dict[str, str]:
+    """Return quantities with their units; other columns, as a lone ``p value``, are the user's."""
+    found: dict[str, dict[str, str]] = {}
+    for name, what, unit in (it.groups("") for it in map(_OF_QUANTITY.fullmatch, header) if it):
+        found.setdefault(name, {})[what] = unit
+    return {name: max(of.values()) for name, of in found.items() if "verdict" in of or len(of) == 3}
+
+
+def _columns(name: str, unit: str) -> dict[str, str]:
+    """Return the columns of a quantity by what they have."""
+    numbers = {what: with_unit(f"{name} {what}", unit) for what in _NUMBERS[DETERMINED]}
+    return {"verdict": f"{name} verdict"} | numbers
+
+
+def _complaints(
+    own: Mapping[str, str], by: str, units: Mapping[str, str]
+) -> Iterator[tuple[str, str]]:
+    """Yield columns of a row with what `identify` does not write there, and what is allowed.
+
+    Of a trace that is left out only its fit counts.
+    """
+    fits = OK, DOUBTFUL, REJECTED, FAILED
+    if own["fit"] not in fits:
+        yield "fit", ", ".join(fits)
+    if own["fit"] in (REJECTED, FAILED) or not own[by]:
+        return
+    low, high = _CONFIDENCES
+    if not low <= _number(own["confidence"]) <= high:
+        yield "confidence", f"a number from {low} to {high}"
+    for columns in map(_columns, units, units.values()):
+        verdict = columns["verdict"]
+        if own[verdict] not in _NUMBERS:
+            yield verdict, ", ".join(_NUMBERS).rstrip(", ")
+            return
+        least, above = 0.0, "above 0"
+        for what in _NUMBERS[own[verdict]]:
+            number = _number(own[columns[what]])
+            if not (least <= number < inf and number > 0):
+                yield columns[what], f"a number {above}"
+                return
+            least, above = number, f"of at least {number:g}, its {what}"
+
+
+def _number(text: str) -> float:
+    """Return the number in a cell, nan if there is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return nan
+
+
 def _cells(
     traces: Sequence[Mapping[str, str]], by: str, units: Mapping[str, str], confidence: float
 ) -> list[Cell]:
@@ -189,14 +262,15 @@ def _cells(
     for cell in cells.values():
         cell.doubtful = any(own["fit"] == DOUBTFUL for own in cell.traces)
         for name, unit in units.items():
-            value, low, high = (with_unit(f"{name} {it}", unit) for it in ("value", "low", "high"))
-            some = [own for own in cell.traces if own[f"{name} verdict"] == DETERMINED]
+            verdict, low, value, high = _columns(name, unit).values()
+            some = [own for own in cell.traces if own[verdict] == DETERMINED]
             if some:
                 logs = [log(float(own[value])) for own in some]
-                weights = [(width / log(float(own[high]) / float(own[low]))) ** 2 for own in some]
+                widths = [log(float(own[high])) - log(float(own[low])) for own in some]
+                weights = [(width / max(it, _LEAST_WIDTH)) ** 2 for it in widths]
                 cell.known[name] = float(np.average(logs, weights=weights)), sum(weights) ** -0.5
-            elif verdict := cell.traces[0][f"{name} verdict"]:
-                cell.others[name] = verdict, cell.traces[0][low] or cell.traces[0][high]
+            elif said := cell.traces[0][verdict]:
+                cell.others[name] = said, cell.traces[0][low] or cell.traces[0][high]
     return [*cells.values()]
 
 
