@@ -29,7 +29,6 @@ from biogrip.files import write_text
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
-from biogrip.fit.methods import share_in_words
 from biogrip.fit.problem import Fit, TraceProblem, silent
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED, compute_status, examine_residuals
@@ -40,6 +39,7 @@ from biogrip.physics.models import Sample
 from biogrip.physics.noise import stream
 from biogrip.physics.protocol import Phase, hold, ramp
 from biogrip.physics.simulation import simulated_response
+from biogrip.records.success import share_in_words
 
 INSTRUMENTS_JUDGED = ("creep", "relaxation", "gripper")
 READINGS = (10, 20, 40, 80, 400, 4000)

@@ -40,7 +40,7 @@ def case() -> Case:
 
 @cache
 def _posed() -> Experiment:
-    return case().problem.to_identify()
+    return case().experiment.to_identify()
 
 
 @cache
@@ -95,6 +95,6 @@ def noisy_trace(seed: int = 0) -> NoisyTrace:
         time_s,
         trace_rad,
         rms(trace_rad - clean),
-        make_genome(model, case().problem.ranges),
+        make_genome(model, case().experiment.ranges),
         genetic,
     )

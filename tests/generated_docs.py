@@ -19,7 +19,7 @@ from scipy.stats import chi2
 from biogrip.cli import main
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
-from biogrip.fit.methods import identifier, share_in_words
+from biogrip.fit.methods import identifier
 from biogrip.fit.problem import silent
 from biogrip.page.answers import (
     compared_rows,
@@ -31,6 +31,7 @@ from biogrip.page.answers import (
 from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.rows import read_table
+from biogrip.records.success import share_in_words
 from biogrip.terminal import QUIET
 from tests.helpers.default import study_of
 from tests.helpers.key_reference import file_schema, reference
@@ -178,7 +179,7 @@ def slow_branch() -> str:
         study_of(f"cases: {{liquid_drop_1: {{fixed: {fixed}}}}}").case("liquid_drop_1")
         for fixed in ("{}", f"{{c: {_SLOW}}}")
     )
-    posed = case.problem.to_identify(), slow.problem.to_identify()
+    posed = case.experiment.to_identify(), slow.experiment.to_identify()
     time_s = case.times_s
     given = case.gripper, case.network, case.torque, time_s
     (target,) = simulated_response(*given, nonlinear=False)
@@ -187,9 +188,7 @@ def slow_branch() -> str:
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
     identify = identifier("least_squares", case.block.least_squares)
     free, held = (
-        np.array(
-            [each.misfit for each in identify([it.of(time_s, t) for t in traces], rngs, silent)]
-        )
+        np.array([each.misfit for each in identify(it.of_each(time_s, traces), rngs, silent)])
         for it in posed
     )
     limit = chi2.ppf(case.confidence, 1)
@@ -244,7 +243,9 @@ def shorter_arms() -> str:
 
 
 def _quantities(text: str) -> str:
-    return "\n".join(line[2:] for line in text.splitlines() if line.startswith("      "))
+    lines = [line.removeprefix("    ") for line in text.splitlines()]
+    told = (line for line in lines if line.startswith(("  ", "Any linear sample")))
+    return "\n".join(f"    {line.removeprefix('  ')}" for line in told)
 
 
 def command_help() -> str:

@@ -68,7 +68,7 @@ def test_a_design_is_better_keeps_its_limits_and_runs(
         assert label in said
     (case,) = study_of(output.read_text()).cases.values()
     assert max(phase.level for phase in case.phases) <= 1.6e-9 * (1 + 1e-12)
-    assert case.problem.torque.end_s == pytest.approx(400.0)
+    assert case.experiment.torque.end_s == pytest.approx(400.0)
     assert len(case.times_s) == 4001
     # The same command gives the same bytes.
     before = output.read_bytes()
@@ -86,7 +86,7 @@ def test_the_search_knows_the_bounds_of_a_train() -> None:
     train, step = search(specimens, limits, 20)[0], 1e-4
     for one in specimens:
         found = rated(one, train.phases, limits.rate_Hz)
-        problem = replace(one.case.problem, phases=train.phases)
+        problem = replace(one.case.experiment, phases=train.phases)
 
         def read(shift: Array, one: Specimen = one, problem: Experiment = problem) -> Array:
             values = dict(zip(problem.searched.names, one.parameters * np.exp(shift), strict=True))
@@ -109,8 +109,8 @@ def test_the_search_knows_the_force_of_the_jaws() -> None:
     pressed = []
     for unknowns in np.random.default_rng(0).random((30, 2 * limits.steps)):
         train = decode(unknowns, limits)
-        torque = replace(one.case.problem, phases=train.phases).torque
-        network = one.case.problem.searched.network(one.parameters[None])
+        torque = replace(one.case.experiment, phases=train.phases).torque
+        network = one.case.experiment.searched.network(one.parameters[None])
         grip = compute_grip(one.case.gripper, network, torque, nonlinear=False)
         pressed.append(grip.lowest_N > 0)
         share = one.told(train)[1]
@@ -138,7 +138,7 @@ def test_parameters_that_trade_have_no_bound() -> None:
     """All four of the paper's drop under its own protocol: c and c_p show as their sum alone."""
     _, (one,) = set_up_of("only: [liquid_drop_2]\nmeasurement: {noise: {level_rad: 3.0e-6}}")
     found = rated(one, one.case.phases, one.case.block.measurement.rate_Hz)
-    by_name = dict(zip(one.case.problem.searched.names, found.bounds, strict=True))
+    by_name = dict(zip(one.case.experiment.searched.names, found.bounds, strict=True))
     assert by_name["c"] == by_name["c_p"] == NO_BOUND
     assert by_name["k_p"] < 0.1
 

@@ -52,6 +52,7 @@ def test_a_drift_that_a_sample_could_have_shown_is_suspected(seed: int) -> None:
     assert "k_p would be " in said
 
 
+@pytest.mark.nightly
 def test_a_trace_that_does_not_drift_is_not_suspected() -> None:
     """Each would be in three of a thousand traces, by each of the tests."""
     for seed in range(3):
@@ -130,7 +131,9 @@ def test_a_power_law_is_not_taken_for_an_offset_and_a_drift(
 @pytest.mark.parametrize(
     ("model", "names"), [("burgers", "c_s"), ("maxwell", "c"), ("generalized_maxwell", "c + c_p")]
 )
-@pytest.mark.parametrize("noise_model", ["white", "coloured"])
+@pytest.mark.parametrize(
+    "noise_model", ["white", pytest.param("coloured", marks=pytest.mark.nightly)]
+)
 def test_flow_under_a_constant_load_is_said_to_look_like_a_drift(
     model: str, names: str, noise_model: str
 ) -> None:

@@ -64,7 +64,7 @@ def test_the_heaviest_note_decides() -> None:
 @pytest.mark.nightly
 def test_a_wrong_set_up_determines_nothing(wrong: str, noise_model: str) -> None:
     found = identified(WRONG[wrong], noise_model=noise_model)
-    assert "trace.csv: fit rejected" in str(found).splitlines()
+    assert "trace: fit rejected" in str(found).splitlines()
     assert "determined:" not in str(found)
     assert found.data["reasons"][0] in str(found)
     assert {item["verdict"] for item in found.data["quantities"]} == {"fit rejected"}

@@ -53,7 +53,7 @@ def test_a_config_fixes_an_option_adds_and_it_is_said_everywhere(tmp_path: Path)
     found = json.loads((tmp_path / "f.json").read_text())
     assert found["assumed"]["fixed"] == {"k": 20.0, "c_p": 50.0}
     assert "Fixed: k = 20 N/m, c_p = 50 N s/m." in said
-    assert "no other sample models are tried" in said
+    assert "Other models are not compared, because k and c_p were fixed." in said
     assert found["models"] == []
     assert "Fixed: k = 20 N/m, c_p = 50 N s/m." in page.read_text()
     header, row = (line.split(",") for line in table.read_text().splitlines())

@@ -11,8 +11,8 @@ from scipy.stats import ttest_ind
 
 from biogrip.arrays import Array
 from biogrip.cli import main
+from biogrip.command.outputs import WRITTEN_BY
 from biogrip.groups import FEWEST_CELLS, Cell, adjusted, compare, estimate
-from biogrip.identify.outputs import WRITTEN_BY
 from tests.helpers.identified import FEW, identify
 from tests.helpers.places import ROOT
 
@@ -121,8 +121,9 @@ def written(folder: Path, rows: Sequence[dict[str, str]], header: Sequence[str] 
 def said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
     """What the command prints of rows."""
 
-    def say(rows: Sequence[dict[str, str]], *options: str) -> str:
-        assert main(["groups", str(written(tmp_path, rows)), "--by", "dish", *options]) == 0
+    def say(rows: Sequence[dict[str, str]], *options: str, header: Sequence[str] = HEADER) -> str:
+        found = str(written(tmp_path, rows, header))
+        assert main(["groups", found, "--by", "dish", *options]) == 0
         return capsys.readouterr().out
 
     return say
@@ -151,6 +152,23 @@ def test_what_is_left_out_is_named(said: Said, rows: list[dict[str, str]]) -> No
     assert "Left out, the fit is rejected: slipped.csv." in found
     assert "Left out, not identified: gone.csv." in found
     assert "Left out, nothing under dish: odd.csv." in found
+
+
+def test_a_rejected_model_leaves_what_any_linear_sample_shows(
+    said: Said, rows: list[dict[str, str]]
+) -> None:
+    """Of the model the same numbers as of any sample; a trace that no sample gives has neither."""
+    free = {name: name.replace("k ", "G(1 s) ") for name in HEADER[5:9]}
+    every = [row | {name: row[own] for own, name in free.items()} for row in rows]
+    none = {**dict.fromkeys(HEADER[6:9], ""), "fit": "rejected", "k verdict": "fit rejected"}
+    for number, linear in ((0, "yes"), (1, "no")):
+        every[number] |= {**none, "linear": linear}
+    found = said(every, header=[*HEADER[:-2], *free.values(), "linear", *HEADER[-2:]])
+    lines = [line for line in found.splitlines() if "left  " in line]
+    assert [line for line in lines if line.startswith("k (N/m)") and "3 of 3" in line]
+    assert [line for line in lines if line.startswith("G(1 s) (N/m)") and "4 of 4" in line]
+    assert "Left out, the fit is rejected: left1.csv." in found
+    assert "Of the model left out, whose fit is rejected: left0.csv." in found
 
 
 def test_cells_that_are_only_bounded_are_named_with_what_follows(
@@ -270,7 +288,7 @@ def test_identify_and_groups_say_the_same_of_a_cell(
     assert f"Left out, the fit is rejected: {folder / 'b5.csv'}." in found
     assert "Averages of several traces: a2 (2)." in found
     ratios = pd.read_csv(table).query("group == 'treated'").set_index("quantity")
-    assert ratios["cells"].tolist() == [5] * 4
+    assert ratios["cells"].tolist() == [5] * 6
     for quantity, ratio in (("k", 1.5), ("k_p", 1.5), ("c", 1.0)):
         row = ratios.loc[quantity]
         assert row["ratio_low"] < ratio < row["ratio_high"]

@@ -24,9 +24,9 @@ SOLID = Sample("zener_maxwell")
 TRUTH = {"k": 300.0, "k_p": 200.0, "c": 900.0}
 FOUND = TRUTH | {"tau": 3.0}
 TIMES: Array = 0.1 * np.arange(1.0, 301.0)
-# What only a gripper has; `rad` as a unit or at the end of a key.
+# What only a gripper has; `rad` as a unit or at the end of a key, but for angular frequencies.
 OF_A_GRIPPER = re.compile(
-    r"\b(jaws?|torques?|rotations?|gripper|arms?|rad)\b|_rad\b", re.IGNORECASE
+    r"\b(jaws?|torques?|rotations?|gripper|arms?|rad(?!/s))\b|_rad\b", re.IGNORECASE
 )
 NOT_READ = re.compile(r"<style.*?</style>|<script.*?</script>|data:[^\"]*", re.DOTALL)
 # What is held, SI units, by what is read.

@@ -85,10 +85,13 @@ def test_columns_of_pandas_are_identified_as_by_the_command(tmp_path: Path) -> N
     config = compared(*models)
     result = library.identify_trace(FRAME["t"], FRAME[["strain"]], **HELD, **own, **config)
     FRAME.to_csv(tmp_path / "trace.csv", index=False)
-    options = "--time t --set measurement.time_unit=s --reading strain=strain --hold 5 --start 85"
+    options = "--time t --set measurement.time_unit=s --reading strain=strain --start 85"
     options += " --model zener_kelvin --offset --noise 2e-4"
     given = yaml.safe_dump(config["config"])
-    found = identified(tmp_path, tmp_path / "trace.csv", *options.split(), config=given)
+    told = *options.split(), "--hold", "5e-3 kPa"
+    found = identified(tmp_path, tmp_path / "trace.csv", *told, config=given)
+    assert found["load"] == f"Held: 0.005 kPa from 85 s to {FRAME['t'].iloc[-1]:g} s."
+    assert f"\nHeld: 5 Pa from 85 s to {FRAME['t'].iloc[-1]:g} s.\n" in str(result)
     frame = result.to_frame()
     assert list(frame.index) == [*TRUTH, "tau_v"]
     for quantity in found["quantities"]:
@@ -130,7 +133,11 @@ def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read() -> N
         ({"config": {"protocl": {}}}, "protocl"),
         ({"time_s": FRAME}, r"time_s: found the shape \(325, 2\), allowed is one column"),
         ({"time_s": ["a"]}, "time_s: could not convert .*; allowed are numbers"),
-        ({"time_s": FRAME["t"][::-1]}, "trace.csv, line 3, .* allowed are times that increase"),
+        ({"time_s": pd.to_datetime(["2026-01-01"])}, "time_s: found datetime64.*; allowed are num"),
+        (
+            {"time_s": FRAME["t"][::-1]},
+            r"time_s\[1\]: .* \(\[0\]\), allowed are times that increase",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_said_by_the_name_of_the_argument(
@@ -142,13 +149,29 @@ def test_what_cannot_be_used_is_said_by_the_name_of_the_argument(
         )
 
 
+def test_times_of_pandas_are_seconds_and_masked_readings_are_gaps() -> None:
+    """Three readings are ten times too large; another is at the instant of the step."""
+    times = np.linspace(0.0, 10.0, 101)
+    strain = 0.1 * (1 - np.exp(-2 * times)) + 1e-4 * np.random.default_rng(1).normal(size=101)
+    clock = pd.to_timedelta(1e6 * times, unit="us").astype("timedelta64[us]")
+    wrong = np.arange(101) % 30 == 20
+    masked = np.ma.array(np.where(wrong, 10 * strain, strain), mask=wrong)
+    told = library.identify_trace(
+        pd.Series(clock), masked, reads="strain", hold=100.0, model="kelvin_voigt", **compared()
+    )
+    assert (told.status, told.data["samples"]) == ("ok", 97)
+    limits = told.to_frame().loc[["k_p", "c_p"]]
+    assert np.all((limits["low"] < [1000, 500]) & (limits["high"] > [1000, 500]))
+
+
 def test_all_of_the_library_can_be_had_from_the_package() -> None:
     assert all(getattr(biogrip, name) is getattr(library, name) for name in library.__all__)
 
 
 def test_it_identifies_as_the_default_study() -> None:
     assert STUDY.ranges == library._RANGES
-    assert all(case.block.least_squares == library._BUDGET for case in STUDY.cases.values())
+    budgets = [case.block.least_squares for case in STUDY.cases.values()]
+    assert all(budget == CREEP.least_squares for budget in budgets)
 
 
 def test_what_is_not_there_is_said_as_everywhere() -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import yaml
 
+from biogrip.command import files as command
+from biogrip.command.settings import Asked, Setting, is_table, read_table
 from biogrip.errors import BiogripError
-from biogrip.identify import identify as command
-from biogrip.identify.settings import Setting, is_table, read_table
 from biogrip.library import Sample, hold, set_up, simulate
 from tests.helpers.default import STUDY
 from tests.helpers.identified import identify as run
@@ -107,7 +107,7 @@ def test_a_table_is_told_by_its_column(tmp_path: Path, name: str, separator: str
     path = tmp_path / name
     text = "\ufefffile|dish||fixed.c_p|'cell, no'\nd1/a.csv|left|||\n\n|||\nb.csv||| 0\nc.csv|NA\n"
     path.write_text(text.replace("|", separator).replace("'", '"'), encoding="utf-8")
-    assert is_table(path)
+    assert is_table(Asked(path))
     setting = Setting(f"{path}, line 5", ("fixed", "c_p"), 0)
     assert [(row.place, row.trace, row.settings, row.copied) for row in read_table(path)] == [
         (f"{path}, line {line}", tmp_path / trace, settings, {"dish": dish, "cell, no": ""})
@@ -122,7 +122,7 @@ def test_a_table_is_told_by_its_column(tmp_path: Path, name: str, separator: str
 @pytest.mark.parametrize("text", ["", "time_s,rotation_rad\n1,2\n", "profile\n1\n", "\0\xff"])
 def test_a_trace_is_no_table(tmp_path: Path, text: str) -> None:
     (tmp_path / "a.csv").write_text(text)
-    assert not is_table(tmp_path / "a.csv")
+    assert not is_table(Asked(tmp_path / "a.csv"))
 
 
 def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("File,dish\na.csv,1\n", "line 1: found no column 'file' among File, dish; allowed is one"),
+        ("fil,dish\na.csv,1\n", "line 1: found no column 'file' among fil, dish; allowed is one"),
         ("file\n", "found no traces, allowed is a row for each."),
         ("file,dish\n,left\n", "line 2, column 'file': found nothing, allowed is a trace."),
         ("file\na.csv,left\n", "line 2: found 2 cells in the row, allowed are the header's 1."),
@@ -243,10 +243,79 @@ def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None
     # As a batch of a workflow.
     usual = [Setting("--model", ("sample", "model"), "kelvin_voigt")]
     given = ([Path("cells.tsv")], Path("few.yaml"), usual)
-    assert command.identify(*given, table=Path("some.csv"), rows=(2, 4)) == 0
+    assert command.identify_files(*given, table=Path("some.csv"), rows=(2, 4)) == 0
     assert [row["trace"] for row in listed("some.csv")] == [row[0] for row in rows[2:5]]
     assert not list(here.glob("*.json"))
     for row in rows:
         write(here / "cells.tsv", [header, row])
         assert identify("cells.tsv")[0] == 0
         assert found(row[0]) == written[row[0]]
+
+
+@pytest.mark.parametrize("name", ["File", "File name", "file_name", "filename", "path", "Trace"])
+def test_the_column_of_files_has_many_names(tmp_path: Path, name: str) -> None:
+    (tmp_path / "a.csv").write_text("time_s,rotation_rad\n")
+    path = tmp_path / "cells.csv"
+    path.write_text(f"dish,{name}\nleft,a.csv\n")
+    assert is_table(Asked(path))
+    assert [(own.trace, own.copied) for own in read_table(path)] == [
+        (tmp_path / "a.csv", {"dish": "left"})
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "settings"),
+    [
+        ("time_s,rotation_rad,file\n0,1,run7\n1,2,run7\n", ()),
+        ("t,file,phi_rad\n0,run7,1\n1,run7,2\n", {"time": "t", "rotation": "phi_rad"}),
+        ("path,C:/data/run7.dat\ntime_s,rotation_rad\n0,1\n", ()),
+    ],
+)
+def test_a_trace_with_a_column_of_files_is_a_trace(
+    tmp_path: Path, text: str, settings: dict[str, str]
+) -> None:
+    path = tmp_path / "c.csv"
+    path.write_text(text)
+    given = (Setting("--x", ("measurement", key), it) for key, it in dict(settings).items())
+    assert not is_table(Asked(path, settings=tuple(given)))
+
+
+def test_an_option_is_a_column_too(tmp_path: Path) -> None:
+    path = tmp_path / "cells.csv"
+    path.write_text(
+        "file,hold,Start,noise-model,model,stress_Pa\na.csv,10,fit,coloured,maxwell,10\n"
+    )
+    (own,) = read_table(path)
+    assert {setting.path: setting.value for setting in own.settings} == {
+        ("--hold",): 10,
+        ("measurement", "fit_start"): True,
+        ("measurement", "noise_model"): "coloured",
+        ("sample", "model"): "maxwell",
+    }
+    assert own.copied == {"stress_Pa": "10"}
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("arm_length_m", "gripper.arm_length_m"),
+        ("Arm length", "gripper.arm_length_m"),
+        ("arm_lenght_m", "gripper.arm_length_m"),
+        ("stress_Pa", "hold"),
+        ("hold_Pa", "hold"),
+        ("noise (rad)", "noise"),
+        ("start_s", "start"),
+    ],
+)
+def test_what_looks_like_a_setting_is_not_copied_beside_the_result(
+    tmp_path: Path, name: str, meant: str
+) -> None:
+    path = tmp_path / "cells.csv"
+    path.write_text(f"file,{name}\na.csv,1.2e-3\n")
+    assert refused(path) == [
+        f"{path}, line 1, column '{name}': looks like a setting and is none; allowed is '{meant}' "
+        "for a column that sets it, in SI units, or a name unlike a setting's."
+    ]
+    # Words are no setting, nor are names of other things.
+    path.write_text(f"file,{name},length_um,passage,day\na.csv,low,12,3,4\n")
+    assert list(read_table(path)[0].copied) == [name, "length_um", "passage", "day"]

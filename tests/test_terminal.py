@@ -91,6 +91,21 @@ def test_progress_and_warnings_are_shown(
         assert not OBEYED.search(text)
 
 
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_commands_progress_is_no_output(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    alone: bool,
+) -> None:
+    """A job's is: its log has what goes to standard error."""
+    monkeypatch.setattr(terminal, "_EVERY_S", 0.0)
+    with terminal.Progress("a", 1, live=alone) as told:
+        told.done()
+    shown = capsys.readouterr()
+    assert (shown.err if alone else shown.out) == "a: 1 of 1 done\n"
+    assert (shown.out if alone else shown.err) == ""
+
+
 @pytest.mark.parametrize("command", ["identify", "groups", "design"])
 def test_examples_are_commands_that_can_be_typed(
     command: str, capsys: pytest.CaptureFixture[str]

@@ -9,7 +9,8 @@ OPTIONS = """
 import sys
 from biogrip.cli import _SETTINGS, _parser
 
-VALUES = {"--hold": "5", "--set": "measurement.block=2", "--fix": "k_p=0", "--start": "1.5"}
+VALUES = {"--hold": "5", "--set": "measurement.block=2", "--fix": "k_p=0"}
+VALUES |= {"--start": "1.5", "--at": "1,10"}
 parser = _parser()
 for name, _, metavar, _ in (option for options in _SETTINGS.values() for option in options):
     given = [name, VALUES.get(name, "a")] if metavar else [name]
@@ -26,7 +27,7 @@ from threadpoolctl import threadpool_info
 
 import biogrip
 from biogrip import library
-from biogrip.identify import notebook
+from biogrip.command import notebook
 
 def threads():
     return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}

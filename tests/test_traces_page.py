@@ -12,13 +12,13 @@ from typing import Any
 import PIL.Image
 import pytest
 
+from biogrip.command import files as command
+from biogrip.command.files import identify_batch
+from biogrip.command.outputs import Outcome
+from biogrip.command.page import draw_strip, write_page
+from biogrip.command.settings import Asked, Setting
 from biogrip.digits import within_limits
 from biogrip.figures.style import BLUE
-from biogrip.identify import identify as command
-from biogrip.identify.one_trace import identify_batch
-from biogrip.identify.outputs import Outcome
-from biogrip.identify.page import draw_strip, write_page
-from biogrip.identify.settings import Asked, Setting
 from tests.helpers.browser import Opened
 from tests.helpers.identified import FEW
 from tests.helpers.places import EXAMPLE
@@ -100,7 +100,7 @@ def test_pictures_are_small_and_in_the_page(page: Path) -> None:
     text = page.read_text()
     pictures = re.findall('src="data:image/png;base64,([^"]+)"', text)
     # Two a trace, and one a quantity.
-    assert len(pictures) == 2 * 12 + 6 == len(re.findall("<img", text))
+    assert len(pictures) == 3 * 12 + 6 == len(re.findall("<img", text))
     for encoded in pictures:
         content = base64.b64decode(encoded)
         assert len(content) < 60_000
@@ -134,7 +134,7 @@ def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(
     traces = [Path(shutil.copy(EXAMPLE, tmp_path / name)) for name in ("a.csv", "b.csv")]
     monkeypatch.setattr(command, "MOST_DRAWN", 1)
     model = [Setting("--model", ("sample", "model"), "liquid_drop")]
-    assert command.identify(traces, few, model, report=tmp_path / "page.html") == 0
+    assert command.identify_files(traces, few, model, report=tmp_path / "page.html") == 0
     text = (tmp_path / "page.html").read_text()
     assert text.count("<img") == 4
     assert "too many traces for pictures" in text

@@ -24,13 +24,11 @@ from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import Fit
-from biogrip.identify.trace_case import ranges_of
+from biogrip.identify.prepare import prepare, ranges_of
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.library import Phase, Sample, hold, identify_sample, judge, simulate
-from biogrip.records.traces import Measurements
-from biogrip.stages.recording import read_checked
 from biogrip.study.load import load_study, read_configs
-from biogrip.study.study import Case
+from biogrip.traces.reader import Recording, read_recording
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ("config/config.yaml", "config/measured.yaml")
@@ -48,11 +46,11 @@ Said = Mapping[str, tuple[float | None, float | None, float | None]]
 
 
 @cache
-def _recorded(name: str) -> tuple[Case, Measurements]:
+def _recorded(name: str) -> tuple[Recording, Experiment]:
     files = [ROOT / file for file in CONFIGS]
     case = load_study(read_configs(files), files).cases[name]
     file = ROOT / f"data/measured/{name}.csv"
-    return case, read_checked(file, case.problem, case.columns)
+    return prepare(read_recording(file, case.columns), case.experiment)
 
 
 @dataclass(frozen=True)
@@ -69,7 +67,7 @@ class Task:
 
     @cached_property
     def _chosen(self) -> BoolArray:
-        time_s = _recorded(self.name)[1].time_s
+        time_s = _recorded(self.name)[0].time_s
         start, end = self.load_s or (-np.inf, np.inf)
         chosen: BoolArray = (time_s > start) & (time_s < end)
         return chosen
@@ -78,22 +76,22 @@ class Task:
     def time_s(self) -> Array:
         """Times since the step, (n_samples,)."""
         start = self.load_s[0] if self.load_s else 0.0
-        return np.asarray(_recorded(self.name)[1].time_s[self._chosen] - start)
+        return np.asarray(_recorded(self.name)[0].time_s[self._chosen] - start)
 
     @property
     def data(self) -> Array:
         """Readings in SI units, (n_samples,)."""
-        return np.asarray(_recorded(self.name)[1].readings[0][self._chosen])
+        return np.asarray(_recorded(self.name)[0].readings[self._chosen])
 
     def deviations(self, measure: str) -> Array | None:
         """Return what readings are divided by, (n_samples,), or none if by nothing."""
         if measure == RELATIVE:
             return np.abs(self.data)
-        return _recorded(self.name)[1].sd if measure == KNOWN else None
+        return _recorded(self.name)[0].sd if measure == KNOWN else None
 
     def experiment(self, measure: str) -> Experiment:
         """Return what biogrip is told, with the search ranges of `biogrip identify`."""
-        given = _recorded(self.name)[0].problem
+        given = _recorded(self.name)[1]
         phases: tuple[Phase, ...] = given.phases
         if self.load_s:
             phases = (hold(self.load_s[1] - self.load_s[0], 1.0),)

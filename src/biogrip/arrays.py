@@ -1,7 +1,7 @@
 """Array types for signatures, slicing of long arrays, and columns of numbers."""
 
 from collections.abc import Iterator
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,12 +22,20 @@ def parts(count: int, at_once: int) -> Iterator[slice]:
 def as_column(values: ArrayLike, name: str) -> Array:
     """Return an array, list or column of pandas as numbers, (n,); the name is for messages.
 
-    A `BiogripError` says that these are no numbers, or more than one column.
+    Time differences are in seconds, and what is masked is NaN. A `BiogripError` says that these are
+    no numbers, or more than one column.
     """
     try:
-        found = np.array(values, dtype=float)
+        given: Any = np.ma.asanyarray(values)
+        if given.dtype.kind == "m":
+            given = given / np.timedelta64(1, "s")
+        elif given.dtype.kind in "cM":
+            raise TypeError(f"found {given.dtype}")
+        found = np.ma.filled(given.astype(float), np.nan)
     except (TypeError, ValueError) as error:
-        raise BiogripError(f"{name}: {error}; allowed are numbers.") from error
+        raise BiogripError(
+            f"{name}: {error}; allowed are numbers, or times since the start."
+        ) from error
     if found.ndim != 1 and found.shape != (len(found), 1):
         raise BiogripError(f"{name}: found the shape {found.shape}, allowed is one column.")
     return found.ravel()

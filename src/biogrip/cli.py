@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from biogrip import __version__
+from biogrip.command.options import KEYS
 from biogrip.errors import BiogripError
 from biogrip.terminal import visible, visible_lines
 
@@ -110,11 +111,14 @@ def _start(text: str) -> tuple[tuple[str, ...], Any]:
 
 def _hold(text: str) -> tuple[tuple[str, ...], Any]:
     from biogrip.study.source import HOLD
+    from biogrip.traces.columns import number_and_unit
 
     with suppress(ValueError):
-        if (value := float(text)) and math.isfinite(value):
-            return HOLD, value
-    raise argparse.ArgumentTypeError(f"found '{text}', allowed is a number, and not 0")
+        number, unit = number_and_unit(text)
+        if number and math.isfinite(number):
+            return HOLD, text if unit else number
+    form = "allowed is a number, and not 0, with its unit or in SI units"
+    raise argparse.ArgumentTypeError(f"found '{text}', {form}")
 
 
 def _fix(text: str) -> tuple[tuple[str, ...], Any]:
@@ -123,6 +127,12 @@ def _fix(text: str) -> tuple[tuple[str, ...], Any]:
         if name:
             return ("fixed", name), float(value)
     raise argparse.ArgumentTypeError(f"found '{text}', allowed is NAME=VALUE, as in k_p=0")
+
+
+def _at(text: str) -> tuple[tuple[str, ...], Any]:
+    with suppress(ValueError):
+        return ("identifiability", "at_s"), [float(each) for each in text.split(",")]
+    raise argparse.ArgumentTypeError(f"found '{text}', allowed are times in s, as in 1,10,100")
 
 
 def _any_key(text: str) -> tuple[tuple[str, ...], Any]:
@@ -140,40 +150,42 @@ def _any_key(text: str) -> tuple[tuple[str, ...], Any]:
 
 _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
     "the file's columns": [
-        ("--time", "measurement.time", "COLUMN", "of times [time_s]"),
+        ("--time", KEYS["time"], "COLUMN", "of times [time_s]"),
         (
             *("--reading", _reading, "[QUANTITY=]COLUMN"),
             "of readings [rotation=rotation_rad]; or displacement, strain, compliance (creep), "
             "force, stress, modulus (relaxation)",
         ),
-        ("--sd", "measurement.sd", "COLUMN", "of the readings' standard deviations"),
+        ("--sd", KEYS["sd"], "COLUMN", "of the readings' standard deviations"),
     ],
     "what was done": [
         (
             *("--hold", _hold, "VALUE"),
-            "what was held from 0 to the end, without a config: a stress in Pa for a strain, a "
-            "force in N for a displacement, and the reverse; 1 for a compliance or a modulus",
+            "what was held from 0 to the end, without a config: a stress for a strain, a force for "
+            "a displacement, and the reverse, as in '20 pN', 5mbar or 5%%, or in SI units; 1 for a "
+            "compliance or a modulus",
         ),
-        ("--load", "measurement.load", "COLUMN", "of what was held, as recorded, instead"),
+        ("--load", KEYS["load"], "COLUMN", "of what was held, as recorded, instead"),
         ("--start", _start, "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
-        ("--from", "measurement.from_s", "SECONDS", "first time of the clock to use [all]"),
-        ("--until", "measurement.until_s", "SECONDS", "last time of the clock to use [all]"),
+        ("--from", KEYS["from"], "SECONDS", "first time of the clock to use [all]"),
+        ("--until", KEYS["until"], "SECONDS", "last time of the clock to use [all]"),
     ],
     "the noise and the instrument": [
-        ("--noise", "measurement.noise_rad", "SD", "known noise, in the readings' SI unit"),
-        ("--noise-model", "measurement.noise_model", "NAME", "white, or coloured: autocorrelated"),
+        ("--noise", KEYS["noise"], "SD", "known noise, in the readings' SI unit"),
+        ("--noise-model", KEYS["noise_model"], "NAME", "white, or coloured: autocorrelated"),
         (
             "--noise-share",
-            "measurement.noise_share",
+            KEYS["noise_share"],
             "SHARE",
             "known noise, as a share of the readings",
         ),
-        ("--offset", "measurement.offset", "", "fit an offset along, or not"),
-        ("--drift", "measurement.drift", "", "fit a linear drift along, or not"),
+        ("--offset", KEYS["offset"], "", "fit an offset along, or not"),
+        ("--drift", KEYS["drift"], "", "fit a linear drift along, or not"),
     ],
     "the sample": [
-        ("--model", "sample.model", "NAME", "sample model [generalized_maxwell]"),
+        ("--model", KEYS["model"], "NAME", "sample model [generalized_maxwell]"),
         ("--fix", _fix, "NAME=VALUE", "known parameter, SI units; 0 for no element; repeatable"),
+        ("--at", _at, "SECONDS,...", "times after a step at which to tell what any model would"),
     ],
     "any other key of the config": [
         (
@@ -267,10 +279,10 @@ def _design_parser(stages: Any) -> None:
 
 
 def _identify(options: argparse.Namespace) -> int:
-    from biogrip.identify.identify import identify
-    from biogrip.identify.settings import Setting
+    from biogrip.command.files import identify_files
+    from biogrip.command.settings import Setting
 
-    return identify(
+    return identify_files(
         options.traces,
         options.config,
         [Setting(*each) for each in options.settings],

@@ -17,9 +17,9 @@ import yaml
 
 from biogrip import __version__
 from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.command.outputs import WRITTEN_BY, check_output
 from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs, write_text
-from biogrip.identify.outputs import WRITTEN_BY, check_output
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.protocol import Phase, hold, join_phases, largest_load, sample_times
@@ -100,7 +100,9 @@ class Specimen:
     @property
     def parameters(self) -> Array:
         """Values of the searched parameters, (n_parameters,)."""
-        return np.array([self.case.parameters[name] for name in self.case.problem.searched.names])
+        return np.array(
+            [self.case.parameters[name] for name in self.case.experiment.searched.names]
+        )
 
     def told(self, train: Train) -> tuple[Array, float]:
         """Return relative bounds under a train, (n_parameters,), and the jaws' least force.
@@ -177,7 +179,7 @@ def set_up(cases: Sequence[Case], block: DesignBlock) -> tuple[Limits, list[Spec
     if block.largest is not None:
         largest = float(np.copysign(block.largest, largest))
     rate_Hz = min(case.block.measurement.rate_Hz for case in cases)
-    duration_s = block.duration_s or min(case.problem.torque.end_s for case in cases)
+    duration_s = block.duration_s or min(case.experiment.torque.end_s for case in cases)
     intervals = int(duration_s * rate_Hz * (1 + 1e-12))
     if intervals < _FEWEST:
         text = f"found room for {intervals} readings at {rate_Hz:g} Hz, allowed are at least "
@@ -191,7 +193,7 @@ def _problem(case: Case, first: Case) -> str | None:
     measured, controlled = case.block.measurement, case.instrument.controlled
     if case.recorded:
         return "found a recorded trace, allowed is a sample with values."
-    for name in case.problem.searched.names:
+    for name in case.experiment.searched.names:
         if not case.parameters[name]:
             return f"found {name} = 0, allowed is a value above 0, or the 0 under `fixed`, too."
     if controlled != first.instrument.controlled:
@@ -208,7 +210,7 @@ def _problem(case: Case, first: Case) -> str | None:
 
 
 def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
-    problem, model, network = case.problem, case.problem.searched, case.network
+    problem, model, network = case.experiment, case.experiment.searched, case.network
     required = np.array([name in (block.parameters or model.names) for name in model.names])
     # The noise of an instrument: that of its own sample under its own protocol.
     read = simulated_response(case.gripper, network, problem.torque, case.times_s, nonlinear=False)
@@ -284,7 +286,7 @@ def rated(specimen: Specimen, phases: tuple[Phase, ...], rate_Hz: float) -> Expe
 
     If it turns the arms further than the comb drives can, it is a `BiogripError`.
     """
-    case, problem = specimen.case, replace(specimen.case.problem, phases=phases)
+    case, problem = specimen.case, replace(specimen.case.experiment, phases=phases)
     times_s, model = sample_times(problem.torque.end_s, rate_Hz), problem.searched
     given = problem.gripper, model, problem.torque, times_s, specimen.parameters[None]
     read, *slopes = linear_responses(*given)[0]
@@ -333,7 +335,7 @@ def _said(
     for one, within, *both in zip(specimens, reached, before, after, strict=True):
         name, instrument = one.case.name, one.case.instrument
         controlled, read = instrument.controlled, instrument.read
-        for index, parameter in enumerate(one.case.problem.searched.names):
+        for index, parameter in enumerate(one.case.experiment.searched.names):
             percents = (_percent(each.bounds[index]) for each in both)
             rows.append((name, f"{parameter}: bound (%)", *percents))
             if one.required[index] and not within[index]:

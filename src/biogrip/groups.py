@@ -21,15 +21,16 @@ from scipy.special import ndtri, stdtr, stdtrit
 
 from biogrip import __version__
 from biogrip.arrays import Array
+from biogrip.command.outputs import FAILED, LINEAR, WRITTEN_BY, check_output
 from biogrip.digits import counted, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs
-from biogrip.identify.outputs import FAILED, WRITTEN_BY, check_output
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
     DETERMINED,
+    FIT_REJECTED,
     NOT_DETERMINED,
 )
 from biogrip.records.rows import read_rows, write_rows
@@ -50,7 +51,7 @@ _NUMBERS: dict[str, tuple[str, ...]] = {
     DETERMINED: ("low", "value", "high"),
     BOUNDED_BELOW: ("low",),
     BOUNDED_ABOVE: ("high",),
-    **{NOT_DETERMINED: (), "": ()},
+    **{NOT_DETERMINED: (), FIT_REJECTED: (), "": ()},
 }
 _CONFIDENCES = 0.5, 0.99
 # Five digits know a logarithm no better; limits of traces without noise may be equal.
@@ -70,6 +71,10 @@ class Cell:
     """Logarithm of each quantity that is determined, and its standard error."""
     others: dict[str, tuple[str, str]] = field(default_factory=dict)
     """Verdict of each other quantity, and its only limit as text, or ""."""
+
+    def rejects(self, quantity: str) -> bool:
+        """Return True if a quantity is of a model that the traces reject."""
+        return self.others.get(quantity, ("",))[0] == FIT_REJECTED
 
 
 @dataclass(frozen=True)
@@ -120,13 +125,15 @@ def adjusted(p_values: Sequence[float]) -> list[float]:
 def compare(cells: Sequence[Cell], groups: Sequence[str], confidence: float) -> Compared:
     """Return `COLUMNS` by quantity and group; ratio and p value are against the first group.
 
-    A median takes `FEWEST_CELLS` that determine the quantity, and no fewer than do not.
+    A median takes `FEWEST_CELLS` that determine the quantity, and no fewer than do not. Of cells
+    whose fit is rejected it takes what is told without a model.
     """
     found: Compared = {}
     for quantity in dict.fromkeys(name for cell in cells for name in cell.known | cell.others):
         estimates: dict[str, Estimate] = {}
         for group in groups:
-            all_known = [cell.known.get(quantity) for cell in cells if cell.group == group]
+            these = [it for it in cells if it.group == group and not it.rejects(quantity)]
+            all_known = [cell.known.get(quantity) for cell in these]
             known = [own for own in all_known if own]
             found[quantity, group] = {"cells": len(all_known), "determined": len(known)}
             if len(known) >= max(FEWEST_CELLS, len(all_known) / 2):
@@ -170,13 +177,13 @@ def groups(found: Path, by: str, table: Path | None) -> None:
     if table is not None:
         refuse_inputs([table], [found])
         check_output(table)
-    used = [own for own in traces if own["fit"] not in (REJECTED, FAILED) and own[by]]
+    used = [own for own in traces if own[by] and _is_used(own)]
     levels = sorted({float(own["confidence"]) for own in used})
     if len(levels) != 1:
         of = " and ".join(map(str, levels)) or "no trace of a group"
         raise BiogripError(
             f"{visible(found)}: found limits of {of}; allowed are those of one confidence, of "
-            "traces whose fits are not rejected."
+            "traces that were identified."
         )
     (confidence,) = levels
     names = list(dict.fromkeys(own[by] for own in traces if own[by]))
@@ -223,7 +230,7 @@ def _complaints(
     fits = OK, DOUBTFUL, REJECTED, FAILED
     if own["fit"] not in fits:
         yield "fit", ", ".join(fits)
-    if own["fit"] in (REJECTED, FAILED) or not own[by]:
+    if not (_is_used(own) and own[by]):
         return
     low, high = _CONFIDENCES
     if not low <= _number(own["confidence"]) <= high:
@@ -250,6 +257,11 @@ def _number(text: str) -> float:
         return nan
 
 
+def _is_used(trace: Mapping[str, str]) -> bool:
+    """Return True if a trace tells anything; of a rejected fit, without its model."""
+    return trace["fit"] != FAILED and (trace["fit"] != REJECTED or trace.get(LINEAR) == "yes")
+
+
 def _cells(
     traces: Sequence[Mapping[str, str]], by: str, units: Mapping[str, str], confidence: float
 ) -> list[Cell]:
@@ -260,7 +272,7 @@ def _cells(
         cells.setdefault((name, own[by]), Cell(name, own[by])).traces.append(own)
     width = 2 * float(ndtri((1 + confidence) / 2))
     for cell in cells.values():
-        cell.doubtful = any(own["fit"] == DOUBTFUL for own in cell.traces)
+        cell.doubtful = any(own["fit"] != OK for own in cell.traces)
         for name, unit in units.items():
             verdict, low, value, high = _columns(name, unit).values()
             some = [own for own in cell.traces if own[verdict] == DETERMINED]
@@ -293,8 +305,10 @@ def _printed(compared: Compared, first: str, units: Mapping[str, str]) -> str:
 def _left_out(traces: Sequence[Mapping[str, str]], by: str, cells: Sequence[Cell]) -> Iterator[str]:
     """Say which traces are left out, and which are averaged."""
     for status, why in ((REJECTED, "the fit is rejected"), (FAILED, "not identified")):
-        if names := [own["trace"] for own in traces if own["fit"] == status]:
+        if names := [it["trace"] for it in traces if it["fit"] == status and not _is_used(it)]:
             yield f"Left out, {why}: {', '.join(names)}."
+    if names := [own["trace"] for own in traces if own["fit"] == REJECTED and _is_used(own)]:
+        yield f"Of the model left out, whose fit is rejected: {', '.join(names)}."
     if names := [own["trace"] for own in traces if not own[by]]:
         yield f"Left out, nothing under {by}: {', '.join(names)}."
     if names := [f"{it.name} ({len(it.traces)})" for it in cells if len(it.traces) > 1]:
@@ -310,5 +324,6 @@ def _not_known(cells: Sequence[Cell], compared: Compared) -> Iterator[str]:
             if some := [f"{cell} ({words} {end})" for cell, it, end in others if it == verdict]:
                 what = f"{name} of {group}: only bounded in {', '.join(some)}, which the median"
                 yield f"{what} leaves out: that of all cells is {moved}."
-        if some := [cell for cell, verdict, _ in others if verdict not in _ONE_SIDED]:
+        told = {*_ONE_SIDED, FIT_REJECTED}
+        if some := [cell for cell, verdict, _ in others if verdict not in told]:
             yield f"{name} of {group}: nothing is told by {', '.join(some)}."

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array, as_column
+from biogrip.command.notebook import TraceResult, identify_trace, one_blas_thread
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
-from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
+from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import Fit, silent
-from biogrip.identify.notebook import TraceResult, identify_trace, one_blas_thread
 from biogrip.judging.diagnosis import Diagnosis, diagnose, with_times
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
@@ -36,7 +36,6 @@ _RANGES = {
     "c_p": GeneRange((-4, 5), (1, 9)),
     "alpha": GeneRange((-1, 0), (1, 9)),
 }
-_BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
 
 
 def set_up(
@@ -120,7 +119,9 @@ def identify_sample(
         Seed of the starts.
     """
     problem = experiment.of(as_column(time_s, "time_s"), as_column(readings, "readings"))
-    return identify_many([problem], _BUDGET, [np.random.default_rng(seed)], silent)[0]
+    return identify_many(
+        [problem], experiment.least_squares, [np.random.default_rng(seed)], silent
+    )[0]
 
 
 @one_blas_thread

@@ -63,7 +63,7 @@ class Progress:
     def __init__(self, what: str, total: int, *, live: bool = False, quiet: bool = False) -> None:
         self._what = visible(what)
         self._total = total
-        self._live = live and sys.stderr.isatty()
+        self._alone, self._live = live, live and sys.stderr.isatty()
         self._quiet = quiet or QUIET in os.environ
         self._done = 0
         self._phase = ""
@@ -106,8 +106,9 @@ class Progress:
             print(f"{CLEARED}{said}", end="", file=sys.stderr, flush=True)
         elif now - self._said >= _EVERY_S and not self._quiet:
             self._said = now
-            # To standard output, so that it does not fill the job's log.
-            print(said, flush=True)
+            # Of a job to standard output, so that it does not fill the log; there a command prints
+            # its results.
+            print(said, file=sys.stderr if self._alone else sys.stdout, flush=True)
 
 
 def warn(text: str) -> None:

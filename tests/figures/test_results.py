@@ -32,7 +32,7 @@ TIME_S = np.arange(0.0, 400.5, 1.0)
 
 
 def response(values: list[float]) -> Array:
-    problem = STUDY.cases[CASE].problem
+    problem = STUDY.cases[CASE].experiment
     network = problem.model.network(np.array([values]))
     device = problem.gripper, network, problem.torque
     found: Array = simulated_response(*device, TIME_S, nonlinear=False)[0]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.fit.any_sample import proportional_deviations
+from biogrip.fit.any_sample import fit_any_sample, proportional_deviations
 from tests.helpers.default import STUDY
 from tests.helpers.problems import clean
 
@@ -15,7 +15,7 @@ CLEAN_S, CLEAN = clean("endothelial_cell", 2.0)
 
 
 def deviations(trace: Array, share: float = 0.05, **given: Any) -> Array:
-    problem = replace(STUDY.cases["endothelial_cell"].problem, noise_share=share, **given)
+    problem = replace(STUDY.cases["endothelial_cell"].experiment, noise_share=share, **given)
     return proportional_deviations(problem, CLEAN_S, trace)
 
 
@@ -57,3 +57,12 @@ def test_an_offset_is_not_rotation() -> None:
     found = deviations(CLEAN + 3 * CLEAN.max(), offset=True)
     large = np.quantile(CLEAN, 0.2) < CLEAN
     np.testing.assert_allclose(found[large], 0.05 * CLEAN[large], rtol=0.1)
+
+
+def test_of_readings_against_the_load_nothing_is_fitted() -> None:
+    residuals = STUDY.cases["endothelial_cell"].experiment.of(CLEAN_S, -CLEAN).residuals
+    fit = fit_any_sample(residuals)
+    assert not fit.amplitudes.any()
+    left, basis = fit.left_of_readings()
+    np.testing.assert_array_equal(left, -CLEAN)
+    assert basis.shape == (0, len(CLEAN))

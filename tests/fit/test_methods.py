@@ -4,21 +4,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit import genetic, least_squares
 from biogrip.fit.least_squares import best_of_starts, fit_from, refine_optima
 from biogrip.fit.local_fits import PRIOR_WIDTH, ROUGH, LocalFits, alike
-from biogrip.fit.methods import (
-    ALL,
-    METHODS,
-    basins,
-    identifier,
-    near_noise,
-    near_noise_words,
-)
+from biogrip.fit.methods import METHODS, identifier
 from biogrip.fit.problem import TraceProblem, silent
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.noise import rms
@@ -132,28 +124,6 @@ def test_offset_and_drift_are_fitted_along() -> None:
         k, _, c, c_p = answer.parameters
         assert k == pytest.approx(1.0, rel=0.05)
         assert c + c_p == pytest.approx(10.0, rel=0.03)
-
-
-def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:
-    runs = pd.DataFrame({"seed": range(len(misfit)), "misfit": misfit, "noise_rms": noise})
-    return runs.astype({"noise_rms": float})
-
-
-def test_two_basins_have_a_tenth_of_the_runs_each() -> None:
-    """And none is told where the noise is unknown, or absent."""
-    one = basins(found([1.05, 1.01, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), 0.02)
-    assert {name: len(runs) for name, runs in one.items()} == {ALL: 20}
-    two = basins(found([1.05, 1.06, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), 0.02)
-    assert two["above the noise"]["seed"].tolist() == [0, 1]
-    assert two["near the noise"]["seed"].tolist() == list(range(2, 20))
-    for noise in (None, 0.0):
-        assert list(basins(found([3.0, 1.0], [noise, noise]), 0.02)) == [ALL]
-
-
-def test_near_the_noise_is_a_share_of_it() -> None:
-    runs = found([1.019, 1.021, 2.03, 1.0], [1.0, 1.0, 2.0, None])
-    np.testing.assert_array_equal(near_noise(runs, 0.02), [True, False, True, False])
-    assert near_noise_words(0.025) == "within 2.5 % of the noise"
 
 
 def starts_of(problem: TraceProblem, count: int) -> Array:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import spearmanr
 
 from biogrip.arrays import Array
 from biogrip.fit.noise_model_fit import (
@@ -10,6 +11,7 @@ from biogrip.fit.noise_model_fit import (
     _noise_model,
     compute_growth,
     outliers_of,
+    significance_of_growth,
 )
 from biogrip.physics.noise import AR1, Noise, add_noise
 from biogrip.physics.whitening import NoiseModel
@@ -42,21 +44,21 @@ def restricted(
 @pytest.mark.parametrize(
     ("colours", "growing"),
     [
-        ([(0.3, 5.0, 0.2), (0.9, 1.0, 0.05), (0.01, 100.0, 0.6)], None),
-        ([(0.3, 5.0, 0.2, 0.4), (0.01, 100.0, 0.6, 0.3899)], np.linspace(0.1, 2.0, 200)),
+        ([(0.3, 5, 0.2, 0, 0.1), (0.9, 1, 0.05, 0, 1e-3), (0.01, 100, 0.6, 0, 0.3)], None),
+        ([(0.3, 5, 0.2, 0.4, 0.05), (0.01, 9, 0.6, 0.37, 0.01)], np.linspace(0.1, 2.0, 200)),
     ],
 )
 def test_the_likelihood_is_that_of_dense_matrices(
     colours: list[tuple[float, ...]], growing: Array | None
 ) -> None:
-    """Differences between colours, less the prior on the share of 1/f noise; twelve digits are
-    there, and the condition of the matrices takes four."""
+    """Differences between colours, less the prior on 1/f noise and a third of a walk; twelve digits
+    are there, and the condition of the matrices takes four."""
     left = np.random.default_rng(1).standard_normal(200)
     likelihood = NoiseModelLikelihood(TIMES, left, DIRECTIONS, growing)
     found, expected = [], []
     for noise_model in (NoiseModel(*shares) for shares in colours):
         x = _logarithms(noise_model)
-        found.append(likelihood._deviance(x) + x[2])
+        found.append(likelihood._deviance(x) + np.log(np.exp(x[2]) + np.exp(x[3]) / 3))
         expected.append(restricted(TIMES, DIRECTIONS, left, noise_model, growing))
     np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-8)
 
@@ -64,8 +66,8 @@ def test_the_likelihood_is_that_of_dense_matrices(
 def test_degrees_of_freedom_are_those_of_satterthwaite() -> None:
     """2 over the variance of the logarithm that the noise model leaves uncertain.
 
-    Its information is that of dense matrices and of a prior of three e-folds. Both sides have the
-    errors of their finite differences.
+    Its information is that of dense matrices and of priors. Both sides have the errors of their
+    finite differences.
     """
     noise = Noise("gaussian", 1.0, "peak", ar1=AR1(0.6, 8.0))
     left = add_noise(np.ones(200), noise, np.random.default_rng(1), TIMES)
@@ -76,7 +78,8 @@ def test_degrees_of_freedom_are_those_of_satterthwaite() -> None:
     rows = np.vstack((sensitivity, nuisance))
 
     def deviance(x: Array) -> float:
-        return restricted(TIMES, DIRECTIONS, left, _noise_model(x))
+        slow = np.log(np.exp(x[2]) + np.exp(x[3]) / 3)
+        return restricted(TIMES, DIRECTIONS, left, _noise_model(x)) - slow
 
     def log_variances(x: Array) -> Array:
         matrix = correlation(TIMES, _noise_model(x))
@@ -84,15 +87,18 @@ def test_degrees_of_freedom_are_those_of_satterthwaite() -> None:
         covariance = np.linalg.inv(rows @ inverse @ rows.T)[:2, :2]
         dense = matrix, DIRECTIONS @ inverse @ DIRECTIONS.T
         determinants = sum(np.linalg.slogdet(each)[1] for each in dense)
-        scale = np.exp((deviance(x) - determinants) / 197) / 197
+        scale = (
+            np.exp((deviance(x) + np.log(np.exp(x[2]) + np.exp(x[3]) / 3) - determinants) / 197)
+            / 197
+        )
         return np.log(np.diagonal(covariance) * scale)
 
-    x, steps = _logarithms(noise_model), 0.1 * np.eye(3)
+    x, steps = _logarithms(noise_model), 0.1 * np.eye(4)
     second = [
         [sum(i * j * deviance(x + i * a + j * b) for i, j in SIGNS) / 0.04 for a in steps]
         for b in steps
     ]
-    information = 0.5 * np.array(second) + np.eye(3) / 9
+    information = 0.5 * np.array(second) + np.eye(4) / 9
     slopes = np.array([log_variances(x + a) - log_variances(x - a) for a in steps]) / 0.2
     spread = np.diagonal(slopes.T @ np.linalg.solve(information, slopes))
     found = likelihood.freedom(noise_model, sensitivity, nuisance)
@@ -109,6 +115,17 @@ def test_noise_that_is_the_same_everywhere_seldom_grows() -> None:
         bool(np.ptp(compute_growth(rng.standard_normal(400), ROTATION))) for _ in range(500)
     )
     assert grown <= 1.5 + 4 * np.sqrt(1.5)
+
+
+@pytest.mark.parametrize("decimals", [0, 1, 8])
+def test_significance_is_scipys(decimals: int) -> None:
+    """With ties, rising and falling."""
+    rng = np.random.default_rng(2)
+    for count in (4, 30, 300):
+        size = np.round(rng.standard_normal(count), decimals)
+        for apart in (rng.random(count), rng.random(count) + 0.3 * size, -size):
+            theirs = spearmanr(size, apart, alternative="greater").pvalue
+            assert significance_of_growth(apart, size) == pytest.approx(theirs, abs=1e-12)
 
 
 @pytest.mark.parametrize("floor", [0.0, 0.1])

@@ -23,7 +23,7 @@ from biogrip.physics.whitening import MOST_SAMPLES
 from tests.helpers.default import STUDY
 
 CASE = STUDY.cases["liquid_drop_2"]
-POSED = CASE.problem
+POSED = CASE.experiment
 TIMES = np.linspace(0, POSED.torque.end_s, 801)
 TRUTH = POSED.logs(CASE.parameters)
 

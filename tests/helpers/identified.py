@@ -11,7 +11,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.cli import main
-from biogrip.identify.notebook import TraceResult, identify_trace
+from biogrip.command.notebook import TraceResult, identify_trace
 from biogrip.library import Sample, set_up, simulate
 from tests.helpers.default import STUDY
 

@@ -22,7 +22,7 @@ from tests.helpers.default import STUDY
 
 MODEL = MODELS["generalized_maxwell"]
 SAMPLES = {name: case.parameters for name, case in STUDY.cases.items()}
-EXPERIMENT = STUDY.cases["liquid_drop_2"].problem
+EXPERIMENT = STUDY.cases["liquid_drop_2"].experiment
 GRIPPER, TORQUE = EXPERIMENT.gripper, EXPERIMENT.torque
 
 

@@ -9,18 +9,17 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from biogrip.arrays import Array
-from biogrip.identify.notebook import identify_trace
+from biogrip.command.notebook import identify_trace
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
+    HARMLESS,
     OK,
-    REJECTION,
     examine_residuals,
     find_slow_misfit,
     has_fast_noise,
 )
 from biogrip.judging.likelihood import make_likelihood
-from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.noise import AR1, Noise, Outliers, add_noise
 from biogrip.physics.whitening import NoiseModel
 from tests.helpers.default import seen
@@ -83,7 +82,38 @@ def test_a_given_noise_is_held_against_what_parameters_leave(beyond: float, said
     noise_sd = fit.misfit * np.sqrt(len(times) / (beyond * chi2.isf(0.003, 7)))
     held = make_likelihood(problem, fit.best, fit.misfit, confidence=0.95, noise_sd=noise_sd)
     notes = examine_residuals(held).notes
-    assert any(note.text.startswith("The noise that was given") for note in notes) == said
+    assert any("the noise that was given" in note.text for note in notes) == said
+
+
+@pytest.mark.parametrize(
+    ("times", "weight", "said"),
+    [
+        (1e-4, DOUBT, "is 10000 times the noise that was given: its value or unit"),
+        (0.5, DOUBT, "is 2 times the noise that was given"),
+        (0.85, HARMLESS, "is 1.18 times the noise that was given: limits are too narrow"),
+        (1.0, "", ""),
+        (1e5, DOUBT, "The noise that was given is 100000 times"),
+    ],
+)
+def test_a_stated_noise_moves_no_optimum_and_is_all_that_is_said(
+    times: float, weight: str, said: str
+) -> None:
+    """A scale of the noise scales chi-squared alone; fits end to ten digits."""
+    time_s = np.linspace(0.25, 100, 400)
+    noise = np.random.default_rng(2).standard_normal(400)
+    noise /= np.std(noise) * np.sqrt(400 / 397)
+    readings = 100 + 80 * np.exp(-time_s / 20) + noise
+    config: dict[str, Any] = {"model_selection": {"models": []}}
+    given: dict[str, Any] = {"reads": "modulus", "model": "zener_maxwell", "config": config}
+    found = identify_trace(time_s, readings, noise=times, **given)
+    without = identify_trace(time_s, readings, **given)
+    values = [[each["value"] for each in one.data["quantities"]] for one in (found, without)]
+    assert values[0] == pytest.approx(values[1], rel=1e-9)
+    assert found.data["misfit_rad"] == pytest.approx(without.data["misfit_rad"], rel=1e-12)
+    # Of limits that are too narrow, a ramp before the first reading is said to move one.
+    notes = [note for note in found.data["notes"] if "If the load was" not in note["text"]]
+    assert [note["weight"] for note in notes] == [weight] * bool(weight)
+    assert all(said in note["text"] for note in notes)
 
 
 def left_by(noise: str) -> Array:
@@ -107,23 +137,33 @@ def test_fast_noise_is_neither_smooth_nor_in_one_place(noise: str, fast: bool) -
 
 
 @pytest.mark.parametrize(
-    ("share", "time_s", "of_peak", "weight"),
+    ("share", "time_s", "error", "walk", "said"),
     [
-        (0.6, 10.0, 0.03, REJECTION),
-        (0.6, 10.0, 0.01, DOUBT),
-        (0.6, 7.0, 0.03, None),
-        (0.4, 100.0, 0.03, DOUBT),
-        (0.4, 70.0, 0.03, None),
-        (0.3, 400.0, 0.03, None),
+        (0.6, 10.0, 0.0, 0.0, "is correlated over 10 s of a trace of 400 s, 60 % of its variance"),
+        # Two standard deviations of the time below it are 8 s, a fiftieth of the trace, or less.
+        (0.6, 10.0, 0.1, 0.0, "is correlated over 10 s"),
+        (0.6, 10.0, 0.12, 0.0, ""),
+        (0.6, 7.0, 0.0, 0.0, ""),
+        (0.4, 100.0, 0.0, 0.0, "is correlated over 100 s"),
+        (0.4, 70.0, 0.0, 0.0, ""),
+        (0.3, 400.0, 0.0, 0.0, ""),
+        (0.1, 400.0, 0.0, 0.4, "walks at random, 40 % of its variance"),
+        (0.1, 400.0, 0.0, 0.3, ""),
+        # Odds of two, of which two standard deviations leave 0.54, more than a half, or 0.49.
+        (0.1, 400.0, 0.65, 2 / 3, "walks at random, 67 % of its variance"),
+        (0.1, 400.0, 0.7, 2 / 3, ""),
     ],
 )
-def test_share_and_time_decide(
-    share: float, time_s: float, of_peak: float, weight: str | None
+def test_share_and_time_less_its_error_decide(
+    share: float, time_s: float, error: float, walk: float, said: str
 ) -> None:
-    note = find_slow_misfit(NoiseModel(share, time_s, 0.0), 400.0, of_peak, GRIPPER)
-    assert (note and note.weight) == weight
+    noise_model = NoiseModel(share, time_s, 0.0, walk=walk)
+    note = find_slow_misfit(noise_model, (error, error), 400.0, 0.03, lambda: "it is so")
+    assert (note is not None) == bool(said)
+    assert note is None or (note.weight == DOUBT and said in note.text)
 
 
+@pytest.mark.nightly
 def test_noise_that_grows_over_decades_is_weighed_and_its_share_advised() -> None:
     """A Maxwell liquid, whose first readings hardly count without weights; then all holds."""
     times = np.geomspace(1e-4, 1e4, 90)

@@ -1,10 +1,13 @@
 """Noise, thresholds and covariance by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from biogrip.judging.likelihood import Likelihood, covariance, make_likelihood
+from biogrip.judging.likelihood import Likelihood, check_rows, covariance, make_likelihood
 from tests.helpers.default import seen
+from tests.helpers.problems import likelihood_of, problem
 
 
 def likelihood_with(freedom: float) -> Likelihood:
@@ -38,7 +41,31 @@ def test_a_parameter_that_is_told_to_less_than_an_e_fold_counts() -> None:
     assert found == pytest.approx(np.array([[2.0, -1.0], [-1.0, 2.0]]) / 3)
 
 
+def test_what_a_trace_without_noise_tells_may_outweigh_every_prior() -> None:
+    """Two parameters of which it tells the sum, to 1e-12: their prior is lost in rounding."""
+    rows = np.array([[[0.0], [1e12], [1e12]]])
+    residuals = seen(samples=100, free=100, freedom=np.inf, condensed_responses=lambda best: rows)
+    given = seen(residuals=residuals), np.zeros(2), 1.0
+    likelihood = make_likelihood(*given, confidence=0.95, noise_sd=1.0)
+    total = seen(gradient=lambda best: np.ones(2))
+    assert likelihood.deviation(total) == pytest.approx(1e-12)
+
+
 def test_noise_that_grows_has_the_covariance_of_unweighted_fits() -> None:
     """Of a slope from readings at 10 and 20: (10^2 + 20^2 3^2) / (10^2 + 20^2)^2."""
     found = covariance(np.array([[10.0, 20.0]]), np.array([1.0, 3.0]))
     assert found[0, 0] == pytest.approx(3700 / 500**2)
+
+
+def test_rows_of_another_misfit_than_that_of_the_readings_have_no_limits() -> None:
+    """A reading is moved behind the back of the rows, by four standard deviations of the noise."""
+    likelihood = likelihood_of(problem("liquid_drop_1", 0))
+    check_rows(likelihood)
+    residuals = likelihood.problem.residuals
+    readings = residuals.trace.readings + 0.0
+    readings[7] += 4 * likelihood.noise_sd
+    moved = replace(residuals.trace, readings=readings)
+    moved.__dict__["rows"] = residuals.trace.rows
+    posed = replace(likelihood.problem, residuals=replace(residuals, trace=moved))
+    with pytest.raises(ArithmeticError, match="stand for readings with"):
+        check_rows(replace(likelihood, problem=posed))

@@ -7,6 +7,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit.local_fits import FINE
+from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood
@@ -14,8 +15,19 @@ from biogrip.judging.profiles import Profile, compute_profiles, find_gaps
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding
 from biogrip.physics.models import MODELS
+from biogrip.physics.response import step_response, superpose
+from biogrip.physics.sample_model import with_fixed
 from biogrip.stages.intervals import judge_quantities
-from tests.helpers.problems import MODEL, clean, likelihood_of, posed_for, problem, run
+from tests.helpers.problems import (
+    GRIPPER,
+    MODEL,
+    TORQUE,
+    clean,
+    likelihood_of,
+    posed_for,
+    problem,
+    run,
+)
 from tests.helpers.scipy_fits import lowest_rise, rise_with_held
 
 QUANTITIES = parameters_and_sum(MODEL)
@@ -52,7 +64,8 @@ def test_an_optimum_that_was_missed_is_judged_again() -> None:
     right, again = (diagnose(experiment, maxwell, f, confidence=0.95) for f in (found, missed))
     assert again.likelihood.misfit == pytest.approx(right.likelihood.misfit, rel=1e-9)
     # Coverage is tested with limits of the same fit.
-    (alike,) = judge_quantities([(experiment, missed)], parameters_and_sum(maxwell), 0.95)
+    fit = TraceFit(experiment, missed, None, np.zeros(len(times), bool))
+    (alike,) = judge_quantities([fit], parameters_and_sum(maxwell), 0.95)
     assert alike.likelihood.misfit == again.likelihood.misfit
     for one, other in zip(alike.findings, again.findings, strict=True):
         assert (one.low, one.high) == (other.low, other.high)
@@ -91,8 +104,26 @@ def test_a_set_in_two_parts_has_a_gap_that_its_verdict_names() -> None:
     whole = Profile(values, parabolas(values), 2.0, -3.0, 3.0, np.zeros(4))
     parts = replace(whole, gaps=(gap,))
     words = [Finding(QUANTITIES[0], profile, 0.1).words() for profile in (whole, parts)]
-    said = "determined only within a factor of 20: 7.4 N/m (0.05 to 20)"
+    said = "determined only to 2.6 decades: 7.4 N/m (0.05 to 20)"
     assert words == [said, f"{said}, except 0.368 to 2.72 N/m"]
+
+
+@pytest.mark.parametrize(("k_p", "stated"), [(0.0, False), (5.0, True)])
+def test_a_sum_whose_condition_the_best_fit_breaks_is_not_stated(k_p: float, stated: bool) -> None:
+    """A branch of 4 s beside a spring that is declared to be none: the branch takes its part."""
+    times, _ = clean("liquid_drop_1")
+    sample = {"k": 20.0, "k_p": 5.0, "c": 80.0, "c_p": 0.001}
+    response = superpose(step_response(GRIPPER, MODEL.sample(sample)), TORQUE, times)[0]
+    noise = 3e-6 * np.random.default_rng(0).standard_normal(len(times))
+    model = with_fixed(MODEL, {"k_p": k_p})
+    posed = posed_for(model, times, response + noise)
+    told = diagnose(posed, model, run("least_squares", posed), confidence=0.95)
+    total = next(each for each in told.findings if each.quantity.label == "c + c_p")
+    assert (total.verdict == DETERMINED) == stated
+    assert ("a branch of the best fit relaxes in" in total.words()) != stated
+    if total.low and total.high:
+        assert total.low < 80.001 < total.high
+        assert total.high > 1.001 * total.low
 
 
 def test_no_limit_is_said_only_of_what_has_none() -> None:

@@ -66,14 +66,16 @@ def test_points_are_moved_to_where_quantities_are_held(form: str) -> None:
     share = rng.choice([0.0, 1.0, *rng.uniform(size=8)], size=3000)
     targets = ends[which, 0] + share * (ends[which, 1] - ends[which, 0])
     bounds = np.tile(low, (3000, 1)), np.tile(high, (3000, 1))
-    held = QuantityConstraint(quantities, which, targets, *bounds, 400.0)
+    held = QuantityConstraint(quantities, which, targets, *bounds, 400.0, np.ones(3000))
     # Points out of bounds are moved into them first.
     x = held.started(np.clip(rng.uniform(low - 1, high + 1, (3000, len(low))), low, high))
     assert np.all((x >= low) & (x <= high))
     values = [quantities[q].log(point) for q, point in zip(which, x, strict=True)]
     assert np.max(np.abs(values - targets)) < 1e-6
     with pytest.raises(ValueError, match="outside its range"):
-        QuantityConstraint(quantities, which, targets + 20, *bounds, 400.0).started(x)
+        QuantityConstraint(
+            quantities, which, targets + 20, *bounds, 400.0, np.ones(len(x))
+        ).started(x)
 
 
 def test_limits_do_not_depend_on_the_batch() -> None:

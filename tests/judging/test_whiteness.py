@@ -29,6 +29,7 @@ def directions(times: Array) -> Array:
     return np.stack([np.ones_like(times), retarded, times * retarded])
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("readings", [10, 20, 400])
 @pytest.mark.parametrize("decades", [0, 4])
 def test_of_white_noise_each_test_fails_as_many_as_its_level_says(
@@ -151,6 +152,7 @@ def test_independent_residuals_are_counted() -> None:
     assert np.median(counts) == pytest.approx(200 / 19, rel=0.3)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("decades", "length"), [(0, 0.04), (3, 0.1)])
 @pytest.mark.parametrize("smooth", [True, False])
 def test_limits_that_allow_for_a_misfit_hold_the_truth(

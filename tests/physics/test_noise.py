@@ -171,6 +171,7 @@ COLOURS = [
     NoiseModel(0.999, 0.2, 0.0),
     NoiseModel(1e-5, 100.0, 0.9),
     NoiseModel(0.2, 5.0, 0.1, 0.6),
+    NoiseModel(0.1, 5.0, 0.1, walk=0.7),
 ]
 
 
@@ -186,6 +187,8 @@ def correlation(time_s: Array, noise_model: NoiseModel, growing: Array | None = 
         + noise_model.ar1 * np.exp(-apart / noise_model.time_s)
         + noise_model.flicker * flicker
     )
+    since = time_s - time_s[0]
+    matrix += noise_model.walk * np.minimum.outer(since, since) / np.mean(since)
     return matrix
 
 

@@ -34,7 +34,7 @@ def test_many_samples_are_looked_at_in_parts(
     time_s = np.linspace(0, torque.end_s, 1001)
     given = gripper, model, torque, time_s, sample[None]
     whole = linear_responses(*given)[0]
-    monkeypatch.setattr(modes, "_TIMES_AT_ONCE", 90)
+    monkeypatch.setattr(modes, "_NUMBERS_AT_ONCE", 90)
     parts = linear_responses(*given)[0]
     np.testing.assert_allclose(parts, whole, rtol=0, atol=1e-14 * np.abs(whole[0]).max())
 

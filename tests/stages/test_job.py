@@ -43,7 +43,7 @@ def told(given: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize("key", ["times_s", "problem", "gripper", "seeds", "title"])
+@pytest.mark.parametrize("key", ["times_s", "experiment", "gripper", "seeds", "title"])
 def test_what_the_rule_does_not_name_cannot_be_read(key: str) -> None:
     case = case_of(NAME, told(settings(STUDY, ["sample", "measurement.noise"], NAME)))
     assert case.block.sample == STUDY.cases[NAME].block.sample
@@ -62,7 +62,7 @@ def test_all_keys_give_the_study_and_its_cases_back() -> None:
     keys = [*CASE_KEYS, "study_seed", "seeds", "methods", "actuator"]
     for name in (*study.cases, *study.points):
         was, case = study.case(name), case_of(name, told(settings(study, keys, name)))
-        for known in ("title", "sample", "noise", "problem", "parameters", "seeds"):
+        for known in ("title", "sample", "noise", "experiment", "parameters", "seeds"):
             assert getattr(case, known) == getattr(was, known)
         np.testing.assert_array_equal(case.times_s, was.times_s)
         assert case.study.study_seed == study.study_seed

@@ -136,6 +136,8 @@ def test_the_table_has_the_best_and_the_worst_determined(study: Study, judged: P
         for level in ("0", "20")
         for kind in ("additive, any", "proportional")
     ]
+    # Without noise no error is told that is less.
+    assert rows[0]["error_least_squares"] == 1.0
     assert rows[-1]["near_noise_genetic"] == 0.6
     assert rows[-1]["near_noise_least_squares"] == 1.0
     assert rows[-1]["basin_genetic"] == 0.8

@@ -123,7 +123,7 @@ def test_cases_in_volts_and_in_torque_share_a_study(tmp_path: Path) -> None:
     """What only some cases have is not taken for what all have."""
     volts = "protocol: {phases: [{duration_s: 100.0, voltage_V: 10.0}]}"
     study = load(tmp_path, f"cases: {{endothelial_cell: {{{volts}}}, my_drop: {{{DROP}}}}}")
-    (phase,) = study.cases["endothelial_cell"].problem.phases
+    (phase,) = study.cases["endothelial_cell"].experiment.phases
     assert phase.duration_s == 100.0
     assert phase.level == pytest.approx(float(torque(study.actuator, 10.0)))
 
@@ -140,7 +140,9 @@ def test_with_coloured_noise_an_offset_and_a_drift_are_fitted(
     tmp_path: Path, noise_model: str, along: tuple[bool, bool]
 ) -> None:
     study = load(tmp_path, f"measurement: {{rate_Hz: 1.0, noise_model: {noise_model}}}")
-    assert {(case.problem.offset, case.problem.drift) for case in study.cases.values()} == {along}
+    assert {(case.experiment.offset, case.experiment.drift) for case in study.cases.values()} == {
+        along
+    }
 
 
 SIGNED = ("-0.8", ">100", "0", "6.1", "<0.001", ">+5", "+2.6")
@@ -172,7 +174,7 @@ def test_numbers_of_the_command_line_are_numbers() -> None:
     study = load_given_study(TYPED, [])
     assert study.near_noise_tolerance == 0.03
     case = study.cases["liquid_drop_1"]
-    assert case.problem.ranges["k"].exponent == (-2, 3)
+    assert case.experiment.ranges["k"].exponent == (-2, 3)
     assert (case.block.measurement.rate_Hz, case.block.measurement.drift) == (10.0, False)
     assert [phase.duration_s for phase in case.phases] == [200.0]
     assert (case.title, case.parameters["k"]) == ("5", 9.0)

@@ -86,12 +86,12 @@ def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
     assert "at 90 %" in made.caption
 
 
-@pytest.mark.parametrize(("every", "seeds", "judged"), [(10, (9, 11), [10]), (25, (24, 27), [25])])
+@pytest.mark.parametrize(("every", "seeds", "judged"), [(10, (9, 11), [10]), (5, (4, 7), [5])])
 def test_some_seeds_are_judged_in_full(
     tmp_path: Path, target: Path, every: int, seeds: tuple[int, int], judged: list[int]
 ) -> None:
-    """One in 25 by default, whatever the batch, and with the limits that whole profiles have."""
-    overlay = OVERLAY if every == 25 else OVERLAY.replace("0.9}", f"0.9, verdicts_every: {every}}}")
+    """One in five by default, whatever the batch, and with the limits that whole profiles have."""
+    overlay = OVERLAY if every == 5 else OVERLAY.replace("0.9}", f"0.9, verdicts_every: {every}}}")
     expected = tmp_path / "expected.json"
     expected.write_text(
         '{"quantities": [{"quantity": "k", "verdict": "determined"}], "trades": [], "notes": [], '

@@ -14,7 +14,7 @@ def written(table: ShownTable, folder: Path) -> list[str]:
     """Markdown, LaTeX and HTML of a table, which is `t.csv` in a folder."""
     write(table, folder / "t.csv")
     for end in ("md", "tex"):
-        convert(folder / "t.html", folder / f"t.{end}")
+        (folder / f"t.{end}").write_text(convert(folder / "t.html", f".{end}"))
     return [(folder / f"t.{end}").read_text() for end in ("md", "tex", "html")]
 
 
@@ -57,8 +57,9 @@ def test_regenerated_tables_are_the_same_bytes_or_their_lines_are_shown(tmp_path
     for folder in (published, made):
         folder.mkdir()
         (folder / "a.csv").write_text("k,c\n1,2\n3,4\n")
-        (folder / "b.md").write_text("text\n")
-    files = [made / "a.csv", made / "b.md"]
+    write(ShownTable("Text.", (Column("k", "k"),), [{"k": 1.5}]), made / "b.csv")
+    (published / "b.md").write_text("Text.\n\n| k   |\n|:----|\n| 1.5 |\n")
+    files = [made / "a.csv", made / "b.html"]
     assert compare(published, files).startswith("2 files of tables compared with ")
     (made / "a.csv").write_text("k,c\n1,2\n3,5\n")
     (made / "c.csv").write_text("new\n")

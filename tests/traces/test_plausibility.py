@@ -9,6 +9,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
+from biogrip.identify.plausibility import _responds, check_recording, free_rotation
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS
@@ -16,7 +17,6 @@ from biogrip.physics.noise import Noise, add_noise
 from biogrip.physics.protocol import Phase, hold, join_phases, ramp, sample_times
 from biogrip.physics.response import step_response, superpose
 from biogrip.traces.columns import Columns
-from biogrip.traces.plausibility import _responds, check_recording, free_rotation
 from biogrip.traces.reader import Recording
 from tests.helpers.default import STUDY
 from tests.helpers.problems import GRIPPER
@@ -53,7 +53,7 @@ def said(
     """What is said of a trace on lines 2, 3, ...: why it is refused, a note on it, or nothing."""
     units = columns.time.removeprefix("time_"), columns.reading.removeprefix("rotation_")
     lines, file = np.arange(len(time_s)) + 2, Path("trace.csv")
-    recording = Recording(time_s, values, lines, 0, file, columns, units)
+    recording = Recording(time_s, values, lines, file, columns, units)
     problem = replace(set_up(gripper, phases, Sample("maxwell")), offset=offset)
     try:
         return check_recording(recording, problem, noise_sd) or ""

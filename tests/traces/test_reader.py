@@ -75,7 +75,7 @@ def test_a_kept_file_is_read_or_refused_as_its_table_says(
     form: dict[str, Any] = PLAIN_FORM | kept.get("form", {})
     form["columns"] = dict(zip(columns.named, names_and_units, strict=True))
     assert found.form == {key: it for key, it in form.items() if it is not None}
-    assert found.without_number == form["gaps"]
+    assert found.gaps == form["gaps"]
     assert found.time_s[[0, -1]].tolist() == [form["first_s"], form["last_s"]]
     assert first_last_sum(found.readings) == pytest.approx(kept["reading"], rel=1e-14)
     if "sd" in kept:
@@ -92,7 +92,7 @@ def test_a_row_with_a_gap_is_left_out_and_counted(tmp_path: Path) -> None:
     text = "\n".join(["time_s,rotation_rad", *ROWS[:3], *gaps, "# note", "", "  ", *ROWS[3:]])
     (tmp_path / "t.csv").write_text(text.replace("nan, ,1", "nan,1"))
     found = read_recording(tmp_path / "t.csv", PLAIN)
-    assert found.without_number == len(gaps)
+    assert found.gaps == len(gaps)
     np.testing.assert_array_equal(found.time_s, np.arange(12))
     assert found.lines.tolist() == [2, 3, 4, *range(len(gaps) + 8, len(gaps) + 17)]
 
@@ -159,7 +159,7 @@ def test_what_pandas_writes_is_read_to_the_last_bit(
     assert found.form["encoding"] == ENCODINGS[encoding]
     np.testing.assert_array_equal(found.time_s, times)
     np.testing.assert_array_equal(found.readings, np.array(values) * 1e-6)
-    assert found.without_number == 1
+    assert found.gaps == 1
     for line, time in zip(found.lines, times, strict=True):
         assert repr(float(time)).replace(".", decimal) in lines[line - 1]
 
@@ -229,7 +229,9 @@ def test_a_unit_is_never_guessed(column: str, given: str | None, below: str, mes
     assert str(error.value).startswith(f"t.csv, column '{column}': {message}")
 
 
-@pytest.mark.parametrize("name", ["strain", "Step", "Shear Strain", "strain_2", "γ", "strain (-)"])
+@pytest.mark.parametrize(
+    "name", ["strain", "Step", "Shear Strain", "strain_2", "γ", "strain (-)", "Lp/Rp", "dL / L0"]
+)
 def test_a_strain_without_a_unit_is_a_pure_number(name: str) -> None:
     assert unit(name, None, STRAIN.units) == "1"
 
@@ -344,3 +346,53 @@ def test_a_damaged_file_is_refused_or_leaves_a_trace(kept: dict[str, Any], tmp_p
             assert np.all(np.isfinite(found.readings))
             read += 1
     assert 0 < read < 60
+
+
+# Separator, time and reading of row i, and the numbers that they are; None is refused.
+MARKED = [
+    (";", "{i},0", "{i}.857", lambda i: (i, 1000 * i + 857)),
+    (";", "{i},5", "{i}.857.123,25", lambda i: (i + 0.5, 1e6 * i + 857123.25)),
+    ("\t", "{i}.0", "{i},857", lambda i: (i, 1000 * i + 857)),
+    (",", "{i}.0", '"{i},857"', lambda i: (i, 1000 * i + 857)),
+    (";", "{i}", "{i}.857.123", lambda i: (i, 1e6 * i + 857123)),
+    (";", "{i}", "{i}'857.5", lambda i: (i, 1000 * i + 857.5)),
+    (";", "{i}", "{i}\u00a0857,5", lambda i: (i, 1000 * i + 857.5)),
+    (";", "0,{i}5", "{i},857", lambda i: (float(f"0.{i}5"), i + 0.857)),
+    (",", "{i}", "{i}.857", lambda i: (i, i + 0.857)),
+    (";", "{i}.500", "{i},857", None),
+    (";", "{i}.5", "{i},85", None),
+    (",", "00:01:{i}.5", "{i}", lambda i: (60.5 + i, i)),
+    (";", "2026-11-25T23:59:{i}", "{i}", lambda i: (i - 11, i)),
+]
+
+
+@pytest.mark.parametrize(("separator", "time", "reading", "right"), MARKED)
+def test_a_table_has_one_decimal_mark(
+    tmp_path: Path, separator: str, time: str, reading: str, right: Any
+) -> None:
+    path, rows = tmp_path / "t.csv", range(11, 31)
+    lines = [separator.join((time, reading)).format(i=i) for i in rows]
+    path.write_text("\n".join([f"t_s{separator}G_Pa", *lines]), encoding="utf-8")
+    columns = Columns("t_s", "G_Pa", quantity=MODULUS)
+    if right is None:
+        found = reading.format(i=11), time.format(i=11)
+        assert "line 2, column 'G_Pa': found '{}' beside '{}'".format(*found) in refusal(
+            path, columns
+        )
+        return
+    recorded = read_recording(path, columns)
+    np.testing.assert_allclose(recorded.time_s, [right(i)[0] for i in rows])
+    np.testing.assert_allclose(recorded.readings, [right(i)[1] for i in rows])
+    assert not any("decimal mark" in remark for remark in recorded.remarks())
+
+
+@pytest.mark.parametrize(("separator", "cell"), [(";", "5,845"), (";", "5.845"), ("\t", "5,845")])
+def test_a_mark_that_may_be_between_thousands_is_said(
+    tmp_path: Path, separator: str, cell: str
+) -> None:
+    path = tmp_path / "t.csv"
+    rows = (f"{i}{separator}{cell}" for i in range(12))
+    path.write_text("\n".join([f"t_s{separator}G_Pa", *rows]))
+    recorded = read_recording(path, Columns("t_s", "G_Pa", quantity=MODULUS))
+    assert recorded.readings[0] == 5.845
+    assert f"of {cell} is read as a decimal mark; where it is between" in recorded.remarks()[0]

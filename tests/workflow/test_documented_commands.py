@@ -47,8 +47,9 @@ LEFT = {
     "howto/figure.md": ["results/figures/heights.png"],
 }
 # The code of posterior.md runs in test_library.py, with a shorter chain.
-TAKES_LONG = {"howto/relaxation.md", "howto/creep.md", "design.md", "tutorial.md"}
-LONG_HOWTOS = ("case", "trace", "noise", "figure", "noise_kind", "posterior")
+TAKES_LONG = {"howto/relaxation.md", "howto/creep.md", "design.md", "groups.md", "tutorial.md"}
+# What module.md, modulus.md and groups.md do, other tests do quickly.
+LONG_HOWTOS = ("case", "trace", "noise", "figure", "noise_kind", "posterior", "module", "modulus")
 TAKES_LONG |= {f"howto/{name}.md" for name in LONG_HOWTOS}
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],

@@ -31,6 +31,11 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         | RECORDED
         | STUDY,
     ),
+    "models to compare": (
+        {"model_selection": {"models": ["maxwell"]}},
+        {"model_fits": 2, "recorded_judgement": 1, "case_tables": 1, "recorded_case_figures": 1}
+        | {"tables": 1, "claims": 1, "page": 1},
+    ),
     "a case, and the title of another": (
         {"cases": {"new": CELL, "liquid_drop_2": {"title": "A drop"}}},
         {"target": 1, "measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1}
@@ -85,6 +90,7 @@ def test_an_edited_trace_is_read_again(tiny_copy: Path) -> None:
     assert planned(tiny_copy, "results/identifications/mine.csv", config=TINY) == again
 
 
+@pytest.mark.nightly
 def test_five_seeds_more_keep_what_there_is(tiny_copy: Path) -> None:
     """And the rows of the seeds that were there have the same bytes."""
     file = tiny_copy / "results/identifications/liquid_drop_2.csv"

@@ -15,7 +15,6 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from biogrip.fit.methods import near_noise, share_with_limits
 from biogrip.judging.quantities import PROVIDED
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.calibration import ARM_KEYS, FreeMotion, calibrate, free_motion
@@ -23,6 +22,7 @@ from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import sample_times
 from biogrip.records.identifications import read_histories, read_identifications
 from biogrip.records.rows import read_frame
+from biogrip.records.success import near_noise, share_with_limits
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
 from biogrip.tables.layout import Column, ShownTable, write

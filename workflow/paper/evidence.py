@@ -13,7 +13,8 @@ import numpy as np
 
 from biogrip.digits import counted
 from biogrip.fit.genome import nearest_encodable
-from biogrip.judging.likelihood import DETERMINED_PERCENT, bounds_percent
+from biogrip.judging.levels import DETERMINED_PERCENT
+from biogrip.judging.likelihood import bounds_percent
 from biogrip.judging.quantities import Quantity
 from biogrip.physics import gripper as actuator
 from biogrip.physics.protocol import sample_times
@@ -204,7 +205,7 @@ def sampling_evidence(study: Study) -> ShownTable:
 def _errors_and_bounds(case: Case) -> list[tuple[Any, ...]]:
     """Return a row of each quantity that is determined at some rate and that the paper reports."""
     truth, identified = case.parameters, case.published.identified
-    problem, noise = case.problem, case.noise
+    problem, noise = case.experiment, case.noise
     names = list(problem.searched.names)
     times = [sample_times(problem.torque.end_s, rate) for rate in _RATES_HZ]
     at_truth = [bounds_percent(problem, noise, truth, time_s) for time_s in times]

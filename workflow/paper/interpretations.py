@@ -15,9 +15,9 @@ from scipy.special import betaincinv
 from scipy.stats import qmc
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.fit.methods import near_noise, near_noise_words
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.records.identifications import INTERPRETATIONS
+from biogrip.records.success import near_noise, near_noise_words
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
 from biogrip.tables.layout import Column, Row, ShownTable, write

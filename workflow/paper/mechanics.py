@@ -294,7 +294,7 @@ def _medians(
 
     Noise has the shape (n_seeds, n_samples).
     """
-    problem = case.problem.to_identify()
+    problem = case.experiment.to_identify()
     searched = problem.searched
     if len(time_s) <= len(searched.names) + problem.offset + problem.drift + 1:
         return {}

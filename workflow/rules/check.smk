@@ -9,8 +9,12 @@ PUBLISHED = shipped("results/published") / OVERLAY
 
 
 def published(kind, *suffixes):
-    """Files of a kind that are published; of the default study, or that are to be."""
-    there = {f"results/{kind}/{file.name}" for file in (PUBLISHED / kind).glob("*")}
+    """Files of a kind that are published; of the default study, or that are to be.
+
+    A table is published as CSV and, made of its HTML, as Markdown.
+    """
+    names = {file.name.replace(".md", ".html") for file in (PUBLISHED / kind).glob("*")}
+    there = {f"results/{kind}/{name}" for name in names}
     ours = {file for suffix in suffixes for file in made(kind, suffix)}
     return sorted(there if OVERLAY else there | ours)
 
@@ -18,7 +22,7 @@ def published(kind, *suffixes):
 # Neither has an output, so that neither is ever taken for done.
 rule check:
     input:
-        made=published("tables", ".csv", ".md"),
+        made=published("tables", ".csv", ".html"),
     log:
         "results/logs/check.log",
     localrule: True
@@ -32,8 +36,8 @@ rule check:
 
 rule publish:
     input:
-        published("tables", ".csv", ".md"),
-        published("figures", ".png", ".pdf"),
+        tables=published("tables", ".csv", ".html"),
+        figures=published("figures", ".png", ".pdf"),
     log:
         "results/logs/publish.log",
     localrule: True

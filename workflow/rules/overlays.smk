@@ -1,6 +1,6 @@
 """What only some configs have: sweeps, and tables of recorded traces."""
 
-from biogrip.identify.settings import Setting, check_settings, read_table
+from biogrip.command.settings import Setting, check_settings, read_table
 
 
 def points(sweep):

@@ -107,7 +107,7 @@ rule judgement:
         runtime=60,
     params:
         **settings_of(
-            *("study_seed", "actuator", *FIT, "measurement.start_s", NOISE),
+            *("study_seed", "actuator", *FIT, NOISE),
             *("identifiability.confidence", "least_squares"),
         ),
     message:
@@ -122,6 +122,8 @@ use rule judgement as recorded_judgement with:
         verdicts="results/identifiability/{case}.json",
     wildcard_constraints:
         case=names(STUDY.recorded),
+    params:
+        **settings_of("measurement.start_s", "model_selection"),
 
 
 rule intervals:

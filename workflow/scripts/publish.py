@@ -4,11 +4,17 @@ import shutil
 from pathlib import Path
 
 from biogrip.errors import BiogripError
+from biogrip.files import write_text
 from biogrip.stages.job import logged, paths
+from biogrip.tables.layout import as_published
 
 with logged(snakemake):
     published = Path(snakemake.params.published)
-    if not snakemake.input:
+    tables, figures = paths(snakemake.input.tables), paths(snakemake.input.figures)
+    if not [*tables, *figures]:
         raise BiogripError(f"{published}: holds nothing in whose place to put tables or figures.")
-    for file in paths(snakemake.input):
-        shutil.copy(file, published / file.parent.name / file.name)
+    for table in tables:
+        name, text = as_published(table)
+        write_text(published / "tables" / name, text)
+    for figure in figures:
+        shutil.copy(figure, published / "figures" / figure.name)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from biogrip.stages.job import job_case, logged
-from biogrip.stages.recording import record
+from biogrip.stages.targets import record
 
 with logged(snakemake):
     record(

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from biogrip.identify.outputs import join_tables
+from biogrip.command.outputs import join_tables
 from biogrip.stages.job import logged, paths
 
 with logged(snakemake):

@@ -3,15 +3,15 @@
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from biogrip.identify.identify import identify
-from biogrip.identify.settings import Setting
+from biogrip.command.files import identify_files
+from biogrip.command.settings import Setting
 from biogrip.stages.job import logged
 
 with logged(snakemake), Path(snakemake.log[0]).open("a") as log, redirect_stdout(log):
     config = Path(snakemake.input.config) if snakemake.input.config else None
     first, last = map(int, snakemake.wildcards.rows.split("-"))
     # A trace that is not there or cannot be used is a row that says so.
-    identify(
+    identify_files(
         [Path(snakemake.input.table)],
         config,
         [Setting("traces.model", ("sample", "model"), snakemake.params.model)],

@@ -22,14 +22,14 @@ from biogrip.figures.style import (
     figure,
     line_of,
 )
-from biogrip.fit.methods import (
+from biogrip.records.identifications import ENCODABLE, read_identifications
+from biogrip.records.success import (
     chi_square_increase,
     near_noise,
     near_noise_words,
     reached_encodable,
     share_in_words,
 )
-from biogrip.records.identifications import ENCODABLE, read_identifications
 from biogrip.study.study import Case
 
 _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)

@@ -22,7 +22,7 @@ from biogrip.figures.style import (
 )
 from biogrip.records.identifications import read_verdicts
 from biogrip.records.traces import read_measurements
-from biogrip.stages.judgement import TRACE
+from biogrip.stages.judgement import TRACE, experiment_for
 from biogrip.study.study import Case
 
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
@@ -49,11 +49,11 @@ def judged_fit(
     case: Case, verdicts: Mapping[str, Any], measurements: Path, calibrated: list[Path]
 ) -> Fit:
     """Return the judged trace of a case and its best fit."""
-    problem = case.problem.calibrated(calibrated)
-    found = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
-    values = {name: found[name] for name in problem.searched.names}
     recorded = read_measurements(measurements, [TRACE])
-    return fit_of(problem, {**problem.fixed, **values}, recorded, TRACE)
+    experiment = experiment_for(case.experiment, recorded, calibrated)
+    found = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
+    values = {name: found[name] for name in experiment.searched.names}
+    return fit_of(experiment, {**experiment.fixed, **values}, recorded, TRACE)
 
 
 def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:

@@ -31,7 +31,7 @@ from biogrip.figures.style import (
     points_within,
     row_of_panels,
 )
-from biogrip.judging.likelihood import CERTAIN
+from biogrip.judging.levels import CERTAIN
 from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.study.study import Case
 from biogrip.tables.cases import target_of

@@ -23,10 +23,10 @@ from biogrip.figures.style import (
     line_of,
     panel,
 )
-from biogrip.fit.methods import near_noise
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
 from biogrip.records.identifications import read_identifications
+from biogrip.records.success import near_noise
 from biogrip.records.traces import read_target
 from biogrip.study.study import Case, Study
 
@@ -48,16 +48,16 @@ def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) 
     files = zip(study.cases.values(), identifications, targets, strict=True)
     for column, (case, identified, target) in enumerate(files):
         time_s, _, rotation = read_target(target)
-        logs = case.problem.logs(case.parameters)
-        _, sensitivity = case.problem.of(time_s, rotation).residuals(logs)
+        logs = case.experiment.logs(case.parameters)
+        _, sensitivity = case.experiment.of(time_s, rotation).residuals(logs)
         sigma = standard_deviation(rotation, case.noise)
         # Without noise there is nothing to compare with: NaN.
         relative = sensitivity / np.where(sigma > 0, sigma, np.nan)
         _moduli(axes[0, column], study, case, identified, time_s)
-        _sensitivities(axes[1, column], case.problem.searched, time_s, relative)
+        _sensitivities(axes[1, column], case.experiment.searched, time_s, relative)
         panel(axes[0, column], "abc"[column], case.title, _TITLE_LETTERS)
         panel(axes[1, column], "def"[column], "when each parameter shows", _TITLE_LETTERS)
-    units = [case.problem.model.stiffness_unit for case in study.cases.values()]
+    units = [case.experiment.model.stiffness_unit for case in study.cases.values()]
     for column, unit in enumerate(units):
         if column == 0 or unit != units[column - 1]:
             axes[0, column].set_ylabel(f"modulus ({unit})")
@@ -72,7 +72,7 @@ def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Arra
     between = np.diff(time_s)
     slowest, fastest = 1 / (time_s[-1] - time_s[0]), 1 / float(np.min(between))
     omega = np.geomspace(slowest / 30, 30 * fastest, _POINTS)
-    model = case.problem.model
+    model = case.experiment.model
     near = []
     for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():
         found = first_seeds(read_identifications(identified, method.name))

@@ -34,9 +34,9 @@ from biogrip.figures.style import (
     panel,
     points_within,
 )
-from biogrip.fit.methods import near_noise, near_noise_words
 from biogrip.judging.verdicts import BOUNDED_ABOVE
 from biogrip.records.identifications import read_identifications, read_verdicts
+from biogrip.records.success import near_noise, near_noise_words
 from biogrip.study.study import Case, Study
 
 # End of the axis of identified over target values, on both sides of 1.

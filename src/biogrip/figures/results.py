@@ -10,13 +10,14 @@ import pandas as pd
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.methods import ALL, basins
 from biogrip.physics.instruments import ROTATION, Channel
 from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import within
 from biogrip.records.identifications import read_histories, read_identifications
+from biogrip.records.success import ALL, basins
 from biogrip.records.traces import Measurements, read_measurements
 from biogrip.stages.job import seeds_of
+from biogrip.stages.judgement import experiment_for
 from biogrip.study.study import Case
 
 SHOWN_SEEDS = 100
@@ -55,14 +56,14 @@ def fits_of_basins(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> dict[str, Fit]:
     """Return the fit of the first run of each basin, by label, from files of a case."""
-    problem = case.problem.calibrated(calibrated)
     found = read_identifications(identifications, case.study.shown)
     fits = {}
     for words, run in first_of_basins(found, case.study.near_noise_tolerance).items():
         seed = int(run["seed"])
-        values = {p.name: float(run[p.column]) for p in problem.model.parameters}
+        values = {p.name: float(run[p.column]) for p in case.sample.model.parameters}
         recorded = read_measurements(_holding(seed, measurements), [seed])
-        fits[f"fit ({words})"] = fit_of(problem, values, recorded, seed)
+        experiment = experiment_for(case.experiment, recorded, calibrated)
+        fits[f"fit ({words})"] = fit_of(experiment, values, recorded, seed)
     return fits
 
 

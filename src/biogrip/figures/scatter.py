@@ -47,7 +47,7 @@ def draw_scatter(
     items = read_verdicts(expected)["quantities"]
     verdicts = {item["quantity"]: item["verdict"] for item in items}
     found = read_identifications(identifications)
-    experiment = case.problem.calibrated(calibrated)
+    experiment = case.experiment.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     log_truth = experiment.logs(case.parameters)
     _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)

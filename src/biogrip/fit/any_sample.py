@@ -1,28 +1,36 @@
-"""What a gripper's arm may do with any sample, by which a trace is judged without a model of it.
+"""What an instrument may read of any linear sample, by which a trace is judged without a model.
 
-A linear viscoelastic sample relaxes by a sum of non-negative exponentials, so a response is a
-non-negative combination of the `extreme_responses`, fitted by non-negative least squares [1]_.
+A linear passive sample relaxes by a sum of non-negative exponentials [1]_, and yields to a load by
+what these have lost; so do a gripper's arms with such a sample between them. What is read is a
+non-negative combination of loads that lag behind (`lag_course`), fitted by non-negative least
+squares [2]_.
+
 `proportional_deviations` smooths a trace so: weights that followed each reading's own noise would
 favour readings that are too low by chance.
 
 References
 ----------
-.. [1] C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, Prentice-Hall, 1974,
+.. [1] S. Bernstein, Sur les fonctions absolument monotones, Acta Mathematica 52 (1929), 1-66.
+.. [2] C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, Prentice-Hall, 1974,
    chapter 23.
 """
 
-from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import nnls
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
-from biogrip.physics.modes import lag_course
+from biogrip.fit.noise_model_fit import absorbed
+from biogrip.physics.modes import Modes, lag_course, mode_responses
+from biogrip.physics.protocol import Course
+from biogrip.physics.residuals import Residuals
 
-# Retardation times a decade; shortest over the sampling interval, longest over the protocol, and
-# that of what does not relax.
-_A_DECADE, _SHORTEST, _LONGEST, _LASTING = 4, 0.01, 10.0, 1e6
+# Lags: shortest over the time between the closest readings, longest over the protocol; how many a
+# decade smooth a trace, and that of what does not relax.
+_SHORTEST, _LONGEST, _A_DECADE, _LASTING = 0.01, 10.0, 4, 1e6
 # The smooth rotation and the weights are found in turn.
 _ROUNDS = 4
 # Share of the readings whose scatter bounds the noise from below, and fewest of them.
@@ -33,17 +41,168 @@ _EXCESS = 2.03
 # Least noise over the largest rotation: rounding errors of single precision.
 _ROUNDING = 1e-7
 
+# Rates a decade, and the fastest but one times the first time.
+_RATES_A_DECADE, _FASTEST = 8, 20.0
+# The slowest times the last time: a line in time to so much.
+_SLOWEST = 1e-8
+# Places at which an interval of rates is divided; how often at most, and decrease of chi^2 that
+# ends it.
+_DIVIDED, _MOST_DIVISIONS, _SETTLED = np.array([[0.2], [0.4], [0.6], [0.8]]), 6, 0.01
+# Difference of logarithms of rates that are close.
+_CLOSE = 0.06
+# Shares of the clearest response below which one is rounding errors, and hardly shows; size of a
+# row that is zero.
+_UNSEEN, _FAINT, _NOTHING = 1e-9, 1e-3, 1e-100
 
-def extreme_responses(problem: Experiment, lags: Sequence[float]) -> Callable[[Array], Array]:
-    """Return a function of times, (n_rows,), that computes extreme responses, (n, n_rows).
 
-    All samples' are non-negative combinations of them. A sample turns the left arm by
-    (1 - x) tau/k_2, where x is the sample's rigidity and decreases, as it relaxes, from at most 1
-    to at least 0. The extremes are: no sample, and rigid ones that relax with one of the lags. Lags
-    are shares of the protocol; the shortest is negligible.
+@dataclass(frozen=True, eq=False)
+class Lags:
+    """Lags that a load may have, and what a trace would show of each."""
+
+    residuals: Residuals
+    """The trace, the protocol and the noise; their model is not used."""
+    covered_s: tuple[float, float]
+    """From when to when after a change of what is controlled there are readings."""
+    rates: Array
+    """In 1/s, ascending, (n_rates,)."""
+    rows: Array
+    """Condensed rows, of norm one or, where a lag does not show, zero, (n_rates, n_rows)."""
+    sizes: Array
+    """Norms of rows of unit amplitude over the noise scale, (n_rates,)."""
+    faint: BoolArray
+    """True for lags that hardly show, (n_rates,)."""
+
+    def _beside(self, chosen: BoolArray) -> tuple[Array, BoolArray]:
+        """Return places of the rates, and the intervals next to lags that are chosen."""
+        return np.log1p(self.covered_s[1] * self.rates), chosen[1:] | chosen[:-1]
+
+    def are_close(self, chosen: BoolArray) -> bool:
+        """Return True if lags next to those that are chosen, (n_rates,), hardly differ from them.
+
+        Between the fastest two there is nothing to be told apart.
+        """
+        places, beside = self._beside(chosen)
+        return bool(np.max(np.diff(places)[:-1], where=beside[:-1], initial=0.0) < _CLOSE)
+
+    def divided(self, chosen: BoolArray) -> "Lags":
+        """Return the grid with closer lags on either side of those that are chosen, (n_rates,)."""
+        places, beside = self._beside(chosen)
+        more = places[:-1][beside] + _DIVIDED * np.diff(places)[beside]
+        near = self.rates[np.append(beside, False) | np.append(False, beside)]
+        rates = np.concatenate((near, np.expm1(more.ravel()) / self.covered_s[1]))
+        return show_lags(self.residuals, self.covered_s, rates)
+
+
+def show_lags(residuals: Residuals, covered_s: tuple[float, float], more: Array) -> Lags:
+    """Compute what a trace would show of a grid of lags, and of more rates in 1/s, (n_more,)."""
+    rates = np.unique(np.append(spread_rates(*covered_s), more))
+    if deforms := residuals.course.deforms:
+        # What does not relax has no part in what is lost.
+        rates[0] = 0.0
+    places = covered_s[1] * rates
+    sign, none = np.full((len(rates), 1), 1.0 if deforms else -1.0), np.zeros((len(rates), 0, 1))
+    rows = residuals.trace.condensed.of_modes(Modes(-rates[:, None], sign, none, none))[:, 0]
+    rows /= residuals.noise_scale
+    sizes = np.maximum(np.linalg.norm(rows, axis=1), _NOTHING)
+    # A slow lag yields in proportion to its rate, and a fast one resists in inverse proportion.
+    clear = sizes * (1 + (places if deforms else 1 / places))
+    clear /= clear.max()
+    rows[clear < _UNSEEN] = 0.0
+    return Lags(residuals, covered_s, rates, rows / sizes[:, None], sizes, clear < _FAINT)
+
+
+@dataclass(frozen=True, eq=False)
+class AnySampleFit:
+    """The linear sample that fits a trace best."""
+
+    lags: Lags
+    """Lags that it may have."""
+    measured: Array
+    """Rows of the trace over the noise scale, (n_rows,)."""
+    amplitudes: Array
+    """Amplitudes of rows of the lags, none below zero, (n_rates,)."""
+
+    @property
+    def taken(self) -> int:
+        """Degrees of freedom that it takes: a time and an amplitude each, an end's time none.
+
+        Neighbouring lags are one between them.
+        """
+        own = self.amplitudes > 0
+        return 2 * int(np.sum(own[1:] & ~own[:-1]) + own[0]) - int(own[0]) - int(own[-1])
+
+    @cached_property
+    def left(self) -> Array:
+        """What they leave of the trace's rows, (n_rows,)."""
+        return self.measured - self.amplitudes @ self.lags.rows
+
+    @property
+    def free(self) -> int:
+        """Degrees of freedom of what it leaves."""
+        return max(self.lags.residuals.free - self.taken, 1)
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of the noise that this would be."""
+        scale = self.lags.residuals.noise_scale
+        return float(np.linalg.norm(self.left)) * scale / float(np.sqrt(self.free))
+
+    def left_of_readings(self) -> tuple[Array, Array]:
+        """Return what it leaves of the readings, (n_samples,), and a basis of what it absorbs."""
+        own, lags, residuals = self.amplitudes > 0, self.lags, self.lags.residuals
+        trace, course = residuals.trace, residuals.course
+        shown = mode_responses(-lags.rates[own][None], course, trace.time_s)[0][0]
+        shown *= (1.0 if course.deforms else -1.0) / lags.sizes[own, None]
+        shown = trace.condensed.cleared(shown)
+        residual: Array = trace.cleared - self.amplitudes[own] @ shown
+        return residual, absorbed(np.vstack((shown, trace.condensed.nuisance)))
+
+
+def fit_any_sample(residuals: Residuals) -> AnySampleFit:
+    """Fit any linear sample to a trace; the model of its residuals is not used.
+
+    The grid of rates is divided next to those that are needed until that changes the fit no more.
     """
-    lagged, stiffness = lag_course(problem.torque, lags), problem.gripper.left
-    return lambda time_s: lagged(time_s) / stiffness.stiffness_Nm_per_rad
+    changes_s, time_s = residuals.course.changes_s, residuals.trace.time_s
+    after = time_s[time_s > changes_s[0]]
+    elapsed = after - changes_s[changes_s.searchsorted(after) - 1]
+    covered_s = float(elapsed.min()), float(after[-1] - changes_s[0])
+    measured = residuals.condensed_trace / residuals.noise_scale
+    lags, least = show_lags(residuals, covered_s, np.zeros(0)), np.inf
+    for _ in range(_MOST_DIVISIONS):
+        amplitudes, norm = nnls(lags.rows.T, measured, maxiter=100 * len(lags.rates))
+        fit = AnySampleFit(lags, measured, amplitudes)
+        if least - norm**2 < _SETTLED:
+            break
+        lags, least = lags.divided(amplitudes > 0), norm**2
+    return fit
+
+
+def spread_rates(
+    first_s: float, last_s: float, a_decade: float = _RATES_A_DECADE, shift: float = 0.0
+) -> Array:
+    """Return rates of lags in 1/s, ascending, for readings from a first time to a last one.
+
+    On the scale log(1 + r `last_s`) they are even, so many a decade, and may be shifted by a share
+    of their spacing. The slowest lag is a line in time, the fastest a bare spring or damper. There
+    is one on either side of 1/`first_s`.
+    """
+    spacing = np.log(10) / a_decade
+    places = np.arange(shift, np.log1p(_FASTEST * last_s / first_s) / spacing) * spacing
+    inner, middle = np.expm1(places[places > 0]) / last_s, 1 / first_s
+    ends = _SLOWEST / last_s, _FASTEST / first_s, 1e6 / first_s
+    return np.unique(np.concatenate((ends, inner, [middle, middle * (1 + 1e-9)])))
+
+
+def spread_lags(course: Course, time_s: Array, a_decade: int) -> list[float]:
+    """Return lags over a protocol's duration, see `lag_course`, so many a decade.
+
+    They are for readings at ascending times, (n_samples,).
+    """
+    shortest = _SHORTEST * float(np.diff(time_s).min()) / course.end_s
+    count = 2 + int(a_decade * np.log10(_LONGEST / shortest))
+    lags: list[float] = np.geomspace(shortest, _LONGEST, count).tolist()
+    return lags
 
 
 def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:
@@ -75,10 +234,8 @@ def proportional_deviations(problem: Experiment, time_s: Array, readings: Array)
     """
     share, noise_sd = problem.noise_share or 0.0, problem.noise_sd
     nuisance = problem.nuisance(time_s)
-    shortest = _SHORTEST * float(np.diff(time_s).min()) / problem.torque.end_s
-    count = 2 + int(_A_DECADE * np.log10(_LONGEST / shortest))
-    lags = np.append(np.geomspace(shortest, _LONGEST, count), _LASTING)
-    family = extreme_responses(problem, lags.tolist())(time_s)
+    lags = [*spread_lags(problem.torque, time_s, _A_DECADE), _LASTING]
+    family = lag_course(problem.torque, lags)(time_s)
     functions = np.vstack((family, nuisance, -nuisance))
     deviations = np.full(len(time_s), share * np.max(np.abs(readings)))
     for _ in range(_ROUNDS):

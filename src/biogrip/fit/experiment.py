@@ -9,12 +9,13 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.fit.genome import GeneRange
+from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.problem import TraceProblem, make_problem
-from biogrip.physics.calibration import read_calibrated_arms
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
+from biogrip.physics.noise import stream
 from biogrip.physics.protocol import Course, Phase, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
@@ -53,20 +54,52 @@ class Experiment:
     noise_sd: float | None = None
     """Standard deviation of the noise, if it is known."""
     noise_share: float | None = None
-    """Standard deviation of the noise as a share of the readings; read by `read_checked`."""
+    """Standard deviation of the noise as a share of the readings, see `proportional_deviations`."""
     sd: Array | None = field(default=None, compare=False)
     """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
     coloured: bool = False
     """True if the noise of a trace may be autocorrelated, see `fit_traces`."""
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
-    ``gripper`` itself; and ``share`` of the ``torque``."""
+    ``gripper`` itself; ``share`` of the ``torque``; and of the ``steps`` of a record, by their
+    number from 0, when each came."""
     fit_start: bool = False
     """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
+    record: Array | None = field(default=None, compare=False)
+    """Times from the start and what was controlled at them, (n, 2), where that was recorded, see
+    `biogrip.physics.recorded_course`; the phases are then a hold as long and as high."""
+    undeclared: frozenset[str] = frozenset()
+    """Which of ``offset`` and ``drift`` nothing is said of: a noise model brings them along."""
+    given_ranges: frozenset[str] = frozenset()
+    """Names of the ranges that are kept; for a recorded trace others follow from the trace."""
+    start_given: bool = True
+    """False if nothing says when the protocol of a recorded trace starts."""
+    simulated: bool = False
+    """True if traces follow this experiment, so that neither start, offset, drift nor model are
+    doubted."""
+    models: tuple[str, ...] = ()
+    """Sample models to compare, as in `CANDIDATES`."""
+    cheap_models: bool = True
+    """True to compare power laws, too, where that takes little time."""
+    least_squares: LeastSquaresSettings = field(
+        default_factory=lambda: LeastSquaresSettings(candidates=1000, starts=16)
+    )
+    """Budget of the fits."""
+    confidence: float = 0.95
+    """Of the limits."""
+    name: str = "trace"
+    """Name that random numbers go by, with `study_seed`."""
+    study_seed: int = 0
+    """Seed of all random numbers."""
 
     @cached_property
     def torque(self) -> Course:
         """Torque of both arms, or what else is held, against time."""
+        if self.record is not None:
+            # Imported here: few experiments have a record.
+            from biogrip.physics.recorded_course import follow_rows
+
+            return follow_rows(*self.record.T, deforms=self.instrument.deforms)
         return join_phases(self.phases, deforms=self.instrument.deforms)
 
     @cached_property
@@ -95,9 +128,18 @@ class Experiment:
         return replace(self, sd=sd, noise_sd=float(np.sqrt(np.mean(sd**2))))
 
     @property
+    def offset_and_drift(self) -> int:
+        """Number of the instrument's terms that are fitted along."""
+        return self.offset + self.drift
+
+    def stream(self, purpose: str, seed: int = 0) -> np.random.Generator:
+        """Return the random numbers of a trace for one purpose."""
+        return stream(self.study_seed, self.name, seed, purpose)
+
+    @property
     def unknowns(self) -> int:
         """Number of parameters that are fitted to a trace, those of the instrument included."""
-        return len(self.searched.names) + self.offset + self.drift + self.fit_start
+        return len(self.searched.names) + self.offset_and_drift + self.fit_start
 
     @property
     def uncertain(self) -> list[tuple[str, str, float]]:
@@ -109,9 +151,17 @@ class Experiment:
             if error and key != _NOT_FITTED
         ]
 
+    def with_step(self, number: int, later_s: float) -> "Experiment":
+        """Return an experiment of which a step of the record comes later by some s."""
+        assert self.record is not None
+        record = self.record.copy()
+        row = np.flatnonzero(np.diff(record[:, 0]) == 0)[number]
+        record[[row, row + 1], 0] += later_s
+        return replace(self, record=record)
+
     @property
     def plain(self) -> bool:
-        """True if noise is assumed to be white, and the gripper to be known exactly."""
+        """True if noise is assumed to be white, and gripper and protocol to be known exactly."""
         return not (self.coloured or self.uncertain)
 
     def calibrated(self, files: Sequence[Path]) -> "Experiment":
@@ -121,6 +171,9 @@ class Experiment:
         """
         if not files:
             return self
+        # Imported here: a recorded trace has no such file.
+        from biogrip.physics.calibration import read_calibrated_arms
+
         gripper, uncertainty = read_calibrated_arms(files[0], self.gripper)
         return replace(self, gripper=gripper, uncertainty={**self.uncertainty, **uncertainty})
 
@@ -137,7 +190,7 @@ class Experiment:
         `model`, `noise_sd`, and `condensed` from `in_noise` replace those of the case.
         """
         rows = condensed or self._condensed(time_s)
-        trace = Trace(time_s, readings, rows, noise_sd or self.noise_sd)
+        trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd)
         given = self.gripper, model or self.searched, self.torque, trace
         return make_problem(Residuals(*given, instrument=self.instrument), self.ranges)
 
@@ -154,8 +207,9 @@ class Experiment:
 
     def rows_key(self, time_s: Array) -> Hashable:
         """Return what the rows of a trace depend on, whose times are (n_samples,)."""
-        sd = None if self.sd is None else self.sd.tobytes()
-        return self.phases, self.instrument, self.offset, self.drift, sd, time_s.tobytes()
+        sd, record = (None if of is None else of.tobytes() for of in (self.sd, self.record))
+        held = self.phases, record, self.instrument, self.offset, self.drift
+        return *held, sd, time_s.tobytes()
 
     def for_model(self, problem: TraceProblem, model: SampleModel) -> TraceProblem:
         """Return one of its problems posed for another model; both share rows of the trace."""
@@ -185,7 +239,7 @@ class Experiment:
         if noise_model is not None:
             whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
         basis = with_uncertain(nuisance, uncertain)
-        return Condensed(self.torque, time_s, basis, whitening=whitening)
+        return Condensed(self.torque, self.torque.snapped(time_s), basis, whitening)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,10 @@ from pydantic import Field
 
 from biogrip.arrays import Array, IntArray
 from biogrip.keys import Block, Complaint
-from biogrip.physics.misfit import Misfit
 from biogrip.physics.sample_model import SampleModel
+
+if TYPE_CHECKING:
+    from biogrip.physics.misfit import Misfit
 
 
 @dataclass(frozen=True)
@@ -199,7 +201,7 @@ _LEAST = 1e-7
 _AT_ONCE = 3
 
 
-def lowest_encodable(misfit: Misfit, ranges: Sequence[GeneRange], starts: Array) -> float:
+def lowest_encodable(misfit: "Misfit", ranges: Sequence[GeneRange], starts: Array) -> float:
     """Return the lowest misfit of all encodable points around some starts.
 
     Around each start's nearest encodable point all neighbours are computed, the last digit or the

@@ -198,10 +198,10 @@ _LITTLE, _MORE = 1e-9, 10.0
 _STILL = 1e-9
 # Steps longer than the first, in e-folds, end on a grid of the second.
 _FAR, _SPACING = 1e-5, 2.0**-24
-# A step with a smaller predicted decrease of chi^2 changes no digit that is written.
-_NOTHING = 1e-8
-# One that ends with less has converged as far as data can tell: limits are at about 4.
-_UNTOLD = 1e-3
+# Predicted decrease of a step, over the mean square that the fit leaves: a smaller one than the
+# first changes no digit that is written; what ends with less than the second has converged as far
+# as data can tell, as limits are at about 4.
+_NOTHING, _UNTOLD = 1e-8, 1e-3
 # E-folds; a converged fit is nearer to its optimum.
 _LONGEST_STEP = 1.0
 # Least curvature of a direction, relative to single parameters; and of a single parameter.
@@ -222,7 +222,8 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     Found are optima, fitted with the finest tolerance, each to the trace of an index, (n,).
     Returned are optima with their misfits on all readings, none above that of `found`, and the
     evaluations of the refinement; branches sorted by relaxation time. An optimum has converged if
-    its next step would not change chi^2 noticeably.
+    its next step would change the sum of squares by next to nothing of what the fit leaves of one
+    reading, or by rounding.
     """
 
     def convex(x: Array, fit: IntArray) -> Normal:
@@ -232,7 +233,8 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     closer = minimize(convex, found.x, low, high, _CLOSE, None, _DAMPING, _MOST_STEPS)
     evaluations = closer.evaluations * (1 + 2 * found.x.shape[1])
     here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
-    rounding = _rounding(fits, here.misfit, trace)
+    scatter = np.array([fits.problems[own].residuals.scatter for own in trace.tolist()])
+    left_of_one, rounding = (here.misfit / scatter) ** 2, _rounding(fits, here.misfit, trace)
     state = _State(fits, trace, rounding, found.x.copy(), here)
     state.move(moving, closer.x)
     left, damping = np.full(len(moving), np.inf), np.zeros(len(moving))
@@ -245,7 +247,7 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
         bounds = low[moving], high[moving]
         plain = _newton_step(*bounds, normal, x, np.zeros(len(x)))
         left[moving] = -np.sum(plain * normal.gradient, axis=1)
-        converged = left <= np.maximum(_NOTHING, rounding)
+        converged = left <= np.maximum(_NOTHING * left_of_one, rounding)
         step = _newton_step(*bounds, normal, x, damping[moving])
         step = np.where(damping[moving, None] > 0, np.log1p(np.maximum(step, -0.9)), step)
         on = np.max(np.abs(plain), axis=1) >= _STILL
@@ -262,7 +264,8 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
         moving = moving[kept | ~converged[moving]]
     order = fits.problems[0].residuals.model.in_order(np.exp(state.x))
     x = np.take_along_axis(state.x, order, axis=1)
-    return Minima(x, state.here.misfit, evaluations, left <= np.maximum(_UNTOLD, rounding))
+    converged = left <= np.maximum(_UNTOLD * left_of_one, rounding)
+    return Minima(x, state.here.misfit, evaluations, converged)
 
 
 def _on_grid(x: Array, step: Array) -> Array:
@@ -296,7 +299,7 @@ def _rounding(fits: LocalFits, misfit: Array, trace: IntArray) -> Array:
     """Estimate the rounding errors of sums of squares, (n,)."""
     residuals = [fits.problems[own].residuals for own in trace.tolist()]
     samples = np.array([each.samples for each in residuals])
-    noise_sd = np.array([each.noise_scale for each in residuals])
+    noise_sd = np.array([each.scatter for each in residuals])
     more = _ROUNDING * np.array([each.peak for each in residuals])
     found: Array = samples * more * (2 * misfit + more) / noise_sd**2
     return found

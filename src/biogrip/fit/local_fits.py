@@ -60,7 +60,8 @@ class LocalFits:
         self.high = np.stack([problem.high for problem in problems])
         self._residuals = problems[0].residuals
         self._traces = np.stack([problem.residuals.condensed_trace for problem in problems])
-        self._noise_sd = np.array([problem.residuals.noise_scale for problem in problems])
+        # Not the noise that is stated: the optimum must not depend on what is believed of it.
+        self._noise_sd = np.array([problem.residuals.scatter for problem in problems])
         self._middle = 0.5 * (self.low + self.high)
 
     def normal(self, x: Array, trace: IntArray) -> Normal:

@@ -1,12 +1,12 @@
 """Fits of nested sample models to the same traces, and the choice of the simplest adequate one.
 
-Each model is fitted from starts of its own and from the optima of the models nested in it, so that
-none fits worse than a model nested in it. If one of these still fits better, because its optimum
-lies outside the richer model's search range, its optimum is the richer model's result, with
-elements that have vanished (`biogrip.physics.models`).
+Each model is fitted from starts of its own and from the optima of the models nested in it, and then
+with other relaxation times (`deepen`), so that none fits worse than a model nested in it. If one of
+these still fits better, because its optimum lies outside the richer model's search range, its
+optimum is the richer model's result, with elements that have vanished (`biogrip.physics.models`).
 
 Models are compared by the information criteria AIC [1]_ and BIC [2]_; differences in BIC below
-`WORTH_A_MENTION` prefer none [3]_.
+`WORTH_A_MENTION` prefer none, and below `STRONG` none that is not simpler [3]_.
 
 References
 ----------
@@ -18,32 +18,70 @@ References
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import Fit, TraceProblem, silent
-from biogrip.physics.models import CANDIDATES, as_richer, contained, contained_in, different_in
+from biogrip.physics.models import CANDIDATES, as_richer, contained_in, different_in
 from biogrip.physics.sample_model import SampleModel
 
 # Factors by which an element that has vanished exceeds a usual one, or falls short of it, at a
 # start; and the usual relaxation time as a share of the length of the experiment.
 _AWAY, _SHARE = (3.0, 100.0), 0.1
-# Relaxation times at which an additional branch starts, over the usual one.
-_FURTHER = 0.03, 1.0, 30.0
 # Factors by which power laws have fewer points and fewer starts. Their responses take forty times
 # as long; of 150 fits to 75 traces none had a chi^2 higher by more than 5e-7 than with all.
 _FEWER = 10, 2
 # A decrease of chi^2 that is worth a fit, far below the 1 that a standard error changes it by.
 _NOTICEABLE = 0.01
+# Relaxation times that every branch of a single model tries.
+_TIMES = 6
 # Models that are equivalent in other parameters may improve one another in turn.
 _MOST_ROUNDS = 3
 
 Answers = list[Fit]
+
+
+def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> Answers:
+    """Return the fits of traces by one model, or lower ones with another relaxation time.
+
+    Random starts may all miss a basin in which an element hardly shows: then no time that they end
+    with is near. So every spring and its damper start once more, as stiff as the others on average,
+    with times from that of the closest readings to the trace's length.
+    """
+    model = problems[0].residuals.model
+    names = model.names
+    pairs = [
+        (index, names.index(f"c{name[1:]}"))
+        for index, name in enumerate(names)
+        if name.startswith("k") and f"c{name[1:]}" in names and name != "k_p"
+    ]
+    if not pairs or model.power_law:
+        return [*found]
+    springs = [spring for spring, _ in pairs]
+    starts = np.repeat(np.log([fit.parameters for fit in found]), len(pairs) * _TIMES, axis=0)
+    every = starts.reshape(len(found), len(pairs), _TIMES, len(names))
+    for trace, problem in enumerate(problems):
+        times = problem.residuals.trace.time_s
+        tried = np.log(np.geomspace(np.diff(times).min(), times[-1], _TIMES))
+        for place, (spring, damper) in enumerate(pairs):
+            every[trace, place, :, spring] = np.mean(every[trace, place, 0, springs])
+            every[trace, place, :, damper] = every[trace, place, 0, spring] + tried
+        every[trace] = np.clip(every[trace], problem.low, problem.high)
+    which = np.repeat(np.arange(len(found)), len(pairs) * _TIMES)
+    ends = fit_from([problems[trace] for trace in which.tolist()], starts, roughly=True)
+    best = [*found]
+    for trace, problem in enumerate(problems):
+        own = ends[which == trace]
+        lowest = int(np.argmin(own.misfit.astype(np.float32)))
+        if _is_noticeably_lower(float(own.misfit[lowest]), best[trace].misfit, problem):
+            best[trace] = _better_from(best[trace], problem, own.x[lowest])
+    return best
 
 
 def fit_models(
@@ -71,7 +109,7 @@ def fit_models(
             further.append(np.reshape(points, (-1, len(problem.low))))
         own = _fewer(settings) if CANDIDATES[name].model.power_law else settings
         found[name] = identify_many(problems[name], own, rngs[name], silent, further)
-        _add_branches(name, problems[name], found)
+        found[name] = deepen(problems[name], found[name])
         done()
     _fit_again(problems, found)
     _take_simpler(problems, found)
@@ -103,52 +141,6 @@ def _of_contained(
                 usual = _usual(kinds[index], kinds, parameters, ~gone, longest_s)
                 start[index] = usual * times if parameters[index] else usual / times
             yield start
-
-
-def _add_branches(name: str, problems: Sequence[TraceProblem], found: dict[str, Answers]) -> None:
-    """Take, in place, better fits that start with one branch more than a fit of fewer branches.
-
-    Beside strong branches a weak one takes long to show: rough fits would not tell.
-    """
-    branches = CANDIDATES[name].model.free_branches
-    fewer = [
-        inner
-        for inner in contained_in(name, found)
-        if 0 < len(CANDIDATES[inner].model.free_branches) == len(branches) - 1
-    ]
-    # A fit of the richest has what those of the models in it have.
-    for inner in [
-        inner for inner in fewer if not any(inner in contained(other) for other in fewer)
-    ]:
-        pairs = [
-            (trace, within_range(start, problem))
-            for trace, problem in enumerate(problems)
-            for start in _with_a_branch_more(
-                as_richer(name, inner, found[inner][trace].parameters), np.array(branches)
-            )
-        ]
-        if not pairs:
-            continue
-        traces = [trace for trace, _ in pairs]
-        starts = np.array([x for _, x in pairs])
-        ends = fit_from([problems[t] for t in traces], starts, roughly=True)
-        for trace, x, misfit in zip(traces, ends.x, ends.misfit.tolist(), strict=True):
-            if _is_noticeably_lower(misfit, found[name][trace].misfit, problems[trace]):
-                found[name][trace] = _better_from(found[name][trace], problems[trace], x)
-
-
-def _with_a_branch_more(parameters: Array, branches: IntArray) -> Iterator[Array]:
-    """Starting points with a branch in the place of one that is gone, weaker than the others."""
-    sizes = parameters[branches]
-    there = np.all((sizes > 0) & np.isfinite(sizes), axis=1)
-    gone = np.flatnonzero(sizes[:, 0] == 0)
-    if not (len(gone) and there.any()):
-        return
-    k, c = np.exp(np.mean(np.log(sizes[there]), axis=0)) / _AWAY[0]
-    for times in _FURTHER:
-        start = parameters.copy()
-        start[branches[gone[-1]]] = k, times * c
-        yield start
 
 
 def _usual(kind: str, kinds: Array, values: Array, there: BoolArray, longest_s: float) -> float:
@@ -230,8 +222,8 @@ def is_within(parameters: Array, problem: TraceProblem) -> bool:
     return bool(np.all((x >= problem.low) & (x <= problem.high)))
 
 
-WORTH_A_MENTION = 2.0
-"""Difference of BIC below which neither of two models is preferred."""
+WORTH_A_MENTION, STRONG = 2.0, 6.0
+"""Differences of BIC from which on a simpler model is preferred, and any other."""
 
 
 @dataclass(frozen=True)
@@ -276,9 +268,17 @@ def ranked(candidates: Sequence[str], misfits: Sequence[float], samples: int) ->
 
 
 def _own_and_best(tried: Sequence[FittedModel], chosen: str) -> tuple[FittedModel, FittedModel]:
-    """Return the chosen model and the one of lowest BIC."""
+    """Return the chosen model and the one that BIC prefers to it, or itself."""
     own = next(each for each in tried if each.candidate == chosen)
-    return own, min(tried, key=lambda each: each.delta_bic)
+    best = min(tried, key=lambda each: each.delta_bic)
+    simpler = len(best.model.names) < len(own.model.names)
+    return own, best if own.delta_bic >= (WORTH_A_MENTION if simpler else STRONG) else own
+
+
+def preferred(tried: Sequence[FittedModel], chosen: str) -> str | None:
+    """Return the candidate that BIC prefers to the chosen model by more than chance, or None."""
+    own, best = _own_and_best(tried, chosen)
+    return None if best is own else best.candidate
 
 
 def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
@@ -287,28 +287,94 @@ def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
     more = len(own.model.names) - len(best.model.names)
     # Difference of n ln(misfit^2), which leaves the number of parameters aside.
     worse = own.delta_aic - best.delta_aic - 2 * more
-    worth_it = own.delta_bic >= WORTH_A_MENTION
-    return best.candidate if worth_it and more > 0 and worse <= WORTH_A_MENTION else None
+    return best.candidate if more > 0 and worse <= WORTH_A_MENTION else None
 
 
 def fits_far_better(tried: Sequence[FittedModel], chosen: str) -> bool:
     """Return True if BIC prefers another model, simpler or richer, and not for its size alone."""
-    own, _ = _own_and_best(tried, chosen)
-    return own.delta_bic >= WORTH_A_MENTION and preferred_simpler(tried, chosen) is None
+    return preferred(tried, chosen) is not None and preferred_simpler(tried, chosen) is None
 
 
-def advice(tried: Sequence[FittedModel], chosen: str) -> str:
-    """State in a sentence whether BIC prefers another of the models tried to the chosen one."""
+def one_branch_more(tried: Sequence[FittedModel]) -> str | None:
+    """Return the candidate with one branch more than the best, if it was not tried; else None."""
+    best = min(tried, key=lambda each: each.delta_bic).candidate
+    names = (name for name in CANDIDATES if CANDIDATES[name].model.free_branches)
+    richer = (name for name in names if list(CANDIDATES[name].model.contains)[:1] == [best])
+    name = next(richer, None)
+    return None if name in {each.candidate for each in tried} else name
+
+
+def advice(tried: Sequence[FittedModel], chosen: str, *, adequate: bool = True) -> str:
+    """State in a sentence whether BIC prefers another of the models tried to the chosen one.
+
+    If what is preferred is not `adequate`, none of them is.
+    """
     own, best = _own_and_best(tried, chosen)
     title = own.model.title[0].upper() + own.model.title[1:]
-    if own.delta_bic < WORTH_A_MENTION:
+    if best is own:
         return f"{title}: none of the {len(tried)} models tried suits the trace better."
-    lead = (
-        f"{best.model.title} (--model {best.candidate}) is preferred, with a BIC lower by "
-        f"{plain(own.delta_bic)}."
-    )
+    named = f"{best.model.title} (--model {best.candidate})"
+    lower = f"with a BIC lower by {plain(own.delta_bic)}"
+    if not adequate:
+        return (
+            f"None of the {len(tried)} models tried is adequate: the best of them, {named}, "
+            f"{lower}, leaves more than noise, too."
+        )
     if preferred_simpler(tried, chosen):
-        return f"{title} is richer than the trace asks for: {lead}"
+        return f"A simpler model, {named}, fits as well, {lower}."
+    lead = f"{named} is preferred, {lower}."
     if len(best.model.names) == len(own.model.names):
         return f"{title} suits the trace less well: {lead}"
     return f"{title} is not adequate: {lead}"
+
+
+@dataclass(frozen=True)
+class FittedModels:
+    """Best fits of sample models to a trace."""
+
+    chosen: str
+    """Sample model that the trace was identified with."""
+    tried: list[FittedModel] = field(default_factory=list)
+    """Rank of each model."""
+    answers: dict[str, Fit] = field(default_factory=dict)
+    """Fit of each by its name, in the same order."""
+    adequate: bool = True
+    """False if that of the model which BIC prefers is rejected for what it leaves."""
+
+    @property
+    def lead(self) -> float:
+        """How much lower than that of the chosen model the BIC of another is."""
+        return max(
+            (own.delta_bic for own in self.tried if own.candidate == self.chosen), default=0.0
+        )
+
+    def data(self, *, rejected: bool) -> dict[str, Any]:
+        """Return one row per model, and advice in words, as plain data.
+
+        If the fit of the chosen model is rejected, advice is only another model, simpler or richer,
+        that may suit the trace.
+        """
+        rows = [
+            {
+                "model": each.candidate,
+                "title": each.model.title,
+                "parameters": len(each.model.names),
+                "misfit_rad": self.answers[each.candidate].misfit,
+                "vanished": vanished(each.candidate, self.answers[each.candidate]),
+                "converged": self.answers[each.candidate].converged,
+                "delta_aic": each.delta_aic,
+                "delta_bic": each.delta_bic,
+            }
+            for each in self.tried
+        ]
+        said = rows and (not rejected or fits_far_better(self.tried, self.chosen))
+        words = advice(self.tried, self.chosen, adequate=self.adequate) if said else None
+        best = preferred(self.tried, self.chosen) if rows and self.adequate else None
+        return {"models": rows, "preferred_model": best, "advice": words}
+
+
+def vanished(candidate: str, answer: Fit) -> list[str]:
+    """Name the elements that vanish in the best fit: parameters that are zero or infinite."""
+    gone = (answer.parameters == 0) | np.isinf(answer.parameters)
+    elements = zip(CANDIDATES[candidate].model.parameters, gone, strict=True)
+    return [each.name for each, is_gone in elements if is_gone and each.kind != "exponent"]

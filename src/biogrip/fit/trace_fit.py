@@ -1,8 +1,8 @@
-"""Identification of one trace together with its noise model and an uncertain gripper.
+"""Identification of one trace with its noise model, an uncertain gripper, and uncertain steps.
 
-If the noise is white and the gripper known, this is one global fit. Otherwise outliers are struck.
-Then the best fit, the autocorrelation of its residuals and the effect of the gripper's uncertainty
-are computed in turn, until none of them changes.
+If the noise is white and all else known, this is one global fit. Otherwise outliers are struck.
+Then the best fit, the autocorrelation of its residuals and the effects of what is uncertain are
+computed in turn, until none of them changes.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,9 +14,10 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment, pose
-from biogrip.fit.least_squares import fit_from
+from biogrip.fit.least_squares import fit_from, identify_many
+from biogrip.fit.nested_fits import deepen
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
-from biogrip.fit.problem import Fit, TraceProblem
+from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.physics.simulation import simulated_response
 from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, drift_is_flow
 
@@ -25,7 +26,7 @@ _SECOND_ORDER = 9.0
 
 
 def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) -> Array:
-    """Compute the changes of a rotation by the uncertainties of the gripper's properties.
+    """Compute the changes of a reading by the uncertainties of the gripper and of the protocol.
 
     To the first order it is half the difference between responses with the property a standard
     uncertainty above and below its value, as is recommended for nonlinear models [1]_. The mean
@@ -47,6 +48,8 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
         gripper, torque = experiment.gripper, experiment.torque
         if part == "torque":
             torque = torque.times(1 + error)
+        elif part == "steps":
+            torque = experiment.with_step(int(key), error).torque
         elif part == "gripper":
             gripper = replace(gripper, **{key: getattr(gripper, key) + error})
         elif part:
@@ -88,6 +91,8 @@ class TraceFit:
     """Autocorrelation model of the noise; None if the noise was assumed to be white."""
     outliers: BoolArray
     """True for readings that were left out, (n_samples,)."""
+    errors: tuple[float, float] = (0.0, 0.0)
+    """Standard deviations of logarithms of the noise model: of its time, and of its walk's odds."""
     fitted_along: str = ""
     """Terms of the instrument that were fitted along, in words."""
 
@@ -111,6 +116,7 @@ class TraceFit:
         others = {
             f"correlated over some {noise_model.time_s:.2g} s": noise_model.ar1,
             "1/f": noise_model.flicker,
+            "a random walk": noise_model.walk,
             f"that grows with the {read}": noise_model.proportional,
         }
         parts = [f"{100 * noise_model.white:.0f} % white"]
@@ -133,10 +139,10 @@ def fit_traces(
     """Fit each of several traces and, if wanted, estimate the model of its noise.
 
     Traces of plain noise are fitted together. With a coloured noise model, outliers are removed,
-    and the noise is a sum of white, Ornstein-Uhlenbeck and 1/f noise. If it grows with the
-    rotation, so does a part of the white noise: the parts whose readings depend on each other are
-    of the instrument's zero. The effect of the gripper's uncertainty on the rotation is one more
-    component of the noise.
+    and the noise is a sum of white, Ornstein-Uhlenbeck and 1/f noise and a random walk. If it grows
+    with the rotation, so does a part of the white noise: the parts whose readings depend on each
+    other are of the instrument's zero. The effect of the gripper's uncertainty on the rotation is
+    one more component of the noise.
 
     `find` finds the global optima of the problems of given traces. A trace is its ascending times
     and readings, (n_samples,), and has assumptions of its own. Too many readings for a coloured
@@ -159,6 +165,26 @@ def fit_traces(
     return [found[trace] for trace in range(len(traces))]
 
 
+def fit_least_squares(
+    experiments: Sequence[Experiment],
+    traces: Sequence[tuple[Array, Array]],
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
+) -> list[TraceFit]:
+    """Fit traces by least squares from many starts, each with random numbers of its own.
+
+    See `fit_traces`; all experiments have the same budget.
+    """
+
+    def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
+        of_traces = [rngs[trace] for trace in which]
+        found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
+        pairs = zip(problems, deepen(problems, found), strict=True)
+        return [fit.in_order(problem.residuals.model) for problem, fit in pairs]
+
+    return fit_traces(experiments, traces, find)
+
+
 def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: Find) -> TraceFit:
     kept = np.ones(len(time_s), dtype=bool)
     if not experiment.coloured:
@@ -172,12 +198,13 @@ def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: 
             )
         kept, plain, found = _without_outliers(experiment, time_s, readings, find)
     time_s, readings = time_s[kept], readings[kept]
-    problem, found, noise_model = _in_turn(experiment, time_s, readings, plain, found)
+    problem, found, noise_model, errors = _in_turn(experiment, time_s, readings, plain, found)
     # Slow deviations now weigh less, so that another basin may be the deepest.
     other = find(problem)
     if np.float32(other.misfit) < np.float32(found.misfit):
         found = other
-    return TraceFit(problem, found, noise_model, ~kept, _fitted_along(experiment, time_s))
+    along = _fitted_along(experiment, time_s)
+    return TraceFit(problem, found, noise_model, ~kept, errors, along)
 
 
 def _fitted_along(experiment: Experiment, time_s: Array) -> str:
@@ -214,7 +241,7 @@ def _in_turn(
     readings: Array,
     plain: TraceProblem,
     found: Fit,
-) -> tuple[TraceProblem, Fit, NoiseModel | None]:
+) -> tuple[TraceProblem, Fit, NoiseModel | None, tuple[float, float]]:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, noise_model = plain, None
     logs = np.log(found.parameters)
@@ -241,16 +268,18 @@ def _in_turn(
         moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_sd
         if moved < _STAYED and _alike(before, noise_model):
             break
+    errors = 0.0, 0.0
     if noise_model is not None:
+        errors = likelihood.errors(noise_model)
         freedom = likelihood.freedom(noise_model, sensitivity / noise_sd, nuisance)
         problem = replace(problem, residuals=problem.residuals.with_freedom(freedom))
-    return problem, found, noise_model
+    return problem, found, noise_model, errors
 
 
 def _alike(one: NoiseModel | None, other: NoiseModel | None) -> bool:
     if one is None or other is None:
         return one is other
-    names = ("ar1", "flicker", "proportional")
+    names = ("ar1", "flicker", "proportional", "walk")
     shares = sum(abs(getattr(one, name) - getattr(other, name)) for name in names)
     times = min(one.ar1, other.ar1) * abs(np.log(one.time_s / other.time_s))
     return bool(shares + times < _CONVERGED)

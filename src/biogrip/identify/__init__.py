@@ -1,1 +1,1 @@
-"""Identification of recorded traces from CSV files to verdicts, without Snakemake."""
+"""From a recording and an experiment to a diagnosis: what the command, notebooks, studies do."""

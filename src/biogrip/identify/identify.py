@@ -1,90 +1,170 @@
-"""The command ``biogrip identify``: the files it reads and writes, and the text it prints."""
+"""From a recording and an experiment to a diagnosis.
 
-from collections.abc import Sequence
+1. The trace is prepared: clock, impossible readings, search ranges (`biogrip.identify.prepare`).
+2. It is fitted by least squares, with the model of its noise, and judged by profile likelihoods.
+3. Other sample models, another start of the protocol, an offset and a drift of the instrument are
+   held against it (`biogrip.identify.other_fits`, `biogrip.judging.onset`).
+
+The command, the library and the rules of a study all do this. Traces of the same model and budget
+are fitted together; the result of a trace is the same, to the last bit, in any batch and alone.
+"""
+
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
-from pathlib import Path
 
-from biogrip.errors import BiogripError
-from biogrip.files import refuse_inputs
-from biogrip.identify.one_trace import identify_batch, identify_traces
-from biogrip.identify.outputs import check_output, write_table
-from biogrip.identify.settings import Asked, Setting, check_settings, is_table, read_table
-from biogrip.identify.words import in_words, side_by_side
-from biogrip.terminal import visible
-from biogrip.traces.columns import trace_file_problem
+import numpy as np
 
-MOST_DRAWN = 50
-"""Most traces of which a page has pictures: with more it would be too large to be sent."""
+from biogrip.digits import counted
+from biogrip.fit.experiment import Experiment
+from biogrip.fit.problem import Progress, silent
+from biogrip.fit.trace_fit import TraceFit
+from biogrip.identify.other_fits import (
+    Trace,
+    fits_of,
+    judge_again,
+    models_tried,
+    note_flow,
+    note_saturated,
+    second_opinions,
+)
+from biogrip.identify.prepare import prepare
+from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
+from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit, name_suspects
+from biogrip.judging.onset import notes_on_start, profile_over_onset
+from biogrip.traces.reader import Recording
+
+STEPS = 4
+"""Number of steps of an identification that `identify_alike` reports."""
 
 
-def identify(
-    files: Sequence[Path],
-    config: Path | None = None,
-    settings: Sequence[Setting] = (),
-    *,
-    output: Path | None = None,
-    report: Path | None = None,
-    table: Path | None = None,
-    rows: tuple[int, int] | None = None,
-) -> int:
-    """Identify traces and tables of traces, write the results, and print them.
+def identify(recording: Recording, experiment: Experiment) -> Diagnosis:
+    """Identify the sample of a recorded trace.
 
-    Config and settings are those of all traces. `output` is the JSON file of a single trace, by
-    default one beside each; `report` and `table` are HTML and CSV files to write, if any. `rows`
-    are the first and last row of a table to identify, from 0, without JSON files; by default all.
+    Parameters
+    ----------
+    recording
+        What was read, from a file or of arrays.
+    experiment
+        What was done: instrument, protocol, sample model, noise.
 
-    Return 1 if any of several traces could not be used. A `BiogripError` says that an option, the
-    config or the only trace cannot.
+    Raises
+    ------
+    BiogripError
+        If the trace is impossible with instrument and protocol; it has line or index, and column.
     """
-    alone = len(files) == 1
-    asked: list[Asked] = []
-    for file in dict.fromkeys(files):
-        if trace_file_problem(file) is None and is_table(file):
-            asked += read_table(file, config, settings)
-            alone = False
-        else:
-            asked.append(Asked(file, config, tuple(settings)))
-    if rows is not None:
-        # The last may be beyond the end.
-        asked = asked[rows[0] : rows[1] + 1]
-    absent = {
-        str(own.trace): f"{own.place}: {problem}"
-        for own in asked
-        if (problem := trace_file_problem(own.trace))
-    }
-    every = [own for own in asked if str(own.trace) not in absent]
-    if alone and absent:
-        raise BiogripError(absent[str(files[0])])
-    if output is not None and not alone:
-        raise BiogripError("--output: only for one trace; each of several gets its own file.")
-    # Errors of options and config concern all traces: they are raised once, here.
-    check_settings(every)
-    outputs = [output or own.trace.with_suffix(".identified.json") for own in every]
-    outputs = outputs if rows is None else []
-    written = [*outputs, *filter(None, (report, table))]
-    if len({path.absolute() for path in written}) < len(written):
-        raise BiogripError("found the same file to be written twice; allowed are different ones.")
-    refuse_inputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
-    for path in written:
-        check_output(path)
-    drawn = report is not None and len(every) <= MOST_DRAWN
-    if outputs:
-        outcome = identify_traces(every, outputs, drawn=drawn)
-    else:
-        outcome = identify_batch(every, None, drawn=drawn)
-    if alone and outcome.refused:
-        raise BiogripError(outcome.refused[str(files[0])])
-    copied = {str(own.trace): own.copied for own in asked}
-    outcome = replace(outcome, refused=outcome.refused | absent, copied=copied)
-    if table is not None:
-        write_table(outcome, table)
-    if report is not None:
-        from biogrip.identify.page import write_page
+    return identify_alike([prepare(recording, experiment)])[0]
 
-        write_page(outcome, report)
-    print(in_words(outcome.found[0]) if alone else side_by_side(outcome.found, outcome.refused))
-    pairs = zip(every, outputs, strict=False)
-    made = [path for own, path in pairs if str(own.trace) not in outcome.refused]
-    if said := [visible(path) for path in (*made, report, table) if path]:
-        print(f"Written to {', '.join(said)}.")
-    return 1 if outcome.refused else 0
+
+def budget(experiment: Experiment) -> Hashable:
+    """Return what traces that are fitted together have in common: model, fits and confidence."""
+    return experiment.searched, experiment.least_squares, experiment.confidence
+
+
+def identify_alike(
+    traces: Sequence[Trace],
+    *,
+    progress: Progress = silent,
+    doing: Callable[[str], None] = lambda step: None,
+    valley: bool = False,
+) -> list[Diagnosis]:
+    """Identify prepared traces of the same `budget`, each as if it were alone.
+
+    `doing` is told of each of the `STEPS`. If `valley` is true, chi^2 is mapped over exchangeable
+    parameters. A `BiogripError` says that one of the traces cannot be fitted.
+    """
+    experiments = [experiment for _, experiment in traces]
+    first, count = experiments[0], sum(len(recording.time_s) for recording, _ in traces)
+    doing(f"fitting {counted(count, 'sample')}")
+    fits = fits_of(traces, progress)
+    doing("finding confidence limits")
+    judged = diagnose_all(
+        [fit.problem for fit in fits],
+        first.searched,
+        [fit.found for fit in fits],
+        confidence=first.confidence,
+        noise_sd=[experiment.noise_sd for experiment in experiments],
+        valley=valley,
+    )
+    if not first.simulated:
+        doing("trying other sample models")
+        judged = _compared(traces, fits, judged, valley=valley)
+    onsets_s: list[tuple[float, float] | None] = [None] * len(traces)
+    for index, (recording, experiment) in enumerate(traces):
+        if experiment.fit_start:
+            judged[index], onsets_s[index] = profile_over_onset(judged[index], recording.time_s)
+    doing("trying an offset and a drift")
+    notes = [_notes_on_fit(*pair) for pair in zip(fits, experiments, strict=True)]
+    if not first.simulated:
+        notes = _notes_on_traces(traces, judged, notes)
+    return [
+        replace(
+            judged[index],
+            notes=[*judged[index].notes, *notes[index]],
+            recording=recording,
+            experiment=experiment,
+            fit=fits[index],
+            onset_limits_s=onsets_s[index],
+        )
+        for index, (recording, experiment) in enumerate(traces)
+    ]
+
+
+def _compared(
+    traces: Sequence[Trace], fits: Sequence[TraceFit], judged: Sequence[Diagnosis], *, valley: bool
+) -> list[Diagnosis]:
+    """Return diagnoses with other models, again where their own was fitted better, and times."""
+    models = models_tried(traces, fits, judged)
+    again = [
+        replace(judge_again(experiment, fit, diagnosis, tried, valley=valley), models=tried)
+        for (_, experiment), fit, diagnosis, tried in zip(traces, fits, judged, models, strict=True)
+    ]
+    return with_times(again, traces[0][1].searched)
+
+
+def _notes_on_traces(
+    traces: Sequence[Trace], judged: Sequence[Diagnosis], on_fits: Sequence[list[Note]]
+) -> list[list[Note]]:
+    """Return notes on the reading of each trace, its fit, its start, and terms not declared."""
+    opinions = second_opinions(traces, judged)
+    notes = []
+    for index, (recording, experiment) in enumerate(traces):
+        said = [Note(HARMLESS, text) for text in recording.remarks()]
+        if experiment.fixed:
+            names, verb = (
+                " and ".join(experiment.fixed),
+                "were" if len(experiment.fixed) > 1 else "was",
+            )
+            said.append(
+                Note(HARMLESS, f"Other models are not compared, because {names} {verb} fixed.")
+            )
+        said += on_fits[index]
+        given = recording.time_s, recording.readings, judged[index]
+        start = notes_on_start(experiment, *given)
+        said += start
+        # Beside another start, an offset and a drift mean nothing.
+        if all(note.weight == HARMLESS for note in start):
+            said += opinions[index]
+        said += [*note_flow(recording, experiment), *note_saturated(recording, experiment)]
+        notes.append(said)
+    return notes
+
+
+def _notes_on_fit(fit: TraceFit, experiment: Experiment) -> list[Note]:
+    """Return notes on the noise model of a fit; one that may hold misfit makes it doubtful."""
+    notes = [Note(HARMLESS, text) for text in fit.notes()]
+    if fit.noise_model is None:
+        return notes
+    residuals = fit.problem.residuals
+    peak = np.max(np.abs(residuals.response(np.log(fit.found.parameters))))
+    slow = fit.noise_model.ar1 + fit.noise_model.walk
+    share = float(fit.found.misfit * np.sqrt(slow) / peak)
+
+    def suspects() -> str:
+        # A slow noise model would take misfit for noise again.
+        trace = residuals.trace
+        white = experiment.to_identify().of(trace.time_s, trace.readings).residuals
+        return name_suspects(white, fit.found.misfit / white.noise_scale, white.noise_scale)
+
+    given = fit.noise_model, fit.errors, residuals.duration_s, share
+    misfit = find_slow_misfit(*given, suspects)
+    return [misfit, *notes] if misfit else notes

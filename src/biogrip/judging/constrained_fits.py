@@ -20,7 +20,8 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit.levenberg_marquardt import Minima, Normal
 from biogrip.fit.local_fits import LocalFits
-from biogrip.judging.likelihood import MISSED, Likelihood
+from biogrip.judging.levels import MISSED
+from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
 
 # E-folds from a bound at which a member counts as free, and by which rounding may exceed it.
@@ -35,7 +36,8 @@ class QuantityConstraint:
 
     Of the quantities that may be held, each fit has the index of its own, (n,), and the logarithm
     of its value, within the quantity's range. Bounds of the log-parameters are (n, n_parameters).
-    Branches must relax within a time for quantities that require it.
+    Branches must relax within a time for quantities that require it; the penalty is in standard
+    deviations of the noise, over which the fits' unit is (n,).
     """
 
     def __init__(
@@ -46,7 +48,9 @@ class QuantityConstraint:
         low: Array,
         high: Array,
         longest_s: float,
+        unit: Array,
     ) -> None:
+        self._unit = unit[:, None]
         self._which, self._targets = which, targets
         self._low, self._high = low, high
         parameters = low.shape[1]
@@ -145,7 +149,7 @@ class QuantityConstraint:
     def _late(self, x: Array, fit: IntArray) -> tuple[Array, Array]:
         """Return the residuals of hinges, (n, n_hinges), and their log-parameter derivatives."""
         which = self._which[fit]
-        forms, stiffness = self._forms[which], self._stiffness[which]
+        forms, stiffness = self._forms[which], self._stiffness[which] * self._unit[fit]
         beyond = np.sum(forms * x[:, None], axis=2) - self._allowed[which]
         late = (beyond > 0) & (stiffness > 0)
         slopes = stiffness[:, :, None] * forms * late[:, :, None]
@@ -215,7 +219,8 @@ class ConstrainedFits:
         self.missed: dict[int, tuple[float, Array]] = {}
         self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
-        scale = np.array([problem.residuals.noise_scale for problem in problems])
+        scale = np.array([problem.residuals.scatter for problem in problems])
+        self._unit = np.array([problem.residuals.noise_scale for problem in problems]) / scale
         # Ratio of chi^2 to the fits' sums of squares.
         self._ratio = (scale / self._noise_sd) ** 2
 
@@ -232,7 +237,8 @@ class ConstrainedFits:
         trace, which = np.divmod(profile, len(self.quantities))
         low, high = self._fits.low[trace], self._fits.high[trace]
         last_s = self._residuals.duration_s
-        constraint = QuantityConstraint(self.quantities, which, targets, low, high, last_s)
+        given = self.quantities, which, targets, low, high, last_s, self._unit[trace]
+        constraint = QuantityConstraint(*given)
         found = self._fits.fitted(near, trace, tolerance, constraint=constraint)
         price = constraint.price(found.x) * self._ratio[trace]
         return self._increases(found, trace) + price, found.x
@@ -276,6 +282,21 @@ class ConstrainedFits:
         return np.array(
             [quantity.range(*ends) for ends in bounds for quantity in self.quantities]
         ).T
+
+    def slowest(self, profile: int) -> float | None:
+        """Return the relaxation time in s of a branch, if it is too slow for a profile's quantity.
+
+        It is that of the trace's optimum.
+        """
+        quantity = self.quantities[profile % len(self.quantities)]
+        best, last_s = self.best[profile], self._residuals.duration_s
+        times = [
+            float(np.exp(penalty.form(len(best)) @ best))
+            for penalty in quantity.penalties
+            if penalty.before is None
+        ]
+        slowest = max(times, default=0.0)
+        return slowest if slowest > last_s else None
 
     def deviations(self) -> Array:
         """Return the logarithms' first-order standard deviations, at most 1, (n_profiles,)."""

@@ -11,16 +11,20 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 5. A fit that has not converged is doubtful, and so are arms that ring.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import plain
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from
+from biogrip.fit.nested_fits import FittedModels
 from biogrip.fit.problem import Fit, TraceProblem
+from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.doubts import (
     DOUBT,
     HARMLESS,
@@ -30,17 +34,23 @@ from biogrip.judging.doubts import (
     compute_status,
     examine_residuals,
 )
-from biogrip.judging.likelihood import MISSED, Likelihood, make_likelihood
+from biogrip.judging.levels import BEYOND_THE_RANGE, FAR_OFF, MISSED
+from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
-from biogrip.judging.valley import compute_valley
-from biogrip.judging.verdicts import Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
+from biogrip.traces.reader import Recording
 
-# Decrease of chi^2 beyond an end that is more than chance: three standard deviations squared.
-_NOTICEABLE = 9.0
+if TYPE_CHECKING:
+    from biogrip.judging.hidden import Hidden
+    from biogrip.judging.without_model import WithoutModel
+
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
 _WIDER, _BEYOND, _AT_END = np.log(1e3), 1.0, 1e-9
+
+RING = "The arms ring"
+"""Beginning of the note on ringing."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +73,52 @@ class Diagnosis:
     """Force of the jaws on the sample of the best fit."""
     notes: list[Note] = field(default_factory=list)
     """Notes on the result, with weights."""
+    recording: Recording | None = None
+    """The trace as it was fitted, of a trace that was identified."""
+    experiment: Experiment | None = None
+    """What was assumed of it, with what follows from the trace."""
+    fit: TraceFit | None = None
+    """The fit that was judged first, with the model of its noise."""
+    models: FittedModels | None = None
+    """Fits of other sample models."""
+    onset_limits_s: tuple[float, float] | None = None
+    """Limits of a fitted onset, from it."""
 
     @property
     def status(self) -> str:
         """Status of the fit by these notes: ok, doubtful or rejected."""
         return compute_status(self.notes)
+
+    def without_model(
+        self, at_s: Sequence[float] = (), kinds: Collection[str] | None = None
+    ) -> "WithoutModel":
+        """Tell what any linear sample would show, see `tell_without_model`.
+
+        Where none gives the trace, as the best of them would be rejected, nothing is told.
+        """
+        # Imported here, as below: only those who ask for it need it.
+        from biogrip.judging.without_model import KINDS, tell_without_model
+
+        residuals, experiment = self.likelihood.problem.residuals, self.experiment
+        found = tell_without_model(
+            residuals,
+            confidence=self.likelihood.confidence,
+            noise_sd=experiment.noise_sd if experiment else None,
+            at_s=at_s,
+            kinds=KINDS if kinds is None else kinds,
+        )
+        # Beyond the noise.
+        far_off = found.misfit**2 - residuals.noise_scale**2 > (FAR_OFF * residuals.peak) ** 2
+        hopeless = far_off and not found.is_linear and self.status == REJECTED
+        return replace(found, told=[]) if hopeless else found
+
+    @cached_property
+    def hidden(self) -> list["Hidden"]:
+        """Errors that the trace could hide, none of a rejected fit, see `find_hidden`."""
+        from biogrip.judging.hidden import find_hidden
+
+        rejected = self.status == REJECTED
+        return [] if rejected else find_hidden(self.likelihood, self.findings)
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""
@@ -145,6 +196,7 @@ def settled(
                 confidence=confidence,
                 noise_sd=noise_sd[trace],
             )
+            check_rows(likelihood)
             remainder = examine_residuals(likelihood)
             if remainder.misfit is not None:
                 likelihood = likelihood.as_misfit(*remainder.misfit)
@@ -178,6 +230,9 @@ def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade
 
 def _with_valley(judged: Diagnosis, model: SampleModel) -> Diagnosis:
     """Return a diagnosis with its valley, whose lowest point counts if no profile is lower."""
+    # Imported here: only a study has valleys.
+    from biogrip.judging.valley import compute_valley
+
     valley, missed = compute_valley(judged.likelihood, model)
     return replace(judged, valley=valley, lowest=missed if judged.lowest is None else judged.lowest)
 
@@ -205,7 +260,7 @@ def _with_notes(judged: Diagnosis, model: SampleModel) -> Diagnosis:
         for finding in findings
         if finding.gaps
     ]
-    notes += [*_range_ends(likelihood, model), *judged.notes]
+    notes += [*_range_ends(likelihood, model), *judged.notes, *_too_slow(judged)]
     notes += _pulling(grip, residuals.duration_s)
     if not judged.converged:
         text = (
@@ -215,6 +270,17 @@ def _with_notes(judged: Diagnosis, model: SampleModel) -> Diagnosis:
         notes.append(Note(DOUBT, text))
     notes += _ringing(judged, rejected=compute_status(notes) == REJECTED)
     return replace(judged, grip=grip, notes=notes)
+
+
+def _too_slow(judged: Diagnosis) -> Iterator[Note]:
+    """Yield a note if limits that allow for a misfit as slow as the trace are too wide."""
+    wide = any(each.verdict == DETERMINED and each.is_wide for each in judged.findings)
+    if judged.likelihood.independent < 1 and wide:
+        yield Note(
+            REJECTION,
+            "What the fit leaves is as slow as the trace, and limits that allow for it tell hardly "
+            "more than an order of magnitude: what the trace determines cannot be judged.",
+        )
 
 
 def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
@@ -234,7 +300,7 @@ def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
             start[index] += outward * _BEYOND
             (low if outward < 0 else high)[index] += outward * _WIDER
             wider = fit_from([replace(problem, low=low, high=high)], start, roughly=True)
-            if likelihood.increase(float(wider.misfit[0])) < -_NOTICEABLE:
+            if likelihood.increase(float(wider.misfit[0])) < -BEYOND_THE_RANGE:
                 unit = f" {parameter.unit}" if parameter.unit else ""
                 yield Note(
                     REJECTION,
@@ -262,7 +328,7 @@ def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
     if ring := residuals.ring(network, noise_sd):
         yield Note(
             REJECTION if rejected else DOUBT,
-            "The arms ring: their inertia, which fits leave out, changes readings of this sample "
+            f"{RING}: their inertia, which fits leave out, changes readings of this sample "
             f"by up to {plain(ring.largest, 2)} times the noise. Leave out the readings of the "
             f"first {_rounded_up(1e3 * ring.lasts_s)} ms after each change of the torque.",
         )

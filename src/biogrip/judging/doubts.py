@@ -3,8 +3,9 @@
 The heaviest note decides the status of a fit: ok, doubtful or rejected (`compute_status`).
 Residuals are tested for white noise (`biogrip.judging.whiteness`), each test at the level
 `FALSE_ALARM`: correlation of neighbours, the cumulative periodogram, means over stretches,
-outliers. Noise that grows with the rotation is told first, and the other tests are of what it
-leaves.
+outliers, a line in the spectrum, a step at any time, parts that differ
+(`biogrip.judging.changes`). A line or a step that explains the others is named in their place.
+Noise that grows with the rotation is told first, and the other tests are of what it leaves.
 
 What is correlated beyond chance (`CERTAIN_MISFIT`) and larger than the scatter of neighbouring
 readings may be noise all the same: if it is correlated for a short time (`has_fast_noise`), or if
@@ -14,13 +15,15 @@ independent residuals only: the fit is good to so much of the peak, which is dou
 noise model may be misfit, too (`find_slow_misfit`): if it is correlated for too long.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, plain
+from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
     absorbed,
@@ -28,16 +31,38 @@ from biogrip.fit.noise_model_fit import (
     compute_growth,
     outliers_of,
 )
+from biogrip.judging.changes import Step, compare_halves, find_step
+from biogrip.judging.levels import (
+    AS_THE_SCATTER,
+    CERTAIN_MISFIT,
+    CLEARLY,
+    FALSE_ALARM,
+    FAR_OFF,
+    LONG,
+    MOSTLY,
+    NO_SCATTER,
+    NOISE_FREE,
+    NOISE_FREE_OF_PEAK,
+    NOTICEABLE,
+    REPEATED,
+    SLOW,
+    SMOOTH,
+    SURE,
+    TOO_LITTLE,
+    TOO_MUCH,
+    UNEVEN,
+    UNRESOLVED,
+)
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.whiteness import (
     as_correlated,
     by_leverage,
     correlated,
     far_out,
+    find_line,
     uneven,
     wandering,
 )
-from biogrip.physics.instruments import Instrument
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, estimate_noise, without
 
@@ -78,32 +103,12 @@ def find_reasons(notes: Sequence[Note]) -> list[str]:
     return [note.text for note in notes if _STATUS[note.weight] == status != OK]
 
 
-FALSE_ALARM = 0.003
-"""Significance level of each test: share of traces with white noise that fail it."""
-
-CERTAIN_MISFIT = 0.001
-"""Significance level of the test that tells misfit from noise."""
-
-# A misfit larger than the scatter of neighbouring readings by this factor changes limits.
-_TOO_MUCH = 1.2
-# A misfit of this share of the peak is far off.
-_FAR_OFF = 0.02
-# A misfit below these shares of the noise and of the peak is that of a trace without noise, and so
-# is one below what no sensor resolves.
-_NOISE_FREE, _NOISE_FREE_OF_PEAK, _UNRESOLVED = 0.01, 1e-3, 1e-6
-# A misfit below this share of the given noise is reported: noise is rarely known better.
-_TOO_LITTLE = 0.5
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
-_MANY = 100_000
+MANY = 100_000
 # Smaller chances are not told apart.
 _NEVER = 1e-6
-CLEARLY = 3.0
-"""Growth of noise from which on its share is known, and unweighted fits are not compared."""
-
-# Share of readings that repeat the one before where a sensor is read less often than it is logged.
-_REPEATED = 0.45
-# Most outliers that are named.
-_NAMED = 5
+# Most outliers that are named, and lines of a spectrum.
+_NAMED, _MOST_LINES = 5, 3
 
 
 @dataclass(frozen=True)
@@ -120,11 +125,13 @@ class Remainder:
 def examine_residuals(likelihood: Likelihood) -> Remainder:
     """Test what the best fit of a trace leaves for noise, and for misfit."""
     residuals, misfit = likelihood.problem.residuals, likelihood.misfit
-    least = min(_NOISE_FREE * likelihood.noise_sd, _NOISE_FREE_OF_PEAK * residuals.peak)
-    if misfit < max(least, _UNRESOLVED * residuals.peak):
+    if misfit < UNRESOLVED * residuals.peak:
         return Remainder([])
     residual, slopes = _left(residuals, likelihood.best)
     rounding = residuals.rounding
+    least = min(NOISE_FREE * likelihood.noise_sd, NOISE_FREE_OF_PEAK * residuals.peak)
+    if misfit < least and estimate_noise(residual, rounding) < NO_SCATTER * misfit:
+        return Remainder([])
     growth = compute_growth(residual, residuals.response(likelihood.best), rounding)
     directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
     basis = absorbed(directions / growth)
@@ -135,28 +142,37 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     struck = outliers_of(by_leverage(standard, basis), rounding)
     if far_out(standard, struck, basis) >= FALSE_ALARM:
         struck[:] = False
+    whole = not struck.any()
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
     bulk = standard[~struck]
     basis = absorbed(basis[:, ~struck]) if struck.any() else basis
     scale = residuals.noise_scale
-    if np.ptp(growth):
+    if np.ptp(growth) or likelihood.freedom == np.inf:
         scale = max(scale, estimate_noise(standard, rounding))
     times = float(np.sqrt(np.mean(bulk**2))) / scale
     correlation, chance = correlated(bulk, basis)
-    notes: list[Note] = []
+    notes = list(_about_given(likelihood, bulk))
     found = None
-    if chance < CERTAIN_MISFIT and times > _TOO_MUCH:
+    lines = list(_lines(bulk, basis, residuals, scale)) if whole else []
+    if chance < CERTAIN_MISFIT and times > TOO_MUCH and not lines:
         found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
+        notes.clear()
         notes += found.notes
         # What a misfit has in a row are no outliers.
         struck &= ~(np.convolve(struck, (1, 0, 1), "same") > 0)
+    elif compute_status(notes) == DOUBTFUL:
+        # With the wrong noise or unit, nothing else is known.
+        return Remainder(notes)
     doubts = [
         *_about_growth(growth, scale, residuals, likelihood.best),
         *_about_outliers(residuals, struck),
     ]
     # Outliers distort a fit, so that all that it leaves is correlated.
-    if not (found or struck.any()):
-        doubts += _about_colour(bulk, basis, correlation, chance, residuals.instrument)
+    if whole:
+        suspects = partial(name_suspects, residuals, times, scale)
+        colour = list(_about_colour(bulk, basis, correlation, chance, suspects))
+        changes = _about_changes(residuals, bulk, basis, growth, coloured=bool(colour))
+        doubts += lines or changes or (colour if not found else [])
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         notes.append(
@@ -166,21 +182,12 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
                 "coloured, gives intervals that allow for such noise.",
             )
         )
-    if not found and _is_far_from_given(likelihood):
-        notes.append(
-            Note(
-                DOUBT,
-                "The noise that was given is "
-                f"{plain(likelihood.noise_sd / misfit, 2)} times what the fit leaves: its "
-                "value, or its unit, is not the right one.",
-            )
-        )
     return Remainder(notes, found.misfit if found else None)
 
 
 def _left(residuals: Residuals, log_parameters: Array) -> tuple[Array, Array]:
     """Return residuals, and their slopes by the parameters, none of very many readings."""
-    if residuals.samples > _MANY:
+    if residuals.samples > MANY:
         return residuals.left(log_parameters), np.zeros((0, residuals.samples))
     return residuals(log_parameters)
 
@@ -206,8 +213,8 @@ def _misfit(
     more, read = plain(times, 2), residuals.trace.readings
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak
     of_peak = f"{plain(100 * share, 2)} % of the peak"
-    suspects = residuals.instrument.suspects(unit=True)
-    if not residuals.rounding and np.mean(read[1:] == read[:-1]) > _REPEATED:
+    suspects = name_suspects(residuals, times, scale)
+    if not residuals.rounding and np.mean(read[1:] == read[:-1]) > REPEATED:
         text = (
             "Most readings repeat the one before, as of a sensor that is read less often than it "
             "is logged: keep one of each."
@@ -217,21 +224,40 @@ def _misfit(
             f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
             "correlated for a short time."
         )
-    elif share < _FAR_OFF:
+    elif share < FAR_OFF:
         text = (
             f"The fit is good to {of_peak}; the rest, {more} times the noise of the trace, is not "
-            f"noise: {suspects} is not quite the right one."
+            f"noise: {suspects}."
         )
     else:
-        text = (
-            f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects} is not "
-            "the right one."
-        )
+        text = f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects}."
         return Remainder([Note(REJECTION, text)])
     misfit = as_correlated(*bulk)
-    count = f"{plain(misfit[0], 2)} independent ones" if misfit[0] > 1 else "less than one"
-    allowed = f"The limits count the {len(bulk[0])} residuals as {count}."
-    return Remainder([Note(DOUBT, f"{text} {allowed}")], misfit)
+    if misfit[0] < 1:
+        text += " It is as slow as the trace, which the limits allow for."
+    else:
+        counted_as = f"{plain(misfit[0], 2)} independent ones"
+        text += f" The limits count the {len(bulk[0])} residuals as {counted_as}."
+    return Remainder([Note(DOUBT, text)], misfit)
+
+
+def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
+    """Return what is wrong where a model's misfit is some times the scale of the noise.
+
+    What any linear sample leaves is noise, or no model's fault.
+    """
+    fit = fit_any_sample(residuals)
+    other = fit.sd / scale
+    noises = counted(plain(other, 2), "noise")
+    inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
+    if correlated(*fit.left_of_readings())[1] >= FALSE_ALARM:
+        return inadequate
+    if other * TOO_MUCH < times:
+        return f"{inadequate}; what that leaves is of load, clock, contact or drift"
+    return (
+        "no linear sample gives this trace under this protocol, but leaves at least "
+        f"{noises}: load, clock, contact or drift"
+    )
 
 
 def _about_growth(
@@ -239,7 +265,7 @@ def _about_growth(
 ) -> Iterator[str]:
     """Yield a sentence on noise that grows with what is read, (n_samples,) in units of a scale."""
     times = compare_extremes(growth)
-    if not np.ptp(growth) or times < _TOO_MUCH:
+    if not np.ptp(growth) or times < TOO_MUCH:
         return
     instrument = residuals.instrument
     read = instrument.read.name
@@ -257,23 +283,25 @@ def _about_growth(
 
 
 def _about_colour(
-    residual: Array, basis: Array, correlation: float, chance: float, instrument: Instrument
+    residual: Array,
+    basis: Array,
+    correlation: float,
+    chance: float,
+    suspects: Callable[[], str],
 ) -> Iterator[str]:
     """Yield a sentence for each test of white noise that residuals, (n_samples,), fail.
 
     The correlation of neighbours and its chance are given.
     """
-    wrong = instrument.suspects()
     if chance < FALSE_ALARM:
         yield (
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
-            f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {wrong} "
-            "is not the right one."
+            f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {suspects()}."
         )
     elif (chance := uneven(residual, basis)) < FALSE_ALARM:
         yield (
             "The residual has more of some frequencies than of others, as white noise has only "
-            f"{one_in(chance)} traces: the intervals are wrong, or {wrong} is."
+            f"{one_in(chance)} traces: the intervals are wrong, or {suspects()}."
         )
     chance = wandering(residual, basis)
     if chance < FALSE_ALARM:
@@ -284,16 +312,81 @@ def _about_colour(
         )
 
 
+def _lines(residual: Array, basis: Array, residuals: Residuals, scale: float) -> Iterator[str]:
+    """Yield a sentence on lines in the spectrum of residuals, if these have no other misfit."""
+    rest, taken, named = residual, basis, list[str]()
+    unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf
+    while len(named) < _MOST_LINES:
+        frequency, chance, line = find_line(rest, residuals.trace.time_s)
+        if chance >= FALSE_ALARM:
+            break
+        amplitude = float(np.linalg.norm(line @ rest)) * np.sqrt(2 / len(rest))
+        named.append(f"{plain(frequency, 3)} Hz ({plain(amplitude, 2)}{unit})")
+        slowest = min(slowest, frequency)
+        taken = absorbed(np.vstack((taken, line)))
+        rest = without(taken, residual)
+    size = float(np.sqrt(np.mean(rest**2)))
+    misfit = correlated(rest, taken)[1] < CERTAIN_MISFIT and size > TOO_MUCH * scale
+    if named and not misfit:
+        yield (
+            f"The residual has a line in its spectrum, at {' and '.join(named)}, as of hum or a "
+            f"vibration. Filter it out, or average the readings over {plain(1 / slowest, 3)} s."
+        )
+
+
+def _about_changes(
+    residuals: Residuals, residual: Array, basis: Array, growth: Array, *, coloured: bool
+) -> list[str]:
+    """Return a sentence on a change within the trace, if it explains what its fit leaves.
+
+    Residuals, (n_samples,), are over the growth of the noise; they may seem to be coloured.
+    """
+    trace = residuals.trace
+    step = find_step(residual, basis, lambda rows: trace.condensed.cleared(rows) / growth)
+    if step and step.chance < FALSE_ALARM and not (coloured and _is_coloured(step)):
+        before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
+        size = plain(-step.size, 2)
+        unit = f" {residuals.instrument.read.unit}".rstrip()
+        return [
+            f"The readings change at about {plain(0.5 * (before_s + after_s))} s, as by a step of "
+            f"{size}{unit}, which white noise shows only {one_in(step.chance)} traces: the values "
+            "may be far off. Leave out what is before or after (--from, --until)."
+        ]
+    split = middle_of(residuals)
+    chance = 1.0 if coloured else compare_halves(residual, basis, split)
+    if chance >= FALSE_ALARM:
+        return []
+    return [
+        f"The readings up to {plain(trace.time_s[split - 1])} s and those after it, each fitted "
+        f"by itself, differ as those with white noise do only {one_in(chance)} traces: the "
+        "sample, the instrument or the protocol changed, and the values may be far off."
+    ]
+
+
+def _is_coloured(step: Step) -> bool:
+    """Return True if what a fit leaves with a step is not white noise, either."""
+    given = step.left, step.basis
+    chances = correlated(*given)[1], uneven(*given), wandering(*given)
+    return min(chances) < FALSE_ALARM
+
+
+def middle_of(residuals: Residuals) -> int:
+    """Return the reading at which phases part a trace, or the middle one."""
+    count = residuals.samples
+    starts = np.searchsorted(residuals.trace.time_s, residuals.course.changes_s)
+    nearest = int(starts[np.argmin(np.abs(starts - count // 2))]) if len(starts) else 0
+    return nearest if count // 4 <= nearest <= count - count // 4 else count // 2
+
+
 def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
     """Yield a sentence that names outliers by their times."""
     far = residuals.trace.time_s[struck]
     if len(far):
         named = ", ".join(f"{each:.6g} s" for each in far[:_NAMED])
         more = f" and {len(far) - _NAMED} more" if len(far) > _NAMED else ""
-        steps = [start for start, order, _ in residuals.course.jumps if order == 0]
         at_step = (
             " Readings at the very instant of a step may be of either side of it: leave them out."
-            if np.isin(far, steps).any()
+            if np.isin(far, residuals.course.steps_s).any()
             else ""
         )
         yield (
@@ -302,18 +395,32 @@ def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
         )
 
 
-def _is_far_from_given(likelihood: Likelihood) -> bool:
-    """Return True if the misfit is far from the noise that was given, by a chi-squared test."""
+def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
+    """Yield a note if the noise that was given is refuted by residuals, in a chi-squared test."""
     from scipy.special import chdtr, chdtrc
 
     if likelihood.freedom < np.inf:
-        return False
+        return
     residuals = likelihood.problem.residuals
-    share = likelihood.misfit / likelihood.noise_sd
-    left = max(residuals.free - len(likelihood.best), 1)
-    sum_of_squares = residuals.samples * share**2
-    too_little = share < _TOO_LITTLE and float(chdtr(left, sum_of_squares)) < FALSE_ALARM
-    return too_little or (share > _TOO_MUCH and float(chdtrc(left, sum_of_squares)) < FALSE_ALARM)
+    lost = residuals.samples - residuals.free + len(likelihood.best)
+    left = max(len(residual) - lost, 1)
+    chi_squared = float(residual @ residual) / likelihood.noise_sd**2
+    share = float(np.sqrt(chi_squared / left))
+    if share < TOO_LITTLE and float(chdtr(left, chi_squared)) < FALSE_ALARM:
+        yield Note(
+            DOUBT,
+            f"The noise that was given is {plain(1 / share, 2)} times what the fit leaves: its "
+            "value, or its unit, is not the right one.",
+        )
+    if share > 1 and float(chdtrc(left, chi_squared)) < FALSE_ALARM:
+        much, so = share > TOO_MUCH, "limits are too narrow by that"
+        if much:
+            suspects = name_suspects(residuals, share, likelihood.noise_sd)
+            so = f"its value or unit is not the right one, or {suspects}"
+        yield Note(
+            DOUBT if much else HARMLESS,
+            f"What the fit leaves is {plain(share, 3)} times the noise that was given: {so}.",
+        )
 
 
 def one_in(chance: float) -> str:
@@ -323,46 +430,43 @@ def one_in(chance: float) -> str:
     return f"once in {plain(1 / chance, 1)}"
 
 
-# Autocorrelated noise with most of the variance, and slower than this share of the trace, is
-# misfit. It may be misfit if it has a noticeable share and lasts for longer.
-_MOST, _SLOW, _NOTICEABLE, _LONG = 0.5, 0.02, 1 / 3, 0.2
-# What scatters by so much more than noise that is correlated for this share would is smooth.
-_SMOOTH = 3.0
 # Of so many stretches of a trace with stationary noise, which is correlated for less than half a
 # stretch, none has so large a share of the sum of squares.
 _SLOW_STRETCHES, _IN_ONE = 20, 0.3
-# Of stretches with fewer readings the scatter is hardly known. Scales of white noise in twenty of
-# them differ by more once in hundreds of traces.
-_IN_A_STRETCH, _FEWEST_STRETCHES, _UNEVEN = 50, 3, 3.0
-# Mean square over that of the scatter: of white noise 1.05 to 1.4, as the scatter is uncertain.
-_AS_THE_SCATTER = 1.44
+# Of stretches with fewer readings the scatter is hardly known.
+_IN_A_STRETCH, _FEWEST_STRETCHES = 50, 3
 
 
 def find_slow_misfit(
-    noise_model: NoiseModel, duration_s: float, share_of_peak: float, instrument: Instrument
+    noise_model: NoiseModel,
+    errors: tuple[float, float],
+    duration_s: float,
+    share_of_peak: float,
+    suspects: Callable[[], str],
 ) -> Note | None:
-    """Return a note if the autocorrelated part of a noise model is, or may be, misfit.
+    """Return a note if the slow parts of a noise model may be misfit.
 
-    `share_of_peak` is the standard deviation of that part over the largest response.
+    Its correlation time and the odds of its walk count less `SURE` times the standard deviations of
+    their logarithms, `errors`. `share_of_peak` is the standard deviation of those parts over the
+    largest response; `suspects` says what is wrong if they are misfit.
     """
     share, time_s = noise_model.ar1, noise_model.time_s
-    misfit = share > _MOST and time_s > _SLOW * duration_s
-    if not misfit and not (share > _NOTICEABLE and time_s > _LONG * duration_s):
+    certain = np.exp(-SURE * np.array(errors))
+    least_s = time_s * float(certain[0])
+    slow = share > MOSTLY and least_s > SLOW * duration_s
+    slow |= share > NOTICEABLE and least_s > LONG * duration_s
+    what = f"is correlated over {plain(time_s, 2)} s of a trace of {plain(duration_s)} s"
+    walk = noise_model.walk
+    certain_walk = certain[1] * walk / (1 - walk + certain[1] * walk)
+    if certain_walk > NOTICEABLE and walk > share:
+        slow, share, what = True, walk, "walks at random"
+    if not slow:
         return None
-    suspects = instrument.suspects(unit=True).capitalize()
-    if not misfit:
-        meaning = f"that may be misfit, of a {instrument.suspects('')} that is not the right one."
-    elif share_of_peak < _FAR_OFF:
-        meaning = (
-            f"that is misfit, not noise, of {plain(100 * share_of_peak, 2)} % of the peak, which "
-            f"the limits allow for. {suspects} is not quite the right one."
-        )
-    else:
-        meaning = f"that is misfit, not noise. {suspects} is not the right one."
     return Note(
-        REJECTION if misfit and share_of_peak >= _FAR_OFF else DOUBT,
-        f"What the fit leaves is correlated over {plain(time_s, 2)} s of a trace of "
-        f"{plain(duration_s)} s, {100 * share:.0f} % of its variance: {meaning}",
+        DOUBT,
+        f"What the fit leaves {what}, {100 * share:.0f} % of its variance and "
+        f"{plain(100 * share_of_peak, 2)} % of the peak. The limits allow for that; but it may be "
+        f"misfit, and then {suspects()}.",
     )
 
 
@@ -379,11 +483,11 @@ def has_fast_noise(residuals: Residuals, residual: Array, slopes: Array) -> bool
     if max(float(np.sum(each)) for each in stretches) > _IN_ONE * float(residual @ residual):
         return False
     noise_model = NoiseModelLikelihood(time_s, residual, slopes).best()
-    fast = noise_model.time_s <= _SLOW * residuals.duration_s
+    fast = noise_model.time_s <= SLOW * residuals.duration_s
     # Neighbours of such noise differ by a root of its readings less than all of it scatters.
     scatter = np.sqrt(np.mean(residual**2)) / max(residuals.noise_scale, 1e-300)
-    rough = scatter < _SMOOTH * np.sqrt(max(_SLOW * len(time_s), 1.0))
-    return fast and bool(rough) and noise_model.ar1 > _NOTICEABLE
+    rough = scatter < SMOOTH * np.sqrt(max(SLOW * len(time_s), 1.0))
+    return fast and bool(rough) and noise_model.ar1 > NOTICEABLE
 
 
 def has_uneven_noise(residual: Array, rounding: float) -> bool:
@@ -397,7 +501,7 @@ def has_uneven_noise(residual: Array, rounding: float) -> bool:
         return False
     stretches = np.array_split(residual, count)
     scales = [estimate_noise(each, rounding) for each in stretches]
-    if max(scales) < _UNEVEN * min(scales):
+    if max(scales) < UNEVEN * min(scales):
         return False
     own = np.concatenate([each / scale for each, scale in zip(stretches, scales, strict=True)])
-    return bool(np.mean(own**2) < _AS_THE_SCATTER)
+    return bool(np.mean(own**2) < AS_THE_SCATTER)

@@ -29,18 +29,13 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import TraceProblem
+from biogrip.judging.levels import CERTAIN, DETERMINED_PERCENT, MISSED
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import Noise, standard_deviation
 
-CERTAIN = 0.999
-"""Confidence that a profile must reach at an end of the range to have a limit on that side."""
-
-MISSED = 0.05
-"""Largest increase of chi^2 that the weak prior of local fits may cause.
-
-A fit that is deeper than an optimum by more shows that the optimum is not the global one.
-"""
+# Error of sums of squares, as a share of those of the largest reading or response.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -75,9 +70,9 @@ class Likelihood:
         `biogrip.judging.whiteness.as_correlated`.
         """
         noise_sd = self.misfit * math.sqrt(self.problem.residuals.samples / independent)
-        threshold, _ = _thresholds(self.confidence, freedom)
+        threshold, _ = find_thresholds(self.confidence, freedom)
         # What few degrees of freedom say of one misfit in a thousand is not known.
-        known, certain = _thresholds(self.confidence, inf)
+        known, certain = find_thresholds(self.confidence, inf)
         return replace(
             self,
             noise_sd=noise_sd,
@@ -103,7 +98,12 @@ class Likelihood:
         relative = rows[1:] / self.noise_sd
         slope = quantity.gradient(self.best)
         information = relative @ relative.T + np.eye(len(slope))
-        return float(np.sqrt(slope @ np.linalg.solve(information, slope)))
+        try:
+            solved = np.linalg.solve(information, slope)
+        except np.linalg.LinAlgError:
+            # Without noise the trace may outweigh the prior by more than numbers have digits.
+            solved = np.linalg.lstsq(information, slope)[0]
+        return float(np.sqrt(np.maximum(slope @ solved, 0.0)))
 
 
 def make_likelihood(
@@ -123,11 +123,29 @@ def make_likelihood(
         left = problem.residuals.free - len(best)
         noise_sd = misfit * float(np.sqrt(problem.residuals.samples / left))
         freedom = float(min(left, problem.residuals.freedom))
-    threshold, certainty = _thresholds(confidence, freedom)
+    threshold, certainty = find_thresholds(confidence, freedom)
     return Likelihood(problem, best, misfit, noise_sd, threshold, certainty, freedom, confidence)
 
 
-def _thresholds(confidence: float, freedom: float) -> tuple[float, float]:
+def check_rows(likelihood: Likelihood) -> None:
+    """Raise an `ArithmeticError` if the condensed rows have another misfit than the readings.
+
+    Profiles, which see the rows alone, would then have limits around another optimum.
+    """
+    residuals, best = likelihood.problem.residuals, likelihood.best
+    of_rows = float(residuals.misfit(np.exp(best)[None])[0])
+    of_readings = float(np.sqrt(np.mean(residuals.left(best) ** 2)))
+    # A spring beside an offset may be as stiff as its range allows.
+    both = residuals.trace.readings, residuals.response(best)
+    largest = max(float(np.max(np.abs(each))) for each in both)
+    rounding = _ROUNDING * residuals.samples * (largest / likelihood.noise_sd) ** 2
+    apart = likelihood.increase(of_rows) - likelihood.increase(of_readings)
+    if abs(apart) > MISSED + rounding:
+        text = f"rows with a misfit of {of_rows:.6g} stand for readings with {of_readings:.6g}"
+        raise ArithmeticError(text)
+
+
+def find_thresholds(confidence: float, freedom: float) -> tuple[float, float]:
     """Return the increases of chi^2 at limits and at `CERTAIN`, by the freedom of the noise.
 
     If the noise is known, chi-squared of one degree of freedom, 3.84 at 95 %; else F(1, freedom).
@@ -145,10 +163,11 @@ def _thresholds(confidence: float, freedom: float) -> tuple[float, float]:
 def compute_fall(samples: int, before: float, after: float, noise_sd: float | None = None) -> float:
     """Compute the decrease of chi^2, twice the increase of log-likelihood, between RMS residuals.
 
-    If the standard deviation of the noise is not known, each fit's misfit estimates it.
+    If the standard deviation of the noise is not known, each fit's misfit estimates it; no noise is
+    less than what the better fit leaves.
     """
     if noise_sd is not None:
-        return samples * (before**2 - after**2) / noise_sd**2
+        return samples * (before**2 - after**2) / max(noise_sd, after) ** 2
     return 2 * samples * float(np.log(before / after))
 
 
@@ -203,10 +222,6 @@ def bound(sensitivity: Array, noise_sd: float | Array, log_parameters: Array, q:
     if np.any(np.isinf(found)):
         return float("inf")
     return float(np.sqrt(slope[members] @ found @ slope[members]))
-
-
-DETERMINED_PERCENT = 100.0
-"""Bound in percent from which on a quantity does not count as determined."""
 
 
 def bounds_percent(

@@ -31,12 +31,12 @@ from biogrip.fit.fitted_onset import (
     spacing_at,
 )
 from biogrip.fit.least_squares import fit_from
-from biogrip.judging.diagnosis import Diagnosis
+from biogrip.judging.diagnosis import RING, Diagnosis
 from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.verdicts import Finding
-from biogrip.physics.protocol import Phase, ramp
+from biogrip.physics.protocol import ramp
 from biogrip.physics.whitening import estimate_noise
 
 # So that correlated noise does not look like a late onset; and level of other tests.
@@ -44,12 +44,19 @@ _FALSE_ALARM, _AS_GOOD = 1e-9, 1e-3
 # Intervals from a change to the first reading of a trace that is cut off, fewest readings by which
 # their growth is known, and its powers of the time if readings were spaced from the change on.
 _DELAYED, _FEWEST_APART, _PLANNED = 10.0, 3, (0.5, 1.5)
+# Starts that are compared, the last so much of an interval before the first reading; and how
+# unlikely is what fits worse.
+_STARTS, _NEAREST, _UNLIKE = 40, 0.01, 0.05
+# Change of a recorded load that is held, as a share of it.
+_HELD = 0.1
 # Misfit over the scatter of neighbours that a right fit does not exceed.
 _WHITE = 1.5
 _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
 # First change of the onset over how far readings are apart there, and most of it as a share of the
 # trace.
 _FIRST_STEP, _MOST = 1 / 64, 0.25
+# Share of that to which an onset has to be known for readings to be of a ring after it.
+_TOLD = 0.1
 # Accuracy of an end of the onset's interval, as a share of its distance.
 _ACCURACY = 0.01
 
@@ -59,8 +66,6 @@ def notes_on_start(
     time_s: Array,
     readings: Array,
     diagnosis: Diagnosis,
-    *,
-    may_be_late: bool,
 ) -> list[Note]:
     """Return notes on another start of the protocol than at 0, on a tare, and on a hidden ramp.
 
@@ -77,25 +82,24 @@ def notes_on_start(
         The trace, times ascending.
     diagnosis
         That of the best fit with that protocol.
-    may_be_late
-        True if the user says nothing of the start.
     """
-    fits, ramp = OnsetFits(experiment, time_s, readings), _with_ramp(experiment, time_s)
+    may_be_late = not experiment.start_given
+    fits, ramped = OnsetFits(experiment, time_s, readings), _with_ramp(experiment, time_s)
     notes: list[Note] = []
-    if may_be_late and ramp and is_cut_off(time_s):
+    if may_be_late and ramped and is_cut_off(time_s):
         notes += _about_clock(fits, diagnosis)
     elif begins_constant(time_s, readings):
         # A constant that is not zero is an offset, with which the onset would be biased.
         free, onset_s = replace(experiment, offset=True), 0.0
         if may_be_late or experiment.fit_start:
-            onset_s = estimate_onset(free, time_s, readings)
+            onset_s = estimate_onset(experiment, time_s, readings)
         if begins_constant(time_s, readings, onset_s):
             if may_be_late:
                 notes += _about_late_onset(replace(fits, experiment=free), diagnosis, onset_s)
             if not experiment.offset and (notes or not may_be_late):
                 notes += _about_tare(fits, diagnosis, onset_s)
-    if diagnosis.status != REJECTED and ramp and not notes:
-        notes += _about_ramp(fits, diagnosis, ramp)
+    if diagnosis.status != REJECTED and ramped and not notes:
+        notes += _about_ramp(fits, diagnosis, ramped)
     return notes
 
 
@@ -149,66 +153,118 @@ def is_cut_off(time_s: Array) -> bool:
 
 
 def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
-    """Yield a note if a trace may be on another clock, with its step just before it."""
-    time_s, noise_sd = fits.time_s, estimate_noise(fits.readings)
-    later_s, best = 2 * time_s[0] - time_s[1], diagnosis.likelihood.best
-    given, rejected = fits.at(0.0, best), diagnosis.status == REJECTED
+    """Yield a note if a trace may be on another clock, with its step some time before it."""
+    time_s, best = fits.time_s, diagnosis.likelihood.best
+    later_s, given = 2 * time_s[0] - time_s[1], fits.at(0.0, best)
+    rejected = diagnosis.status == REJECTED
     other = fits.best(later_s) if rejected else fits.at(later_s, best)
+    alike = _as_good(fits, other)
+    starts_s = [min(fit.onset_s for fit in alike), max(fit.onset_s for fit in alike)]
+    told = starts_s[1] - starts_s[0] < time_s[1] - time_s[0]
+    when = f"at {other.onset_s:.4g} s" if told else "at any time from {:.4g} to {:.4g} s"
     fall = compute_fall(len(time_s), given.misfit, other.misfit, None)
     found = ""
-    if rejected and 0 < other.onset_s < time_s[0] and other.misfit < _WHITE * noise_sd:
-        far = fall > chdtri(1, _FALSE_ALARM)
-        found = f"the fit is far better (χ² falls by {plain(fall)})" if far else ""
+    white = other.misfit < _WHITE * estimate_noise(fits.readings)
+    if rejected and 0 < other.onset_s < time_s[0] and white:
+        if fall > chdtri(1, _FALSE_ALARM):
+            found = f"the fit is far better (χ² falls by {plain(fall)})"
+            found += "" if told else f", and values hang on it: {_moved(diagnosis, None, alike)}"
     elif not rejected and fall > -chdtri(1, _AS_GOOD):
-        moved = _moved(diagnosis, given, other, 0.5)
+        moved = _moved(diagnosis, given, alike, 0.5)
         found = f"the trace fits as well: {moved}" if moved else ""
     if found:
         yield Note(
             REJECTION if rejected else DOUBT,
             f"The readings begin {plain(time_s[0])} s after the step of the protocol. If it starts "
-            f"at {other.onset_s:.4g} s of the clock, {found}. Say when the protocol started "
+            f"{when.format(*starts_s)} of the clock, {found}. Say when the protocol started "
             "(--start, measurement.start_s), be it at 0, or what came before (--config, protocol).",
         )
 
 
-def _moved(diagnosis: Diagnosis, given: OnsetFit, other: OnsetFit, widths: float) -> str:
-    """Name what another fit moves beyond its limits, by more than so many of their widths."""
-    x = diagnosis.likelihood.best
-    moved = x + other.log_parameters - given.log_parameters
-    said = []
+def _as_good(fits: OnsetFits, best: OnsetFit) -> list[OnsetFit]:
+    """Return the best fit and others, of onsets from 0 to the first reading, that are as good.
+
+    Each begins with the values of its neighbour.
+    """
+    first_s, interval_s = fits.time_s[0], fits.time_s[1] - fits.time_s[0]
+    onsets_s = first_s - np.geomspace(_NEAREST * interval_s, first_s, _STARTS)
+    found = [best]
+    for side in (onsets_s[onsets_s < best.onset_s], onsets_s[onsets_s > best.onset_s][::-1]):
+        near = best
+        for onset_s in side.tolist():
+            near = fits.at(onset_s, near.log_parameters)
+            if compute_fall(len(fits.time_s), near.misfit, best.misfit, None) > chdtri(1, _UNLIKE):
+                break
+            found.append(near)
+    return found
+
+
+def _moved(
+    diagnosis: Diagnosis, given: OnsetFit | None, others: Sequence[OnsetFit], widths: float = 0.0
+) -> str:
+    """Name what other fits move beyond its limits, by more than so many of their widths.
+
+    Without a given fit to compare with, for one that is rejected has no limits, all is named.
+    """
+    x, said = diagnosis.likelihood.best, []
     for each in diagnosis.findings:
-        before, after = each.quantity.log(x), each.quantity.log(moved)
+        shift = x - given.log_parameters if given else 0.0
+        moved = [other.log_parameters + shift for other in others]
+        logs, before = [each.quantity.log(own) for own in moved], each.quantity.log(x)
         width = np.log(each.high / each.low) if each.high and each.low else 0.0
-        if not each.allows(moved) and abs(after - before) > widths * width:
+        far = [
+            not each.allows(own) and abs(after - before) > widths * width
+            for own, after in zip(moved, logs, strict=True)
+        ]
+        if given is None or any(far):
+            ends = dict.fromkeys(plain(float(np.exp(end))) for end in (min(logs), max(logs)))
             unit = f" {each.quantity.unit}".rstrip()
-            said.append(f"{each.quantity.label} would be {plain(np.exp(after))}{unit}")
+            said.append(f"{each.quantity.label} would be {' to '.join(ends)}{unit}")
     return "; ".join(said)
 
 
-def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramp: tuple[Phase, ...]) -> Iterator[Note]:
-    """Yield a note if a ramp up to the first reading moves a value by the width of its limits."""
-    ramped_fits = replace(fits, experiment=replace(fits.experiment, phases=ramp))
-    given, ramped = (own.at(0.0, diagnosis.likelihood.best) for own in (fits, ramped_fits))
-    if moved := _moved(diagnosis, given, ramped, 1.0):
+def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> Iterator[Note]:
+    """Yield a note if a ramp up to the first reading, or one as long before, moves a value.
+
+    That is by the width of its limits or more.
+    """
+    best, delay_s = diagnosis.likelihood.best, float(fits.time_s[0])
+    given, others = fits.at(0.0, best), replace(fits, experiment=ramped)
+    ends = {f"with the first reading, at {plain(delay_s)} s": 0.0}
+    if ramped.record is None and len(fits.experiment.phases) == 1:
+        ends["at 0, and was as long"] = -delay_s
+    moved = {
+        end: said
+        for end, onset_s in ends.items()
+        if (said := _moved(diagnosis, given, [others.at(onset_s, best)], 1.0))
+    }
+    if moved:
+        said = "; or if it ends ".join(f"{end}: {values}" for end, values in moved.items())
         yield Note(
             HARMLESS,
-            "If the load was no step but a ramp that ends with the first reading, at "
-            f"{plain(fits.time_s[0])} s: {moved}. A ramp is given by a protocol (--config), or as "
-            "recorded (--load).",
+            f"If the load was no step but a ramp that ends {said}. A ramp is given by a protocol "
+            "(--config), or as recorded (--load).",
         )
 
 
-def _with_ramp(experiment: Experiment, time_s: Array) -> tuple[Phase, ...]:
-    """Return phases with a ramp up to the first reading, none but for a hold until after that."""
+def _with_ramp(experiment: Experiment, time_s: Array) -> Experiment | None:
+    """Return one with a ramp up to the first reading, none but for a hold until after that."""
+    delay_s, record = float(time_s[0]), experiment.record
+    if record is not None:
+        later = record[record[:, 0] > delay_s]
+        level, before = record[0, 1], record[: len(record) - len(later), 1]
+        if delay_s <= 0 or not level or np.ptp(before) > _HELD * abs(level):
+            return None
+        return replace(experiment, record=np.vstack(([0.0, 0.0], [delay_s, level], later)))
     first, *rest = experiment.phases
-    delay_s = float(time_s[0])
     if not 0 < delay_s < first.duration_s or first.slope or first.curvature:
-        return ()
-    return (
+        return None
+    phases = (
         ramp(delay_s, 0.0, first.level),
         replace(first, duration_s=first.duration_s - delay_s),
         *rest,
     )
+    return replace(experiment, phases=phases)
 
 
 def onset_limits(best: Likelihood, time_s: Array) -> tuple[float, float]:
@@ -231,6 +287,10 @@ def profile_over_onset(
     """
     best = diagnosis.likelihood
     ends = onset_limits(best, time_s)
+    if ends[1] - ends[0] > _TOLD * spacing_at(time_s, 0.0):
+        # Nothing tells how soon after a change of the torque a reading came.
+        notes = [note for note in diagnosis.notes if not note.text.startswith(RING)]
+        diagnosis = replace(diagnosis, notes=notes)
     others = [_at(best, float(change_s)) for end in ends for change_s in end * _SHARES]
     others = [each for each in others if each.threshold > 0]
     if not others:

@@ -187,6 +187,9 @@ class Profile:
     certainty: float | None = None
     """Increase that a limit takes at an end of the range, if an end is above the threshold and yet
     has no limit for want of it; else None."""
+    slowest_s: float | None = None
+    """Relaxation time of a branch of the best fit, if the quantity requires one within the trace,
+    and no fit with such a one is nearly as good: then there are no limits."""
 
 
 def compute_profiles(
@@ -224,7 +227,14 @@ def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
         short = (increases[[0, -1]] > fits.threshold[index]) & np.isnan(ends)
         certainty = float(fits.certainty[index]) if np.any(short) else None
         best = float(fits.at_best[index])
-        found.append(Profile(values, increases, best, low, high, lowest, gaps, certainty))
+        slowest_s = fits.slowest(index)
+        if np.min(increases[values != best], initial=np.inf) <= fits.threshold[index]:
+            slowest_s = None
+        if slowest_s is not None:
+            low, high, gaps, certainty = None, None, (), None
+        found.append(
+            Profile(values, increases, best, low, high, lowest, gaps, certainty, slowest_s)
+        )
     return found
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import plain, with_limits, within_limits
+from biogrip.judging.levels import WIDE, WORTH_A_PROFILE
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations
@@ -24,14 +25,8 @@ DETERMINED = "determined"
 BOUNDED_BELOW = "bounded below"
 BOUNDED_ABOVE = "bounded above"
 NOT_DETERMINED = "not determined"
-
-WIDE = 3.0
-"""Limits further than this factor from their middle tell little more than an order of magnitude:
-moduli of cells of one kind scatter by a factor of about 2 to 3."""
-
-# A combination of undetermined parameters is profiled if the first-order standard
-# deviation of its logarithm is below this.
-_WORTH_A_LOOK = 0.5
+FIT_REJECTED = "fit rejected"
+"""Verdict on every quantity of a fit that is rejected."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +74,12 @@ class Finding:
         """True if the trace bounds the quantity on at least one side."""
         return self.verdict != NOT_DETERMINED
 
+    @property
+    def is_wide(self) -> bool:
+        """True if its two limits tell little more than an order of magnitude: see `WIDE`."""
+        low, high = self.low, self.high
+        return low is not None and high is not None and high > WIDE**2 * low
+
     def allows(self, log_parameters: Array) -> bool:
         """Return True if parameters, (n_parameters,), lie within the limits; NaN does."""
         value = self.quantity.log(log_parameters)
@@ -101,13 +102,16 @@ class Finding:
     def _limits_in_words(self) -> str:
         low, high, unit = self.low, self.high, self._unit
         if low is not None and high is not None:
-            factor = math.sqrt(high / low)
-            how = f" only within a factor of {plain(factor, 2)}" if factor > WIDE else ""
+            decades = plain(math.log10(high / low), 2)
+            how = f" only to {decades} decades" if self.is_wide else ""
             return f"determined{how}: {with_limits(self.value, low, high, self.quantity.unit)}"
         if low is not None:
             return f"only bounded below: at least {plain(low, 2)}{unit}"
         if high is not None:
             return f"only bounded above: at most {plain(high, 2)}{unit}"
+        if self.profile.slowest_s is not None:
+            slowest = f"a branch of the best fit relaxes in {plain(self.profile.slowest_s, 2)} s,"
+            return f"not stated: {slowest} longer than the trace lasts"
         if self.profile.certainty is None:
             return "not determined: the trace sets no limit within the search range"
         increase = max(self.profile.increases[[0, -1]])
@@ -184,7 +188,7 @@ def find_trade_offs(
         for pair in combinations(left, 2):
             candidates = find_combinations(model, list(pair))
             deviations = [likelihoods[trace].deviation(quantity) for quantity in candidates]
-            if min(deviations, default=np.inf) < _WORTH_A_LOOK:
+            if min(deviations, default=np.inf) < WORTH_A_PROFILE:
                 pairs.append((trace, pair, candidates[int(np.argmin(deviations))]))
     profiled: dict[tuple[int, Quantity], Finding] = {}
     for quantity in dict.fromkeys(quantity for _, _, quantity in pairs):

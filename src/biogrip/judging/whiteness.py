@@ -25,6 +25,8 @@ References
    Biometrics Bulletin 2 (1946), 110-114.
 .. [6] H. Akaike, A new look at the statistical model identification, IEEE Transactions on Automatic
    Control 19 (1974), 716-723.
+.. [7] R. A. Fisher, Tests of significance in harmonic analysis, Proceedings of the Royal Society
+   of London A 125 (1929), 54-59.
 """
 
 import numpy as np
@@ -43,15 +45,21 @@ _TWO_MORE = 4.0
 _FEWEST, _LEAST_FREEDOM = 0.3, 3.0
 # Least share of its variance that a fit leaves of a reading whose noise can be told.
 _TOLD = 0.03
+# Fewest periods of a line, since what is slower may be a misfit; its frequencies are so much finer
+# than the periodogram's; and the largest difference of intervals, as a share, that is none.
+_PERIODS, _FINER, _EVEN = 10, 16, 0.01
 
 
 def correlated(residual: Array, basis: Array) -> tuple[float, float]:
     """Return the correlation of neighbouring residuals, and the chance of as much in white noise.
 
     The statistic is that of Durbin and Watson, d = sum (r_i+1 - r_i)^2 / sum r_i^2 [1]_, the
-    correlation 1 - d/2 relative to the mean of d; the chance is that of a smaller d.
+    correlation 1 - d/2 relative to the mean of d; the chance is that of a smaller d. A fit that
+    absorbs all but one direction leaves nothing to chance.
     """
     n = len(residual)
+    if n - len(basis) < 2:
+        return 0.0, 1.0
     observed = float(np.sum(np.diff(residual) ** 2) / np.sum(residual**2))
     differences = np.diff(basis)
     # A Q^T, for the matrix A = D^T D of differences D.
@@ -95,6 +103,21 @@ def wandering(residual: Array, basis: Array) -> float:
     return _chance_of_less(1 - observed, free - first, free - 2 * first + second, free, 1.0)
 
 
+def averaged(basis: Array) -> Array:
+    """Return orthonormal rows of means over stretches that a fit does not absorb."""
+    n = basis.shape[1]
+    count = min(_STRETCHES, n // _SHORTEST)
+    rows = np.zeros((max(count, 0), n))
+    for row, part in zip(
+        rows, np.array_split(np.arange(n), count) if count > 1 else (), strict=False
+    ):
+        row[part] = len(part) ** -0.5
+    rest = without(basis, rows)
+    _, shares, found = np.linalg.svd(rest, full_matrices=False)
+    kept: Array = found[shares > _TOLD]
+    return kept
+
+
 def _chance_of_less(observed: float, first: float, second: float, free: int, most: float) -> float:
     """Return the chance of a smaller ratio r^T A r / r^T r of what a fit leaves of white noise.
 
@@ -132,6 +155,25 @@ def uneven(residual: Array, basis: Array) -> float:
     reached = np.cumsum(power)[:-1] / np.sum(power)
     shares = np.cumsum(expected)[:-1] / np.sum(expected)
     return float(kolmogorov(np.sqrt(len(power)) * np.max(np.abs(reached - shares))))
+
+
+def find_line(residual: Array, time_s: Array) -> tuple[float, float, Array]:
+    """Return the frequency of the strongest sine, its chance in white noise, and its directions.
+
+    The chance is that of the largest ordinate of the periodogram [7]_, one where times are not
+    evenly spaced; directions are cosine and sine as orthonormal rows, (2, n_samples).
+    """
+    n, apart = len(residual), np.diff(time_s)
+    if n < 4 * _PERIODS or np.ptp(apart) > _EVEN * np.median(apart):
+        return 0.0, 1.0, np.zeros((0, n))
+    fine = np.abs(np.fft.rfft(residual, _FINER * n)[: _FINER * ((n + 1) // 2)]) ** 2
+    power = fine[_FINER::_FINER]
+    share = np.max(power[_PERIODS - 1 :]) / np.sum(power)
+    slowest = _FINER * _PERIODS
+    frequency = (slowest + np.argmax(fine[slowest:])) / (_FINER * n * np.mean(apart))
+    angle = 2 * np.pi * frequency * time_s
+    basis = np.linalg.qr(np.column_stack((np.cos(angle), np.sin(angle))))[0].T
+    return float(frequency), min(len(power) * float(1 - share) ** (len(power) - 1), 1.0), basis
 
 
 def by_leverage(residual: Array, basis: Array) -> Array:
@@ -205,7 +247,7 @@ def as_correlated(residual: Array, basis: Array) -> tuple[float, float]:
     largest = float(np.linalg.eigvalsh(taken.T @ found @ taken)[-1])
     remaining = found - taken @ (taken.T @ found)
     freedom = float(np.trace(remaining) ** 2 / np.sum(remaining * remaining.T))
-    independent = n * float(np.mean(residual**2)) / largest
+    independent = min(n * float(np.mean(residual**2)) / largest, float(n - len(basis)))
     return max(independent, _FEWEST), max(freedom, _LEAST_FREEDOM)
 
 

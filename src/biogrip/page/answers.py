@@ -5,9 +5,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 
 from biogrip.digits import legible, plain, with_unit
-from biogrip.fit.methods import ALL, share_with_limits
 from biogrip.judging.quantities import PROVIDED
 from biogrip.judging.verdicts import DETERMINED
+from biogrip.records.success import ALL, share_with_limits
 
 Row = Mapping[str, str]
 

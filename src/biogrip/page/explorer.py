@@ -14,7 +14,7 @@ from biogrip.figures.style import COLORS, MEASURED, TARGET, is_over_decades
 from biogrip.fit.methods import Method
 from biogrip.records.identifications import read_identifications
 from biogrip.records.traces import read_measurements
-from biogrip.stages.judgement import TRACE
+from biogrip.stages.judgement import TRACE, experiment_for
 from biogrip.study.study import Case
 
 # As many readings as a phone draws.
@@ -43,13 +43,13 @@ def fits_of(
     calibrated: Sequence[Path],
 ) -> Fits:
     """Return the judged trace of a case with the fit of each method, from files of the case."""
-    problem = case.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
+    experiment = experiment_for(case.experiment, recorded, calibrated)
     fits = []
     for method in methods:
         found = read_identifications(identifications, method.name).set_index("seed").loc[TRACE]
-        values = {p.name: float(found[p.column]) for p in problem.model.parameters}
-        fits.append((method, fit_of(problem, values, recorded, TRACE)))
+        values = {p.name: float(found[p.column]) for p in experiment.model.parameters}
+        fits.append((method, fit_of(experiment, values, recorded, TRACE)))
     return fits
 
 

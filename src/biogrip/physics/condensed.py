@@ -6,37 +6,32 @@ twice as far from the last change at its end as at its start, a response is a po
 19 to 1e-15 of its peak, whatever the rate: with e^(-rho (3 + s)), |s| <= 1, Chebyshev coefficients
 fall like 5.8^-n [1]_. Earlier changes are further away. So a piece with thousands of readings needs
 twenty nodes, and sums of products over its readings follow from one small matrix, which is summed
-up block by block. If readings are few, they are the nodes.
+up block by block. If readings are few, they are the nodes; so they are where the course changes at
+nearly every one of them, as one that was recorded.
 
-Second, a few times replace the nodes (`Condensed`). The linear response of any sample is a weighted
-sum of the responses of modes to the protocol, g(t; r). Over all rates r these nearly span a space
-of some fifty dimensions only, in which a function is determined by its values at as many
-well-chosen times [2]_, [3]_. So a response is simulated at those times, and a square matrix turns
-its values into rows with the sum of squares, and the gradients, of the residuals at all readings.
+Second, some seventy modes stand for all (`SpanningModes`): whatever the course, the response of any
+mode is a sum of theirs. A triangular matrix has all products of these at the nodes (`Condensed`),
+and with it the rows of all responses, and of their gradients. A trace's rows are its projections on
+the same orthonormal functions, and the norm of what they do not reach.
 
 References
 ----------
 .. [1] L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapter 8:
    how fast Chebyshev's coefficients of analytic functions fall.
-.. [2] P. Businger and G. H. Golub, Linear least squares solutions by Householder
-   transformations, Numerische Mathematik 7 (1965), 269-276: QR with column pivoting.
-.. [3] Z. Drmač and S. Gugercin, A new selection operator for the discrete empirical
-   interpolation method, SIAM Journal on Scientific Computing 38 (2016), A631-A648: points of
-   interpolation chosen by it.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
-from biogrip.arrays import Array, IntArray
-from biogrip.physics.modes import mode_responses
+from biogrip.arrays import Array
+from biogrip.physics.modes import mode_responses, responses_in_turn
 from biogrip.physics.protocol import Course
-from biogrip.physics.rate_tables import ModeRows
+from biogrip.physics.rate_tables import ModeRows, SpanningModes
 from biogrip.physics.whitening import Whitening, without
 
 _NODES = 20
@@ -51,13 +46,8 @@ _FEWEST_READINGS, _LARGEST_CONDITION = 256, 100.0
 _READINGS_AT_ONCE = 16_384
 # Most readings whose polynomials are kept for the next trace.
 _MOST_READINGS_KEPT = 100_000
-
-# Spacing of rates in log(1 - T r), T the last time: far closer than modes can be resolved.
-_SPACING_OF_RATES = 0.25
-# Slowest rate times T, and fastest rate times the shortest sampling interval.
-_SLOWEST_RATE, _FASTEST_RATE = 1e-6, 1e3
-# Directions with a smaller relative singular value are rounding errors.
-_LEAST_SINGULAR_VALUE = 1e-14
+# Most nodes of which orthonormal functions are kept for the next trace.
+_MOST_NODES_KEPT = 20_000
 
 
 @dataclass(frozen=True)
@@ -93,24 +83,13 @@ class DenseSamples:
 
     def rows_of_values(self, values: Array) -> Array:
         """Return rows with the products of the readings, from node values, (..., n_nodes)."""
-        return self._turned(values, lambda own, triangle: own @ (_TO_SERIES.T @ triangle))
-
-    def values_of_rows(self, rows: Array) -> Array:
-        """Return values at the nodes from rows: the inverse of `rows_of_values`."""
-        to_nodes = legendre.legvander(_PLACES, _DEGREE).T
-        return self._turned(
-            rows, lambda own, triangle: np.linalg.solve(triangle.T, own.T).T @ to_nodes
-        )
-
-    def _turned(self, values: Array, turn: Callable[[Array, Array], Array]) -> Array:
-        """Apply a function of node values and triangle to each piece that has a triangle."""
-        turned, start = np.copy(values), 0
+        rows, start = np.copy(values), 0
         for piece in self._pieces:
             here = slice(start, start + len(piece.nodes_s))
             start = here.stop
             if piece.triangle is not None:
-                turned[..., here] = turn(values[..., here], piece.triangle)
-        return turned
+                rows[..., here] = values[..., here] @ (_TO_SERIES.T @ piece.triangle)
+        return rows
 
     def rows_of_samples(self, samples: Array) -> tuple[Array, float]:
         """Project readings, (n_samples,), smooth or not, on smooth functions.
@@ -197,7 +176,7 @@ class Condensed:
 
     def later(self, change_s: float) -> "Condensed":
         """Return rows for a protocol that starts later by some s; noise and nuisance stay."""
-        return replace(self, all_s=self.all_s - change_s)
+        return replace(self, all_s=self.course.snapped(self.all_s - change_s))
 
     def cleared(self, rows: Array) -> Array:
         """Project nuisance out of functions of time, (..., n_samples), and whiten noise."""
@@ -212,88 +191,69 @@ class Condensed:
 
     def of_trace(self, readings: Array) -> Array:
         """Return rows of a trace without nuisance, (n_rows,); no response reaches the last."""
-        projected, rest = self.dense.rows_of_samples(readings)
-        rows = projected @ self._basis
-        return np.append(rows, np.hypot(np.linalg.norm(projected - self._basis @ rows), rest))
-
-    @cached_property
-    def time_s(self) -> Array:
-        """Times at which responses are simulated, (n_times,)."""
-        return self.dense.time_s[self._chosen]
-
-    def rows_of_nodes(self, values: Array) -> Array:
-        """Return rows of responses without nuisance, from values at the nodes, (..., n_nodes)."""
-        return self._cleared_rows(self.dense.rows_of_values(values))
-
-    @cached_property
-    def to_rows(self) -> Array:
-        """Matrix that turns values at `time_s`, from its left, into rows, (n_times, n_rows)."""
-        values = self.dense.values_of_rows(self._span.T)
-        matrix = np.linalg.solve(
-            values[:, self._chosen], self._cleared_rows(self._span.T) @ self._basis
-        )
-        return np.pad(matrix, ((0, 0), (0, 1)))
+        if self._in_parts:
+            triangle = self._triangle(readings)
+            # The rest of it is what modes need.
+            self.__dict__.setdefault("_factors", (np.empty(0), triangle[:, :-1]))
+            return np.array(triangle[:, -1])
+        (orthonormal, _), (own, rest) = self._factors, self._dense.rows_of_samples(readings)
+        rows = own @ orthonormal
+        return np.append(rows, np.hypot(np.linalg.norm(own - orthonormal @ rows), rest))
 
     @cached_property
     def of_modes(self) -> ModeRows:
         """Function from modes of many samples to rows of their responses."""
-        elapsed = np.subtract.outer(self.time_s, self.course.changes_s)
-        shortest_s = float(np.min(elapsed, where=elapsed > 0, initial=self.time_s[-1]))
-        return ModeRows(self.course, self.time_s, self.to_rows, shortest_s)
+        (_, triangle), first = self._factors, len(self._projected)
+        return ModeRows(self._modes, without(triangle[:, :first].T, triangle[:, first:].T))
 
     @cached_property
-    def dense(self) -> DenseSamples:
+    def _dense(self) -> DenseSamples:
         """Nodes that replace the readings."""
         # Whitened functions are not smooth: each reading is a node.
-        dense = self.whitening is None
-        return DenseSamples(self.course, self.all_s, dense=dense)
+        return DenseSamples(self.course, self.all_s, dense=self.whitening is None)
 
     @cached_property
-    def _nuisance_rows(self) -> Array:
-        """The nuisance as rows of the nodes, (n_functions, n_nodes)."""
-        rows = [self.dense.rows_of_samples(function)[0] for function in self.nuisance]
-        return np.reshape(rows, (len(rows), len(self.dense.time_s)))
+    def _modes(self) -> SpanningModes:
+        """The modes that stand for all."""
+        starts, nodes_s = np.append(-np.inf, self.course.changes_s), self._dense.time_s
+        elapsed, end_s = nodes_s - starts[starts.searchsorted(nodes_s) - 1], float(self.all_s[-1])
+        orders = 1 + int(np.max(np.flatnonzero(np.any(self.course.changes, axis=0))))
+        shortest_s = float(np.min(elapsed, initial=end_s))
+        return SpanningModes(end_s, shortest_s, orders, deforms=self.course.deforms)
+
+    @property
+    def _projected(self) -> Array:
+        """Functions that whitening does not project out, (n_functions, n_samples)."""
+        return self.functions if self.whitening is None else self.functions[:0]
+
+    @property
+    def _in_parts(self) -> bool:
+        """True if there are too many nodes to keep functions of them."""
+        return self.whitening is None and len(self._dense.time_s) > _MOST_NODES_KEPT
 
     @cached_property
-    def _span(self) -> Array:
-        """Orthonormal rows of the nodes that span all responses, (n_nodes, n_rows)."""
-        end_s, time_s = self.all_s[-1], self.dense.time_s
-        shortest_s = np.diff(self.all_s).min()
-        last = np.log1p(_FASTEST_RATE * end_s / shortest_s)
-        rates = (
-            -np.expm1(
-                np.append(_SLOWEST_RATE, np.arange(_SPACING_OF_RATES, last, _SPACING_OF_RATES))
-            )
-            / end_s
-        )
-        growth, slope = (
-            self.dense.rows_of_values(of[0])
-            for of in mode_responses(rates[None], self.course, time_s)
-        )
-        size = np.linalg.norm(growth, axis=1, keepdims=True)
-        size[size == 0] = 1.0
-        family = np.concatenate((growth / size, rates[:, None] * slope / size))
-        basis, triangle = np.linalg.qr(family.reshape(-1, len(time_s)).T)
-        turned, share, _ = np.linalg.svd(triangle)
-        return basis @ turned[:, share > _LEAST_SINGULAR_VALUE * share[0]]
-
-    @cached_property
-    def _chosen(self) -> IntArray:
-        """Indices of the best interpolation nodes of the span, by QR with column pivoting."""
-        # Imported here: the genetic algorithm does not need it, and loading takes long.
-        from scipy.linalg import qr
-
-        span = self.dense.values_of_rows(self._span.T)
-        _, order = qr(span, mode="r", pivoting=True)
-        return np.sort(order[: span.shape[0]])
-
-    @cached_property
-    def _basis(self) -> Array:
-        """Orthonormal rows that span all responses without nuisance, (n_nodes, n_rows - 1)."""
-        return np.linalg.qr(self._cleared_rows(self._span.T).T)[0]
-
-    def _cleared_rows(self, rows: Array) -> Array:
-        """Project out nuisance and whiten as `cleared` does, with rows of the nodes."""
+    def _factors(self) -> tuple[Array, Array]:
+        """Q and R of functions and responses of the modes in columns; of too many nodes no Q."""
+        if self._in_parts:
+            return np.empty(0), self._triangle(np.zeros_like(self.all_s))[:, :-1]
+        dense, modes = self._dense, self._modes
+        given = modes.rates[None], self.course, dense.time_s
+        responses = modes.scale[:, None] * mode_responses(*given, slopes=False)[0][0]
+        responses = dense.rows_of_values(responses)
         if self.whitening is not None:
-            return self.whitening(rows)
-        return without(self._nuisance_rows, rows)
+            responses = self.whitening(responses)
+        others = [dense.rows_of_samples(function)[0] for function in self._projected]
+        orthonormal, triangle = np.linalg.qr(np.vstack((*others, responses)).T)
+        return orthonormal, np.pad(triangle, ((0, 1), (0, 0)))
+
+    def _triangle(self, readings: Array) -> Array:
+        """Return R of functions, modes and readings in columns, part by part, (n_rows, n_rows)."""
+        rates, scale = self._modes.rates[None], self._modes.scale[:, None]
+        triangle = np.zeros((len(self._projected) + len(scale) + 1,) * 2)
+        before = slice(int(self.all_s.searchsorted(self.course.time_s[0], side="right")))
+        later = responses_in_turn(rates, self.course, self.all_s, slopes=False)
+        for here, found in chain([(before, np.zeros((1, 1, len(scale), before.stop)))], later):
+            more = np.vstack((self._projected[:, here], scale * found[0, 0], readings[here])).T
+            triangle = np.asarray(np.linalg.qr(np.concatenate((triangle, more)), mode="r"))
+            triangle *= np.where(np.diagonal(triangle) < 0, -1.0, 1.0)[:, None]
+        return triangle

@@ -40,6 +40,11 @@ class Channel:
         """Usual name of a column or key: the name with the unit."""
         return self.name + self.suffix
 
+    @property
+    def si(self) -> str:
+        """The SI unit as a key of the units."""
+        return self.unit or "1"
+
 
 @dataclass(frozen=True)
 class Instrument:
@@ -61,12 +66,6 @@ class Instrument:
         """True if a deformation is controlled and a load is read."""
         return self.kind == "relaxation"
 
-    def suspects(self, article: str = "the ", *, unit: bool = False) -> str:
-        """Return what may be wrong if a model does not fit, and with `unit` the file's unit too."""
-        parts = ["model", "protocol", *(["gripper"] if self.has_jaws else []), *["unit"][:unit]]
-        *first, last = (f"{article}{part}" for part in parts)
-        return f"{', '.join(first)} or {last}"
-
     @property
     def has_jaws(self) -> bool:
         """True if it grips the sample between arms, which yield and may let it go."""
@@ -85,8 +84,11 @@ ROTATION = Channel(
 GRIPPER = Instrument("gripper", TORQUE, ROTATION)
 """Its read rotation is the closing one of its left arm."""
 
-STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "mPa": 1e-3}
-"""Units of stresses and moduli."""
+STRESS_UNITS = {
+    **{"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "mPa": 1e-3, "bar": 1e5, "mbar": 1e2},
+    **{"cmH2O": 98.0665, "mmHg": 133.322387415},
+}
+"""Units of stresses and moduli; columns of water and mercury are the conventional ones."""
 
 _FORCES = {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "pN": 1e-12, "kN": 1e3, "MN": 1e6}
 FORCE = Channel("force", "N", _FORCES | {"gf": 9.80665e-3, "kgf": 9.80665})

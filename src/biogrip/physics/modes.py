@@ -28,24 +28,25 @@ References
    approximation, ACM Transactions on Mathematical Software 29 (2003), 245-262.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from biogrip.arrays import Array, parts
+from biogrip.arrays import Array, IntArray, parts
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import Course
-from biogrip.physics.response import LEFT, Arms, Impedance, phi_function
+from biogrip.physics.response import LEFT, Arms, Impedance, phi_functions
 from biogrip.physics.sample_model import Network, SampleModel
 
 _COMPLEX_STEP = 1e-30
 # Rate at which a bare damper forgets, in 1/s; its force is c times the rate of the deformation.
 _RATE_OF_A_DAMPER = 1e30
-# Numbers formed together, which should fit a processor's cache, and times: the responses of modes
-# at a million would take too much memory.
-_NUMBERS_AT_ONCE, _TIMES_AT_ONCE = 400_000, 100_000
+# Numbers formed together, which should fit a processor's cache.
+_NUMBERS_AT_ONCE = 400_000
+# Phases, and steps of a recursion, that are taken one by one.
+_FEW = 50
 
 
 class Modes(NamedTuple):
@@ -89,24 +90,17 @@ def linear_responses(
         Readings, and their derivatives; without `slopes`, (n, 1, n_times).
     """
     modes = compute_modes(gripper, model, course, parameters, slopes=slopes)
-    rows = np.empty((len(parameters), 1 + modes.rate_slopes.shape[1], len(time_s)))
-    for some in parts(len(time_s), _TIMES_AT_ONCE):
-        rows[:, :, some] = _superpose(modes, course, time_s[some])
-    return rows
-
-
-def _superpose(modes: Modes, course: Course, time_s: Array) -> Array:
-    """Sum responses of modes, w g, and their derivatives, d(w g) = dw g + w dr dg/dr."""
     n, count, m = modes.rate_slopes.shape
+    # Sums of responses of modes, w g, and their derivatives, d(w g) = dw g + w dr dg/dr.
     by_response = np.concatenate((modes.weights[:, None], modes.weight_slopes), axis=1)
     by_slope = np.zeros_like(by_response)
     by_slope[:, 1:] = modes.weights[:, None] * modes.rate_slopes
     mixing = np.concatenate((by_response, by_slope), axis=2)
-    rows = np.empty((n, 1 + count, len(time_s)))
+    rows = np.zeros((n, 1 + count, len(time_s)))
     for some in parts(n, max(1, _NUMBERS_AT_ONCE // (m * len(time_s)))):
-        both = np.concatenate(mode_responses(modes.rates[some], course, time_s), axis=1)
-        # One product per sample: the order of its sums does not depend on the number of samples.
-        rows[some] = mixing[some] @ both
+        for here, both in responses_in_turn(modes.rates[some], course, time_s):
+            # One product per sample: the order of its sums does not depend on their number.
+            rows[some, :, here] = mixing[some] @ np.concatenate(both, axis=1)
     return rows
 
 
@@ -210,7 +204,7 @@ def _split_complex_step(values: NDArray[Any], count: int) -> tuple[Array, Array]
 def relaxation(network: Network, course: Course, time_s: Array) -> Array:
     """Compute the load on samples that a protocol deforms, (n, n_times)."""
     rates, weights = _branches(network)
-    decay, _ = mode_responses(rates, course, time_s)
+    decay, _ = mode_responses(rates, course, time_s, slopes=False)
     load: Array = (weights[:, None] @ decay)[:, 0]
     return load
 
@@ -244,13 +238,15 @@ def lag_course(course: Course, shares: Sequence[float]) -> Callable[[Array], Arr
     rates, sign = -1 / (course.end_s * np.array(shares)), 1.0 if course.deforms else -1.0
 
     def lagged(time_s: Array) -> Array:
-        lags: Array = sign * mode_responses(rates[None], course, time_s)[0][0]
+        lags: Array = sign * mode_responses(rates[None], course, time_s, slopes=False)[0][0]
         return lags
 
     return lagged
 
 
-def mode_responses(rates: Array, course: Course, time_s: Array) -> tuple[Array, Array]:
+def mode_responses(
+    rates: Array, course: Course, time_s: Array, *, slopes: bool = True
+) -> tuple[Array, Array]:
     """Compute responses of modes of unit weight, or of branches of unit stiffness, and dg/dr.
 
     Parameters
@@ -262,53 +258,152 @@ def mode_responses(rates: Array, course: Course, time_s: Array) -> tuple[Array, 
     time_s : (n_times,)
         Ascending; at the very instant of a step, what precedes it. Before the protocol nothing
         responds.
+    slopes
+        True to compute derivatives; else the responses are returned in their place.
 
     Returns
     -------
     responses, slopes : (n, n_modes, n_times)
         In units of what is controlled, and those times s.
     """
-    rate = rates[:, :, None]
-    responses, slopes = np.zeros((2, *rates.shape, len(time_s)))
-    reached, its_slope = np.zeros((2, *rates.shape, 1))
-    ends = np.append(course.time_s[1:], course.end_s)
+    both = np.zeros((1 + slopes, *rates.shape, len(time_s)))
+    for here, found in responses_in_turn(rates, course, time_s, slopes=slopes):
+        both[..., here] = found
+    return both[0], both[-1]
+
+
+def responses_in_turn(
+    rates: Array, course: Course, time_s: Array, *, slopes: bool = True
+) -> Iterator[tuple[slice, Array]]:
+    """Yield parts of the times after the start, and what `mode_responses` finds there, stacked.
+
+    The end of a phase is the initial state of the next, so that phases cost no more than readings.
+    """
+    at_once = max(1, _NUMBERS_AT_ONCE // max(rates.size, 1))
+    lengths = np.diff(course.time_s, append=course.end_s)
+    # What precedes a step is read at its instant.
     firsts = np.append(time_s.searchsorted(course.time_s, side="right"), len(time_s))
-    level = 0.0
     # The step of a deformation is the start of a phase.
-    orders = (1, 2) if course.deforms else (0, 1, 2)
-    respond = _stretched if course.deforms else _loaded
-    for k, (start, powers) in enumerate(zip(course.time_s, course.within_phases, strict=True)):
-        here = slice(firsts[k], firsts[k + 1])
-        # The end of a phase is the initial state of the next.
-        elapsed = np.append(time_s[here], ends[k]) - start
-        if course.deforms:
-            value, slope, curvature = powers
-            reached = reached + (value - level)
-            level = value + slope * elapsed[-1] + curvature * elapsed[-1] ** 2 / 2
-        remains = np.exp(rate * elapsed)
-        response, slope = reached * remains, (its_slope + reached * elapsed) * remains
-        for order in orders:
-            if powers[order]:
-                one, one_slope = respond(order, rate, elapsed)
-                response, slope = response + powers[order] * one, slope + powers[order] * one_slope
-        responses[..., here], slopes[..., here] = response[..., :-1], slope[..., :-1]
-        reached, its_slope = response[..., -1:], slope[..., -1:]
-    return responses, slopes
+    steps = np.append(course.changes[:, 0] * course.deforms, 0.0)
+    state = np.zeros((1 + slopes, *rates.shape))
+    state[0] += steps[0]
+    for phases in parts(len(lengths), at_once):
+        powers, lasts = course.within_phases[phases], lengths[phases]
+        go_on = _Motion(rates[:, :, None], powers, deforms=course.deforms, slopes=slopes)
+        after = steps[phases.start + 1 :][: len(lasts)]
+        states = go_on.carried(state, lasts, after)
+        state = states[..., -1]
+        first, counts = firsts[phases.start], np.diff(firsts[phases.start :])[: len(lasts)]
+        phase = np.repeat(np.arange(len(lasts)), counts)
+        for some in parts(len(phase), at_once):
+            here, own = slice(first + some.start, first + min(some.stop, len(phase))), phase[some]
+            elapsed = time_s[here] - course.time_s[phases][own]
+            if np.array_equal(elapsed, lasts[own]):
+                # Rows of a record are read at the ends of its phases.
+                found = states[..., own + 1]
+                found[0] -= after[own]
+                yield here, found
+            else:
+                yield here, go_on.after(states, own, elapsed)
 
 
-def _loaded(order: int, rate: Array, elapsed: Array) -> tuple[Array, Array]:
-    """Return the response to a load t^n/n!, and its derivative."""
-    z = rate * elapsed
-    if order == 0:
-        growth = np.expm1(z)
-        return growth, elapsed * (growth + 1)
-    power = elapsed ** (order + 1)
-    this, before = phi_function(order + 1, z), phi_function(order, z)
-    return rate * power * this, power * (before - order * this)
+class _Motion:
+    """How modes go on in neighbouring phases, with the derivatives by their rates.
+
+    Rates are (n, n_modes, 1), and all orders of what is controlled, at the starts of the phases,
+    (n_phases, n_orders).
+    """
+
+    def __init__(self, rates: Array, powers: Array, *, deforms: bool, slopes: bool) -> None:
+        self._rates, self._powers = rates, powers
+        self._deforms, self._slopes = deforms, slopes
+
+    def carried(self, state: Array, lengths_s: Array, steps: Array) -> Array:
+        """Return modes at the starts of the phases and at their end, (..., n_phases + 1).
+
+        Given are how long they last and what a branch is stretched by after each, (n_phases,).
+        """
+        remains, gained = self._terms(np.arange(len(lengths_s)), lengths_s)
+        reached = _recursion(state[0], remains, gained[0] + steps)
+        if not self._slopes:
+            return reached[None]
+        moved = reached[..., :-1] * lengths_s * remains + gained[1]
+        return np.stack((reached, _recursion(state[1], remains, moved)))
+
+    def after(self, states: Array, phase: IntArray, elapsed_s: Array) -> Array:
+        """Return modes at times since the starts of phases, (..., n_times)."""
+        remains, found = self._terms(phase, elapsed_s)
+        reached = states[..., phase]
+        found[0] += reached[0] * remains
+        if self._slopes:
+            found[1] += (reached[1] + reached[0] * elapsed_s) * remains
+        return found
+
+    def _terms(self, phase: IntArray, elapsed_s: Array) -> tuple[Array, Array]:
+        """Return what remains of modes after times in phases, and what they gain in these."""
+        at: Array = elapsed_s
+        same: IntArray | slice = slice(None)
+        if len(self._powers) > _FEW:
+            # Rows at equal intervals are few different times apart.
+            at, same = np.unique(elapsed_s, return_inverse=True)
+        orders = np.flatnonzero(np.any(self._powers, axis=0))
+        orders = orders[orders >= self._deforms].tolist()
+        terms = respond(orders, self._rates, at, deforms=self._deforms, slopes=self._slopes)
+        remains = np.exp(self._rates * at)[..., same]
+        gained = np.zeros((1 + self._slopes, *remains.shape))
+        for order, term in zip(orders, terms, strict=True):
+            gained += self._powers[phase, order] * term[..., same]
+        return remains, gained
 
 
-def _stretched(order: int, rate: Array, elapsed: Array) -> tuple[Array, Array]:
-    """Return the response to a deformation t^n/n!, n above 0, and its derivative."""
-    z, power = rate * elapsed, elapsed**order
-    this, after = phi_function(order, z), phi_function(order + 1, z)
-    return power * this, power * elapsed * (this - order * after)
+def _recursion(first: Array, factors: Array, terms: Array) -> Array:
+    """Return x_0 ... x_n, along the last axis, with x_(k+1) = factors_k x_k + terms_k.
+
+    Many steps are taken in blocks: those of all blocks from zero on at once, then from block to
+    block.
+    """
+    count = terms.shape[-1]
+    block = int(np.sqrt(count)) if count > _FEW else 1
+    blocks = -(-count // block)
+    padding = [(0, 0)] * (terms.ndim - 1) + [(0, blocks * block - count)]
+    scale, within = (
+        np.moveaxis(np.pad(of, padding).reshape(*of.shape[:-1], blocks, block), (-1, -2), (0, 1))
+        for of in (factors, terms)
+    )
+    scale, within = np.ascontiguousarray(scale), np.ascontiguousarray(within)
+    for k in range(1, block):
+        within[k] += scale[k] * within[k - 1]
+        scale[k] *= scale[k - 1]
+    starts = np.empty((blocks + 1, *first.shape))
+    starts[0] = first
+    for k in range(blocks):
+        starts[k + 1] = scale[-1, k] * starts[k] + within[-1, k]
+    within += scale * starts[:-1]
+    reached = np.moveaxis(within, (0, 1), (-1, -2)).reshape(*first.shape, blocks * block)
+    return np.concatenate((first[..., None], reached[..., :count]), axis=-1)
+
+
+def respond(
+    orders: Sequence[int], rate: Array, elapsed_s: Array, *, deforms: bool, slopes: bool = False
+) -> list[Array]:
+    """Return responses of modes to t^n/n! after times, and derivatives by the rate, for each n.
+
+    A load is controlled or, if that `deforms`, a deformation. Rates and times are broadcast; the
+    derivatives are stacked below, if there are `slopes`.
+    """
+    z, most = rate * elapsed_s, max(orders, default=0)
+    phis = phi_functions(most + 1, z) if most else []
+    found = []
+    for order in orders:
+        power = elapsed_s**order
+        if order == 0:
+            decay = np.exp(z) if deforms else np.expm1(z)
+            both = decay, elapsed_s * (decay if deforms else decay + 1)
+        elif deforms:
+            both = power * phis[order], power * elapsed_s * (phis[order] - order * phis[order + 1])
+        else:
+            power = power * elapsed_s
+            slope = power * (phis[order] - order * phis[order + 1])
+            both = rate * power * phis[order + 1], slope
+        found.append(np.stack(both[: 1 + slopes]))
+    return found

@@ -8,6 +8,7 @@ closes both arms alike; it is an increment on that which closes them onto the sa
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import factorial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,8 @@ from biogrip.arrays import Array
 
 # Share of the largest level that a step is more than.
 _LEAST_STEP = 1e-13
+# Share of how far times are apart by which one may be off a change for rounding alone.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -44,20 +47,25 @@ class Phase:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Course:
-    """A protocol as a list of changes, to which linear responses superpose."""
+    """A protocol as a list of changes, to which linear responses superpose.
+
+    Orders are level, slope and curvature; of a recorded course, the rate of the curvature, too.
+    """
 
     time_s: Array
     """Starts of the phases, (n_phases,)."""
     changes: Array
-    """Jumps of level, slope and curvature at these times, (n_phases, 3)."""
+    """Jumps of all orders at these times, (n_phases, n_orders)."""
+    within_phases: Array
+    """All orders at the starts of the phases, (n_phases, n_orders)."""
     end_s: float
     """End of the protocol."""
     deforms: bool = False
     """True if a deformation is controlled, and the load is read: relaxation."""
 
-    @cached_property
+    @property
     def jumps(self) -> list[tuple[float, int, float]]:
         """Changes proportional to t^order/order!: start, order and height."""
         return [
@@ -70,21 +78,39 @@ class Course:
     @cached_property
     def changes_s(self) -> Array:
         """Times at which what is controlled changes, ascending."""
-        return np.unique([start for start, *_ in self.jumps])
+        return np.unique(self.time_s[np.any(self.changes, axis=1)])
 
-    @cached_property
-    def within_phases(self) -> Array:
-        """Level, slope and curvature at the starts of phases, (n_phases, 3)."""
-        powers = self.changes.copy()
-        for k, gap in enumerate(np.diff(self.time_s)):
-            level, slope, curvature = powers[k]
-            carried = level + slope * gap + curvature * gap**2 / 2, slope + curvature * gap
-            powers[k + 1] += (*carried, curvature)
-        return powers
+    @property
+    def steps_s(self) -> Array:
+        """Times of steps, ascending."""
+        return self.time_s[self.changes[:, 0] != 0]
+
+    @property
+    def jumps_s(self) -> Array:
+        """Times at which a sample may jump, ascending: those of steps.
+
+        Of a deformation, they are also those at which its rate jumps, and with it a damper's force.
+        """
+        return self.time_s[np.any(self.changes[:, : 1 + self.deforms], axis=1)]
 
     def times(self, factor: float) -> "Course":
         """Return the protocol with all that is controlled multiplied by a factor."""
-        return replace(self, changes=factor * self.changes)
+        scaled = factor * self.changes, factor * self.within_phases
+        return replace(self, changes=scaled[0], within_phases=scaled[1])
+
+    def snapped(self, time_s: Array) -> Array:
+        """Return ascending times, (n_times,), with those that are changes but for rounding on them.
+
+        A time is moved to a change that is nearer than 1e-9 of how far it is from its neighbours.
+        """
+        if len(time_s) < 2 or not len(self.changes_s):
+            return time_s
+        gaps = np.diff(time_s)
+        apart = np.minimum(np.append(gaps, gaps[-1]), np.append(gaps[0], gaps))
+        after = np.clip(self.changes_s.searchsorted(time_s), 1, max(1, len(self.changes_s) - 1))
+        near = self.changes_s[np.stack((after - 1, np.minimum(after, len(self.changes_s) - 1)))]
+        nearest = np.where(np.abs(near[0] - time_s) <= np.abs(near[1] - time_s), *near)
+        return np.where(np.abs(nearest - time_s) <= _ROUNDING * apart, nearest, time_s)
 
     @cached_property
     def only_steps(self) -> bool:
@@ -122,23 +148,26 @@ def join_phases(phases: tuple[Phase, ...], *, deforms: bool = False) -> Course:
         slope + curvature * durations,
         curvature,
     )
-    least = _LEAST_STEP * np.max(np.abs(level))
+    least = _LEAST_STEP * np.max(np.abs(changes), axis=0)
     changes[1:] -= np.stack(reached, axis=1)[:-1]
-    # A ramp that ends where the next one begins makes no step, but for rounding.
-    steps = changes[1:, 0]
-    steps[np.abs(steps) < least] = 0.0
-    return Course(starts, changes, float(ends[-1]), deforms)
+    # A ramp that ends where the next one begins makes no step, but for rounding, and one that goes
+    # on at the same rate no jump of the rate.
+    changes[1:][np.abs(changes[1:]) < least] = 0.0
+    within = changes.copy()
+    for k, gap in enumerate(np.diff(starts)):
+        level, slope, curvature = within[k]
+        carried = level + slope * gap + curvature * gap**2 / 2, slope + curvature * gap
+        within[k + 1] += (*carried, curvature)
+    return Course(starts, changes, within, float(ends[-1]), deforms)
 
 
 def evaluate(course: Course, time_s: ArrayLike) -> Array:
     """Return what is controlled, (n_times,); at the instant of a step, its value after the step."""
     t = np.asarray(time_s, dtype=float)
-    controlled = np.zeros_like(t)
-    for start, (level, slope, curvature) in zip(course.time_s, course.changes, strict=True):
-        elapsed = t - start
-        gain = level + slope * elapsed + curvature * elapsed**2 / 2
-        controlled += np.where(elapsed >= 0, gain, 0.0)
-    return controlled
+    phase = course.time_s.searchsorted(t, side="right") - 1
+    powers, elapsed = course.within_phases[phase].T, t - course.time_s[phase]
+    controlled = sum(each * elapsed**n / factorial(n) for n, each in enumerate(powers))
+    return np.where(phase >= 0, controlled, 0.0)
 
 
 def is_held(course: Course, time_s: ArrayLike) -> bool:

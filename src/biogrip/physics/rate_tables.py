@@ -19,25 +19,31 @@ References
 ----------
 .. [1] L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapter 8:
    convergence of Chebyshev interpolants within a Bernstein ellipse.
+.. [2] H. Cheng, Z. Gimbutas, P. G. Martinsson and V. Rokhlin, On the compression of low rank
+   matrices, SIAM Journal on Scientific Computing 26 (2005), 1389-1404: by QR with column pivoting.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial, chebyshev
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array, IntArray
-from biogrip.physics.modes import Modes, mode_responses
-from biogrip.physics.protocol import Course
+from biogrip.physics.modes import Modes, respond
 
 # Width and degree of wide pieces, and number of short pieces in one for sums and for rows.
 _WIDTH, _DEGREE = 0.25, 11
 _SHORTER, _SHORTER_OF_ROWS = 32, 16
 _ORDERS = np.arange(6)
-# exp(-40) is lost in rounding: beyond, only what has not begun to decay is left. Under a ramp, a
-# term remains that falls with the rate only.
-_DECAYED, _DECAYED_UNDER_RAMPS = 40.0, 1e12
+# exp(-40) is lost in rounding: beyond, only what has not begun to decay is left.
+_DECAYED = 40.0
+
+# Spacing in u of the rates to choose modes from, and of times on a logarithmic scale.
+_SPACING_OF_RATES, _SPACING_OF_TIMES = 0.05, 0.1
+# What is left of a mode beside those chosen, relative to the first.
+_LEFT_OUT = 1e-14
 
 # Chebyshev's nodes on (0, 1).
 _NODES, _SHORT_NODES = (
@@ -115,44 +121,39 @@ class ModeRows:
     times 1 - T r. A response with its derivatives is then one small product: weights and powers of
     the places within pieces, times the pieces' coefficients.
 
-    A matrix, (n_times, n_rows), turns values at ascending times, multiplied from their right, into
-    rows; `shortest_s` is the shortest of these times after a change of the load.
+    Of a mode so fast that nothing lasts until the next reading, only powers of 1/r remain, up to
+    the fifth: the last piece is a polynomial in those.
+
+    Given are modes that stand for all, and the rows of their responses, (n_modes, n_rows).
     """
 
-    def __init__(self, course: Course, time_s: Array, to_rows: Array, shortest_s: float) -> None:
-        self._end_s, self._deforms = float(time_s[-1]), course.deforms
-        self._rows = to_rows.shape[1]
-        decayed = _DECAYED if course.only_steps else _DECAYED_UNDER_RAMPS
-        wide = int(np.ceil(np.log1p(decayed * self._end_s / shortest_s) / _WIDTH))
-        self._last = wide * _SHORTER_OF_ROWS
-        # (n_pieces, degree + 1, n_rows).
-        self._table = np.empty((self._last, len(_ORDERS), self._rows))
-        for piece in range(wide):
-            u = _WIDTH * (piece + _NODES)
-            responses, _ = mode_responses(-np.expm1(u)[None] / self._end_s, course, time_s)
-            values = (responses[0] / self._scale(np.expm1(u))[:, None]) @ to_rows
-            powers = _in_short_pieces(values.T, _SHORTER_OF_ROWS)
-            here = slice(piece * _SHORTER_OF_ROWS, (piece + 1) * _SHORTER_OF_ROWS)
-            self._table[here] = powers.transpose(1, 2, 0)
+    def __init__(self, modes: "SpanningModes", rows: Array) -> None:
+        self._end_s, self._deforms, self._decayed = modes.end_s, modes.deforms, modes.decayed
+        powers = modes.powers.reshape(len(rows), -1).T @ rows
+        # (n_pieces + 1, degree + 1, n_rows).
+        self._table = powers.reshape(-1, len(_ORDERS), rows.shape[1])
+        self._last = len(self._table) - 1
 
     def __call__(self, modes: Modes) -> Array:
         """Return rows of responses with derivatives, (n, 1 + n_parameters, n_rows)."""
         count, parameters, n_modes = modes.rate_slopes.shape
         scaled, width = -self._end_s * modes.rates, _WIDTH / _SHORTER_OF_ROWS
+        scaled_slopes = -self._end_s * modes.rate_slopes
         u = np.log1p(scaled) / width
-        decayed = u >= self._last
-        u = np.minimum(u, np.nextafter(self._last, 0))
-        piece = u.astype(np.intp)
-        powers, power_slopes = _powers(u - piece)
+        lasts = u < self._last
+        piece = np.where(lasts, u, self._last).astype(np.intp)
+        beyond = self._decayed / np.maximum(scaled, self._decayed)
+        powers, power_slopes = _powers(np.where(lasts, u - piece, beyond))
         # The divisor, and the place, with their derivatives by the log-parameters.
-        known = np.where(decayed, np.expm1(width * self._last), scaled)
-        known_slopes = np.where(decayed, 0.0, -self._end_s)[:, None] * modes.rate_slopes
-        place_slopes = known_slopes / (width * (1 + scaled))[:, None]
-        scale, scale_slopes = self._scale(known), known_slopes
+        place_slopes = np.where(
+            lasts, 1 / (width * (1 + scaled)), -beyond / np.maximum(scaled, self._decayed)
+        )
+        place_slopes = place_slopes[:, None] * scaled_slopes
+        scale = _divisor(scaled, self._decayed, self._deforms)
+        scale_slopes = np.where(lasts, 1.0, 0.0)[:, None] * scaled_slopes
         if self._deforms:
             # What a fast mode has not forgotten falls with its rate.
-            scale = self._scale(scaled)
-            scale_slopes = (self._end_s * scale * scale)[:, None] * modes.rate_slopes
+            scale_slopes = -(scale * scale)[:, None] * scaled_slopes
         amplitudes = modes.weights * scale
         amplitude_slopes = modes.weight_slopes * scale[:, None]
         amplitude_slopes += modes.weights[:, None] * scale_slopes
@@ -162,12 +163,89 @@ class ModeRows:
         np.multiply(amplitude_slopes[..., None], powers[:, None], out=mixed[:, 1:])
         mixed[:, 1:] += moved[..., None] * power_slopes[:, None]
         # One product per sample: the order of its sums does not depend on the number of samples.
-        pieces = self._table[piece].reshape(count, -1, self._rows)
+        pieces = self._table[piece].reshape(count, -1, self._table.shape[2])
         return mixed.reshape(count, 1 + parameters, -1) @ pieces
 
-    def _scale(self, scaled: Array) -> Array:
-        """Return the divisor of a mode's rows by -T r."""
-        return 1 / (1 + scaled) if self._deforms else scaled
+
+class SpanningModes:
+    """Modes whose responses to any course span those of all modes, slow and fast.
+
+    A course is a sum of jumps of its level, its rate, and so on. So columns are taken that stand
+    for all [2]_ from a matrix with a column a rate, of responses to any such jump after any time
+    from the shortest to T.
+
+    Parameters
+    ----------
+    end_s
+        T.
+    shortest_s
+        Shortest time of a reading after a change of what is controlled.
+    orders
+        Number of orders of the course.
+    deforms
+        True if a deformation is controlled.
+    """
+
+    def __init__(self, end_s: float, shortest_s: float, orders: int, *, deforms: bool) -> None:
+        self.end_s, self.deforms = end_s, deforms
+        # Rounded up, so that many traces have the same.
+        halvings = int(np.ceil(np.log2(end_s / shortest_s)))
+        rates, self.decayed, self.powers = _spanning(halvings, orders, deforms)
+        self.rates: Array = rates / end_s
+        """Rates of the modes, (n_modes,)."""
+        self.scale = _scale(rates, deforms)
+        """Factors, (n_modes,), with which responses of modes are as large for all rates."""
+
+
+@lru_cache(maxsize=16)
+def _spanning(halvings: int, orders: int, deforms: bool) -> tuple[Array, float, Array]:
+    """Return rates of spanning modes over T, a rate beyond which nothing lasts, and a table.
+
+    It has coefficients of the share of each mode in that of any rate, piece by piece, (n_modes,
+    n_pieces + 1, degree + 1), see `ModeRows`.
+    """
+    # Imported here: the genetic algorithm does not need it, and loading takes long.
+    from scipy.linalg import qr
+
+    elapsed = np.exp(-np.arange(0.0, halvings * np.log(2) + _SPACING_OF_TIMES, _SPACING_OF_TIMES))
+
+    def jumps(rates: Array) -> Array:
+        """Return scaled responses to jumps of all orders after all times, (n_jumps, n)."""
+        every = respond(range(orders), rates, elapsed[:, None], deforms=deforms)
+        return np.concatenate([found[0] for found in every]) * _scale(rates, deforms)
+
+    wide = int(np.ceil(np.log1p(_DECAYED * 2.0**halvings) / _WIDTH))
+    decayed = float(np.expm1(_WIDTH * wide))
+    last = np.log1p(decayed / _SHORT_NODES[0])
+    candidates = -np.expm1(np.arange(_SPACING_OF_RATES, last, _SPACING_OF_RATES))
+    found = jumps(candidates)
+    sizes = np.max(np.abs(found), axis=1, keepdims=True)
+    basis, triangle, order = qr(found / sizes, mode="economic", pivoting=True)
+    left = np.abs(np.diagonal(triangle))
+    count = int(np.count_nonzero(left > _LEFT_OUT * left[0]))
+    rates, basis = candidates[order[:count]], basis[:, :count] / sizes
+
+    def values(scaled: Array) -> Array:
+        """Return shares of modes in tabulated rows, by -T r, (n_modes, n)."""
+        shares = np.linalg.solve(triangle[:count, :count], basis.T @ jumps(-scaled))
+        return shares / (_scale(-scaled, deforms) * _divisor(scaled, decayed, deforms))
+
+    pieces = [
+        _in_short_pieces(values(np.expm1(_WIDTH * (piece + _NODES))), _SHORTER_OF_ROWS)
+        for piece in range(wide)
+    ]
+    beyond = values(decayed / _SHORT_NODES) @ _TO_SERIES @ _TO_POWERS
+    return rates, decayed, np.concatenate([*pieces, beyond[:, None]], axis=1)
+
+
+def _scale(rates: Array, deforms: bool) -> Array:
+    """Return factors with which responses of modes are as large for all rates over T."""
+    return 1 - rates if deforms else 1 - 1 / rates
+
+
+def _divisor(scaled: Array, decayed: float, deforms: bool) -> Array:
+    """Return the divisor of a mode's rows by -T r."""
+    return 1 / (1 + scaled) if deforms else np.minimum(scaled, decayed)
 
 
 def _powers(place: Array) -> tuple[Array, Array]:

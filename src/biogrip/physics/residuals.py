@@ -32,6 +32,8 @@ class Trace:
     """Rows for the protocol and these times; specify nuisance functions and noise model."""
     known_noise: float | None = None
     """Standard deviation of the noise; None to estimate it from neighbouring readings."""
+    known_scatter: float | None = None
+    """That of neighbouring readings, if it is another trace's; None to estimate it."""
 
     @cached_property
     def cleared(self) -> Array:
@@ -46,19 +48,19 @@ class Trace:
     @cached_property
     def noise_sd(self) -> float:
         """Standard deviation of the noise, known or estimated."""
-        if self.known_noise is not None:
-            return self.known_noise
+        return self.scatter if self.known_noise is None else self.known_noise
+
+    @cached_property
+    def scatter(self) -> float:
+        """Standard deviation of the noise by neighbouring readings, whatever is known of it."""
+        if self.known_scatter is not None:
+            return self.known_scatter
         return estimate_noise(self.cleared, self.rounding)
 
     @cached_property
     def rows(self) -> Array:
         """Condensed rows, (n_rows,)."""
         return self.condensed.of_trace(self.cleared)
-
-    @cached_property
-    def at_nodes(self) -> tuple[Array, float]:
-        """Rows of the nodes, and the norm of what no response reaches."""
-        return self.condensed.dense.rows_of_samples(self.cleared)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +102,11 @@ class Residuals:
         return self.trace.noise_sd
 
     @property
+    def scatter(self) -> float:
+        """Standard deviation of the noise by neighbouring readings, which scales fits."""
+        return self.trace.scatter
+
+    @property
     def rounding(self) -> float:
         """Step that the readings are multiples of, or zero."""
         return self.trace.rounding
@@ -136,7 +143,9 @@ class Residuals:
         """Return the residuals of the same trace for a protocol that starts later by some s."""
         trace = self.trace
         condensed = trace.condensed.later(change_s)
-        moved = Trace(trace.time_s - change_s, trace.readings, condensed, trace.noise_sd)
+        moved = replace(
+            trace, time_s=condensed.all_s, condensed=condensed, known_scatter=trace.scatter
+        )
         return replace(self, trace=moved)
 
     def shares_responses(self, other: "Residuals") -> bool:
@@ -185,15 +194,12 @@ class Residuals:
             Root mean squares.
         """
         n, parameters = log_parameters.shape
-        condensed, sums = self.trace.condensed, np.empty((n, 1 + parameters))
-        nodes_s = condensed.dense.time_s
-        for some in parts(n, max(1, _NUMBERS_AT_ONCE // (len(nodes_s) * (1 + parameters)))):
-            rows = condensed.rows_of_nodes(self._simulated(log_parameters[some], nodes_s))
-            measured, rest = zip(*(other.trace.at_nodes for other in others[some]), strict=True)
-            rows[:, 0] -= measured
+        sums = np.empty((n, 1 + parameters))
+        for some in parts(n, max(1, _NUMBERS_AT_ONCE // (len(self.trace.rows) * (1 + parameters)))):
+            rows = self.condensed_responses(log_parameters[some])
+            rows[:, 0] -= [other.trace.rows for other in others[some]]
             # One product per sample: the order of its sums does not depend on their number.
             sums[some] = (rows @ np.ascontiguousarray(rows[:, 0])[:, :, None])[:, :, 0]
-            sums[some, 0] += np.square(rest)
         return sums[:, 1:], np.sqrt(sums[:, 0] / self.samples)
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:

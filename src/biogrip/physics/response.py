@@ -154,7 +154,7 @@ def linear_jaw_force(response: StepResponse, course: Course, time_s: Array) -> A
         after = time_s >= start
         elapsed = time_s[after] - start
         z = rates * elapsed
-        growth = elapsed**order * (phi_function(order, z) if order else np.exp(z))
+        growth = elapsed**order * (phi_functions(order, z)[order] if order else np.exp(z))
         rest = height * static[:, None] * elapsed**order / factorial(order)
         force[:, after] += rest + np.einsum("nj,njt->nt", height * weights, growth).real
     return force
@@ -167,11 +167,13 @@ def _growth(order: int, rates: NDArray[Any], elapsed: Array) -> NDArray[Any]:
         return rates * np.exp(z)
     if order == 0:
         return np.expm1(z)
-    return rates * elapsed ** (order + 1) * phi_function(order + 1, z)
+    return rates * elapsed ** (order + 1) * phi_functions(order + 1, z)[-1]
 
 
-def phi_function(order: int, z: NDArray[Any]) -> NDArray[Any]:
-    """Compute phi_n(z) = (e^z - sum_{k<n} z^k/k!) / z^n without cancellation near zero.
+def phi_functions(most: int, z: NDArray[Any]) -> list[NDArray[Any]]:
+    """Compute phi_n(z) = (e^z - sum_{k<n} z^k/k!) / z^n for n = 0 ... most, at least 1.
+
+    Near zero, where that would cancel, the last is a series, and the others follow from it.
 
     References
     ----------
@@ -179,15 +181,19 @@ def phi_function(order: int, z: NDArray[Any]) -> NDArray[Any]:
        209-286.
     """
     small = np.abs(z) < 1.0
-    near = np.where(small, z, 0)
+    near, far = np.where(small, z, 0), np.where(small, 1, z)
     series = np.zeros_like(near)
     for k in range(18, -1, -1):
-        series = series * near + 1 / factorial(k + order)
-    far = np.where(small, 1, z)
+        series = series * near + 1 / factorial(k + most)
     value = np.expm1(far) / far
-    for n in range(1, order):
+    found = [np.exp(z), value]
+    for n in range(1, most):
         value = (value - 1 / factorial(n)) / far
-    return np.where(small, series, value)
+        found.append(value)
+    for n in range(most, 0, -1):
+        found[n] = np.where(small, series, found[n])
+        series = series * near + 1 / factorial(n - 1)
+    return found
 
 
 @dataclass(frozen=True)

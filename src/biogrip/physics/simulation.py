@@ -16,8 +16,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper, displacement_of_tip
-from biogrip.physics.modes import relaxation
-from biogrip.physics.nonlinear import correction, nonlinear_rotation
+from biogrip.physics.modes import mode_responses, relaxation
 from biogrip.physics.protocol import Course
 from biogrip.physics.response import (
     LEFT,
@@ -47,6 +46,8 @@ def jaw_force(
     response = jaw_force_response(gripper, network, inertia=inertia)
     force = linear_jaw_force(response, course, time_s)
     if nonlinear:
+        from biogrip.physics.nonlinear import correction
+
         # Arms with inertia have not moved yet at the instant of a step.
         instants = np.nextafter(time_s, -np.inf) if inertia else time_s
         more = correction(gripper, network, course).checked().force_at(instants)
@@ -56,7 +57,7 @@ def jaw_force(
 
 # Forces below this share of the largest one are rounding errors.
 _LEAST_FORCE = 1e-9
-_TIMES_OF_PHASE = 200
+_TIMES_OF_PHASE, _MOST_TIMES = 200, 20_000
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,8 @@ def compute_grip(gripper: Gripper, network: Network, course: Course, *, nonlinea
 def _instants(course: Course) -> Array:
     """Return times that are dense after every change of the load."""
     lengths = np.diff(course.time_s, append=course.end_s)
-    share = np.geomspace(1e-9, 1.0, _TIMES_OF_PHASE)[:-1]
+    count = max(3, min(_TIMES_OF_PHASE, _MOST_TIMES // len(lengths)))
+    share = np.geomspace(1e-9, 1.0, count)[:-1]
     pieces = [start + length * share for start, length in zip(course.time_s, lengths, strict=True)]
     return np.unique(np.append(np.concatenate(pieces), course.end_s))
 
@@ -120,11 +122,18 @@ def simulated_response(
     or the linear one, (4)-(6), at ascending times.
     """
     if nonlinear:
+        # Imported here, as elsewhere: only a study simulates by it.
+        from biogrip.physics.nonlinear import nonlinear_rotation
+
         return nonlinear_rotation(gripper, network, course, time_s)
     if course.deforms:
         return relaxation(network, course, time_s)
     response = step_response(gripper, network, inertia=gripper.has_inertia)
-    return superpose(response, course, time_s)
+    if gripper.has_inertia:
+        return superpose(response, course, time_s)
+    growth, _ = mode_responses(response.rates, course, time_s, slopes=False)
+    rotation: Array = (response.weights[:, LEFT, None] @ growth)[:, 0]
+    return rotation
 
 
 def simulated_shortening(
@@ -132,6 +141,8 @@ def simulated_shortening(
 ) -> Array:
     """Simulate the shortening of samples in m, (n, n_times); see `simulated_response`."""
     if nonlinear:
+        from biogrip.physics.nonlinear import nonlinear_rotation
+
         turns = (nonlinear_rotation(gripper, network, course, time_s, a) for a in (LEFT, RIGHT))
         left, right = (displacement_of_tip(gripper, turn) for turn in turns)
         return left + right

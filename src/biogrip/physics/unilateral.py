@@ -27,7 +27,7 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import Course
-from biogrip.physics.response import phi_function
+from biogrip.physics.response import phi_functions
 from biogrip.physics.sample_model import Network
 
 _MOST_EVENTS = 100_000
@@ -197,7 +197,7 @@ class _Motion:
         for order in range(3):
             load = self.forcing.powers[:, order, None]
             if np.any(load):
-                modes = modes + load * elapsed_s ** (order + 1) * phi_function(order + 1, z)
+                modes = modes + load * elapsed_s ** (order + 1) * phi_functions(order + 1, z)[-1]
         return modes
 
 

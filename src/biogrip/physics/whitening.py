@@ -7,10 +7,11 @@ projected out in part [2]_.
 
 The size of the noise is estimated without a model, and its colour is whitened. The autocorrelation
 is that of white noise plus exponentials of the time between two readings (Ornstein-Uhlenbeck
-processes): one of any relaxation time, and a geometric series of them for 1/f noise. White noise
-may have a part that grows with the reading. The Cholesky factor L of its matrix C is computed, and
-solved with, in linear time [3]_. Residuals r become L^-1 r, which are white and on average as large
-as r. Least squares of these are generalised least squares [4]_.
+processes): one of any relaxation time, and a geometric series of them for 1/f noise. A random walk
+begins with the first reading; the covariance of two of its readings is the time of the earlier one.
+White noise may have a part that grows with the reading. The Cholesky factor L of its matrix C is
+computed, and solved with, in linear time [3]_. Residuals r become L^-1 r, which are white and on
+average as large as r. Least squares of these are generalised least squares [4]_.
 
 References
 ----------
@@ -184,11 +185,13 @@ class NoiseModel:
     proportional: float = 0.0
     """Share of white noise whose standard deviation is proportional to the reading, on average
     over the readings. The rest is white noise that is the same everywhere."""
+    walk: float = 0.0
+    """Share of a random walk that begins with the first reading, on average over the readings."""
 
     @property
     def white(self) -> float:
         """Share of white noise that is the same everywhere."""
-        return 1 - self.ar1 - self.flicker - self.proportional
+        return 1 - self.ar1 - self.flicker - self.proportional - self.walk
 
 
 WEIGHTED = NoiseModel(ar1=0.0, time_s=1.0, flicker=0.0, proportional=1.0)
@@ -229,15 +232,18 @@ class Whitening:
             noise_model.ar1, np.full(len(flicker), noise_model.flicker / len(flicker))
         )
         self._solve = driver.solve_lower
+        walked = (time_s - time_s[0]) / np.mean(time_s - time_s[0])
+        rates, shares = np.append(rates, 0.0), np.append(shares, noise_model.walk)
         self._time_s, self._rates = np.ascontiguousarray(time_s, float), rates
         self._left = np.tile(shares, (len(time_s), 1))
-        ones = np.ones_like(self._left)
+        right = np.ones_like(self._left)
+        right[:, -1] = walked
         # White noise keeps the matrix regular, however small its share.
-        diagonal = np.full(len(time_s), 1.0)
+        diagonal = 1.0 + noise_model.walk * (walked - 1)
         if growing is not None:
             diagonal += noise_model.proportional * (growing**2 / np.mean(growing**2) - 1)
         pivots, self._right = driver.factor(
-            self._time_s, rates, diagonal, self._left, ones, np.empty_like(diagonal), ones.copy()
+            self._time_s, rates, diagonal, self._left, right, np.empty_like(diagonal), right.copy()
         )
         self._deviations = np.sqrt(pivots)
         self.log_determinant = float(np.sum(np.log(pivots)))

@@ -1,10 +1,8 @@
 """Files of targets, CSV, and of measurements, npz: traces without and with noise."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +10,7 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import Instrument
 from biogrip.records.rows import read_arrays, write_arrays, write_rows
+from biogrip.traces.reader import Recording
 
 # More than any instrument gives, and few enough that results on different processors agree.
 _DIGITS = 9
@@ -28,19 +27,38 @@ class Measurements:
     """Trace without noise, (n_samples,); None for a recorded trace."""
     readings: dict[int, Array]
     """Noisy trace of each seed, (n_samples,) each."""
-    gaps: int = 0
-    """Number of rows of a recording that were left out for want of a number."""
     sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
-    suspicion: str | None = None
-    """Sentence on a rotation of a recording that is hardly plausible."""
     onset_s: float | None = None
-    """Time of a recording's clock from which the sampling instants count, if it was given."""
-    at_steps: tuple[float, ...] = ()
-    """Times by the recording's clock of readings that were left out, for they are at the very
-    instant of a step of what is controlled."""
-    form: Mapping[str, Any] = field(default_factory=dict)
-    """What was recognised in the file of a recording, see `Recording.form`."""
+    """Time of a recording's clock from which the times count, if it was given or fitted."""
+    remarks: tuple[str, ...] = ()
+    """Sentences on reading a recording."""
+
+    @property
+    def recording(self) -> Recording:
+        """The only trace, a recorded one."""
+        (readings,) = self.readings.values()
+        index = np.arange(len(readings))
+        return Recording(
+            self.time_s,
+            readings,
+            index,
+            sd=self.sd,
+            onset_s=self.onset_s,
+            remarks_before=self.remarks,
+        )
+
+
+def of_recording(recording: Recording) -> Measurements:
+    """Return the measurements of a recorded trace, whose seed is 0."""
+    return Measurements(
+        recording.time_s,
+        None,
+        {0: recording.readings},
+        sd=recording.sd,
+        onset_s=recording.onset_s,
+        remarks=tuple(recording.remarks()),
+    )
 
 
 def write_target(
@@ -87,13 +105,15 @@ def read_target(path: Path) -> tuple[Array, Array, Array]:
 
 
 def write_measurements(path: Path, measurements: Measurements) -> None:
-    """Write noisy traces as npz: time_s, target and sd if known, seeds, traces in their order."""
+    """Write noisy traces as npz: time_s, seeds, traces in their order, and what else is known."""
     arrays = {
         "time_s": measurements.time_s,
         "target": measurements.target,
         "sd": measurements.sd,
         "seeds": list(measurements.readings),
         "traces": list(measurements.readings.values()),
+        "onset_s": measurements.onset_s,
+        "remarks": measurements.remarks or None,
     }
     write_arrays(path, {name: values for name, values in arrays.items() if values is not None})
 
@@ -105,4 +125,12 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
     if missing := set(seeds or ()) - set(traces):
         raise BiogripError(f"{path}: has no trace of seed {min(missing)}.")
     chosen = traces if seeds is None else {seed: traces[seed] for seed in seeds}
-    return Measurements(found["time_s"], found.get("target"), chosen, sd=found.get("sd"))
+    onset_s = found.get("onset_s")
+    return Measurements(
+        found["time_s"],
+        found.get("target"),
+        chosen,
+        sd=found.get("sd"),
+        onset_s=None if onset_s is None else float(onset_s),
+        remarks=tuple(map(str, found.get("remarks", ()))),
+    )

@@ -29,6 +29,7 @@ from biogrip.records.identifications import (
 )
 from biogrip.records.rows import join_arrays, read_arrays, read_rows, write_arrays, write_rows
 from biogrip.records.traces import read_measurements
+from biogrip.stages.judgement import experiment_for
 from biogrip.study.study import Case
 from biogrip.terminal import Progress
 
@@ -50,10 +51,9 @@ def identify(
     history: Path,
 ) -> None:
     """Identify a batch of seeds with one method."""
-    experiment = case.problem.to_identify().calibrated(calibrated)
     identified = identifier(method, case.block.method(method))
     recorded = read_measurements(measurements, list(seeds))
-    experiment = experiment.weighted(recorded.sd)
+    experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
     progress = Progress(f"{case.name}, {method}", len(seeds))
     whose = case.name, method, experiment.model, experiment.searched, experiment.fixed
     records = []
@@ -85,17 +85,17 @@ def join(
     """
     header = columns(case.sample.model)
     rows = [row for batch in batches for row in read_rows(batch, header)[1:]]
-    problem = case.problem.to_identify().calibrated(calibrated)
-    searched = problem.searched.parameters
-    ranges = [problem.ranges[parameter.range_name] for parameter in searched]
+    searched = case.experiment.searched.parameters
     ends = defaultdict(list)
     for row in rows:
         ends[row[2]].append([float(row[header.index(p.column)]) for p in searched])
     lowest: dict[str, str] = {}
     for file in measurements:
         recorded = read_measurements(file)
-        traces, weighted = recorded.readings, problem.weighted(recorded.sd)
-        posed = weighted.of_each(recorded.time_s, [*traces.values()])
+        experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
+        ranges = [experiment.ranges[parameter.range_name] for parameter in searched]
+        traces = recorded.readings
+        posed = experiment.of_each(recorded.time_s, [*traces.values()])
         for seed, of_trace in zip(map(str, traces), posed, strict=True):
             misfit = lowest_encodable(of_trace.residuals.misfit, ranges, np.array(ends[seed]))
             lowest[seed] = f"{misfit:.6e}"
@@ -113,15 +113,14 @@ def fit(
     """Fit a batch of seeds by least squares with each model."""
     models = {name: sample.model for name, sample in case.models.items()}
     recorded = read_measurements(measurements, list(seeds))
-    problem = case.problem.to_identify(*models.values()).calibrated(calibrated)
-    problem = problem.weighted(recorded.sd)
+    experiment = experiment_for(case.experiment, recorded, calibrated).to_identify(*models.values())
     progress = Progress(f"{case.name}, models", len(models) * len(seeds))
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
     for group in groups(seeds):
-        traces = problem.of_each(recorded.time_s, [recorded.readings[seed] for seed in group])
+        traces = experiment.of_each(recorded.time_s, [recorded.readings[seed] for seed in group])
         found = fit_models(
             {
-                name: [problem.for_model(trace, model) for trace in traces]
+                name: [experiment.for_model(trace, model) for trace in traces]
                 for name, model in models.items()
             },
             case.block.least_squares,

@@ -15,14 +15,12 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from
-from biogrip.fit.methods import identifier
-from biogrip.fit.problem import Fit, TraceProblem, silent
-from biogrip.fit.trace_fit import fit_traces
+from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.judging.diagnosis import Diagnosis, profiled, settled
 from biogrip.judging.likelihood import Likelihood, covariance
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, compute_findings
-from biogrip.physics.noise import add_noise, standard_deviation, stream
+from biogrip.physics.noise import add_noise, standard_deviation
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.records.identifications import INTERVALS, read_verdicts
 from biogrip.records.traces import read_target
@@ -48,7 +46,7 @@ def estimate(
 
     The noise of a seed is that of its measurement.
     """
-    experiment = case.problem.calibrated(calibrated)
+    experiment = case.judged_experiment.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     found = read_verdicts(expected)["quantities"]
     determined = {item["quantity"] for item in found if item["verdict"] == DETERMINED}
@@ -68,14 +66,18 @@ def _rows(
     rest_known, informed, truth = _rest_known(case, experiment, time_s, rotation)
     progress = Progress(f"{case.name}, intervals", len(seeds))
     for group in groups(seeds, _TIMES):
-        rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in group]
+        rngs = [experiment.stream("noise", seed) for seed in group]
         traces = [add_noise(rotation, case.noise, rng, time_s) for rng in rngs]
-        optima = _optima(case, experiment, group, time_s, traces)
+        fits = fit_least_squares(
+            [experiment] * len(traces),
+            [(time_s, trace) for trace in traces],
+            [experiment.stream("coverage", seed) for seed in group],
+        )
         known = np.tile(truth, (len(group), 1))
         if len(informed):
             simpler = experiment.of_each(time_s, traces, rest_known)
             known[:, informed] = fit_from(simpler, truth[informed]).x
-        judged = _judged(optima, every, selected, group, case)
+        judged = _judged(fits, every, selected, group, case)
         for index, seed in enumerate(group):
             in_full = seed % case.block.identifiability.verdicts_every == 0
             shown = range(len(every)) if in_full else selected
@@ -101,27 +103,8 @@ def _rest_known(
     return with_fixed(experiment.searched, given), informed, truth
 
 
-def _optima(
-    case: Case,
-    experiment: Experiment,
-    group: Sequence[int],
-    time_s: Array,
-    traces: list[Array],
-) -> list[tuple[TraceProblem, Fit]]:
-    """Return problems and fits of traces, fitted together if their noise is white."""
-    rngs = [stream(case.study.study_seed, case.name, seed, "coverage") for seed in group]
-    identify = identifier("least_squares", case.block.least_squares)
-
-    def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
-        return identify(problems, [rngs[index] for index in which], silent)
-
-    posed = [experiment] * len(traces)
-    fits = fit_traces(posed, [(time_s, trace) for trace in traces], find)
-    return [(fit.problem, fit.found) for fit in fits]
-
-
 def _judged(
-    optima: Sequence[tuple[TraceProblem, Fit]],
+    fits: Sequence[TraceFit],
     every: Sequence[Quantity],
     selected: Sequence[int],
     group: Sequence[int],
@@ -136,13 +119,13 @@ def _judged(
             if (seed % case.block.identifiability.verdicts_every == 0) == full
         ]
         if some and shown:
-            found = judge_quantities([optima[index] for index in some], shown, case.confidence)
+            found = judge_quantities([fits[index] for index in some], shown, case.confidence)
             judged.update(zip(some, found, strict=True))
     return judged
 
 
 def judge_quantities(
-    optima: Sequence[tuple[TraceProblem, Fit]],
+    fits: Sequence[TraceFit],
     quantities: Sequence[Quantity],
     confidence: float,
 ) -> list[Diagnosis]:
@@ -152,8 +135,8 @@ def judge_quantities(
         every = compute_findings(likelihoods, quantities, smooth=False)
         return [profiled(*pair, []) for pair in zip(likelihoods, every, strict=True)]
 
-    problems, found = zip(*optima, strict=True)
-    return settled(problems, found, profile, confidence=confidence, noise_sd=[None] * len(problems))
+    problems, found = [fit.problem for fit in fits], [fit.found for fit in fits]
+    return settled(problems, found, profile, confidence=confidence, noise_sd=[None] * len(fits))
 
 
 def _estimates(

@@ -16,7 +16,6 @@ import pandas as pd
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.genetic import identify_many
 from biogrip.fit.genome import nearest_encodable
-from biogrip.fit.methods import near_noise
 from biogrip.judging.likelihood import bounds_percent, headlines
 from biogrip.judging.quantities import Quantity
 from biogrip.keys import built
@@ -25,6 +24,7 @@ from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import INTERPRETATIONS, read_identifications
 from biogrip.records.rows import RowFile
+from biogrip.records.success import near_noise
 from biogrip.records.traces import read_target
 from biogrip.stages.identification import groups
 from biogrip.study.case_blocks import CaseBlock
@@ -79,7 +79,7 @@ def _rows(
     bounds = {}
     for point in points:
         case = study.points[point.name]
-        problem = case.problem.calibrated(calibrations.get(point.name, []))
+        problem = case.experiment.calibrated(calibrations.get(point.name, []))
         bounds[point.name] = bounds_percent(problem, case.noise, true, case.times_s)
     heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
     for point in points:
@@ -104,7 +104,7 @@ def _judged(
     near: float,
 ) -> Iterator[tuple[str | int, ...]]:
     """Yield what one method finds at a point, for every quantity."""
-    searched = point.problem.searched.parameters
+    searched = point.experiment.searched.parameters
     members = {q.label: [searched[index] for index in q.members] for q, _ in bounds}
     truths = {label: sum(true[p.name] for p in of) for label, of in members.items()}
     values = {
@@ -137,7 +137,7 @@ def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
 
 def _resolution(point: Case, true: Mapping[str, float]) -> float:
     """Return the noise-free RMS misfit of the encodable parameters nearest to the truth."""
-    problem = point.problem
+    problem = point.experiment
     time_s = point.times_s
     truth = [true[p.name] for p in problem.model.parameters]
     rounded = [
@@ -170,7 +170,7 @@ def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, 
     for name, reading in readings.items():
         block = built(CaseBlock, overlaid(case.plain, reading.changes))
         interpretation = replace(case, block=block)
-        experiment = interpretation.problem
+        experiment = interpretation.experiment
         for seeds in groups(range(case.seeds)):
             noises, searches = (
                 [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]

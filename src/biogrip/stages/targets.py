@@ -1,8 +1,8 @@
 """What is simulated of a case: its response, noisy traces of it, and a test without sample.
 
 A target is the response without noise: what the instrument reads and, of the gripper, the force of
-the jaws. A measurement adds noise to it, a trace a seed. A calibration identifies the gripper's
-arms by a test without sample.
+the jaws. A measurement adds noise to it, a trace a seed; of a recorded trace it is what was read of
+the user's file. A calibration identifies the gripper's arms by a test without sample.
 """
 
 from collections.abc import Iterable
@@ -13,6 +13,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
+from biogrip.identify.prepare import prepare
 from biogrip.physics.calibration import FreeMotion, calibrate, calibration_yaml, free_motion
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import evaluate, sample_times
@@ -21,12 +22,15 @@ from biogrip.physics.unilateral import unilateral_response
 from biogrip.records.rows import write_arrays
 from biogrip.records.traces import (
     Measurements,
+    of_recording,
     read_target,
     write_measurements,
     write_target,
 )
 from biogrip.study.study import Case
 from biogrip.terminal import warn
+from biogrip.traces.columns import place
+from biogrip.traces.reader import read_recording
 
 
 def simulate(case: Case, target: Path) -> None:
@@ -112,3 +116,13 @@ def run(case: Case, gripper: Path, records: Path) -> None:
         found[name] = calibrate(record, *causes)
     write_arrays(records, columns)
     write_text(gripper, calibration_yaml(found["left"], found["right"]))
+
+
+def record(case: Case, recorded: Path, measurements: Path) -> None:
+    """Read, check and convert the user's file; errors name file, line and column."""
+    if case.columns.load is not None:
+        raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
+    trace, _ = prepare(read_recording(recorded, case.columns), case.experiment)
+    for remark in trace.remarks():
+        warn(f"{place(recorded)}: {remark}")
+    write_measurements(measurements, of_recording(trace))

@@ -65,9 +65,14 @@ class Identifiability(Block):
     coverage_seeds: Annotated[int, Field(ge=0, le=1_000_000)]
     """Number of seeds for which intervals are compared with the true values, and the spread with
     the Cramér-Rao bound, if there is noise; 0 leaves that out."""
-    verdicts_every: Annotated[int, Field(ge=1, le=1_000_000)] = 25
+    verdicts_every: Annotated[int, Field(ge=1, le=1_000_000)] = 5
     """One in so many of these seeds also gets the verdicts that users are shown, from whole
-    profiles. By default 25; with 1 a table counts them."""
+    profiles. By default 5; with 1 a table counts them."""
+    at_s: Annotated[
+        tuple[Annotated[float, Field(ge=1e-12, le=1e12)], ...], Field(max_length=20)
+    ] = ()
+    """Times after a step, and inverses of angular frequencies, at which `biogrip identify` tells
+    what any linear sample would show. By default one a decade."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,8 +21,8 @@ _SHOWN = 6
 _CaseName = Annotated[
     str,
     Field(
-        pattern="^[A-Za-z][A-Za-z0-9_-]{0,63}$",
-        json_schema_extra={"form": "a letter, then up to 63 letters, digits, '_' or '-'"},
+        pattern="^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$",
+        json_schema_extra={"form": "a letter or digit, then up to 63 of these, '_' or '-'"},
     ),
 ]
 _Name = Annotated[

@@ -21,6 +21,9 @@ NOISE_MODELS = ("white", COLOURED)
 KNOWN_NOISE = ("noise_rad", "sd", "noise_share")
 """Keys that say how large the noise is."""
 
+ARRAYS = "<arrays>"
+"""The file of a trace that is given as arrays."""
+
 READINGS = tuple(INSTRUMENTS)
 """Keys that name the column of the readings, one for each quantity that an instrument reads."""
 
@@ -84,8 +87,9 @@ class MeasurementBlock(Block):
     out."""
     load: _Name = None
     """Name of the file's column of what was controlled: torques, or the forces, stresses,
-    displacements or strains under which the readings were taken. Ramps that follow it are the
-    protocol, which starts with it or at start_s. Only for `biogrip identify`."""
+    displacements or strains under which the readings were taken. The protocol follows it from row
+    to row, from start_s on; without that from its first row or, if there it is not zero, from 0.
+    Only for `biogrip identify`."""
     load_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
     """Unit of that column, where its name does not end in it."""
     average_repeated: bool = False
@@ -121,9 +125,9 @@ class MeasurementBlock(Block):
     model; false where the instrument is known not to drift, and the sample may flow."""
     noise_model: Annotated[str | None, OneOf(NOISE_MODELS)] = None
     """Model of the noise when a trace is judged. `white`: samples are independent; `coloured`:
-    noise may be autocorrelated (AR(1), 1/f) and grow with the rotation, and outliers are left out,
-    so that intervals are wider and keep their coverage; every identification, judged or not, then
-    fits an offset and a drift along, unless they are false. By default white."""
+    noise may be autocorrelated (AR(1), 1/f, a random walk) and grow with the rotation, and outliers
+    are left out, so that intervals are wider and keep their coverage; every identification, judged
+    or not, then fits an offset and a drift along, unless they are false. By default white."""
     noise: Noise
 
     @property
@@ -153,6 +157,12 @@ class MeasurementBlock(Block):
     def readings(self) -> list[str]:
         """Quantities whose columns are named; of a valid recorded trace, one."""
         return [name for name in READINGS if getattr(self, name) is not None]
+
+    @property
+    def undeclared(self) -> frozenset[str]:
+        """Which of offset and drift nothing is said of."""
+        said = {"offset": self.offset, "drift": self.drift}
+        return frozenset(name for name, declared in said.items() if declared is None)
 
     @property
     def fits_offset(self) -> bool:
@@ -185,7 +195,7 @@ class MeasurementBlock(Block):
         if self.time is None:
             yield ("time",), "is missing: a recorded trace needs the name of its time column."
         yield from self._reading_complaints()
-        if complaint := trace_file_problem(self.file):
+        if self.file != ARRAYS and (complaint := trace_file_problem(self.file)):
             yield ("file",), complaint
 
     def _reading_complaints(self) -> Iterator[Complaint]:

@@ -117,7 +117,8 @@ def _text(
             limits = [f"{_BOUNDS[it]} {bound(leaf.node[it])}" for it in _BOUNDS if it in leaf.node]
             text = f"{' and '.join(limits)} {leaf.get('unit', '')}".rstrip()
             return f"found {_shown(found)}, allowed is {text}."
-    return f"found {_shown(found)}, allowed is {leaf.word}."
+    comma = isinstance(found, str) and _NUMBER.fullmatch(found.strip().replace(",", ".", 1))
+    return f"found {_shown(found)}{' (a decimal comma?)' * bool(comma)}, allowed is {leaf.word}."
 
 
 def _shown(value: Any) -> str:

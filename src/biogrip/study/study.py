@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.genome import GeneRange
+from biogrip.fit.genome import GeneRange, SearchRange
 from biogrip.fit.methods import METHODS, Method
 from biogrip.keys import built, plain
 from biogrip.physics.gripper import NO_ARMS, CombDrive, Contact, Gripper
@@ -19,7 +19,7 @@ from biogrip.physics.protocol import Course, Phase, join_phases, sample_times
 from biogrip.physics.sample_model import Network, with_fixed
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
-from biogrip.study.source import overlaid
+from biogrip.study.source import default_config, overlaid, read_config
 from biogrip.study.sweeps import point_blocks
 from biogrip.traces.columns import Columns
 
@@ -33,6 +33,8 @@ class Case:
     block: CaseBlock
     """Config block, with the study's blocks merged in."""
     study: "Study"
+    record: Array | None = None
+    """What was controlled in a recorded trace, if it was recorded; see `Experiment.record`."""
 
     @cached_property
     def plain(self) -> dict[str, Any]:
@@ -89,12 +91,6 @@ class Case:
     def columns(self) -> Columns:
         """Columns of a recorded trace's file."""
         return self.block.measurement.columns
-
-    @property
-    def may_start_late(self) -> bool:
-        """True if the trace is recorded, and nothing says when its protocol starts."""
-        measured = self.block.measurement
-        return self.recorded and measured.start_s is None and not measured.fit_start
 
     @property
     def instrument(self) -> Instrument:
@@ -170,8 +166,8 @@ class Case:
         return self.block.contact == "unilateral"
 
     @cached_property
-    def problem(self) -> Experiment:
-        """Assumptions of the identification; a calibration replaces the gripper's arms."""
+    def experiment(self) -> Experiment:
+        """What was done, for any identification; a calibration replaces the gripper's arms."""
         assumed, measurement = self.block.assumed_gripper, self.block.measurement
         gripper = self.gripper
         if isinstance(assumed, Mapping):
@@ -191,6 +187,40 @@ class Case:
             coloured=measurement.coloured,
             uncertainty=uncertainty.by_part if uncertainty else {},
             fit_start=measurement.fit_start,
+            record=self.record,
+            undeclared=measurement.undeclared,
+            given_ranges=self._given_ranges,
+            simulated=not self.recorded,
+            name=self.name,
+        )
+
+    @property
+    def _given_ranges(self) -> frozenset[str]:
+        """Names of search ranges that are not the default study's: those that the user gave."""
+        default = built(SearchRange, read_config(default_config())["search_range"])
+        given = vars(self.block.search_range).items()
+        return frozenset(name for name, genes in given if genes != getattr(default, name))
+
+    @property
+    def judged_experiment(self) -> Experiment:
+        """What was done, and how a trace is judged."""
+        judged = replace(
+            self.experiment,
+            least_squares=self.block.least_squares,
+            confidence=self.confidence,
+            study_seed=self.study.study_seed,
+        )
+        if not self.recorded:
+            return judged
+        measured, models = self.block.measurement, self.study.config.model_selection.models
+        # A recorded load that is there in its first row came before that.
+        known = measured.fit_start or (self.record is not None and not self.record[0, 1])
+        default = read_config(default_config())["model_selection"]["models"]
+        return replace(
+            judged,
+            start_given=known or measured.start_s is not None,
+            models=models,
+            cheap_models=[*models] == default,
         )
 
     @property

@@ -10,10 +10,10 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import counted
-from biogrip.fit.methods import ALL, basins, near_noise, near_noise_words, share_with_limits
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.models import Published
 from biogrip.records.identifications import read_identifications, read_verdicts
+from biogrip.records.success import ALL, basins, near_noise, near_noise_words, share_with_limits
 from biogrip.study.study import Case, Study
 from biogrip.tables.layout import Column, Row, ShownTable
 

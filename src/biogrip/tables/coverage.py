@@ -7,15 +7,10 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
+from biogrip.judging.levels import WIDE
 from biogrip.judging.likelihood import bound
 from biogrip.judging.quantities import parameters_and_sum
-from biogrip.judging.verdicts import (
-    BOUNDED_ABOVE,
-    BOUNDED_BELOW,
-    DETERMINED,
-    NOT_DETERMINED,
-    WIDE,
-)
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.noise import standard_deviation
 from biogrip.records.identifications import INTERVALS
 from biogrip.records.traces import read_target
@@ -58,7 +53,7 @@ def coverage(
     rows: list[Row] = []
     estimated = pd.concat([INTERVALS.read(it) for it in intervals], ignore_index=True)
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
-        experiment = case.problem.calibrated([next(calibrations)] if case.is_calibrated else [])
+        experiment = case.experiment.calibrated([next(calibrations)] if case.is_calibrated else [])
         log_truth = experiment.logs(case.parameters)
         found = estimated[estimated["case"] == name]
         time_s, _, rotation = read_target(target)
@@ -158,7 +153,7 @@ def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
     estimated = pd.concat([INTERVALS.read(it) for it in intervals], ignore_index=True)
     for name, case in study.cases.items():
         found = estimated[estimated["case"] == name]
-        for quantity in parameters_and_sum(case.problem.searched):
+        for quantity in parameters_and_sum(case.experiment.searched):
             mine = found[(found["quantity"] == quantity.label) & found["verdict"].notna()]
             target = target_of(quantity.label, case.parameters)
             head: Row = {"case": name, "quantity": quantity.label, "unit": quantity.unit}

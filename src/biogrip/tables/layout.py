@@ -85,27 +85,32 @@ def write(table: ShownTable, output: Path) -> None:
     write_text(output.with_suffix(".html"), html)
 
 
-def convert(page: Path, output: Path) -> None:
-    """Write a table's HTML as Markdown or LaTeX, which the ending of the output says."""
+def convert(page: Path, ending: str) -> str:
+    """Return a table's HTML as Markdown, `.md`, or LaTeX, `.tex`."""
     # Well-formed after its first line, as `write` made it, but for what pandas makes of two blanks.
     text = page.read_text(encoding="utf-8").partition("\n")[2].replace("&nbsp;", " ")
     body = ElementTree.fromstring(text)[1]
     caption = body.findtext("p", "")
     headings, *rows = ([cell.text or "" for cell in row] for row in body.iter("tr"))
     shown = pd.DataFrame(rows, columns=headings)
-    if output.suffix == ".md":
+    if ending == ".md":
         barless = shown.map(_without_bars).rename(columns=_without_bars)
         table = barless.to_markdown(index=False, disable_numparse=True)
-        text = f"{_TAG.sub('&lt;', caption)}\n\n{table}\n"
-    else:
-        text = shown.to_latex(
-            index=False,
-            escape=True,
-            caption=" ".join(caption.split()).translate(_LATEX),
-            label=f"tab:{output.stem}",
-            column_format="l" * shown.shape[1],
-        )
-    write_text(output, text)
+        return f"{_TAG.sub('&lt;', caption)}\n\n{table}\n"
+    return shown.to_latex(
+        index=False,
+        escape=True,
+        caption=" ".join(caption.split()).translate(_LATEX),
+        label=f"tab:{page.stem}",
+        column_format="l" * shown.shape[1],
+    )
+
+
+def as_published(table: Path) -> tuple[str, str]:
+    """Return name and text under which a table is published: CSV as it is, HTML as Markdown."""
+    if table.suffix == ".html":
+        return f"{table.stem}.md", convert(table, ".md")
+    return table.name, table.read_bytes().decode()
 
 
 def _text(cell: Any, digits: int) -> str:
@@ -124,20 +129,23 @@ def _without_bars(text: str) -> str:
 
 
 def compare(published: Path, made: Sequence[Path]) -> str:
-    """Compare tables with published files of the same names, and say how many agree.
+    """Compare tables, CSV and HTML, with those that are published, and say how many agree.
 
     It is an error, which shows the lines that differ, if one has other bytes or is not published.
     """
     if not made:
         raise BiogripError(f"{published}: holds no tables to compare with.")
     differing: list[str] = []
-    for now in made:
-        before = published / now.name
+    for table in made:
+        name, now = as_published(table)
+        before = published / name
         if not before.exists():
-            differing.append(f"{now.name}: is not published.")
-        elif before.read_bytes() != now.read_bytes():
-            old, new = (file.read_text(encoding="utf-8").splitlines() for file in (before, now))
-            differing += unified_diff(old, new, str(before), str(now), n=0, lineterm="")
+            differing.append(f"{name}: is not published.")
+        elif before.read_bytes() != now.encode():
+            old = before.read_text(encoding="utf-8").splitlines()
+            differing += unified_diff(
+                old, now.splitlines(), str(before), str(table), n=0, lineterm=""
+            )
     if differing:
         shown = "\n".join(islice(differing, _MOST_LINES))
         raise BiogripError(f"the regenerated tables differ from {published}.\n{shown}")

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from biogrip.fit.methods import chi_square_increase, reached_encodable, share_with_limits
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.records.identifications import ENCODABLE, MODEL_FITS, read_identifications
+from biogrip.records.success import chi_square_increase, reached_encodable, share_with_limits
 from biogrip.study.study import Study
 from biogrip.tables.cases import error_percent, target_of
 from biogrip.tables.layout import Column, Row, ShownTable

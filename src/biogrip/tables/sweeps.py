@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from biogrip.fit.methods import near_noise_words
 from biogrip.judging.likelihood import headlines
+from biogrip.records.success import near_noise_words
 from biogrip.stages.sweeps import POINTS
 from biogrip.study.study import Study
 from biogrip.study.sweeps import AxisBlock
@@ -39,6 +39,8 @@ _BY_METHOD = {
     "basin_error_percent": ("basin_error", "Median abs. error there %"),
     "median_absolute_error_percent": ("error", "Median abs. error of all %"),
 }
+# Errors, and the least that is told without noise, where rounding decides how a fit ends.
+_ERRORS, _LEAST_PERCENT = [name for name in _BY_METHOD if "error" in name], 1.0
 
 
 def robustness(study: Study, name: str, points: Path) -> ShownTable:
@@ -51,6 +53,8 @@ def robustness(study: Study, name: str, points: Path) -> ShownTable:
             chosen = found[found["quantity"] == quantity]
             for (row, column), group in chosen.groupby(["row", "column"], sort=False):
                 by_method = group.set_index("method")
+                if by_method["bound_percent"].isna().all():
+                    by_method[_ERRORS] = by_method[_ERRORS].clip(lower=_LEAST_PERCENT)
                 head = {
                     "case": case,
                     "row": row,
@@ -85,7 +89,8 @@ def robustness(study: Study, name: str, points: Path) -> ShownTable:
         "that is more, in both. Bound is the standard deviation that noise leaves at least, to "
         "first order and with parameters without information taken as known; the median absolute "
         "error of an estimator that attains it is 0.67 of that. Without noise, the misfit of the "
-        "truth rounded to two digits stands for the noise."
+        "truth rounded to two digits stands for the noise, and errors below "
+        f"{_LEAST_PERCENT:g} % are given as that: rounding decides where these fits end."
     )
     marked = [key for key in study.config.reconstructed if key.split(".")[0] == "gripper"]
     if marked:

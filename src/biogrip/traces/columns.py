@@ -47,7 +47,13 @@ _RECIPROCAL = re.compile(r"([A-Za-z]+)(?:\^|\*\*)?\(?[-\u2212]1\)?")
 _PURE = re.compile(
     r"[^\W\d_]+|(?:[\w.,-]*[\w.,]?[ _-])*(?:strain|deformation|gamma|epsilon|eps|[γεϵ])", re.I
 )
+# Of two lengths, as Lp/Rp, and units that no column here has.
+_RATIO = re.compile(r"[^\W\d_]+\d*\s*/\s*([^\W_]+)")
+_UNITS = {*TIME_UNITS, *["V", "mV", "uV", "A", "mA", "px", "pixel", "pixels", "counts"]}
+_UNITS |= {unit for each in INSTRUMENTS.values() for unit in each.read.units}
 _NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
+# A number with what may be its unit behind it.
+_SIZED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*?)\s*", re.I)
 # Keys that no option of the command sets but `--set`, with what they may say.
 _BY_SET = {
     "time_unit": "UNIT",
@@ -132,7 +138,7 @@ def _option(key: str) -> str:
 
 
 def unit_of(
-    path: Path,
+    path: Path | None,
     column: str,
     given: str | None,
     allowed: Mapping[str, float],
@@ -199,6 +205,31 @@ def known_unit(written: str, allowed: Collection[str]) -> str | None:
     return None
 
 
+def number_and_unit(text: str) -> tuple[float, str]:
+    """Return a number and what stands behind it, as in ``20 pN`` or ``5%``.
+
+    A `ValueError` says that it does not begin with a number.
+    """
+    found = _SIZED.fullmatch(plain_name(text))
+    if found is None:
+        raise ValueError(f"found '{shortened(text)}', allowed is a number, or one with its unit")
+    return float(found[1]), found[2]
+
+
+def held_unit(value: float | str, controlled: Channel) -> tuple[float, str]:
+    """Return the number and the unit of what was held, a key of its units; a number is in SI units.
+
+    A `BiogripError` has the units that are allowed.
+    """
+    number, written = number_and_unit(str(value))
+    unit = known_unit(written, controlled.units) if written else controlled.si
+    if unit is None:
+        allowed = ", ".join(controlled.units)
+        found = f"found the unit '{shortened(written)}' of a {controlled.name}"
+        raise BiogripError(f"--hold: {found}, allowed are {allowed}.")
+    return number, unit
+
+
 def _endings(column: str, *patterns: str) -> list[str]:
     """Return what patterns find at the end of a name."""
     name = re.sub(r"_per_([^\W_]+)$", r" 1/\1", plain_name(column))
@@ -214,13 +245,23 @@ def _unit_at_end(column: str, allowed: Collection[str]) -> str | None:
 
 def _said_at_end(column: str) -> str | None:
     """Return what can be nothing but a unit at the end of a name, or None."""
+    if _is_ratio(column):
+        return None
     return next((end for end in _endings(column, *_SURELY) if end and not end.isdigit()), None)
 
 
 def _is_pure(column: str) -> bool:
     """Return True if a name has no ending, but perhaps a number, that could be a unit."""
     name = plain_name(column)
+    if _is_ratio(name):
+        return True
     return not name.isdigit() and _PURE.fullmatch(_NUMBERED.sub("", name)) is not None
+
+
+def _is_ratio(column: str) -> bool:
+    """Return True if a name is that of one thing over another, which is no unit."""
+    found = _RATIO.fullmatch(plain_name(column))
+    return found is not None and known_unit(found[1], _UNITS) is None
 
 
 def _bare(cell: str) -> str:
@@ -228,8 +269,10 @@ def _bare(cell: str) -> str:
     return plain[1:-1].strip() if in_brackets(plain) else plain
 
 
-def place(path: Path, line: int | None = None, column: str | None = None) -> str:
-    """Return the file, line and column at the beginning of a message."""
+def place(path: Path | None, line: int | None = None, column: str | None = None) -> str:
+    """Return the file, line and column at the beginning of a message; of an array its index."""
+    if path is None:
+        return "the trace" if column is None else column + f"[{line}]" * (line is not None)
     at = "" if line is None else f", line {line}"
     of = "" if column is None else f", column '{visible(column)}'"
     return f"{visible(path)}{at}{of}"

@@ -1,7 +1,7 @@
 """Reader of recorded traces in the user's own files, with gaps, units and line numbers."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.digits import counted
+from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
 from biogrip.terminal import visible
 from biogrip.traces.columns import (
@@ -20,25 +20,27 @@ from biogrip.traces.columns import (
     shortened,
     unit_of,
 )
-from biogrip.traces.loads import ramps
-from biogrip.traces.tables import BLANKS, Sheet, Table, find_tables, number_or_inf, read_sheet
+from biogrip.traces.tables import (
+    BLANKS,
+    Sheet,
+    Table,
+    find_marks,
+    find_tables,
+    is_clock,
+    number_or_inf,
+    read_sheet,
+    seconds_or_inf,
+)
 
 FEWEST_SAMPLES = 10
 
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
-
-
-def is_usual(form: Mapping[str, Any], columns: Columns) -> bool:
-    """Return True if a file, by its `Recording.form`, is a table as biogrip itself would write."""
-    odd = ("units_line", "block", "preamble", "averaged", "outside", "others", "load")
-    return (
-        (form["encoding"], form["separator"], form["decimal"]) == ("UTF-8", "commas", "point")
-        and not any(key in form for key in odd)
-        and columns.block is None
-        and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
-    )
+_MARKS = {".": "point", ",": "comma"}
+# More seconds than there are in hours, minutes and seconds without a date.
+_DATED_S = 1e10
+_THOUSANDS = {".": "points", ",": "commas", " ": "blanks or apostrophes", "": None}
 
 
 def form_in_words(path: Path, form: Mapping[str, Any]) -> str:
@@ -52,30 +54,111 @@ def form_in_words(path: Path, form: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class Recording:
-    """A recorded trace."""
+    """A recorded trace, in SI units."""
 
     time_s: Array
-    """Strictly increasing times, (n_samples,)."""
+    """Strictly increasing times, (n_samples,), from the start of the protocol if `onset_s` is
+    known."""
     readings: Array
-    """Closing rotation of the left arm, or another reading in SI units, (n_samples,)."""
+    """What the instrument read, (n_samples,)."""
     lines: IntArray
-    """Line number of each sample, from 1, (n_samples,)."""
-    without_number: int
-    """Number of rows left out as gaps."""
-    path: Path
-    """The file."""
-    read: Columns
+    """Line number of each reading in the file, from 1, or index in its array, (n_samples,)."""
+    path: Path | None = None
+    """The file; None for arrays."""
+    read: Columns = field(default_factory=lambda: Columns("time_s", "readings"))
     """What was read of it."""
-    units: tuple[str, str]
+    units: tuple[str, str] = ("s", "1")
     """Units of the times and of the readings in the file."""
     sd: Array | None = None
-    """Standard deviations of the rotations, (n_samples,), where the file has them."""
+    """Standard deviations of the readings, (n_samples,), where they are known."""
+    onset_s: float | None = None
+    """Time of the clock at which the protocol starts, if that was given or fitted."""
+    gaps: int = 0
+    """Number of rows left out for want of a number."""
+    at_steps: tuple[float, ...] = ()
+    """Times by the clock of readings that were left out where a sample may jump."""
+    load_noise: float = 0.0
+    """Standard deviation of what was smoothed out of `load`, as a share of its largest value."""
+    suspicion: str | None = None
+    """Sentence on a reading that is hardly plausible."""
     form: Mapping[str, Any] = field(default_factory=dict)
     """What was recognised in the file, for people to check before they believe a fit; `read_as` of
     the JSON file."""
+    remarks_before: tuple[str, ...] = ()
+    """Sentences that come before: of an earlier reading, where `form` is lost, or on what was
+    held."""
     load: Array | None = None
-    """Times and loads, or deformations, in SI units, linear between them, (n, 2), where they are
-    read: of all rows, used or not. See `ramps`."""
+    """Times and loads, or deformations, in SI units, (n, 2), where they are read: of all rows, used
+    or not."""
+
+    def part(self, kept: BoolArray) -> "Recording":
+        """Return some of the readings, (n_samples,) true for those."""
+        return replace(
+            self,
+            time_s=self.time_s[kept],
+            readings=self.readings[kept],
+            lines=self.lines[kept],
+            sd=None if self.sd is None else self.sd[kept],
+        )
+
+    def place(self, sample: int, column: str) -> str:
+        """Return file, line and column of a reading, or array and index, for messages."""
+        return place(self.path, int(self.lines[sample]), column)
+
+    def extent(self, column: str) -> str:
+        """Return the same for all readings."""
+        first, last = self.lines[[0, -1]]
+        if self.path is None:
+            return f"{column}[{first}] to [{last}]"
+        return f"{place(self.path)}, lines {first} to {last}, column '{column}'"
+
+    def remarks(self) -> list[str]:
+        """Return sentences on what was left out, and on what is hardly plausible."""
+        said = [*self.remarks_before, *filter(None, [self.suspicion])]
+        if self.gaps:
+            rows = f"{counted(self.gaps, 'row')} of {len(self.time_s) + self.gaps}"
+            said.append(f"Left out for want of a number: {rows}.")
+        form = self.form
+        if "averaged" in form:
+            said.append(f"Averaged at repeated times: {counted(form['averaged'], 'reading')}.")
+        if "outside" in form:
+            said.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
+        if "others" in form:
+            said.append(f"Left out, for rows asks for others: {counted(form['others'], 'row')}.")
+        if self.load_noise:
+            said.append(
+                f"Smoothed out of {self.read.load}, since the readings do not follow it: what "
+                f"scatters from row to row by {plain(100 * self.load_noise, 2)} % of the largest. "
+                "What is left counts as exact."
+            )
+        if "unclear" in form:
+            said.append(
+                f"The {form['decimal']} of {form['unclear']} is read as a decimal mark; where it "
+                "is between thousands, numbers are 1000 times as large."
+            )
+        if "clock" in form:
+            said.append(f"Times are {form['clock']}.")
+        if self.at_steps:
+            times = ", ".join(f"{time_s:.6g} s" for time_s in self.at_steps)
+            said.append(
+                "Left out where a sample may jump, at a step or where the rate of a deformation "
+                "jumps, since nothing tells on which side they were taken: "
+                f"{counted(len(self.at_steps), 'reading')}, at {times}."
+            )
+        return said
+
+
+def is_usual(recording: Recording) -> bool:
+    """Return True of arrays, and of a file with a table as biogrip itself would write."""
+    form, columns = recording.form, recording.read
+    odd = ("units_line", "block", "preamble", "averaged", "outside", "others", "thousands")
+    return recording.path is None or (
+        (form["encoding"], form["separator"], form["decimal"]) == ("UTF-8", "commas", "point")
+        and not any(key in form for key in (*odd, "unclear", "clock"))
+        and columns.block is None
+        and columns.load is None
+        and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
+    )
 
 
 def read_recording(path: Path, columns: Columns) -> Recording:
@@ -84,8 +167,10 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     The file is text in UTF-8, UTF-16 or Windows-1252. Empty lines and lines that start with ``#``
     are ignored. The header is the line that has the columns, or has a row of units below it; of
     several such tables, ``block`` says which. The header decides the separator: comma, semicolon or
-    tab. With the last two, numbers may have a decimal comma. Cells may be quoted and padded with
-    blanks, but a quoted cell ends on its line. Other columns may hold anything.
+    tab. With the last two, numbers may have a decimal comma; one table has one decimal mark, and
+    other marks are between thousands. Times may be hours:minutes:seconds, after a date or not.
+    Cells may be quoted and padded with blanks, but a quoted cell ends on its line. Other columns
+    may hold anything.
 
     An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
     row is left out and counted; nothing is interpolated. Other spreadsheet errors, as ``#REF!``,
@@ -103,32 +188,16 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     tables, index = find_tables(path, sheet, columns)
     table = tables[index]
     header_line = int(sheet.numbers[table.at]) or None
-    indices, units = _columns_of(path, header_line, table, columns)
-    values, decimal = _numbers(path, sheet, table, indices)
-    lines, load, followed = sheet.numbers[table.first : table.end], None, None
+    times = [sheet.cells[table.first : table.end, i] for i in table.indices(columns.time)[:1]]
+    clock = any(is_clock(cells.tolist()) for cells in times)
+    indices, units = _columns_of(path, header_line, table, columns, clock=clock)
+    values, form = _numbers(path, sheet, table, indices, clock=clock)
+    lines, load = sheet.numbers[table.first : table.end], None
     if columns.load is not None:
         history, values = values[:, [0, -1]], values[:, :-1]
         numbers = ~np.any(np.isnan(history), axis=1)
-        load, followed = _load(path, columns, history[numbers], lines[numbers], units)
+        load = _load(path, columns, history[numbers], lines[numbers], units)
     chosen = _chosen(path, sheet, table, columns)
-    gaps = chosen & np.any(np.isnan(values), axis=1)
-    kept, lines = values[chosen & ~gaps], lines[chosen & ~gaps]
-    without_number = int(np.count_nonzero(gaps))
-    _check_count(path, columns, len(kept), without_number)
-    if columns.sd is not None:
-        _check_positive(path, columns.sd, kept[:, 2], lines)
-    averaged = 0
-    if columns.average_repeated:
-        kept, lines, averaged = _averaged(kept, lines)
-    _check_order(path, columns, kept[:, 0], lines)
-    time_s = kept[:, 0] * TIME_UNITS[units[0]]
-    used = np.ones(len(time_s), bool)
-    if columns.from_s is not None:
-        used &= time_s >= columns.from_s
-    if columns.until_s is not None:
-        used &= time_s <= columns.until_s
-    kept, lines, time_s = kept[used], lines[used], time_s[used]
-    _check_count(path, columns, len(kept), without_number, "usable time")
     names_and_units = (
         {"column": table.names[i], "unit": unit} for i, unit in zip(indices, units, strict=True)
     )
@@ -136,39 +205,93 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     form = {
         "encoding": sheet.encoding,
         "separator": _SEPARATORS[sheet.separator],
-        "decimal": decimal,
+        **form,
         "header_line": header_line,
         "units_line": None if table.units is None else int(sheet.numbers[table.first - 1]),
         "block": index + 1 if several else None,
         "blocks": len(tables) if several else None,
         "preamble": table.title or None,
         "columns": dict(zip(columns.named, names_and_units, strict=True)),
-        "rows": len(values),
+    }
+    others = int(np.count_nonzero(~chosen)) or None
+    form |= {"rows": len(values), "gaps": None, "averaged": None, "outside": None, "others": others}
+    found = _checked(path, columns, (units[0], units[1]), values[chosen], lines[chosen])
+    form |= found.form
+    return replace(
+        found, form={key: value for key, value in form.items() if value is not None}, load=load
+    )
+
+
+def recording_of_arrays(columns: Columns, *arrays: Array) -> Recording:
+    """Return a recording of times, readings and perhaps standard deviations, (n_samples,) each.
+
+    Messages and units go by the names in `columns`; a row with a NaN is a gap.
+
+    Raises
+    ------
+    BiogripError
+        As `read_recording`, or if `columns` asks for what only a file has.
+    """
+    for key in ("block", "rows", "load"):
+        if getattr(columns, key) is not None:
+            raise BiogripError(f"measurement.{key}: is only for a file, not for arrays.")
+    units: list[str] = []
+    for key in columns.named:
+        units.append(_unit(None, key, "", columns, units))
+    values = np.column_stack(arrays)
+    for row, column in np.argwhere(np.isinf(values))[:1]:
+        name = [*columns.named.values()][column]
+        raise BiogripError(f"{place(None, row, name)}: found inf, allowed are finite numbers.")
+    return _checked(None, columns, (units[0], units[1]), values, np.arange(len(values)))
+
+
+def _checked(
+    path: Path | None, columns: Columns, units: tuple[str, str], values: Array, lines: IntArray
+) -> Recording:
+    """Return the readings that are numbers, in SI units; refuse those that no trace can have.
+
+    Values are times, readings and perhaps standard deviations, (n_rows, 2) or (n_rows, 3).
+    """
+    gaps = np.any(np.isnan(values), axis=1)
+    values, lines, without_number = values[~gaps], lines[~gaps], int(np.count_nonzero(gaps))
+    _check_count(path, columns, len(values), without_number)
+    if columns.sd is not None:
+        _check_positive(path, columns.sd, values[:, 2], lines)
+    averaged = 0
+    if columns.average_repeated:
+        values, lines, averaged = _averaged(values, lines)
+    _check_order(path, columns, values[:, 0], lines)
+    time_s = values[:, 0] * TIME_UNITS[units[0]]
+    used = np.ones(len(time_s), bool)
+    if columns.from_s is not None:
+        used &= time_s >= columns.from_s
+    if columns.until_s is not None:
+        used &= time_s <= columns.until_s
+    values, lines, time_s = values[used], lines[used], time_s[used]
+    _check_count(path, columns, len(values), without_number, "usable time")
+    unit = columns.quantity.units[units[1]]
+    form = {
         "gaps": without_number,
         "averaged": averaged or None,
         "outside": int(np.count_nonzero(~used)) or None,
-        "others": int(np.count_nonzero(~chosen)) or None,
-        "load": followed,
         "first_s": float(time_s[0]),
         "last_s": float(time_s[-1]),
     }
-    unit = columns.quantity.units[units[1]]
     return Recording(
         time_s,
-        kept[:, 1] * (unit * columns.scale),
+        values[:, 1] * (unit * columns.scale),
         lines,
-        without_number,
         path,
         columns,
-        (units[0], units[1]),
-        sd=None if columns.sd is None else kept[:, 2] * (unit * abs(columns.scale)),
+        units,
+        sd=None if columns.sd is None else values[:, 2] * (unit * abs(columns.scale)),
+        gaps=without_number,
         form={key: value for key, value in form.items() if value is not None},
-        load=load,
     )
 
 
 def _columns_of(
-    path: Path, line: int | None, table: Table, columns: Columns
+    path: Path, line: int | None, table: Table, columns: Columns, *, clock: bool
 ) -> tuple[list[int], list[str]]:
     """Return where the columns to read are in a table, and their units; or list what is wrong."""
     found: dict[int, str] = {}
@@ -198,7 +321,8 @@ def _columns_of(
         found[same[0]] = key
         below = table.units[same[0]] if table.units else ""
         try:
-            units.append(_unit(path, key, below, columns, units))
+            timed = clock and key == "time"
+            units.append("s" if timed else _unit(path, key, below, columns, units))
         except BiogripError as error:
             problems.append(str(error))
     if problems:
@@ -206,7 +330,7 @@ def _columns_of(
     return list(found), units
 
 
-def _unit(path: Path, key: str, below: str, columns: Columns, units: list[str]) -> str:
+def _unit(path: Path | None, key: str, below: str, columns: Columns, units: list[str]) -> str:
     """Return the unit of a column; standard deviations have that of the readings before them."""
     name, given, unit_key = columns.named[key], columns.reading_unit, columns.unit_key
     allowed = columns.quantity.units
@@ -219,8 +343,13 @@ def _unit(path: Path, key: str, below: str, columns: Columns, units: list[str]) 
     return unit_of(path, name, given, allowed, columns.said_by(unit_key), below)
 
 
-def _numbers(path: Path, sheet: Sheet, table: Table, indices: list[int]) -> tuple[Array, str]:
-    """Return the numbers of columns, (n_rows, n_columns), NaN for gaps, and the decimal sign."""
+def _numbers(
+    path: Path, sheet: Sheet, table: Table, indices: list[int], *, clock: bool
+) -> tuple[Array, dict[str, Any]]:
+    """Return the numbers of columns, (n_rows, n_columns), NaN for gaps, and what marks they have.
+
+    If the first column has a clock's times, they are in s, from the first if there are dates.
+    """
     rows, width = slice(table.first, table.end), len(table.names)
     cells, lines = sheet.cells[rows], sheet.numbers[rows]
     for index in indices:
@@ -237,19 +366,34 @@ def _numbers(path: Path, sheet: Sheet, table: Table, indices: list[int]) -> tupl
             f"row, allowed are the header's {width}. A decimal comma needs semicolons or tabs as "
             "separators."
         )
-    decimal, values = "point", np.empty((len(cells), len(indices)))
+    numbers = cells[:, indices[clock:]]
+    marks = find_marks(numbers.ravel().tolist(), sheet.separator)
+    if not marks.decimal:
+        one, other = marks.cells
+        row, column = np.argwhere(numbers == other)[0]
+        raise BiogripError(
+            f"{place(path, lines[row], table.names[indices[clock:][column]])}: found '{other}' "
+            f"beside '{one}', of which nothing tells which has the decimal mark; allowed is one "
+            "decimal mark in a table."
+        )
+    values = np.empty((len(cells), len(indices)))
     for column, index in enumerate(indices):
-        texts = cells[:, index].tolist()
-        if sheet.separator != "," and any("," in text for text in texts):
-            decimal, texts = "comma", [text.replace(",", ".") for text in texts]
-        values[:, column] = np.fromiter(map(number_or_inf, texts), float, len(cells))
+        number = seconds_or_inf if clock and column == 0 else marks.number
+        values[:, column] = np.fromiter(map(number, cells[:, index].tolist()), float, len(cells))
         for row in np.flatnonzero(np.isinf(values[:, column]))[:1]:
             raise BiogripError(
                 f"{place(path, lines[row], table.names[index])}: found "
                 f"'{shortened(cells[row, index])}', allowed is a finite number, or nan, NA, N/A, - "
                 "or nothing where there is none."
             )
-    return values, decimal
+    form = {"decimal": _MARKS[marks.decimal], "thousands": _THOUSANDS[marks.thousands]}
+    form |= {"unclear": "".join(marks.cells) or None}
+    if clock:
+        form["clock"] = "hours:minutes:seconds"
+        if (first := np.nanmin(values[:, 0])) > _DATED_S:
+            form["clock"] = "dates, from the first"
+            values[:, 0] -= first
+    return values, form
 
 
 def _chosen(path: Path, sheet: Sheet, table: Table, columns: Columns) -> BoolArray:
@@ -270,17 +414,14 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: Columns) -> BoolArr
     return chosen
 
 
-def _load(
-    path: Path, columns: Columns, history: Array, lines: IntArray, units: list[str]
-) -> tuple[Array, str]:
-    """Return ramps in SI units that follow times and loads, (n, 2), and how they do in words."""
+def _load(path: Path, columns: Columns, history: Array, lines: IntArray, units: list[str]) -> Array:
+    """Return rows of times and loads, (n, 2), in SI units."""
     _check_count(path, columns, len(history), 0)
     if columns.average_repeated:
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
-    ends, off = ramps(*history.T)
-    said = f"{counted(len(ends) - 1, 'ramp')} along {columns.load}, within {off:.2g} {units[-1]}"
-    return ends * [TIME_UNITS[units[0]], columns.controlled.units[units[-1]]], said
+    sizes: Array = history * [TIME_UNITS[units[0]], columns.controlled.units[units[-1]]]
+    return sizes
 
 
 def _averaged(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:
@@ -297,7 +438,7 @@ def _averaged(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:
 
 
 def _check_count(
-    path: Path, columns: Columns, found: int, without_number: int, what: str = "row"
+    path: Path | None, columns: Columns, found: int, without_number: int, what: str = "row"
 ) -> None:
     if found < FEWEST_SAMPLES:
         gaps = f" ({counted(without_number, 'row')} with NaN)" if without_number else ""
@@ -309,7 +450,7 @@ def _check_count(
         )
 
 
-def _check_positive(path: Path, column: str, sd: Array, lines: IntArray) -> None:
+def _check_positive(path: Path | None, column: str, sd: Array, lines: IntArray) -> None:
     for row in np.flatnonzero(sd <= 0)[:1]:
         raise BiogripError(
             f"{place(path, lines[row], column)}: found {sd[row]:.15g}, allowed is a standard "
@@ -317,11 +458,12 @@ def _check_positive(path: Path, column: str, sd: Array, lines: IntArray) -> None
         )
 
 
-def _check_order(path: Path, columns: Columns, time: Array, lines: IntArray) -> None:
+def _check_order(path: Path | None, columns: Columns, time: Array, lines: IntArray) -> None:
     least = _SHORTEST_STEP * float(np.max(np.abs(time)))
     for row in np.flatnonzero(np.diff(time) <= least)[:1]:
         before, now = time[row : row + 2]
         found, hint = f"{now:.15g} after {before:.15g}", ""
+        earlier = f"line {lines[row]}" if path else f"[{lines[row]}]"
         if now == before:
             found = f"{now:.15g} repeated"
             way = columns.said_by("average_repeated")
@@ -329,5 +471,5 @@ def _check_order(path: Path, columns: Columns, time: Array, lines: IntArray) -> 
         by = f", by more than {least:.1g}" if now > before else ""
         raise BiogripError(
             f"{place(path, lines[row + 1], columns.time)}: found {found} "
-            f"(line {lines[row]}), allowed are times that increase{by}.{hint}"
+            f"({earlier}), allowed are times that increase{by}.{hint}"
         )

@@ -12,6 +12,7 @@ import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from itertools import groupby, pairwise
 from math import inf, isfinite, nan
 from operator import eq
@@ -51,7 +52,13 @@ _CELL = re.compile(r'"[^"]*"|[^\s"]+(?:[ \t]+[\[(][^\])\s]*[\])])?')
 _OTHERWISE = re.compile(r"[,;\t][\"\s]|[\"\s][,;\t]")
 _WIDE_GAP = re.compile(r"\s{2,}|\t")
 # Begins like a row of numbers.
-_ROW = re.compile(r'[\s",;]*[-+]?[.\d][\d.,eE+-]*[\s",;]')
+_ROW = re.compile(r'[\s",;]*[-+]?[.\d][\d.,:eE+-]*[\s",;]')
+# Numbers with points or commas, and of these such whose marks may be between thousands.
+_MARKED = re.compile(r"[-+]?\d*[.,][\d.,]*(?:[eE][-+]?\d+)?")
+_IN_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*")
+# Thousands with blanks or apostrophes between them.
+_GAPPED = re.compile(r"(?<![\d.,])[1-9]\d{0,2}(?:['\u2019 \u00a0\u2009\u202f]\d{3})+(?!\d)")
+_CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[T ])?(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
 _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
 _PREAMBLE_LINES_SHOWN = 3
 _NAMES_SHOWN = 8
@@ -374,6 +381,80 @@ def _count_numbers(cells: Sequence[str]) -> int:
 def _is_number(cell: str) -> bool:
     """Return True if a cell is a finite number, with a decimal point or comma."""
     return isfinite(number_or_inf(cell.replace(",", ".")))
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Marks in the numbers of a table."""
+
+    decimal: str = "."
+    """The decimal mark; empty if it cannot be told."""
+    thousands: str = ""
+    """What is between thousands, blank for blanks and apostrophes."""
+    cells: tuple[str, ...] = ()
+    """Cells that leave it open: one whose mark may as well be between thousands, or two that speak
+    against each other."""
+
+    def number(self, cell: str) -> float:
+        """Return a cell's number: see `number_or_inf`."""
+        if self.thousands == " ":
+            cell = _without_gaps(cell)
+        elif self.thousands:
+            cell = re.sub(rf"(?<=\d)[{self.thousands}](?=\d{{3}}(?!\d))", "", cell)
+        return number_or_inf(cell.replace(self.decimal, "."))
+
+
+def _without_gaps(text: str) -> str:
+    return _GAPPED.sub(lambda found: re.sub(r"\D", "", found[0]), text)
+
+
+def find_marks(cells: Sequence[str], separator: str) -> Marks:
+    """Tell the decimal mark of a table's numbers, which is one for all columns.
+
+    A mark is decimal if it is nowhere, or in one cell not, where one between thousands would be.
+    Between commas that part cells no comma is.
+    """
+    written = "\n".join(cells)
+    text = _without_gaps(written)
+    plain, blank = text.split("\n"), " " * (text != written)
+    present = [mark for mark in ".," if mark in text]
+    sure: dict[str, str] = {}
+    for cell, number in zip(cells, plain, strict=False):
+        if len(sure) == len(present):
+            break
+        if _MARKED.fullmatch(number) and not _IN_THOUSANDS.fullmatch(number):
+            sure.setdefault(max(present, key=number.rfind), cell)
+    if separator == "," and present:
+        sure = {".": ""}
+    if len(sure) == 1:
+        (decimal,) = sure
+        others = "".join(mark for mark in present if mark != decimal)
+        return Marks(decimal, others or blank)
+    if not present:
+        return Marks(thousands=blank)
+    either = tuple(sure.values()) or tuple(next(c for c in cells if m in c) for m in present)
+    if len(present) > 1:
+        return Marks("", blank, either)
+    if any(it.count(present[0]) > 1 for it in plain if _IN_THOUSANDS.fullmatch(it)):
+        return Marks(".,".replace(present[0], ""), present[0])
+    return Marks(present[0], blank, either)
+
+
+def seconds_or_inf(cell: str) -> float:
+    """Return seconds of hours, minutes, seconds, and perhaps a date, else as `number_or_inf`."""
+    if not (found := _CLOCK.fullmatch(cell)):
+        return nan if cell.lower() in _GAPS else inf
+    day, hours, minutes, seconds = found.groups()
+    try:
+        days = date.fromisoformat(day).toordinal() if day else 0
+    except ValueError:
+        return inf
+    return 86400 * days + 3600 * int(hours) + 60 * int(minutes) + float(seconds.replace(",", "."))
+
+
+def is_clock(cells: Sequence[str]) -> bool:
+    """Return True if the first cell that is no gap has hours, minutes and seconds."""
+    return isfinite(next((s for s in map(seconds_or_inf, cells[:_LINES_SEARCHED]) if s == s), inf))
 
 
 def number_or_inf(cell: str) -> float:

@@ -11,6 +11,7 @@ from biogrip import __version__
 from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_path, write_text
+from biogrip.judging.without_model import EXPONENT, LEVEL
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
 from biogrip.records.rows import write_rows
 from biogrip.terminal import visible, visible_lines
@@ -21,9 +22,12 @@ WRITTEN_BY = "written_by_biogrip"
 FAILED = "failed"
 """Status of a trace that could not be read, or whose fit failed; and the column that says why."""
 
+LINEAR = "linear"
+"""Column that is ``yes`` if a linear sample leaves noise of the trace, else ``no``."""
+
 COLUMNS = (
     *("trace", "fit", "confidence", "model", "preferred_model", "samples"),
-    *("noise_rad", "misfit_rad", "fixed", FAILED, WRITTEN_BY),
+    *("noise_rad", "misfit_rad", "fixed", LINEAR, FAILED, WRITTEN_BY),
 )
 """Columns of the table of traces, but for those of quantities."""
 
@@ -38,7 +42,7 @@ class Outcome:
     """Results of several traces."""
 
     found: list[dict[str, Any]]
-    """Result of each usable trace, as `Identified.data`."""
+    """Result of each usable trace, see `data_of`."""
     refused: dict[str, str]
     """Message of each other trace, which could not be read or whose fit failed, by file."""
     pictures: dict[str, list[str]] = field(default_factory=dict)
@@ -87,6 +91,7 @@ def _in_units(name: str, read: Channel) -> str:
 def write_table(outcome: Outcome, table: Path) -> None:
     """Write one row per trace as CSV: numbers, their units in the header, and why it failed if so.
 
+    Of what any linear sample would show, it has what was asked for, or else levels and exponents.
     Rows are in the order of what is copied.
     """
     # The same is read in all traces.
@@ -95,10 +100,15 @@ def write_table(outcome: Outcome, table: Path) -> None:
     rows: dict[str, dict[str, Any]] = {}
     for each in map(rounded_numbers, outcome.found):
         row = {name: each[name] for name in COLUMNS if name in each}
-        # The model of the lowest BIC, if others were compared.
-        best = [model["model"] for model in each["models"] if model["delta_bic"] == 0]
-        row |= {"preferred_model": "".join(best[:1]), "fixed": "; ".join(each.get("fixed", ()))}
-        for own in each["quantities"]:
+        row |= {
+            "preferred_model": each["preferred_model"] or "",
+            "fixed": "; ".join(each.get("fixed", ())),
+        }
+        row[LINEAR] = "yes" if each["without_model"]["is_linear"] else "no"
+        without = each["without_model"]["quantities"]
+        if not each["assumed"]["identifiability"]["at_s"]:
+            without = [own for own in without if own["kind"] in (LEVEL, EXPONENT)]
+        for own in (*each["quantities"], *without):
             for what in _OF_QUANTITY:
                 unit = own["unit"] if what != "verdict" else ""
                 name = with_unit(f"{own['quantity']} {what}", unit)

@@ -4,18 +4,20 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import log
 from textwrap import indent
 from typing import Any
 
-from biogrip.digits import instant, plain, with_limits, with_unit, within_limits
+from biogrip.digits import counted, instant, plain, with_limits, with_unit, within_limits
 from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
 from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
     DETERMINED,
+    FIT_REJECTED,
     NOT_DETERMINED,
 )
-from biogrip.records.identifications import FIT_REJECTED
+from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
 
@@ -27,6 +29,8 @@ _COLOURS = {
     FIT_REJECTED: 90,
 }
 
+# Most lines on what any linear sample would show.
+_LINES = 5
 # What the notes of a weight do to the fit.
 _SAID = {HARMLESS: "note", DOUBT: DOUBTFUL, REJECTION: REJECTED}
 
@@ -34,25 +38,61 @@ _SAID = {HARMLESS: "note", DOUBT: DOUBTFUL, REJECTION: REJECTED}
 def in_words(found: Mapping[str, Any]) -> str:
     """Return the result of one trace as plain text."""
     width = max(len(item["quantity"]) for item in found["quantities"])
+    rejected = found["fit"] == REJECTED
     lines = [
         f"{visible(found['trace'])}: fit {found['fit']}",
         *(f"  {visible(reason)}" for reason in found["reasons"]),
         f"{found['samples']} samples, {noise_in_words(found)}, "
         f"misfit {in_unit(found['misfit_rad'], found)}",
+        *(without_model_in_words(found) if rejected else []),
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
         *(
             f"  {item['quantity']:<{width}}  {_coloured(item['in_words'], item['verdict'])}"
             for item in found["quantities"]
         ),
     ]
-    lines += one_sided_in_words([found])
-    lines += [found["limits"]] if found["fit"] != REJECTED else []
+    lines += [] if rejected else without_model_in_words(found)
+    lines += one_sided_in_words([found], foremost(found))
+    lines += [found["limits"]] if not rejected else []
+    lines += [each["words"] for each in found["hidden"][:1]]
     lines += [trade["words"] for trade in found["trades"]]
     lines += fitted_in_words(found)
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
     return "\n".join(lines)
+
+
+def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
+    """Return lines on what any linear sample would show."""
+    own, told = found["without_model"], foremost(found)
+    left = f"{in_unit(own['misfit_rad'], found)}, {counted(plain(own['times_noise'], 2), 'noise')}"
+    if not told:
+        return [f"The nearest of all linear samples leaves {left}: it tells nothing, either."]
+    width = max(len(each["quantity"]) for each in told)
+    lines = (f"  {each['quantity']:<{width}}  {each['in_words']}" for each in told)
+    return [f"Any linear sample, whatever its model, leaves {left}:", *lines]
+
+
+def foremost(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return what is foremost of what any linear sample would show.
+
+    It is all that is told at times that were asked for, or else the level at three times, and what
+    is told between them.
+    """
+    every = found["without_model"]["quantities"]
+    told = [each for each in every if each["verdict"] != NOT_DETERMINED]
+    levels = [each for each in told if each["kind"] == LEVEL]
+    if found["assumed"]["identifiability"]["at_s"] or not levels:
+        return told
+    middle = levels[len(levels) // 2]
+    chosen = [middle, levels[0], levels[-1]]
+    for kind in (EXPONENT, FLOW, LOSS):
+        own = [each for each in told if each["kind"] == kind]
+        chosen += sorted(own, key=lambda it: abs(log((it["at_s"] or 1.0) / middle["at_s"])))[:1]
+    chosen += [each for each in told if each["kind"] == BEYOND]
+    chosen = [each for number, each in enumerate(chosen) if each not in chosen[:number]][:_LINES]
+    return [each for each in told if each in chosen]
 
 
 def noise_in_words(found: Mapping[str, Any]) -> str:
@@ -72,8 +112,8 @@ def in_unit(value: float, found: Mapping[str, Any]) -> str:
 
 
 def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
-    """Return lines on fixed parameters, and on onset, offset and drift as far as fitted."""
-    lines = fixed_in_words(found)
+    """Return lines on what is given, and on onset, offset and drift as far as fitted."""
+    lines = given_in_words(found)
     if "onset_s" in found:
         when = instant(found["onset_s"], *found["onset_limits_s"])
         lines.append(f"The protocol starts at {when} of the clock, as fitted.")
@@ -84,14 +124,17 @@ def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def fixed_in_words(found: Mapping[str, Any]) -> list[str]:
-    """Return a line on fixed parameters, or none."""
-    return [f"Fixed: {', '.join(found['fixed'])}."] if "fixed" in found else []
+def given_in_words(found: Mapping[str, Any]) -> list[str]:
+    """Return a line on what was held or loaded, and one on fixed parameters, as far as given."""
+    lines = [visible(found["load"])] if "load" in found else []
+    return [*lines, f"Fixed: {', '.join(found['fixed'])}."] if "fixed" in found else lines
 
 
-def one_sided_in_words(found: Sequence[Mapping[str, Any]]) -> list[str]:
+def one_sided_in_words(
+    found: Sequence[Mapping[str, Any]], also: Sequence[Mapping[str, Any]] = ()
+) -> list[str]:
     """Return a sentence on the confidence of one-sided limits of traces; nothing without any."""
-    quantities = [item for each in found for item in each["quantities"]]
+    quantities = [*also, *(item for each in found for item in each["quantities"])]
     if all((item["low"] is None) == (item["high"] is None) for item in quantities):
         return []
     return [f"One-sided limits hold with {50 * (1 + found[0]['confidence']):g} % confidence."]
@@ -147,7 +190,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)
-        lines += _once(found, fixed_in_words)
+        lines += _once(found, given_in_words)
         for each in found:
             said = [f"{_SAID[note['weight']]}: {note['text']}" for note in each["notes"]]
             said += [each["advice"]] if each["fit"] == REJECTED and each["advice"] else []

@@ -18,40 +18,95 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from biogrip import __version__
+from biogrip.command import words
+from biogrip.command.outputs import WRITTEN_BY, Outcome
 from biogrip.digits import with_unit
 from biogrip.figures.fit import draw_fit
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.figures.results import fit_of
-from biogrip.figures.style import BLUE, COLUMN_IN, figure, is_over_decades, save_png, styled
+from biogrip.figures.style import (
+    BLUE,
+    COLUMN_IN,
+    FITTED,
+    MEASURED,
+    SHADE,
+    figure,
+    is_over_decades,
+    save_png,
+    styled,
+)
 from biogrip.files import write_text
-from biogrip.identify import words
-from biogrip.identify.one_trace import Identified
-from biogrip.identify.outputs import WRITTEN_BY, Outcome
+from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
+from biogrip.judging.without_model import LEVEL, level_turned
+from biogrip.physics.protocol import evaluate, hold, join_phases
+from biogrip.physics.simulation import simulated_response
+from biogrip.records.traces import of_recording
 from biogrip.terminal import visible, visible_lines
 
 _MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
 # Ratio of the largest to the smallest limit above which an axis is logarithmic.
 _WIDE = 5.0
+# Times at which a level is drawn.
+_BAND = 25
 
 
-def draw(identified: Identified) -> list[str]:
-    """Return pictures of a trace as data URLs: the fit with its residuals, and all profiles."""
-    drawn = draw_best(identified)
+def draw(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
+    """Return pictures of a trace as data URLs: the fit with its residuals, and all profiles.
+
+    A third one is of the level over time, as far as that is told without a model.
+    """
+    drawn = draw_best(diagnosis)
     with styled():
-        return [_address(drawn), _address(draw_profiles_of(identified.data))]
+        more = [draw_level(diagnosis, data)] if data["without_model"]["quantities"] else []
+        return [_address(each) for each in (drawn, draw_profiles_of(data), *more)]
 
 
-def draw_best(identified: Identified) -> Figure:
+def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
+    """Draw what limits any linear sample has at times after a step, and the best fit.
+
+    Where one level was held, readings over it are drawn, too.
+    """
+    experiment, recording = diagnosis.experiment, diagnosis.recording
+    assert experiment is not None
+    assert recording is not None
+    first_s, last_s = data["without_model"]["covered_s"]
+    times = np.geomspace(first_s, last_s, _BAND)
+    told = diagnosis.without_model(times.tolist(), [LEVEL]).told
+    step = join_phases((hold(2 * times[-1], 1.0),), deforms=experiment.instrument.deforms)
+    network = experiment.searched.network(np.exp(diagnosis.likelihood.best))
+    best = simulated_response(experiment.gripper, network, step, times, nonlinear=False)[0]
+    turned = level_turned(diagnosis.likelihood.problem.residuals) or (lambda response: response)
+    drawn = figure(COLUMN_IN, 2.4)
+    axes = drawn.subplots()
+    low, high = np.array([(it.low, it.high) for it in told], dtype=float).T
+    axes.fill_between(times, low, high, color=SHADE, label="any linear sample")
+    axes.plot(times, turned(best), "--", color=FITTED, label="best fit")
+    after = recording.time_s > 0
+    held = evaluate(experiment.torque, recording.time_s[after])
+    if not (np.ptp(held) or experiment.offset_and_drift):
+        readings = turned(recording.readings[after] / held)
+        axes.plot(recording.time_s[after], readings, ".", color=MEASURED, markersize=1.2)
+    ends = float(np.nanmin(low)), float(np.nanmax(high))
+    axes.set_ylim(ends[0] - 0.1 * np.ptp(ends), ends[1] + 0.1 * np.ptp(ends))
+    axes.set(xscale="log", xlabel="time after a step (s)", xlim=times[[0, -1]])
+    axes.set_ylabel(with_unit(told[0].quantity.split("(")[0], told[0].unit))
+    axes.legend()
+    return drawn
+
+
+def draw_best(diagnosis: Diagnosis) -> Figure:
     """Draw a trace, its best fit and the residuals over the time of the file's clock.
 
     Where readings spread over decades after the protocol's start, time is counted from there.
     """
-    problem, recorded = identified.problem, identified.recorded
-    found = {item["quantity"]: item["value"] for item in identified.data["quantities"]}
-    values = {name: found[name] for name in problem.searched.names}
-    fit = fit_of(problem, {**problem.fixed, **values}, recorded, 0)
-    start_s = recorded.onset_s or 0.0
+    experiment, recording = diagnosis.experiment, diagnosis.recording
+    assert experiment is not None
+    assert recording is not None
+    found = {finding.quantity.label: finding.value for finding in diagnosis.findings}
+    values = {name: found[name] for name in experiment.searched.names}
+    fit = fit_of(experiment, {**experiment.fixed, **values}, of_recording(recording), 0)
+    start_s = recording.onset_s or 0.0
     spread = is_over_decades(fit.time_s)
     if not spread:
         fit = replace(fit, time_s=fit.time_s + start_s)

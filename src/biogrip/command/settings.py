@@ -12,55 +12,69 @@ modulus is read, a hold of 1 needs no option.
 import csv
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from io import StringIO
 from itertools import zip_longest
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.command.held import remarks_on_hold
+from biogrip.command.options import KEYS
+from biogrip.command.outputs import COLUMNS
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
-from biogrip.identify.outputs import COLUMNS
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.experiment_blocks import LONGEST_S, SHORTEST_S
 from biogrip.study.load import load_study, read_configs
-from biogrip.study.measurement_block import READINGS, MeasurementBlock
+from biogrip.study.measurement_block import ARRAYS, READINGS, MeasurementBlock
 from biogrip.study.messages import checked, schema_of
 from biogrip.study.source import (
     HOLD,
     KeyPath,
     Source,
     default_config,
+    dotted,
     keys_in,
     overlaid,
     value_of,
 )
 from biogrip.study.study import Case
 from biogrip.terminal import visible
-from biogrip.traces.columns import listed, place, trace_file_problem
-from biogrip.traces.reader import Recording, read_recording
+from biogrip.traces.columns import Columns, held_unit, listed, place, trace_file_problem
+from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
+from biogrip.traces.tables import number_or_inf
 
 MODEL = "generalized_maxwell"
 """Sample model of traces of which nothing says another."""
 
-FILE = "file"
-"""The column that every table of traces has."""
+_FILES = ("file", "filename", "filepath", "path", "trace", "tracefile")
 
 LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
+# Options of the command that may be columns of a table, and the keys that they set.
+_OPTIONS: dict[str, tuple[str, ...]] = {
+    "hold": HOLD,
+    "start": ("measurement", "start_s"),
+    **{name: tuple(key.split(".")) for name, key in KEYS.items()},
+}
+_OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
 _SEPARATORS = ",;\t"
+# Blocks whose numbers are an instrument's.
+_INSTRUMENT = ("gripper", "actuator")
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
 _HEAD_BYTES = 100_000
 
@@ -91,6 +105,8 @@ class Asked:
     """Row of a table that lists the trace, for messages."""
     copied: Mapping[str, str] = field(default_factory=dict)
     """Other cells of that row, by column."""
+    arrays: tuple[Array, ...] = ()
+    """Times, readings and perhaps standard deviations, (n_samples,) each, instead of a file."""
 
     @property
     def given(self) -> dict[str, Any]:
@@ -99,6 +115,12 @@ class Asked:
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
         return blocks
+
+    def read(self, columns: Columns) -> Recording:
+        """Read the trace; a `BiogripError` has file, line and column, or array and index."""
+        if self.arrays:
+            return recording_of_arrays(columns, *self.arrays)
+        return read_recording(self.trace, columns)
 
 
 def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
@@ -118,11 +140,28 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     return found
 
 
+def read_trace(asked: Asked) -> tuple[Recording, Case]:
+    """Read a trace, and return it with the case that it is.
+
+    A `BiogripError` has file, line and column, or setting, that cannot be used.
+    """
+    case, recording = _case_of(asked)
+    columns = replace(case.columns, by_options=True)
+    # What its protocol follows from was read before the protocol's start was known.
+    recording = replace(recording, read=columns) if recording else asked.read(columns)
+    return replace(recording, remarks_before=remarks_on_hold(recording, case, asked.given)), case
+
+
 def case_of(asked: Asked) -> Case:
-    """Return the case that a trace is, before its readings are looked at.
+    """Return the case that a trace is.
 
     A `BiogripError` has option, row, or file, line and key, if settings or config cannot be used.
     """
+    return _case_of(asked)[0]
+
+
+def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
+    """Return the case that a trace is, and the trace if its protocol follows from it."""
     files = [default_config(), *([asked.config] if asked.config else [])]
     below = read_configs(files)
     given = asked.given
@@ -130,7 +169,7 @@ def case_of(asked: Asked) -> Case:
         of_config = [*keys_in(read_configs([asked.config] if asked.config else []))]
         said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in found]
         raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
-    merged = _with_instrument(overlaid(below, given), given, asked.trace)
+    merged, recording, record = _with_instrument(overlaid(below, given), given, asked)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
         merged.pop(name, None)
@@ -143,7 +182,7 @@ def case_of(asked: Asked) -> Case:
     except BiogripError as error:
         _, *problems = str(error).replace(f"cases.{case}.", "").split("\n")
         raise BiogripError("\n".join(problems)) from error
-    return study.cases[case]
+    return replace(study.cases[case], record=record), recording
 
 
 def _source(
@@ -161,54 +200,67 @@ def _source(
 
 
 def _with_instrument(
-    merged: dict[str, Any], given: Mapping[str, Any], trace: Path
-) -> dict[str, Any]:
-    """Return the blocks with the trace's file, its instrument, and a protocol of that."""
+    merged: dict[str, Any], given: Mapping[str, Any], asked: Asked
+) -> tuple[dict[str, Any], Recording | None, Array | None]:
+    """Return the blocks with the trace's file, its instrument, and a protocol of that.
+
+    Where the protocol follows from the trace, it is returned, too, and what was controlled, if it
+    was recorded, see `Experiment.record`.
+    """
     level = merged.pop(HOLD[0], None)
     if not isinstance(merged["measurement"], dict):
-        return merged
+        return merged, None, None
     instrument = _instrument(merged, given)
     usual = {"time": "time_s", instrument.read.name: instrument.read.column}
-    measurement = usual | merged["measurement"] | {"file": str(trace)}
+    file = ARRAYS if asked.arrays else str(asked.trace)
+    measurement = usual | merged["measurement"] | {"file": file}
     measurement = schema_of(MeasurementBlock).with_numbers(measurement)
     kind, controlled = given.get("instrument", instrument.kind), instrument.controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
     of_column = measurement.get(LOAD[-1]) is not None
     if level is None and not of_column:
         if "protocol" in given or instrument.has_jaws:
-            return found
+            return found, None, None
         if not instrument.relative:
             unit = f" in {controlled.unit}" if controlled.unit else ""
             raise BiogripError(
                 f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, a "
                 "column of it by --load, or a protocol in --config."
             )
-    own = _recording(trace, measurement)
-    phases = [{"duration_s": 1.0, controlled.column: 1.0 if level is None else level}]
-    start_s = measurement.get("start_s")
+    if level is not None:
+        level, unit = held_unit(level, controlled)
+        level *= controlled.units[unit]
+    own = _recording(asked, measurement)
+    phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
+    record, start_s = None, measurement.get("start_s")
     if own is not None and own.load is not None:
-        start_s = own.load[0, 0] if start_s is None else start_s
-        measurement["start_s"] = float(start_s) or None
-        phases = _phases(own.load, start_s, controlled.column) or phases
+        first_s, first = own.load[0].tolist()
+        # A load that is there in the first row came before it: at 0, as one that is held.
+        start_s = (min(first_s, 0.0) if first else first_s) if start_s is None else start_s
+        measurement["start_s"] = start_s or None
+        record = _from(own.load, start_s)
+        largest = max(record[:, 1], key=abs)
+        if instrument.relative:
+            record[:, 1] /= largest
+        phase = {"duration_s": float(record[-1, 0]), controlled.column: float(largest)}
     elif own is not None:
         first = start_s or min(float(own.time_s[0]), 0.0)
         lasts = float(own.time_s[-1]) - first
-        phases[0]["duration_s"] = lasts if lasts > 0 else 1.0
+        phase["duration_s"] = lasts if lasts > 0 else 1.0
         if lasts > 0 and not SHORTEST_S <= lasts <= LONGEST_S:
             raise BiogripError(
-                f"{place(trace)}: found {lasts:g} s from the protocol's start, at {first:g} s, to "
-                f"the last reading; allowed are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit of "
-                "time right? Or say when it started (--start)."
+                f"{place(own.path)}: found {lasts:g} s from the protocol's start, at {first:g} s, "
+                f"to the last reading; allowed are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit "
+                "of time right? Or say when it started (--start)."
             )
-    return {**found, "protocol": {"phases": phases}}
+    return {**found, "protocol": {"phases": [phase]}}, own, record
 
 
-def _phases(load: Array, start_s: float, key: str) -> list[dict[str, float]]:
-    """Return the phases of ramps, (n, 2) times and loads, from a time on."""
-    times, loads = load[load[:, 0] > start_s].T
-    times, loads = np.r_[start_s, times], np.r_[np.interp(start_s, *load.T), loads]
-    ramps = np.c_[np.diff(times), loads[:-1], loads[1:]].tolist()
-    return [{"duration_s": lasts, key: of, f"to_{key}": to} for lasts, of, to in ramps]
+def _from(load: Array, start_s: float) -> Array:
+    """Return rows of times and loads, (n, 2), from a time on, counted from it."""
+    after = load[load[:, 0] > start_s]
+    first = start_s, np.interp(start_s, *load.T)
+    return np.vstack((first, after)) - (start_s, 0.0)
 
 
 def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrument:
@@ -222,11 +274,11 @@ def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrume
     return next((each for each in some if each.controlled.column in keys), some[0])
 
 
-def _recording(trace: Path, measurement: Mapping[str, Any]) -> Recording | None:
+def _recording(asked: Asked, measurement: Mapping[str, Any]) -> Recording | None:
     """Read a trace; return None if whoever uses it will say what is wrong."""
     block = checked(MeasurementBlock, measurement)[0]
     with suppress(BiogripError):
-        return None if block is None else read_recording(trace, block.columns)
+        return None if block is None else asked.read(block.columns)
     return None
 
 
@@ -260,13 +312,52 @@ def _refuse(problems: Sequence[str]) -> None:
         raise BiogripError("\n".join([*problems[:_MOST_SHOWN], *more]))
 
 
-def is_table(path: Path) -> bool:
-    """Return True if the first line of a file is a header with a column `file`."""
-    with path.open("rb") as stream:
-        first = stream.readline(_HEAD_BYTES).decode("utf-8-sig", errors="replace")
-    # Another spelling, as File, is a table, too, whose reader says what is wrong.
-    names = [name.strip(' "\r\n').lower() for name in re.split(f"[{_SEPARATORS}]", first)]
-    return FILE in names
+def is_table(asked: Asked) -> bool:
+    """Return True if the first line of a file is a header with a column `file`, and no trace's.
+
+    Another name of that column, as `path`, counts above the name of a file that exists.
+    """
+    with asked.trace.open("rb") as stream:
+        lines = [stream.readline(_HEAD_BYTES).decode("utf-8-sig", "replace") for _ in range(2)]
+    names, cells = (
+        [cell.strip(' "\r\n') for cell in re.split(f"[{_SEPARATORS}]", line)] for line in lines
+    )
+    if (name := _file_column(names)) is None:
+        return False
+    measured = asked.given.get("measurement")
+    measured = measured if isinstance(measured, dict) else {}
+    readings = {measured[key] for key in READINGS if key in measured} or {"rotation_rad"}
+    if measured.get("time", "time_s") in names and readings & {*names}:
+        return False
+    below = dict(zip(names, cells, strict=False)).get(name)
+    exists = below and trace_file_problem(asked.trace.parent / below) is None
+    return bool(exists) or name.lower() == _FILES[0]
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[ -]+", "_", name.lower())
+
+
+def _file_column(names: Sequence[str]) -> str | None:
+    """Return the name of the column of files, or None."""
+    found = {_plain(name).replace("_", ""): name for name in reversed(names)}
+    return next((found[name] for name in _FILES if name in found), None)
+
+
+def _meant(name: str) -> str | None:
+    """Return the option or key that a column's name is, but for its prefix, unit or spelling."""
+    blocks = read_configs([default_config()])
+    known = {str(path[-1]): dotted(path) for path in keys_in(blocks) if path[0] in _INSTRUMENT}
+    known |= {each.controlled.column: "hold" for each in INSTRUMENTS.values()}
+    known |= {name: name for name in _OF_NUMBERS}
+    by_plain = {re.sub("_[^_]+$", "", key).lower(): meant for key, meant in known.items()}
+    by_plain |= {key.lower(): meant for key, meant in known.items()}
+    plain = _plain(name)
+    bare = re.sub(r"_?[(\[].*$|_[^_]+$", "", plain)
+    if plain in by_plain or bare in _OF_NUMBERS:
+        return by_plain.get(plain, bare)
+    close = get_close_matches(plain, [key for key in by_plain if "_" in key], n=1, cutoff=0.9)
+    return by_plain[close[0]] if close else None
 
 
 def read_table(
@@ -279,12 +370,14 @@ def read_table(
     are no YAML, a trace twice.
     """
     (_, header), *rows = _rows(path)
-    if FILE not in header:
+    if (file := _file_column(header)) is None:
         raise BiogripError(
-            f"{place(path, 1)}: found no column '{FILE}' among {listed(header)}; allowed is one."
-            f"{nearest(FILE, header)}"
+            f"{place(path, 1)}: found no column '{_FILES[0]}' among {listed(header)}; allowed is "
+            f"one.{nearest(_FILES[0], header)}"
         )
-    problems = list(_name_problems(path, header))
+    options_of = {name: _plain(name) for name in header if _plain(name) in _OPTIONS}
+    problems = list(_name_problems(path, header, [file, *options_of]))
+    problems += _unused(path, header, rows, {file, *options_of})
     found, lines = [], dict[str, int]()
     for line, row in rows:
         if not any(row):
@@ -293,23 +386,27 @@ def read_table(
             text = f"found {counted(len(row), 'cell')} in the row, allowed are the header's"
             problems.append(f"{place(path, line)}: {text} {len(header)}.")
         by_name = dict(zip_longest(header, row[: len(header)], fillvalue=""))
-        trace = path.parent / by_name.pop(FILE)
+        trace = path.parent / by_name.pop(file)
         # Resolved, so that links to one file are found.
         before = lines.setdefault(os.path.realpath(trace), line)
         if trace == path.parent:
-            problems.append(f"{place(path, line, FILE)}: found nothing, allowed is a trace.")
+            problems.append(f"{place(path, line, file)}: found nothing, allowed is a trace.")
         elif before != line:
             text = f"found '{visible(trace)}' again, as on line {before}; allowed is each"
-            problems.append(f"{place(path, line, FILE)}: {text} trace once.")
+            problems.append(f"{place(path, line, file)}: {text} trace once.")
         settings = list(options)
         for name, cell in by_name.items():
-            if "." in name and cell:
+            if ("." in name or name in options_of) and cell:
                 try:
-                    key = tuple(name.split("."))
-                    settings.append(Setting(place(path, line), key, value_of(cell, name)))
+                    key = _OPTIONS.get(options_of.get(name, ""), tuple(name.split(".")))
+                    value = value_of(cell, name)
+                    if key == _OPTIONS["start"] and value == "fit":
+                        key, value = ("measurement", "fit_start"), True
+                    settings.append(Setting(place(path, line), key, value))
                 except BiogripError as error:
                     problems.append(f"{place(path, line, name)}: {error}")
-        copied = {name: cell for name, cell in by_name.items() if name and "." not in name}
+        used = {"", *options_of, *(name for name in by_name if "." in name)}
+        copied = {name: cell for name, cell in by_name.items() if name not in used}
         found.append(Asked(trace, config, tuple(settings), place(path, line), copied))
     if not found:
         problems.append(f"{place(path)}: found no traces, allowed is a row for each.")
@@ -331,13 +428,30 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
         raise BiogripError(f"{place(path)}: cannot be read as a table: {error}.") from error
 
 
-def _name_problems(path: Path, header: Sequence[str]) -> Iterator[str]:
-    """Find names that stand twice, or would be taken for results."""
+def _unused(
+    path: Path, header: Sequence[str], rows: Sequence[tuple[int, list[str]]], used: set[str]
+) -> Iterator[str]:
+    """Find columns of numbers that look like settings, and would only be copied."""
+    for number, name in enumerate(header):
+        cells = [cell for _, row in rows for cell in row[number : number + 1] if cell]
+        numbers = cells and all(isfinite(number_or_inf(cell)) for cell in cells)
+        if not name or "." in name or name in used or not numbers:
+            continue
+        meant = _meant(name)
+        if meant and meant not in map(_plain, header):
+            yield (
+                f"{place(path, 1, name)}: looks like a setting and is none; allowed is "
+                f"'{meant}' for a column that sets it, in SI units, or a name unlike a setting's."
+            )
+
+
+def _name_problems(path: Path, header: Sequence[str], used: Collection[str]) -> Iterator[str]:
+    """Find names that stand twice, or, if they are not used, would be taken for results."""
     for number, name in enumerate(header):
         text = ""
         if name and name in header[:number]:
             text = "stands twice; allowed is each name once."
-        elif name in COLUMNS or _OF_RESULTS.fullmatch(name):
+        elif name not in used and (name in COLUMNS or _OF_RESULTS.fullmatch(name)):
             text = "is a column of the results; allowed is another name."
         if text:
             yield f"{place(path, 1, name)}: {text}"

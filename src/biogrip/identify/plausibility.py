@@ -13,41 +13,37 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
-from biogrip.fit.any_sample import extreme_responses, fit_responses
+from biogrip.fit.any_sample import fit_responses
 from biogrip.fit.experiment import Experiment
+from biogrip.judging.levels import (
+    FAR_ABOVE,
+    LARGEST_SHARE,
+    NO_RESPONSE,
+    SHORTEST_SHARE,
+    SMALLEST_SHARE,
+)
 from biogrip.physics.gripper import Gripper
+from biogrip.physics.modes import lag_course
 from biogrip.physics.protocol import Course, evaluate
 from biogrip.physics.whitening import nuisance_basis, without
-from biogrip.traces.columns import TIME_UNITS, place
+from biogrip.traces.columns import TIME_UNITS
 from biogrip.traces.reader import Recording
 
-# Plausible rotations over that of the free arm. No sample makes the arm turn further than without
-# it: the excess allows for errors of the fit and of the gripper's stiffness. The paper's stiffest
-# sample turns it by 8e-3. The ratio, 750, is below 1000, so that no trace passes both in its unit
-# and in one a thousand times larger or smaller.
-_SMALLEST_SHARE, _LARGEST_SHARE = 2e-3, 1.5
-# Least share of the protocol that a trace must cover: more than min/h = s/min = 1/60.
-_SHORTEST_SHARE = 0.02
-# Share of traces of pure noise that are accepted as a response.
-_FALSE_ALARM = 1e-3
 # Relative tolerance, since times are written with few digits.
 _TIME_SLACK = 1e-5
-_LAG_SHARES = (1e-6, 0.1, 10.0)
+_LAG_SHARES = (1e-9, 0.1, 10.0)
 # Log-likelihood ratio, times two, above which a trace counts as mirrored.
-_FAR_LIKELIER = -2 * math.log(_FALSE_ALARM)
+_FAR_LIKELIER = -2 * math.log(NO_RESPONSE)
 # Share of a function's norm that may be rounding error.
 _ROUNDING = 1e-9
-# Multiple of a given noise from which a rotation is seen, however small it is.
-_FAR_ABOVE = 10.0
 # Multiple of the free rotation beyond which its square could overflow.
 _ABSURD = 1e9
 
 
 def check_recording(
     recording: Recording,
-    problem: Experiment,
+    experiment: Experiment,
     noise_sd: float | None = None,
-    onset_s: float | None = None,
 ) -> str | None:
     """Refuse a trace that is impossible with the instrument and protocol.
 
@@ -60,14 +56,13 @@ def check_recording(
     Parameters
     ----------
     recording
-        Trace, its times counted from the start of the protocol.
-    problem
+        Trace, its times counted from the start of the protocol; if that is known, readings before
+        it are allowed.
+    experiment
         What it was recorded with.
     noise_sd
         Typical standard deviation of the noise, if it is given: a small rotation passes if that is
         far smaller still.
-    onset_s
-        Time of the clock at which the protocol starts; if given, readings before it are allowed.
 
     Returns
     -------
@@ -79,16 +74,16 @@ def check_recording(
     BiogripError
         With file, line, column, what was found and allowed, and a unit that would be plausible.
     """
-    torque, instrument = problem.torque, problem.instrument
-    _check_times(recording, torque, onset_s)
+    torque, instrument = experiment.torque, experiment.instrument
+    _check_times(recording, torque)
     time_s, trace = recording.time_s, recording.readings
-    free, largest = free_rotation(problem.gripper, torque), float(np.abs(trace).max())
+    free, largest = free_rotation(experiment.gripper, torque), float(np.abs(trace).max())
     if largest > _ABSURD * free:
         return _check_turn(recording, largest, free, None)
-    responses = extreme_responses(problem, _LAG_SHARES)(time_s)
-    nuisance = problem.nuisance(time_s)
+    responses = lag_course(torque, _LAG_SHARES)(time_s)
+    nuisance = experiment.nuisance(time_s)
     (amplitudes, rest), (_, mirrored) = _either_sign(trace, responses, nuisance)
-    where = _extent(recording, recording.read.reading)
+    where = recording.extent(recording.read.reading)
     read, controlled = recording.read.quantity, instrument.controlled.name
     least = min(rest, mirrored)
     is_constant = not instrument.deforms and len(trace) * np.var(trace) <= least
@@ -101,7 +96,7 @@ def check_recording(
             f"from zero that follows the {controlled} and stands out of the noise."
         )
     # An undeclared offset may look like the wrong sign.
-    also = nuisance_basis(time_s, offset=True, drift=problem.drift)
+    also = nuisance_basis(time_s, offset=True, drift=experiment.drift)
     (_, beside), (_, mirrored_beside) = _either_sign(trace, responses, also)
     likelier = rest > mirrored * math.exp(_FAR_LIKELIER / len(trace))
     if likelier and beside > mirrored_beside:
@@ -133,7 +128,7 @@ def _responds(trace: Array, nuisance: Array, rest: float, unknowns: int) -> bool
 
     freedom = len(trace) - unknowns
     explained = float(np.sum(without(nuisance, trace) ** 2)) - rest
-    return bool(explained > unknowns * fdtri(unknowns, freedom, 1 - _FALSE_ALARM) * rest / freedom)
+    return bool(explained > unknowns * fdtri(unknowns, freedom, 1 - NO_RESPONSE) * rest / freedom)
 
 
 def free_rotation(gripper: Gripper, torque: Course) -> float:
@@ -148,12 +143,13 @@ def free_rotation(gripper: Gripper, torque: Course) -> float:
     return float(largest / gripper.left.stiffness_Nm_per_rad)
 
 
-def _check_times(recording: Recording, torque: Course, onset_s: float | None) -> None:
+def _check_times(recording: Recording, torque: Course) -> None:
     columns, end_s, slack = recording.read, torque.end_s, _TIME_SLACK * torque.end_s
+    onset_s = recording.onset_s
     begins = onset_s or 0.0
     time_s, earliest = recording.time_s, -slack if onset_s is None else -np.inf
     clock_s = time_s + begins
-    shortest = _SHORTEST_SHARE * end_s
+    shortest = SHORTEST_SHARE * end_s
 
     def fits(factor: float) -> bool:
         first, last = factor * clock_s[[0, -1]] - begins
@@ -169,12 +165,12 @@ def _check_times(recording: Recording, torque: Course, onset_s: float | None) ->
                 how = "start_s under measurement says when, or fit_start: true finds it"
             hint = f" If the protocol starts at another time of the clock than 0, {how}."
         raise BiogripError(
-            f"{place(recording.path, recording.lines[sample], columns.time)}: found "
+            f"{recording.place(sample, columns.time)}: found "
             f"{clock_s[sample]:.12g} s, allowed is the protocol's time, {begins:g} to "
             f"{begins + end_s:g} s.{hint}"
         )
     raise BiogripError(
-        f"{_extent(recording, columns.time)}: found only {clock_s[0]:g} to "
+        f"{recording.extent(columns.time)}: found only {clock_s[0]:g} to "
         f"{clock_s[-1]:g} s of the protocol's {end_s:g} s, allowed are at least {shortest:g} s of "
         f"it.{hint}"
     )
@@ -183,7 +179,7 @@ def _check_times(recording: Recording, torque: Course, onset_s: float | None) ->
 def _check_turn(
     recording: Recording, turn: float, free: float, noise_sd: float | None
 ) -> str | None:
-    columns, smallest, largest = recording.read, _SMALLEST_SHARE * free, _LARGEST_SHARE * free
+    columns, smallest, largest = recording.read, SMALLEST_SHARE * free, LARGEST_SHARE * free
 
     def fits(factor: float) -> bool:
         return smallest <= factor * turn <= largest
@@ -192,7 +188,7 @@ def _check_turn(
         return None
     hint = _other_units(recording.units[1], columns.quantity.units, fits)
     alone = f"without any sample the arm turns by {free:.3g} rad"
-    if noise_sd is not None and _FAR_ABOVE * noise_sd < turn < smallest:
+    if noise_sd is not None and FAR_ABOVE * noise_sd < turn < smallest:
         return (
             f"The largest rotation is {turn:.3g} rad, where {alone}: the sample is very stiff, or "
             f"the unit is not the right one.{hint}"
@@ -200,12 +196,12 @@ def _check_turn(
     limit = f"at most {largest:.3g} rad: {alone}"
     if turn < smallest:
         limit = (
-            f"at least {smallest:.3g} rad, or less with a given noise (--noise) {_FAR_ABOVE:g} "
+            f"at least {smallest:.3g} rad, or less with a given noise (--noise) {FAR_ABOVE:g} "
             f"times smaller still, where {alone}"
         )
-    sample = np.argmax(np.abs(recording.readings))
+    sample = int(np.argmax(np.abs(recording.readings)))
     raise BiogripError(
-        f"{place(recording.path, recording.lines[sample], columns.reading)}: found "
+        f"{recording.place(sample, columns.reading)}: found "
         f"{recording.readings[sample]:.3g} rad as the largest rotation, and {turn:.3g} rad as "
         f"the largest with the noise smoothed out; allowed is {limit}.{hint}"
     )
@@ -217,8 +213,3 @@ def _other_units(unit: str, units: Mapping[str, float], fits: Callable[[float], 
     found = [f"{factor:.4g} times (is it in {name}?)" for factor, name in named if fits(factor)]
     found = found or [f"{factor:g} times" for factor in (1e-6, 1e-3, 1e3, 1e6) if fits(factor)]
     return f" It would fit if it were {' or '.join(found)}." if found else ""
-
-
-def _extent(recording: Recording, column: str) -> str:
-    first, last = recording.lines[[0, -1]]
-    return f"{place(recording.path)}, lines {first} to {last}, column '{column}'"

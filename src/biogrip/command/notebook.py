@@ -1,25 +1,23 @@
 """A trace in a notebook: identified and told as by the command, from arrays or pandas columns."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from biogrip.arrays import as_column
+from biogrip.command.files import data_of
+from biogrip.command.settings import MODEL, Asked, Setting, read_trace
+from biogrip.command.words import in_words
 from biogrip.errors import BiogripError
-from biogrip.identify.one_trace import Identified, identify_alike
-from biogrip.identify.settings import MODEL, Asked, Setting
-from biogrip.identify.trace_case import read_trace
-from biogrip.identify.words import in_words
+from biogrip.identify.identify import identify
+from biogrip.judging.diagnosis import Diagnosis
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS
 from biogrip.study.source import HOLD
-from biogrip.terminal import Progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,6 +30,7 @@ one_blas_thread: Callable[[_Function], _Function] = threadpool_limits.wrap(
 )
 """Decorator of what fits: its matrices are small, and BLAS threads cost more than they bring."""
 
+_TRACE = "trace"
 # Options of the command in what it says, and the arguments and keys that they are here.
 _ARGUMENTS = (
     ("--start fit", 'start="fit"'),
@@ -58,8 +57,13 @@ def _with_arguments(said: Any) -> Any:
 
 
 @dataclass(frozen=True, repr=False)
-class TraceResult(Identified):
+class TraceResult:
     """What a trace tells; ``print`` says all that the command says."""
+
+    diagnosis: Diagnosis
+    """The fit and all that was tested."""
+    data: dict[str, Any]
+    """The same as plain data, not rounded, with the keys of the command's JSON file."""
 
     @property
     def status(self) -> str:
@@ -81,11 +85,23 @@ class TraceResult(Identified):
         frame = pd.DataFrame(self.data[what], columns=["quantity", "unit", "verdict", *limits])
         return frame.astype(limits).set_index("quantity")
 
+    def without_model(self, at: Sequence[float] = ()) -> "pd.DataFrame":
+        """Return a table of what any linear sample would show, whatever its model.
+
+        At times in s after a step, and inverse angular frequencies; by default one a decade.
+        """
+        import pandas as pd
+
+        found = self.diagnosis.without_model(at)
+        columns = ["quantity", "at_s", "unit", "value", "low", "high"]
+        frame = pd.DataFrame(found.told)[columns]
+        return frame.astype(dict.fromkeys(["at_s", "value", "low", "high"], float))
+
     def plot(self) -> "Figure":
         """Draw the trace, its fit and the residuals."""
-        from biogrip.identify.page import draw_best
+        from biogrip.command.page import draw_best
 
-        return draw_best(self)
+        return draw_best(self.diagnosis)
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""
@@ -104,7 +120,7 @@ def identify_trace(
     *,
     reads: str = GRIPPER.read.name,
     model: str = MODEL,
-    hold: float | None = None,
+    hold: float | str | None = None,
     start: float | str | None = None,
     sd: ArrayLike | None = None,
     noise: float | None = None,
@@ -126,7 +142,8 @@ def identify_trace(
     model
         Name of the sample model.
     hold
-        What is held from 0 to the end, SI units, unless ``config`` has the protocol.
+        What is held from 0 to the end, in SI units or with its unit, as ``"20 pN"``, unless
+        ``config`` has the protocol.
     start
         Start of the protocol on the clock of `time_s`, in s, or ``"fit"``.
     sd : (n_samples,), optional
@@ -170,17 +187,11 @@ def identify_trace(
         ("fixed", "fixed", fixed and {**fixed}),
     ]
     settings = [Setting(by, tuple(key.split(".")), it) for by, key, it in chosen if it is not None]
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "trace.csv"
-        rows, header = np.transpose([*columns.values()]), ",".join(columns)
-        np.savetxt(file, rows, "%.17g", ",", header=header, comments="")
-        asked = Asked(file, None, tuple(settings), file.name)
-        try:
-            trace = read_trace(asked)
-            with Progress("", 5, live=False, quiet=True) as progress:
-                (result,) = identify_alike([Path(file.name)], [trace], progress)
-        except BiogripError as error:
-            said = _with_arguments(str(error).replace(str(file), file.name))
-            raise BiogripError(said) from None
-    result.data["assumed"]["measurement"]["file"] = file.name
-    return TraceResult(**{**vars(result), "data": _with_arguments(result.data)})
+    asked = Asked(Path(_TRACE), None, tuple(settings), "arguments", arrays=(*columns.values(),))
+    try:
+        recording, case = read_trace(asked)
+        diagnosis = identify(recording, case.judged_experiment)
+    except BiogripError as error:
+        raise BiogripError(_with_arguments(str(error))) from None
+    data = data_of(diagnosis, case, _TRACE, asked.given)
+    return TraceResult(diagnosis, _with_arguments(data))

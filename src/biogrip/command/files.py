@@ -1,0 +1,320 @@
+"""The command ``biogrip identify``: the files it reads and writes, and the text it prints.
+
+Traces are identified in batches, several processes at once. One that fails costs no other its
+result.
+"""
+
+import json
+import os
+import sys
+import traceback
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeVar
+
+from biogrip import __version__
+from biogrip.command.held import load_in_words
+from biogrip.command.outputs import WRITTEN_BY, Outcome, check_output, in_own_units, write_table
+from biogrip.command.settings import (
+    Asked,
+    Setting,
+    check_settings,
+    is_table,
+    read_table,
+    read_trace,
+)
+from biogrip.command.words import in_words, side_by_side
+from biogrip.digits import rounded_numbers
+from biogrip.errors import BiogripError
+from biogrip.files import refuse_inputs, write_text
+from biogrip.fit.genome import SearchRange
+from biogrip.identify.data import trace_data
+from biogrip.identify.identify import STEPS, budget, identify_alike
+from biogrip.identify.other_fits import Trace
+from biogrip.identify.prepare import prepare
+from biogrip.judging.diagnosis import Diagnosis
+from biogrip.keys import plain
+from biogrip.processes import worker_processes
+from biogrip.study.study import Case
+from biogrip.terminal import Progress, visible
+from biogrip.traces.columns import trace_file_problem
+from biogrip.traces.reader import form_in_words, is_usual
+
+MOST_DRAWN = 50
+"""Most traces of which a page has pictures: with more it would be too large to be sent."""
+
+# Most traces of a batch, and most readings that are fitted together, of short traces.
+_MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
+
+T = TypeVar("T")
+
+
+def identify_files(
+    files: Sequence[Path],
+    config: Path | None = None,
+    settings: Sequence[Setting] = (),
+    *,
+    output: Path | None = None,
+    report: Path | None = None,
+    table: Path | None = None,
+    rows: tuple[int, int] | None = None,
+) -> int:
+    """Identify traces and tables of traces, write the results, and print them.
+
+    Config and settings are those of all traces. `output` is the JSON file of a single trace, by
+    default one beside each; `report` and `table` are HTML and CSV files to write, if any. `rows`
+    are the first and last row of a table to identify, from 0, without JSON files; by default all.
+
+    Return 1 if any of several traces could not be used. A `BiogripError` says that an option, the
+    config or the only trace cannot.
+    """
+    alone = len(files) == 1
+    asked: list[Asked] = []
+    for file in dict.fromkeys(files):
+        own = Asked(file, config, tuple(settings))
+        if trace_file_problem(file) is None and is_table(own):
+            asked += read_table(file, config, settings)
+            alone = False
+        else:
+            asked.append(own)
+    if rows is not None:
+        # The last may be beyond the end.
+        asked = asked[rows[0] : rows[1] + 1]
+    absent = {
+        str(own.trace): f"{own.place}: {problem}"
+        for own in asked
+        if (problem := trace_file_problem(own.trace))
+    }
+    every = [own for own in asked if str(own.trace) not in absent]
+    if alone and absent:
+        raise BiogripError(absent[str(files[0])])
+    if output is not None and not alone:
+        raise BiogripError("--output: only for one trace; each of several gets its own file.")
+    # Errors of options and config concern all traces: they are raised once, here.
+    check_settings(every)
+    outputs = [output or own.trace.with_suffix(".identified.json") for own in every]
+    outputs = outputs if rows is None else []
+    written = [*outputs, *filter(None, (report, table))]
+    if len({path.absolute() for path in written}) < len(written):
+        raise BiogripError("found the same file to be written twice; allowed are different ones.")
+    refuse_inputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
+    for path in written:
+        check_output(path)
+    drawn = report is not None and len(every) <= MOST_DRAWN
+    outcome = _identify_traces(every, outputs or None, drawn=drawn)
+    if alone and outcome.refused:
+        raise BiogripError(outcome.refused[str(files[0])])
+    copied = {str(own.trace): own.copied for own in asked}
+    outcome = replace(outcome, refused=outcome.refused | absent, copied=copied)
+    if table is not None:
+        write_table(outcome, table)
+    if report is not None:
+        from biogrip.command.page import write_page
+
+        write_page(outcome, report)
+    print(in_words(outcome.found[0]) if alone else side_by_side(outcome.found, outcome.refused))
+    pairs = zip(every, outputs, strict=False)
+    made = [path for own, path in pairs if str(own.trace) not in outcome.refused]
+    if said := [visible(path) for path in (*made, report, table) if path]:
+        print(f"Written to {', '.join(said)}.")
+    return 1 if outcome.refused else 0
+
+
+def _identify_traces(
+    asked: Sequence[Asked], outputs: Sequence[Path] | None, *, drawn: bool
+) -> Outcome:
+    """Identify traces in batches, several processes at once, and write a JSON file of each.
+
+    Errors of those that fail are collected. If `drawn`, there are pictures of each. Without JSON
+    files, as a job of a workflow, it is one batch.
+    """
+    if len(asked) <= 1 or outputs is None:
+        return identify_batch(asked, outputs, drawn=drawn)
+    processors = len(os.sched_getaffinity(0))
+    size = min(_MOST_IN_BATCH, -(-len(asked) // processors))
+    batches = [slice(start, start + size) for start in range(0, len(asked), size)]
+    every = Outcome([], {})
+    with worker_processes(min(processors, len(batches))) as processes:
+        jobs = [
+            processes.submit(identify_batch, asked[own], outputs[own], drawn=drawn)
+            for own in batches
+        ]
+        for own, job in zip(batches, jobs, strict=True):
+            outcome = job.result()
+            every.found.extend(outcome.found)
+            every.refused.update(outcome.refused)
+            every.pictures.update(outcome.pictures)
+            for number, each in enumerate(asked[own], start=own.start + 1):
+                print(f"{number} of {len(asked)}: {visible(each.trace)}", file=sys.stderr)
+    return every
+
+
+def identify_batch(
+    asked: Sequence[Asked], outputs: Sequence[Path] | None, *, drawn: bool = False
+) -> Outcome:
+    """Identify the traces of one batch, see `identify_files`; None to write no JSON files."""
+    alone = len(asked) == 1 and outputs is not None
+    name, count = str(asked[0].trace) if alone else "", 1 + STEPS
+    with Progress(name, count, live=alone, quiet=not alone) as progress:
+        cases, traces, refused = _read_batch(asked, progress)
+        judged = _judge_batch(asked, traces, refused, progress)
+    outcome = Outcome([], {})
+    for index, own in enumerate(asked):
+        if index in refused:
+            outcome.refused[str(own.trace)] = str(refused[index])
+            continue
+        data = data_of(judged[index], cases[index], str(own.trace), own.given)
+        outcome.found.append(data)
+        if outputs is not None:
+            # Assumptions, which must be repeatable, are not rounded.
+            written = rounded_numbers(data) | {"assumed": data["assumed"]}
+            written = in_own_units(written, cases[index].instrument.read)
+            write_text(outputs[index], json.dumps(written, indent=1) + "\n")
+        if drawn:
+            # Imported here: loading Matplotlib takes long.
+            from biogrip.command.page import draw
+
+            pictures = _tried(own, draw, judged[index], data)
+            if not isinstance(pictures, BiogripError):
+                outcome.pictures[str(own.trace)] = pictures
+    return outcome
+
+
+def _read_batch(
+    asked: Sequence[Asked], progress: Progress
+) -> tuple[dict[int, Case], dict[int, Trace], dict[int, BiogripError]]:
+    """Return cases, prepared traces, and errors of traces that cannot be used, by index."""
+    cases: dict[int, Case] = {}
+    traces: dict[int, Trace] = {}
+    refused: dict[int, BiogripError] = {}
+
+    def read(own: Asked) -> tuple[Case, Trace]:
+        recording, case = read_trace(own)
+        if not is_usual(recording):
+            progress.note(form_in_words(own.trace, recording.form))
+        return case, prepare(recording, case.judged_experiment)
+
+    for index, own in enumerate(asked):
+        found = _tried(own, read, own)
+        if isinstance(found, BiogripError):
+            refused[index] = found
+        else:
+            cases[index], traces[index] = found
+    return cases, traces, refused
+
+
+def _judge_batch(
+    asked: Sequence[Asked],
+    traces: Mapping[int, Trace],
+    refused: dict[int, BiogripError],
+    progress: Progress,
+) -> dict[int, Diagnosis]:
+    """Return diagnoses by index; add errors of the traces that cannot be fitted."""
+    alike = defaultdict[Hashable, list[int]](list)
+    for index, (recording, experiment) in traces.items():
+        few = len(recording.time_s) * _MOST_IN_BATCH <= _MOST_READINGS
+        alike[budget(experiment), None if few else index].append(index)
+
+    def doing(step: str) -> None:
+        progress.done()
+        progress.doing(step)
+
+    judged: dict[int, Diagnosis] = {}
+    groups = [*alike.values()]
+    # An error is of one of a group: it is then identified one by one.
+    for group in groups:
+        found = _tried(
+            asked[group[0]],
+            partial(identify_alike, progress=progress.within, doing=doing),
+            [traces[index] for index in group],
+        )
+        if not isinstance(found, BiogripError):
+            judged.update(zip(group, found, strict=True))
+        elif len(group) == 1:
+            refused[group[0]] = found
+        else:
+            groups += ([index] for index in group)
+    return judged
+
+
+def _tried(asked: Asked, work: Callable[..., T], *given: Any) -> T | BiogripError:
+    """Return what work on a trace gives, or the error by which it fails, whatever that is."""
+    try:
+        return work(*given)
+    except BiogripError as error:
+        return error
+    except BrokenPipeError:
+        # Whoever reads the progress has gone.
+        raise
+    except Exception as error:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        return BiogripError(
+            f"{visible(asked.trace)}: the fit failed, which is a fault of biogrip and not of the "
+            f"trace: {type(error).__name__}: {error} ({Path(where.filename).name}, line "
+            f"{where.lineno}). Please report it, with the trace if it may be shared."
+        )
+
+
+def data_of(
+    diagnosis: Diagnosis, case: Case, trace: str, given: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return all that is said of a trace as plain data, with a config that repeats it.
+
+    Given are the blocks of the config that the user has set.
+    """
+    recording, experiment = diagnosis.recording, diagnosis.experiment
+    assert recording
+    assert experiment
+    load = load_in_words((recording, experiment), case, given)
+    tried = diagnosis.models.answers if diagnosis.models else ()
+    return {
+        WRITTEN_BY: __version__,
+        "trace": trace,
+        **({} if is_usual(recording) else {"read_as": recording.form}),
+        **({"load": load} if load else {}),
+        **trace_data(diagnosis),
+        "without_model": diagnosis.without_model(case.block.identifiability.at_s).data(),
+        "assumed": _assumed(diagnosis, case, list(tried or case.models)),
+        "by_default": _by_default(given) if case.instrument.has_jaws else [],
+        "versions": {
+            "biogrip": __version__,
+            **{name: version(name) for name in ("numpy", "scipy")},
+        },
+    }
+
+
+def _assumed(diagnosis: Diagnosis, case: Case, tried: Sequence[str]) -> dict[str, Any]:
+    """Return what an identification relies on: its model, and a config that repeats it."""
+    found = diagnosis.experiment
+    assert found
+    asked = case.block.identifiability
+    blocks = ["instrument", "protocol", "search_range", "measurement", "models", "least_squares"]
+    blocks += ["gripper"] if case.instrument.has_jaws else []
+    if case.record is not None:
+        blocks.remove("protocol")
+    terms: dict[str, Any] = {"offset": found.offset, "drift": found.drift}
+    left_out = {name: it for name, it in terms.items() if it != getattr(case.experiment, name)}
+    block = replace(
+        case.block,
+        search_range=SearchRange(**found.ranges),
+        measurement=replace(case.block.measurement, **left_out),
+    )
+    return {
+        "model": case.sample.candidate,
+        **{name: plain(getattr(block, name)) for name in blocks},
+        **({"actuator": plain(case.study.actuator)} if case.instrument.has_jaws else {}),
+        "fixed": case.fixed,
+        "identifiability": {key: plain(getattr(asked, key)) for key in ("confidence", "at_s")},
+        "model_selection": {"models": list(tried)},
+        "study_seed": case.study.study_seed,
+    }
+
+
+def _by_default(given: Mapping[str, Any]) -> list[str]:
+    """Return which of gripper and protocol the user does not set; uncertainties are no gripper."""
+    blocks = ("gripper", "protocol")
+    return [name for name in blocks if not set(given.get(name) or ()) - {"uncertainty"}]

@@ -1,0 +1,168 @@
+"""A diagnosis as plain data in SI units: what JSON files, tables and pages have of it."""
+
+from typing import Any
+
+import numpy as np
+
+from biogrip.digits import counted, round_increase
+from biogrip.fit.experiment import Experiment
+from biogrip.judging.diagnosis import Diagnosis
+from biogrip.judging.doubts import REJECTED, REJECTION, compute_status, find_reasons, order_notes
+from biogrip.judging.verdicts import FIT_REJECTED, Finding
+from biogrip.physics.simulation import simulated_response
+from biogrip.physics.whitening import within
+from biogrip.traces.reader import Recording
+
+
+def judged_data(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return status, quantities and notes; only increases of chi^2 are rounded.
+
+    A rejected fit determines nothing: its quantities have the best fit as value, no limits, and
+    the verdict `FIT_REJECTED`; its misfit tells no noise. Notes that neither reject it nor are on
+    reading the file speak of results that it does not have, and are left out.
+    """
+    likelihood, notes = diagnosis.likelihood, diagnosis.notes
+    status = compute_status(notes)
+    rejected = status == REJECTED
+    if rejected:
+        remarks = diagnosis.recording.remarks() if diagnosis.recording else []
+        notes = [note for note in notes if note.weight == REJECTION or note.text in remarks]
+    ordered = order_notes(notes)
+    return {
+        "fit": status,
+        "reasons": find_reasons(ordered),
+        "samples": likelihood.problem.residuals.samples,
+        "misfit_rad": likelihood.misfit,
+        "noise_rad": None if rejected else likelihood.noise_sd,
+        "scatter_rad": likelihood.problem.residuals.noise_scale,
+        "threshold": likelihood.threshold,
+        "certainty": likelihood.certainty,
+        "quantities": [_finding(each, rejected=rejected) for each in diagnosis.findings],
+        "hidden": [
+            {"words": each.words(), "moves": each.moves}
+            for each in ([] if rejected else diagnosis.hidden)
+            if each.beyond[1] > 1
+        ],
+        "trades": [
+            {
+                "members": list(trade.members),
+                "words": trade.words(),
+                **_finding(trade.finding, rejected=False),
+            }
+            for trade in ([] if rejected else diagnosis.trades)
+        ],
+        **({"jaw_force": dict(vars(diagnosis.grip))} if diagnosis.grip else {}),
+        "notes": [dict(vars(note)) for note in ordered],
+    }
+
+
+def _finding(finding: Finding, *, rejected: bool) -> dict[str, Any]:
+    profile = finding.profile
+    return {
+        "quantity": finding.quantity.label,
+        "symbol": finding.quantity.symbol,
+        "unit": finding.quantity.unit,
+        "verdict": FIT_REJECTED if rejected else finding.verdict,
+        "value": finding.value,
+        "low": None if rejected else finding.low,
+        "high": None if rejected else finding.high,
+        "excluded": [] if rejected else [[start, end] for start, end in finding.gaps],
+        "deviation": finding.deviation,
+        "provided": finding.quantity.provided,
+        "in_words": f"fit rejected: the best fit, {finding.best_in_words}, is not to be used"
+        if rejected
+        else finding.words(),
+        "profile": {
+            "values": [float(value) for value in np.exp(profile.log_values)],
+            "increases": [round_increase(float(increase)) for increase in profile.increases],
+        },
+    }
+
+
+def trace_data(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return all that `identify` says of a trace: `judged_data`, and what it stands on."""
+    experiment, recording = diagnosis.experiment, diagnosis.recording
+    fit, models = diagnosis.fit, diagnosis.models
+    assert experiment is not None
+    assert recording is not None
+    assert fit is not None
+    assert models is not None
+    instrument, said = experiment.instrument, judged_data(diagnosis)
+    rejected = said["fit"] == REJECTED
+    return {
+        "model": experiment.model.name,
+        "model_title": experiment.model.title,
+        "confidence": experiment.confidence,
+        "instrument": instrument.kind,
+        "reads": {"quantity": instrument.read.name, "unit": instrument.read.unit},
+        **_fixed(experiment),
+        "limits": _what_limits_include(experiment),
+        **_fitted_along(diagnosis, recording, experiment),
+        **said,
+        "noise_model": fit.noise_data(),
+        **models.data(rejected=rejected),
+        "moduli": None if rejected else _moduli(diagnosis, recording, experiment),
+    }
+
+
+def _moduli(
+    diagnosis: Diagnosis, recording: Recording, experiment: Experiment
+) -> dict[str, list[float]]:
+    """Return moduli of the fit from one over the duration to one over the first interval."""
+    time_s = recording.time_s
+    first_s = np.diff(time_s)[np.searchsorted(time_s[:-2], 0.0)]
+    ends = 1 / float(np.ptp(time_s)), 1 / float(first_s)
+    best = np.exp(diagnosis.likelihood.best).tolist()
+    values = dict(zip(experiment.searched.names, best, strict=True))
+    table = experiment.model.moduli({**experiment.fixed, **values}, np.geomspace(*ends, 31))
+    return {name: column.tolist() for name, column in table.items()}
+
+
+def _fixed(experiment: Experiment) -> dict[str, list[str]]:
+    """Return values and units of fixed parameters in words, or nothing if there are none."""
+    units = {p.name: p.unit for p in experiment.model.parameters}
+    fixed = experiment.fixed.items()
+    words = [f"{name} = {value:g} {units[name]}".rstrip() for name, value in fixed]
+    return {"fixed": words} if words else {}
+
+
+def _what_limits_include(experiment: Experiment) -> str:
+    """Return a sentence on the part that uncertainties of gripper and protocol have in limits."""
+    instrument, controlled = experiment.instrument, experiment.instrument.controlled.name
+    exact = "gripper" if instrument.has_jaws else controlled
+    known = [(part, key) for part, key, _ in experiment.uncertain]
+    keys = [f"{part}.{key}".removesuffix(".share") for part, key in known if part != "steps"]
+    said = []
+    if instrument.has_jaws and keys:
+        said.append(f"Limits include uncertainties of the gripper: {', '.join(keys)}.")
+    if steps := len(known) - len(keys):
+        said.append(
+            f"Limits allow for {counted(steps, 'step')} of the {controlled} anywhere between the "
+            f"two rows of its record; otherwise the {exact} is taken as exact."
+        )
+    return " ".join(said) or f"Limits are statistical only: the {exact} is taken as exact."
+
+
+def _fitted_along(
+    diagnosis: Diagnosis, recording: Recording, experiment: Experiment
+) -> dict[str, Any]:
+    """Return onset, offset and drift of the instrument in the best fit, as far as fitted."""
+    found: dict[str, Any] = {}
+    if experiment.fit_start:
+        found["onset_s"] = float(recording.onset_s or 0.0)
+    if diagnosis.onset_limits_s:
+        found["onset_limits_s"] = [found["onset_s"] + end_s for end_s in diagnosis.onset_limits_s]
+    if not (experiment.offset or experiment.drift):
+        return found
+    time_s, measured = recording.time_s, recording.readings
+    network = experiment.searched.network(np.exp(diagnosis.likelihood.best))
+    simulated = simulated_response(
+        experiment.gripper, network, experiment.torque, time_s, nonlinear=False
+    )[0]
+    added = within(experiment.nuisance(time_s), measured - simulated, experiment.sd)
+    slope = float((added[-1] - added[0]) / (time_s[-1] - time_s[0]))
+    if experiment.offset:
+        found["offset_rad"] = float(added[0] - slope * time_s[0])
+    if experiment.drift:
+        found["drift_rad_per_s"] = slope
+    return found

@@ -1,0 +1,194 @@
+"""What a recording and an experiment are to each other before they are fitted.
+
+`prepare` moves the recording's clock to the start of the protocol, leaves out readings that nothing
+can tell of, refuses an impossible trace, and gives the experiment what follows from the trace:
+standard deviations of the readings, and search ranges.
+
+Torque over rotation is the scale of stiffness at the jaws, and load over deformation that of other
+instruments. A spring changes the trace by less than its noise if it is softer by more than the
+ratio of the trace to the noise, over all readings, or if it yields by less than what all readings
+together resolve. A damper is as stiff as c/t after a time t, which is between the shortest sampling
+interval and the duration; so is a springpot, with a power of t.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.fit.any_sample import proportional_deviations
+from biogrip.fit.experiment import Experiment
+from biogrip.fit.fitted_onset import OnsetFits, estimate_onset
+from biogrip.fit.genome import GeneRange
+from biogrip.identify.plausibility import check_recording
+from biogrip.physics.protocol import Course, is_held, largest_load
+from biogrip.physics.whitening import MOST_SAMPLES, drift_is_flow, estimate_noise
+from biogrip.traces.columns import place
+from biogrip.traces.reader import Recording
+
+# Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
+_CLEAREST, _MARGIN = 1e5, 10.0
+# Smallest and largest exponents of ten of search ranges.
+_LEAST_EXPONENT, _MOST_EXPONENT = -16, 18
+
+_FLOWS = {"damper": "c_p", "maxwell": "c", "burgers": "c_s"}
+
+
+def flow_of(experiment: Experiment) -> str:
+    """Name what a sample flows by under a constant load, on and on in a line; nothing if by none.
+
+    Without the spring beside the branches that is the sum of their dampers.
+    """
+    if experiment.fixed.get("k_p") == 0:
+        return " + ".join(p.name for p in experiment.searched.parameters if p.kind == "damping")
+    return _FLOWS.get(experiment.model.name, "")
+
+
+def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Experiment]:
+    """Return a recording from the protocol's start on, and the experiment with what follows of it.
+
+    A `BiogripError` has file, line and column of what is impossible with instrument and protocol.
+    """
+    if experiment.record is not None:
+        # Imported here, as below: few traces have a record.
+        from biogrip.physics.recorded_course import with_steps
+
+        record, uncertain_s = with_steps(experiment.record)
+        steps = {str(number): error for number, error in enumerate(uncertain_s.tolist())}
+        uncertainty = {**experiment.uncertainty, "steps": steps}
+        experiment = replace(experiment, record=record, uncertainty=uncertainty)
+    recording = _checked(recording, experiment)
+    if experiment.record is not None:
+        from biogrip.identify.load_noise import without_noise
+
+        record, noise = without_noise(experiment, recording.time_s, recording.readings)
+        experiment = replace(experiment, record=record)
+        recording = replace(recording, load_noise=noise)
+    experiment = for_trace(experiment, recording)
+    if experiment.fit_start and recording.onset_s is not None:
+        fits = OnsetFits(experiment, recording.time_s, recording.readings)
+        later_s = fits.best(0.0).onset_s
+        onset_s = recording.onset_s + later_s
+        recording = replace(recording, time_s=recording.time_s - later_s, onset_s=onset_s)
+    return recording, experiment
+
+
+def for_trace(experiment: Experiment, recording: Recording) -> Experiment:
+    """Return the experiment with what follows from a recording: see `prepare`."""
+    if experiment.coloured:
+        experiment = _without_likenesses(experiment, recording.time_s)
+    experiment = experiment.weighted(recording.sd)
+    ranges = ranges_of(experiment, recording.time_s, recording.readings)
+    found = {name: it for name, it in ranges.items() if name not in experiment.given_ranges}
+    return replace(experiment, ranges={**experiment.ranges, **found})
+
+
+def _checked(trace: Recording, experiment: Experiment) -> Recording:
+    """Return a recording with its times from the protocol's start on; refuse an impossible one."""
+    # An offset or a drift that comes with a noise model does not make a trace more plausible.
+    experiment = replace(
+        experiment,
+        offset=experiment.offset and "offset" not in experiment.undeclared,
+        drift=experiment.drift and "drift" not in experiment.undeclared,
+    )
+    weighted = trace.sd is not None or experiment.noise_share is not None
+    if (experiment.coloured or weighted) and len(trace.time_s) > MOST_SAMPLES:
+        raise BiogripError(
+            f"{place(trace.path)}: found {len(trace.time_s)} samples, allowed are at most "
+            f"{MOST_SAMPLES} with {'weights' if weighted else 'a coloured noise model'}: average "
+            "neighbouring ones."
+        )
+    onset_s = trace.read.start_s
+    if experiment.fit_start:
+        onset_s = estimate_onset(experiment, trace.time_s, trace.readings)
+    if onset_s is not None:
+        trace = without_padding(replace(trace, time_s=trace.time_s - onset_s, onset_s=onset_s))
+    # What a gripper reads does not jump: dampers hold its arms.
+    if not experiment.instrument.has_jaws:
+        trace = without_steps(trace, experiment.torque)
+    if len(trace.time_s) <= experiment.unknowns:
+        raise BiogripError(
+            f"{place(trace.path)}: found {len(trace.time_s)} readings for {experiment.unknowns} "
+            "unknown parameters; allowed are more readings than parameters, or a simpler model."
+        )
+    trace = replace(trace, suspicion=check_recording(trace, experiment, _noise(trace, experiment)))
+    if experiment.noise_share is None:
+        return trace
+    return replace(trace, sd=proportional_deviations(experiment, trace.time_s, trace.readings))
+
+
+def without_steps(trace: Recording, protocol: Course) -> Recording:
+    """Leave out readings at the very instant of a step.
+
+    Without inertia a sample may jump there, and nothing tells on which side a reading was taken. A
+    damper's force jumps with the rate of a deformation, too.
+    """
+    at = np.isin(protocol.snapped(trace.time_s), protocol.jumps_s)
+    times = trace.time_s[at] + (trace.onset_s or 0.0)
+    return replace(trace.part(~at), at_steps=tuple(times.tolist()))
+
+
+def without_padding(trace: Recording) -> Recording:
+    """Leave out the same number again and again before the protocol, which is no measurement.
+
+    The last of them stays: it tells that the protocol had not yet started.
+    """
+    differs = np.flatnonzero(trace.readings != trace.readings[0])
+    first = max(min([*differs[:1], np.count_nonzero(trace.time_s < 0)]) - 1, 0)
+    kept = np.arange(len(trace.time_s)) >= first
+    return replace(trace.part(kept), gaps=trace.gaps + first)
+
+
+def _noise(trace: Recording, experiment: Experiment) -> float | None:
+    """Return the standard deviation of the noise, if it is given; typical where it differs."""
+    if trace.sd is not None:
+        return float(np.median(trace.sd))
+    if experiment.noise_share is not None:
+        largest = float(np.max(np.abs(trace.readings)))
+        return math.hypot(experiment.noise_share * largest, experiment.noise_sd or 0.0)
+    return experiment.noise_sd
+
+
+def _without_likenesses(experiment: Experiment, time_s: Array) -> Experiment:
+    """Return an experiment without an undeclared offset or drift that its sample looks like."""
+    network = experiment.searched.network([experiment.searched.example])
+    deforms = experiment.instrument.deforms
+    own = network.k_p[0] > 0 if deforms else network.c_p[0] == 0
+    if "offset" in experiment.undeclared and own and is_held(experiment.torque, time_s):
+        experiment = replace(experiment, offset=False)
+    flows = bool(flow_of(experiment)) and drift_is_flow(experiment.torque, time_s)
+    if "drift" in experiment.undeclared and flows:
+        experiment = replace(experiment, drift=False)
+    return experiment
+
+
+def ranges_of(experiment: Experiment, time_s: Array, readings: Array) -> dict[str, GeneRange]:
+    """Compute search ranges of springs and dampers from the scales of a trace, (n_samples,).
+
+    The experiment has the noise, if it is known. Ranges are by name, without that of exponents.
+    """
+    changed = readings - np.mean(readings) if experiment.offset else readings
+    noise_sd = experiment.sd
+    if noise_sd is None:
+        one = experiment.noise_sd or estimate_noise(readings)
+        noise_sd = np.full(len(changed), one)
+    largest = float(np.max(np.abs(changed)))
+    ratios = np.linalg.norm([changed / noise_sd, largest / noise_sd], axis=1)
+    softer, stiffer = _MARGIN * np.clip(ratios, 1.0, _CLEAREST)
+    load = abs(largest_load(experiment.phases))
+    stiffness = load / (experiment.gripper.lever_m**2 * largest)
+    if experiment.instrument.deforms:
+        stiffness = largest / load
+    low, high = stiffness / softer, stiffness * stiffer
+    short_s, long_s = float(np.min(np.diff(time_s))), float(np.ptp(time_s))
+    dampers = _decades(low * short_s, high * long_s)
+    springpots = _decades(low * min(short_s, 1.0), high * max(long_s, 1.0))
+    return {"k": springpots, "k_p": _decades(low, high), "c": dampers, "c_p": dampers}
+
+
+def _decades(low: float, high: float) -> GeneRange:
+    ends = int(np.floor(np.log10(low))), int(np.ceil(np.log10(high)))
+    least, most = (min(max(end, _LEAST_EXPONENT), _MOST_EXPONENT) for end in ends)
+    return GeneRange((least, most), (1, 9))

@@ -1,0 +1,161 @@
+"""What a trace could hide: errors that no test would tell, and by how much they move its results.
+
+Errors of several kinds are planted in the trace's own best fit, to first order: readings that jump
+at some time, or are scaled from then on; a load that starts late; a second branch of the sample. A
+fit absorbs a part of each, which moves the parameters, and leaves a part, by which tests tell it.
+The size is that which the most sensitive test just misses: a scan for steps, parts of the trace
+fitted apart, and means over stretches. As readings scatter, half of such errors are told. No error
+is larger than its kind may well be, nor than what moves a quantity twofold, up to where first order
+may hold.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.digits import plain
+from biogrip.fit.noise_model_fit import absorbed
+from biogrip.judging.changes import Steps, parts_apart, steps_of
+from biogrip.judging.doubts import MANY, middle_of
+from biogrip.judging.levels import FALSE_ALARM
+from biogrip.judging.likelihood import Likelihood
+from biogrip.judging.verdicts import Finding
+from biogrip.judging.whiteness import averaged
+from biogrip.physics.models import CANDIDATES, as_richer, contained
+from biogrip.physics.whitening import without
+
+# Times of a jump and of a changed gain, in shares of the readings.
+_SHARES = np.linspace(0.1, 0.9, 9)
+# Largest errors that may well be: a fifth of the peak, or of the readings; as late as readings are
+# apart at first; half of the first branch.
+_JUMP, _GAIN, _BRANCH = 0.2, 0.2, 0.5
+# Onsets and strengths of finite differences, as shares of the first interval and of the branch; and
+# relaxation times of a second branch over that of the first.
+_LATE, _WEAK, _TIMES = 1e-3, 1e-3, (0.1, 10.0)
+# Models that may have one branch more than another.
+_RICHER = "generalized_maxwell_2", "generalized_maxwell_3"
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """An error that a trace could hide, of the size that its tests just miss."""
+
+    error: str
+    """In words, with its size and time."""
+    moves: dict[str, float]
+    """By how much the logarithm of each quantity moves, by its label, with the error's sign."""
+    beyond: tuple[str, float]
+    """Label of the quantity that moves most, over how far its limit is, and that ratio."""
+
+    def words(self) -> str:
+        """Return what it does as a sentence."""
+        label, _ = self.beyond
+        return (
+            f"{self.error[0].upper()}{self.error[1:]}, which this trace could hide, moves {label} "
+            f"by {plain(100 * np.expm1(abs(self.moves[label])), 2)} %, beyond its limits."
+        )
+
+
+def find_hidden(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Hidden]:
+    """Return the worst error of each kind, of those that move a quantity with two limits.
+
+    Of more readings than slopes are computed of, none are looked for.
+    """
+    residuals, best = likelihood.problem.residuals, likelihood.best
+    limited = [each for each in findings if each.low is not None and each.high is not None]
+    if residuals.samples > MANY or not limited:
+        return []
+    _, slopes = residuals(best)
+    nuisance = residuals.trace.condensed.nuisance
+    basis = absorbed(np.vstack((slopes, nuisance)))
+    tests = basis, steps_of(basis, residuals.trace.condensed.cleared), middle_of(residuals)
+    information = slopes @ slopes.T / likelihood.noise_sd**2 + np.eye(len(slopes))
+    worst: dict[str, Hidden] = {}
+    for kind, words, unit, most_size, shape in _planted(likelihood):
+        changed = residuals.trace.condensed.cleared(shape)
+        told = _told(without(basis, changed) / likelihood.noise_sd, *tests)
+        moved = np.linalg.solve(information, slopes @ changed) / likelihood.noise_sd**2
+        of_one = [float(each.quantity.gradient(best) @ moved) for each in limited]
+        twofold = max(map(abs, of_one)) / np.log(2)
+        size = 1 / max(told, 1 / most_size, twofold)
+        labels = [each.quantity.label for each in limited]
+        moves = {label: size * by for label, by in zip(labels, of_one, strict=True)}
+        ratios = {each.quantity.label: _beyond(each, moves) for each in limited}
+        most = max(ratios, key=lambda label: ratios[label])
+        found = Hidden(words.format(plain(size * unit, 2)), moves, (most, ratios[most]))
+        if kind not in worst or found.beyond[1] > worst[kind].beyond[1]:
+            worst[kind] = found
+    return sorted(worst.values(), key=lambda each: -each.beyond[1])
+
+
+def _beyond(finding: Finding, moves: dict[str, float]) -> float:
+    """Return a move over the distance of the nearer limit."""
+    profile = finding.profile
+    low, high = (abs((end or 0.0) - profile.best) for end in (profile.low, profile.high))
+    return abs(moves[finding.quantity.label]) / max(min(low, high), 1e-12)
+
+
+def _told(left: Array, basis: Array, steps: Steps, split: int) -> float:
+    """Return an error over the size that the most sensitive test just misses.
+
+    What a fit leaves of it is in standard deviations of the noise, (n_samples,).
+    """
+    from scipy.special import chdtri
+
+    scanned = np.abs(steps.shapes @ left) / steps.norms
+    found = [float(np.max(scanned, initial=0.0)) / steps.critical(FALSE_ALARM)]
+    for rows in (parts_apart(basis, split), averaged(basis)):
+        if len(rows):
+            # Of a sum of squares with as many degrees of freedom the mean is that of noise.
+            more = chdtri(len(rows), FALSE_ALARM) - len(rows)
+            found.append(float(np.linalg.norm(rows @ left) / np.sqrt(more)))
+    return max(found)
+
+
+def _planted(likelihood: Likelihood) -> Iterator[tuple[str, str, float, float, Array]]:
+    """Yield kind, words, factor of the size in words, most, and shape of each error, (n_samples,).
+
+    A shape is for an error of size one.
+    """
+    residuals, best = likelihood.problem.residuals, likelihood.best
+    time_s, response, peak = residuals.trace.time_s, residuals.response(best), residuals.peak
+    count = len(time_s)
+    for before in np.unique((_SHARES * count).astype(np.int64)).tolist():
+        after, at = (np.arange(count) >= before).astype(float), plain(time_s[before], 2)
+        yield "jump", f"a jump of {{}} % of the peak at {at} s", 100, _JUMP, peak * after
+        yield "gain", f"a gain that changes by {{}} % at {at} s", 100, _GAIN, after * response
+    late_s = _LATE * float(np.min(np.diff(time_s)))
+    later = residuals.later(late_s).response(best)
+    apart_s = float(time_s[1] - time_s[0])
+    yield "start", "a start that is late by {} s", 1, apart_s, (later - response) / late_s
+    for tau, shape in _second_branch(likelihood, response):
+        words = f"a second branch of {plain(tau, 2)} s with {{}} % of its stiffness"
+        yield "branch", words, 100, _BRANCH, shape
+
+
+def _second_branch(likelihood: Likelihood, response: Array) -> Iterator[tuple[float, Array]]:
+    """Yield relaxation times of a second branch, and its effect for the stiffness of the first."""
+    residuals = likelihood.problem.residuals
+    # Not the whole models: those of an instrument whose samples have moduli have other units.
+    name, names = residuals.model.name, residuals.model.names
+    for richer in _RICHER:
+        model = CANDIDATES[richer].model
+        alike = (it for it in contained(richer) if CANDIDATES[it].model.name == name)
+        if not (own := next((it for it in alike if CANDIDATES[it].model.names == names), None)):
+            continue
+        values = as_richer(richer, own, np.exp(likelihood.best))
+        there = [branch for branch in model.free_branches if values[branch[0]] > 0]
+        gone = [branch for branch in model.free_branches if values[branch[0]] == 0]
+        # Of a solid in Kelvin's form one branch is the spring beside the other.
+        if there and gone and np.all(np.isfinite(values)):
+            break
+    else:
+        return
+    posed, (first, damper), second = replace(residuals, model=model), there[0], gone[0]
+    scales = [values[first if each.startswith("k") else damper] for each in model.names]
+    values = np.where(values > 0, values, 1e-12 * np.array(scales))
+    for tau in (times * values[damper] / values[first] for times in _TIMES):
+        values[[*second]] = _WEAK * values[first] * np.array([1.0, tau])
+        yield tau, (posed.response(np.log(values)) - response) / _WEAK

@@ -1,0 +1,111 @@
+"""Every level and threshold that decides a status, or whether a limit is said, with its reason.
+
+Levels of significance say how often a right fit is blamed by chance; `docs/levels.md` has how often
+all tests together do. What has no such reason is chosen, and said to be. Tolerances of numerical
+methods stand beside the loops that they end.
+"""
+
+# What a fit leaves.
+
+FALSE_ALARM = 0.003
+"""Level of each test that makes a fit doubtful: with some five tests, few in a hundred right ones
+are."""
+
+CERTAIN_MISFIT = 0.001
+"""Level of the test that tells misfit from noise, stricter as it may reject a fit."""
+
+TOO_MUCH = 1.2
+"""Misfit over the scatter of neighbouring readings from which on it changes limits. Chosen: by less
+it would widen them by a fifth at most."""
+
+FAR_OFF = 0.02
+"""Share of the peak from which on a certain misfit rejects a fit. Chosen: up to there limits allow
+for a misfit, which `tests/judging/test_whiteness.py` simulates."""
+
+NOISE_FREE, NOISE_FREE_OF_PEAK, NO_SCATTER, UNRESOLVED = 0.01, 1e-3, 0.1, 1e-6
+"""A misfit below these shares of the noise and of the peak is that of a trace without noise, if
+neighbours scatter by this share of it; and so is one below what no sensor resolves."""
+
+TOO_LITTLE = 0.5
+"""Misfit over a given noise below which that is doubted. Chosen: noise is rarely known better."""
+
+CLEARLY = 3.0
+"""Growth of noise from which on its share is known, and unweighted fits are not compared."""
+
+REPEATED = 0.45
+"""Share of readings that repeat the one before if a sensor is logged more often than it is read:
+half or more if it is logged twice as often."""
+
+# Slow noise, which may be misfit.
+
+MOSTLY, SLOW, NOTICEABLE, LONG = 0.5, 0.02, 1 / 3, 0.2
+"""Correlated noise may be misfit if it has most of the variance and lasts for more than a fiftieth
+of the trace, or a noticeable share and a fifth: a trace then has fewer than five independent parts.
+Chosen."""
+
+SURE = 2.0
+"""Standard deviations by which estimates of slow noise count less: one in forty is lower still."""
+
+SMOOTH = 3.0
+"""Scatter over that of noise which is correlated for `SLOW` from which on it is no such noise.
+Chosen."""
+
+UNEVEN = 3.0
+"""Ratio of the scatter of stretches, which white noise exceeds in 20 of them once in hundreds."""
+
+AS_THE_SCATTER = 1.44
+"""Mean square over that of the scatter up to which noise may be white: 1.05 to 1.4 if it is."""
+
+# Limits and verdicts.
+
+CERTAIN = 0.999
+"""Confidence that a profile must reach at an end of the range to have a limit on that side: that
+the range ends there is chosen, and must not decide."""
+
+MISSED = 0.05
+"""Increase of chi^2, from the weak prior of local fits, beyond which a fit is not the optimum: an
+eightieth of what moves a 95 % limit.
+
+A fit that is deeper than an optimum by more shows that the optimum is not the global one.
+"""
+
+WIDE = 3.0
+"""Limits further than this factor from their middle tell little more than an order of magnitude:
+moduli of cells of one kind scatter by a factor of about 2 to 3."""
+
+WORTH_A_PROFILE = 0.5
+"""First-order standard deviation of the logarithm of a combination of undetermined parameters below
+which it may be determined: its limits are then within a factor of e or so."""
+
+DETERMINED_PERCENT = 100.0
+"""Bound in percent from which on a quantity does not count as determined."""
+
+BEYOND_THE_RANGE = 9.0
+"""Decrease of chi^2 beyond an end of the search range that is more than chance: three standard
+deviations squared."""
+
+# Other models, and instruments.
+
+FAR_BETTER = 10.0
+"""Difference of BIC by which a model is far better than another (Kass and Raftery 1995)."""
+
+SATURATED, MORE_OFTEN, FEWEST_VALUES = 0.05, 5, 5
+"""Share of readings at an end of their scale from which on they are saturated, how many times as
+often as each of the next values, and fewest values."""
+
+# Impossible traces, which are refused.
+
+SMALLEST_SHARE, LARGEST_SHARE = 2e-3, 1.5
+"""Plausible rotations over that of the free arm. No sample makes the arm turn further than without
+it: the excess allows for errors of the fit and of the gripper's stiffness. The paper's stiffest
+sample turns it by 8e-3. The ratio, 750, is below 1000, so that no trace passes both in its unit
+and in one a thousand times larger or smaller."""
+
+SHORTEST_SHARE = 0.02
+"""Share of the protocol that a trace must cover: more than min/h = s/min = 1/60."""
+
+NO_RESPONSE = 1e-3
+"""Share of traces of pure noise that are accepted as a response."""
+
+FAR_ABOVE = 10.0
+"""Multiple of a given noise from which a rotation is seen, however small it is."""

@@ -1,0 +1,392 @@
+"""What any linear sample would show, whatever its model: quantities with limits, and a test.
+
+A linear passive sample has a spectrum of relaxation times that is nowhere negative. Its relaxation
+modulus G, its compliance J and what they are at a frequency are linear functionals of it, or ratios
+of two. The limits of a quantity are the ends of what it is over all spectra whose sum of squares
+exceeds the least by no more than a quantile of F, or of chi-squared if the noise is known [1]_,
+[2]_. In each fit for a limit one more row, of great weight, holds the quantity at a value v: f at
+v, or the ratio f/g by f - v g at zero. The root of the excess is nearly linear in v, and Newton's
+method takes two or three fits.
+
+What the best fit leaves tells the noise, as the sum of squares over the degrees of freedom that the
+relaxation times of the best fit and their amplitudes leave.
+
+In relaxation nothing is told of what relaxes before the first reading after a step. G' and G'' are
+then those of what relaxes later, to which the rest would add.
+
+Between arms that yield, a load is shared by arms and sample. Of a gripper, K is the force over the
+shortening at a time after a step of the torque: at once and at rest it is the sample's stiffness.
+
+References
+----------
+.. [1] B. W. Rust and W. R. Burrus, Mathematical Programming and the Numerical Solution of Linear
+   Equations, Elsevier, 1972: limits of linear functionals of what is not negative.
+.. [2] P. B. Stark, Inference in infinite-dimensional inverse problems: discretization and duality,
+   Journal of Geophysical Research 97 (1992), 14055-14082.
+"""
+
+import math
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.special import chdtrc
+
+from biogrip.arrays import Array, BoolArray
+from biogrip.digits import plain, with_limits
+from biogrip.fit.any_sample import AnySampleFit, Lags, fit_any_sample
+from biogrip.judging.levels import CERTAIN_MISFIT, TOO_MUCH
+from biogrip.judging.likelihood import find_thresholds
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.judging.whiteness import as_correlated, correlated
+from biogrip.physics.residuals import Residuals
+
+# First digits of the times at which quantities are told and, where these are too few, of more.
+_DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2
+# Weight of the row that holds a quantity, in the inverse of its standard deviation; accuracies of
+# the threshold's root, and of ends at which the excess jumps; share of the root that is flat; most
+# fits; growth of steps; most grids.
+_WEIGHT, _ROUGH, _ACCURATE, _CLOSE, _FLAT = 300.0, 0.3, 0.02, 1e-3, 0.03
+_MOST_FITS, _LARGER, _MOST_DIVISIONS = 25, 4.0, 4
+# Least ratio of a time to the first, and of the last to it, for slopes and moduli.
+_INNER = 2.0
+# A limit hangs on what hardly shows if a noise of that changes the quantity so many times more.
+_HANGS = 10.0
+# Standard deviation of a quantity that counts as none, over the largest that a noise of one lag
+# makes.
+_LEAST = 1e-3
+# Share of what the clearest lag adds that is none.
+_NONE = 1e-9
+
+# Share of a value below which a lower limit says no more than that it is positive.
+_LITTLE = 0.01
+# Ratio beyond which an upper limit hangs on the fastest lag that is tried.
+_MOST = 1e4
+# Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
+_UNITS = {False: ("N/m", "m/N", "m/(N s)", "N s/m"), True: ("Pa", "1/Pa", "1/(Pa s)", "Pa s")}
+
+LEVEL, EXPONENT, LOSS, BEYOND, FLOW = "level", "exponent", "loss", "beyond", "flow"
+KINDS = (LEVEL, EXPONENT, LOSS, BEYOND, FLOW, "storage", "loss tangent", "increment", "slope")
+"""Kinds of quantities. A level is a modulus, a stiffness or a compliance at a time; beyond is what
+it is at once and at rest."""
+
+# What lags of unit amplitude add, (n_rates,), by a time in s and their rates in 1/s, (n_rates,).
+_Functional = Callable[[float, Array], Array]
+_ADDED: dict[str, _Functional] = {
+    "left": lambda time_s, rates: np.exp(-rates * time_s),
+    "yielded": lambda time_s, rates: -np.expm1(-rates * time_s),
+    "per second": lambda time_s, rates: rates * np.exp(-rates * time_s),
+    "per e-fold": lambda time_s, rates: time_s * rates * np.exp(-rates * time_s),
+    "lasting": lambda _, rates: np.eye(1, len(rates))[0],
+    "flowing": lambda _, rates: rates * np.eye(1, len(rates))[0],
+    "all": lambda _, rates: np.ones_like(rates),
+    # At the angular frequency that is the inverse of the time.
+    "slow": lambda time_s, rates: 1 / (1 + (rates * time_s) ** 2),
+    "fast": lambda time_s, rates: (rates * time_s) ** 2 / (1 + (rates * time_s) ** 2),
+    "lost": lambda time_s, rates: rates * time_s / (1 + (rates * time_s) ** 2),
+}
+
+
+@dataclass(frozen=True)
+class Told:
+    """A quantity, and its limits over all linear samples."""
+
+    quantity: str
+    """Its name, such as ``G(10 s)``."""
+    kind: str
+    """One of the `KINDS`."""
+    at_s: float | None
+    """Time in s after a step, or the inverse of an angular frequency."""
+    unit: str
+    """SI unit; empty for a pure number."""
+    value: float | None
+    """Of the best fit; None unless there are both limits."""
+    low: float | None
+    """Lower limit, if there is one."""
+    high: float | None
+    """Upper limit, if there is one."""
+
+    @property
+    def verdict(self) -> str:
+        """Verdict as on a model's quantities: determined, bounded below or above, or not."""
+        if self.low is not None:
+            return BOUNDED_BELOW if self.high is None else DETERMINED
+        return NOT_DETERMINED if self.high is None else BOUNDED_ABOVE
+
+    def words(self) -> str:
+        """Return value and limits, or the only limit, in words."""
+        unit = f" {self.unit}".rstrip()
+        if self.value is not None and self.low is not None and self.high is not None:
+            return with_limits(self.value, self.low, self.high, self.unit)
+        if self.low is not None:
+            return f"at least {plain(self.low)}{unit}"
+        return "not determined" if self.high is None else f"at most {plain(self.high)}{unit}"
+
+
+@dataclass(frozen=True)
+class WithoutModel:
+    """What a trace tells without a model."""
+
+    told: list[Told]
+    """Quantities with their limits."""
+    misfit: float
+    """RMS of what the linear sample that fits best leaves, in the unit of the readings."""
+    times_noise: float
+    """The same in the known noise or, if it is not, in the scatter of neighbouring readings."""
+    is_linear: bool
+    """False if no linear sample gives this trace, for what the best leaves is no noise."""
+    covered_s: tuple[float, float]
+    """From when to when after a step there are readings, and so limits on either side."""
+
+    def data(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            "is_linear": self.is_linear,
+            "times_noise": self.times_noise,
+            "misfit_rad": self.misfit,
+            "covered_s": list(self.covered_s),
+            "quantities": [
+                {**asdict(each), "verdict": each.verdict, "in_words": each.words()}
+                for each in self.told
+            ],
+        }
+
+
+def tell_without_model(
+    residuals: Residuals,
+    *,
+    confidence: float,
+    noise_sd: float | None = None,
+    at_s: Sequence[float] = (),
+    kinds: Collection[str] = KINDS,
+) -> WithoutModel:
+    """Tell what a trace says of any linear sample, whatever its model.
+
+    Parameters
+    ----------
+    residuals
+        Protocol, trace with what is projected out and whitened, and instrument; their model is not
+        used.
+    confidence
+        Of two limits, such as 0.95; a single limit is one of such a pair.
+    noise_sd
+        Standard deviation of the noise, if it is known.
+    at_s
+        Times in s after a step, whose inverses are angular frequencies; by default one a decade.
+    kinds
+        What is to be told.
+    """
+    fit = fit_any_sample(residuals)
+    free, sd, left = fit.free, fit.sd, fit.left_of_readings()
+    _, chance = correlated(*left)
+    freedom, times = min(free, residuals.freedom), float(sd / (noise_sd or residuals.noise_scale))
+    if noise_sd is not None:
+        too_large = float(chdtrc(free, free * times**2))
+        chance = min(chance, too_large)
+        if too_large >= CERTAIN_MISFIT:
+            sd, freedom = noise_sd, math.inf
+    is_linear = chance >= CERTAIN_MISFIT or times <= TOO_MUCH
+    if not is_linear:
+        independent, freedom = as_correlated(*left)
+        sd = fit.sd * math.sqrt(free / independent)
+    threshold, _ = find_thresholds(confidence, freedom)
+    root = math.sqrt(threshold) * sd / residuals.noise_scale
+    times_s = at_s or decades(*fit.lags.covered_s)
+    quantities = (each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds)
+    told = [_told(fit, each, root) for each in quantities]
+    misfit = fit.sd * math.sqrt(free / residuals.samples)
+    return WithoutModel(told, misfit, times, is_linear, fit.lags.covered_s)
+
+
+def decades(first_s: float, last_s: float) -> list[float]:
+    """Return powers of ten between two times or, of less than two, more round numbers."""
+    powers = range(math.floor(math.log10(first_s)), math.floor(math.log10(last_s)) + 1)
+    for digits in _DIGITS:
+        times = [float(f"{digit}e{power}") for power in powers for digit in digits]
+        inside = [time_s for time_s in times if first_s <= time_s <= last_s]
+        if len(inside) >= _FEWEST_TIMES:
+            break
+    return inside
+
+
+def level_turned(residuals: Residuals) -> Callable[[Any], Any] | None:
+    """Return the function of a response to a unit step that is told as the level, if not itself.
+
+    Of a gripper, whose free arm turns by 1/k_2, and by 1/(k_2 + k_2 K/K_jaws) on a sample, it is
+    the static K, force over shortening, from the left arm's rotation per torque.
+    """
+    if not residuals.instrument.has_jaws:
+        return None
+    gripper = residuals.gripper
+    free, jaws = 1 / gripper.left.stiffness_Nm_per_rad, gripper.jaw_stiffness_N_per_m
+    return lambda turned: jaws * (free / turned - 1)
+
+
+@dataclass(frozen=True)
+class _Quantity:
+    """A functional of the amplitudes of lags, or the ratio of two."""
+
+    name: str
+    kind: str
+    at_s: float | None
+    unit: str
+    above: _Functional
+    below: _Functional | None = None
+    """What it is divided by."""
+    sides: tuple[int, ...] = (-1, 1)
+    """Sides on which it may have a limit, -1 or 1."""
+    turned: Callable[[float], float] | None = None
+    """Falling function of it that is told in its place."""
+    fastest: float = math.inf
+    """Rate in 1/s up to which lags count."""
+
+    def added(self, lags: Lags) -> tuple[Array, Array]:
+        """Return what amplitudes of rows add to it, or its numerator, and to its divisor."""
+        at_s, shown = self.at_s or 0.0, (lags.rates <= self.fastest) / lags.sizes
+        below = self.below(at_s, lags.rates) if self.below else np.zeros_like(shown)
+        return self.above(at_s, lags.rates) * shown, below * shown
+
+
+def _told(fit: AnySampleFit, quantity: _Quantity, root: float) -> Told:
+    """Find the limits of a quantity that is not negative."""
+    profile = _Profile(fit, quantity, root)
+    value: float | None = profile.best
+    ends = [profile.limit(side) if side in quantity.sides else None for side in (-1, 1)]
+    if (turned := quantity.turned) is not None:
+        value, *ends = (turned(it) if it else None for it in (value, *ends[::-1]))
+    low, high = (float(end) if end is not None and end > 0 else None for end in ends)
+    if quantity.below is not None and max(value or 0.0, high or 0.0) > _MOST:
+        value, high = None, None
+    if low is not None and value is not None and low < _LITTLE * max(value, _LITTLE * (high or 0)):
+        low = None
+    value = None if low is None or high is None or value is None else float(value)
+    return Told(quantity.name, quantity.kind, quantity.at_s, quantity.unit, value, low, high)
+
+
+class _Profile:
+    """The root of the least excess of the sum of squares, as a function of a quantity."""
+
+    def __init__(self, fit: AnySampleFit, quantity: _Quantity, root: float) -> None:
+        self._fit, self._quantity, self._root = fit, quantity, root
+        self._least = float(fit.left @ fit.left)
+        above, below = quantity.added(fit.lags)
+        divisor = float(below @ fit.amplitudes) if quantity.below else 1.0
+        self.best = float(above @ fit.amplitudes) / divisor if divisor else math.nan
+        """The value of the best fit, NaN if it has none."""
+        row, own, faint = above - self.best * below, fit.amplitudes > 0, fit.lags.faint
+        clearly = float(np.abs(row[~faint]).max())
+        deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[own], row[own])[0]))
+        deviation = deviation if deviation > _LEAST * clearly else clearly
+        self._stride = root * deviation / (divisor or 1.0)
+        held = min(deviation, max(0.1 * self.best * divisor, _NONE * clearly))
+        self._weight = _WEIGHT / held if held else 0.0
+        self._open = [it for it in (-1, 1) if np.any(it * row[faint] > _HANGS * clearly)]
+
+    def limit(self, side: int) -> float | None:
+        """Find the lower or upper limit, side -1 or 1, if there is one.
+
+        It is found roughly, and then with closer lags on either side of those that it needs.
+        """
+        if not 0 < self._stride < math.inf or side in self._open:
+            return None
+        lags, value, accuracy = self._fit.lags, self.best + side * self._stride, _ROUGH
+        for _ in range(_MOST_DIVISIONS):
+            found, needed = self._crossing(lags, side, value, accuracy)
+            if found is None or (accuracy < _ROUGH and lags.are_close(needed)):
+                break
+            lags, value, accuracy = lags.divided(needed), found, _ACCURATE
+        # Where the excess jumps, Newton's method may end on the other side.
+        return found if found is not None and side * (found - self.best) >= 0 else None
+
+    def _crossing(
+        self, lags: Lags, side: int, value: float, accuracy: float
+    ) -> tuple[float | None, BoolArray]:
+        """Return the limit with certain lags, and which it needs, beginning with a value.
+
+        The root of the excess there is accurate to a share.
+        """
+        above, below = self._quantity.added(lags)
+        seen: BoolArray = np.any(lags.rows, axis=1)
+        ratio = self._quantity.below is not None
+        rows = np.column_stack((lags.rows, above))
+        measured, weight = np.append(self._fit.measured, 0.0), self._weight
+        inner, outer = self.best, math.inf
+        for _ in range(_MOST_FITS):
+            value = value if side > 0 else max(value, 0.0)
+            rows[:, -1] = np.where(seen, weight * (above - value * below), 0.0)
+            measured[-1] = 0.0 if ratio else weight * value
+            amplitudes, norm = nnls(rows.T, measured, maxiter=100 * len(rows))
+            reached = math.sqrt(max(norm**2 - self._least, 0.0))
+            over = reached - self._root
+            if over < 0 and value <= 0:
+                break
+            force = weight * float(measured[-1] - amplitudes @ rows[:, -1])
+            slope = force * (float(below @ amplitudes) if ratio else 1.0)
+            # Where the excess is flat, its slope says nothing.
+            steep = side * slope > 0 and reached > _FLAT * self._root
+            step = -over * reached / slope if steep else side * math.inf
+            if abs(over) < accuracy * self._root:
+                return value + (step if steep else 0.0), amplitudes > 0
+            inner, outer = (value, outer) if over < 0 else (inner, value)
+            if abs(outer - inner) < _CLOSE * abs(inner - self.best):
+                return inner, amplitudes > 0
+            far = outer if math.isfinite(outer) else self.best + _LARGER * (value - self.best)
+            if far == inner:
+                break
+            share = (value + step - inner) / (far - inner)
+            if far == outer and not _CLOSE < share < 1 - _CLOSE:
+                share = 0.5
+            value = inner + min(share, 1.0) * (far - inner)
+        return None, seen
+
+
+def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Iterator[_Quantity]:
+    """Yield what is told at times, and beyond the readings."""
+    instrument, (first_s, last_s) = residuals.instrument, lags.covered_s
+    deforms, jaws, turned = instrument.deforms, instrument.has_jaws, level_turned(residuals)
+    inside = [time_s for time_s in times if first_s <= time_s <= last_s]
+    # Slopes and moduli at an end of the trace are hardly known.
+    inner = [time_s for time_s in inside if _INNER * first_s <= time_s <= last_s / _INNER]
+    letter, (unit, *of_creep) = "G" if instrument.per_area else "K", _UNITS[instrument.per_area]
+    if not (deforms or jaws):
+        letter, unit = "J", of_creep[0]
+    # What falls is not smaller before the first reading, and not larger after the last one.
+    falls, level = (1, _ADDED["left"]) if deforms else (-1, _ADDED["yielded"])
+    for at_s in times:
+        sides = (-falls,) * (at_s <= last_s) + (falls,) * (at_s >= first_s)
+        yield _Quantity(f"{letter}({at_s:g} s)", LEVEL, at_s, unit, level, None, sides, turned)
+    for at_s in inner if not jaws else ():
+        yield _Quantity(f"exponent({at_s:g} s)", EXPONENT, at_s, "", _ADDED["per e-fold"], level)
+    yield _Quantity(f"{letter} at once", BEYOND, first_s, unit, level, None, (-falls,), turned)
+    if deforms or jaws:
+        final = _ADDED["lasting" if deforms else "all"]
+        yield _Quantity(f"{letter} at rest", BEYOND, None, unit, final, None, (falls,), turned)
+    if jaws:
+        return
+    if not deforms:
+        for before_s, at_s in pairwise(inside):
+            name = f"J({before_s:g} to {at_s:g} s)"
+            yield _Quantity(name, "increment", at_s, unit, partial(_rise, before_s))
+        _, per_s, viscosity = of_creep
+        yield _Quantity("slope at the end", "slope", last_s, per_s, _ADDED["per second"])
+        flow = _ADDED["flowing"]
+        yield _Quantity("viscosity", FLOW, None, viscosity, flow, None, (1,), lambda it: 1 / it)
+    # Under a step of the deformation the fastest lag, of a damper, does not show.
+    fastest = 1 / first_s if deforms and not lags.rows[-1].any() else math.inf
+    stored, lost = _ADDED["slow" if deforms else "fast"], _ADDED["lost"]
+    for at_s in reversed(inner):
+        for name, kind, its, above, below in (
+            (f"{letter}'", "storage", unit, stored, None),
+            (f"{letter}''", LOSS, unit, lost, None),
+            ("tan delta", "loss tangent", "", lost, stored),
+        ):
+            name = f"{name}({1 / at_s:.3g} rad/s)"
+            yield _Quantity(name, kind, at_s, its, above, below, fastest=fastest)
+
+
+def _rise(before_s: float, time_s: float, rates: Array) -> Array:
+    return np.exp(-rates * before_s) - np.exp(-rates * time_s)

@@ -1,0 +1,112 @@
+"""From a recording and an experiment to a diagnosis: the same by every way."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.identify.identify import identify
+from biogrip.judging.verdicts import DETERMINED
+from biogrip.library import INSTRUMENTS, BiogripError, Sample, hold, set_up
+from biogrip.stages.judgement import judge
+from biogrip.stages.targets import record
+from biogrip.traces.columns import Columns
+from biogrip.traces.reader import Recording, recording_of_arrays
+from tests.helpers.default import study_of
+from tests.helpers.identified import identified, write_trace
+
+TRUTH = {"k_s": 5e4, "k_v": 2e4, "c_v": 2e6}
+SECONDS = np.arange(4.0, 600.0, 4.0)
+SCATTER = 5e-5 * np.random.default_rng(3).standard_normal(len(SECONDS))
+# A soft tissue under 100 Pa: as its own equation has it, J = 1/k_s + (1 - exp(-t k_v/c_v))/k_v.
+STRAIN = 100 * (1 / 5e4 + (1 - np.exp(-SECONDS / 100)) / 2e4) + SCATTER
+STRAINS = Columns("time_s", "strain", quantity=INSTRUMENTS["strain"].read)
+
+
+def recorded(*, strain: Array = STRAIN, time_s: Array = SECONDS, **more: Any) -> Recording:
+    return recording_of_arrays(Columns(**{**vars(STRAINS), **more}), time_s, strain)
+
+
+def test_a_sample_far_from_the_ranges_of_the_experiment_is_identified() -> None:
+    """Those of the paper's cells, with 9.9e4 as the largest damper: they follow from the trace."""
+    creep = set_up(INSTRUMENTS["strain"], (hold(600.0, 100.0),), Sample("zener_kelvin"))
+    found = identify(recorded(), replace(creep, cheap_models=False))
+    assert found.status == "ok"
+    for finding in found.findings:
+        truth = {**TRUTH, "tau_v": 100.0}[finding.quantity.label]
+        assert finding.verdict == DETERMINED
+        assert finding.low is not None
+        assert finding.high is not None
+        # Of four intervals at 95 % one may miss, but none by its width.
+        width = finding.high - finding.low
+        assert finding.low - width < truth < finding.high + width
+        assert width < 0.1 * truth
+
+
+CASE = """
+only: [creep]
+model_selection: {models: [maxwell]}
+least_squares: {candidates: 100, starts: 4}
+cases:
+  creep:
+    instrument: creep
+    sample: {model: zener_kelvin}
+    protocol: {phases: [{duration_s: 600.0, stress_Pa: 100.0}]}
+"""
+
+
+# A fitted start takes half a minute.
+TERMS = "", "offset: true", "noise_share: 0.02"
+ALSO = pytest.param("fit_start: true", marks=pytest.mark.nightly)
+
+
+@pytest.mark.parametrize("terms", [*TERMS, ALSO])
+def test_a_study_gives_the_answer_of_the_command(tmp_path: Path, terms: str) -> None:
+    """Of the same file: to the last bit, since both do the same."""
+    file = write_trace(tmp_path / "creep.csv", SECONDS, STRAIN, "time_s,strain")
+    measured = f"{{file: {file}, time: time_s, strain: strain, {terms}}}"
+    (case,) = study_of(f"{CASE}    measurement: {measured}").cases.values()
+    record(case, file, tmp_path / "trace.npz")
+    judge(case, tmp_path / "trace.npz", [], tmp_path / "judged.json")
+    of_study = json.loads((tmp_path / "judged.json").read_text())
+    given = "protocol: {phases: [{duration_s: 600.0, stress_Pa: 100.0}]}\n"
+    given += "model_selection: {models: [maxwell]}\nleast_squares: {candidates: 100, starts: 4}\n"
+    given += f"measurement: {{{terms}}}"
+    options = ("--reading", "strain=strain", "--model", "zener_kelvin")
+    of_command = identified(tmp_path, file, *options, config=given)
+    for key in ("fit", "reasons", "samples", "threshold", "certainty", "quantities", "notes"):
+        assert of_study[key] == of_command[key], key
+    assert of_study["misfit"] == of_command["misfit"]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"strain": np.where(SECONDS == 20, np.inf, STRAIN)}, r"strain\[4\]: found inf, allowed"),
+        ({"time_s": SECONDS[::-1]}, r"time_s\[1\]: found 592 after 596 \(\[0\]\), allowed are"),
+        ({"strain": -STRAIN}, r"strain\[0\] to \[148\]: found a strain that goes against the st"),
+        ({"time_s": 10 * SECONDS}, r"time_s\[15\]: found 640 s, allowed is the protocol's time"),
+        ({"strain": np.where(SECONDS < 570, np.nan, STRAIN)}, "the trace: found 7 rows with a nu"),
+        ({"rows": {"step": 1}}, "measurement.rows: is only for a file, not for arrays."),
+    ],
+)
+def test_a_message_names_array_and_index(given: dict[str, Any], said: str) -> None:
+    creep = set_up(INSTRUMENTS["strain"], (hold(600.0, 100.0),), Sample("zener_kelvin"))
+    with pytest.raises(BiogripError, match=said):
+        identify(recorded(**given), creep)
+
+
+def test_neither_study_nor_figures_are_loaded_for_a_trace() -> None:
+    code = "import sys, biogrip.identify.identify; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    ours = [name.split(".") for name in run.stdout.split() if name.split(".")[0] == "biogrip"]
+    rooms = {name[1] for name in ours if len(name) == 3}
+    assert rooms == {"identify", "judging", "fit", "traces", "physics"}
+    # Packages have no code of their own.
+    assert len([name for name in ours if name[-1] not in {"biogrip", *rooms} or name[2:]]) <= 50

@@ -1,0 +1,120 @@
+"""Changes within a trace: how often each test is wrong, and what it tells of a Zener relaxation."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import f as fisher
+
+from biogrip.arrays import Array
+from biogrip.command.notebook import identify_trace
+from biogrip.fit.noise_model_fit import absorbed
+from biogrip.judging.changes import compare_halves, find_step, steps_of
+from biogrip.judging.doubts import DOUBTFUL
+from biogrip.judging.levels import FALSE_ALARM
+
+NOISE, QUIET = 3.6, 1.2
+LEVEL = 0.01
+
+
+def relaxation(times: Array) -> tuple[Array, Array]:
+    """A Zener solid's modulus and what its fit absorbs; k_p 100, k 80 Pa, tau 20 s of 100 s."""
+    decay = np.exp(-times / 20)
+    slopes = np.stack([np.ones_like(times), decay, decay * times])
+    return 100 + 80 * decay, absorbed(slopes)
+
+
+def itself(rows: Array) -> Array:
+    return rows
+
+
+@pytest.mark.parametrize("readings", [8, 20, 100, 400])
+@pytest.mark.parametrize("decades", [0, 4])
+def test_of_white_noise_both_tests_fail_as_many_as_their_level_says(
+    readings: int, decades: int
+) -> None:
+    """Within four standard deviations of 1 % of 2,000 traces, 0.9 %, and an error of a fifth."""
+    even = 100 * np.arange(1, readings + 1) / readings
+    times = np.geomspace(100 * 10.0**-decades, 100, readings) if decades else even
+    _, basis = relaxation(times)
+    steps = steps_of(basis, itself)
+    noise = np.random.default_rng(readings + decades).standard_normal((2000, readings))
+    left = noise - noise @ basis.T @ basis
+    share = (left @ steps.shapes.T / steps.norms) ** 2 / np.sum(left**2, axis=1)[:, None]
+    alarms = [
+        [steps.chance(own) < LEVEL for own in np.max(share, axis=1).tolist()],
+        [compare_halves(own, basis, readings // 2) < LEVEL for own in left],
+    ]
+    assert np.mean(alarms, axis=1) == pytest.approx(LEVEL, abs=0.011)
+
+
+@pytest.mark.parametrize(
+    ("change", "least"),
+    [("jump", 0.58), ("gain", 0.94), ("start", 0.81)],
+)
+def test_steps_are_told_and_timed(change: str, least: float) -> None:
+    """A scan tells 65, 97 and 88 %: of 200 traces no less than three standard errors below."""
+    times = np.arange(1, 101.0)
+    true, basis = relaxation(times)
+    wrong = {
+        "jump": 2 * NOISE * (times > 50),
+        "gain": -0.1 * true * (times > 50),
+        "start": 5 * NOISE * (times < 2.5),
+    }[change]
+    noise = NOISE * np.random.default_rng(3).standard_normal((200, 100))
+    left = wrong + noise
+    left -= left @ basis.T @ basis
+    found = [find_step(own, basis, itself) for own in left]
+    told = [step for step in found if step and step.chance < FALSE_ALARM]
+    assert len(told) > least * 200
+    assert np.median([step.before for step in told]) == pytest.approx(
+        2 if change == "start" else 50, abs=1
+    )
+
+
+def test_a_step_is_what_a_fit_with_it_finds() -> None:
+    """Ordinary least squares with one regressor more, and what that leaves."""
+    times = np.arange(1, 41.0) * 2.5
+    true, basis = relaxation(times)
+    trace = true + np.random.default_rng(0).standard_normal(40) + 4.0 * (times > 60)
+    found = find_step(trace - trace @ basis.T @ basis, basis, itself)
+    assert found
+    assert found.before == 24
+    design: Array = np.vstack((basis, np.where(times > 60, 1.0, 0.0))).T
+    amplitudes = np.linalg.lstsq(design, trace, rcond=None)[0]
+    assert found.size == pytest.approx(amplitudes[-1])
+    assert found.left == pytest.approx(trace - design @ amplitudes, abs=1e-9)
+
+
+def test_halves_are_compared_as_chow_does() -> None:
+    """The F test of one fit against two, each with parameters of its own."""
+    times = np.arange(1, 61.0)
+    true, basis = relaxation(times)
+    trace = true * np.where(times > 25, 0.99, 1.0) + np.random.default_rng(1).standard_normal(60)
+
+    def squares(some: slice) -> float:
+        return float(np.linalg.lstsq(basis[:, some].T, trace[some], rcond=None)[1][0])
+
+    apart = squares(slice(25)) + squares(slice(25, None))
+    ratio = (squares(slice(None)) - apart) / 3 / (apart / 54)
+    chance = compare_halves(trace - trace @ basis.T @ basis, basis, 25)
+    assert chance == pytest.approx(fisher.sf(ratio, 3, 54), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [("none", ""), ("jump", "change at about 50.5 s"), ("rate", "each fitted by itself, differ")],
+)
+def test_what_changed_is_said(change: str, said: str) -> None:
+    """A jump of three noises; a sample that relaxes twice as fast from 50 s on; neither."""
+    times = np.arange(1, 101.0)
+    true, _ = relaxation(times)
+    faster = 100 + 80 * np.exp(-2.5 - (times - 50) / 9)
+    jump = np.full(100, 3 * QUIET)
+    wrong = {"none": 0 * times, "jump": jump, "rate": faster - true}[change]
+    readings = true + np.where(times > 50, wrong, 0)
+    readings += QUIET * np.random.default_rng(13).standard_normal(100)
+    config: dict[str, Any] = {"model_selection": {"models": []}}
+    found = identify_trace(times, readings, reads="modulus", model="zener_maxwell", config=config)
+    assert (found.status == DOUBTFUL) == bool(said)
+    assert said in str(found)

@@ -1,0 +1,294 @@
+"""Limits over all linear samples: held against fits written out here, and known samples."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+from biogrip.arrays import Array
+from biogrip.fit import any_sample
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.judging.without_model import (
+    LEVEL,
+    Told,
+    WithoutModel,
+    decades,
+    tell_without_model,
+)
+from biogrip.physics.condensed import Condensed
+from biogrip.physics.gripper import NO_ARMS, Gripper
+from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import Phase, hold, join_phases, ramp
+from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.whitening import WEIGHTED, Whitening, nuisance_basis
+from tests.helpers.problems import GRIPPER
+
+TIMES = np.geomspace(0.1, 100.0, 80)
+EVEN = np.arange(0.25, 100.0, 0.5)
+HELD = (hold(101.0, 1.0),)
+
+
+def tell(
+    time_s: Array,
+    readings: Array,
+    phases: tuple[Phase, ...] = HELD,
+    reads: str = "stress",
+    gripper: Gripper = NO_ARMS,
+    known: float | None = None,
+    sd: Array | None = None,
+    offset: bool = False,
+    **given: Any,
+) -> WithoutModel:
+    """What a trace tells without a model."""
+    instrument = INSTRUMENTS[reads]
+    nuisance = nuisance_basis(time_s, offset=offset, drift=False)
+    whitening = None if sd is None else Whitening(time_s, WEIGHTED, nuisance, None, sd)
+    course = join_phases(phases, deforms=instrument.deforms)
+    trace = Trace(time_s, readings, Condensed(course, time_s, nuisance, whitening), known)
+    posed = Residuals(gripper, MODELS["maxwell"], course, trace, instrument=instrument)
+    return tell_without_model(posed, confidence=0.95, noise_sd=known, **given)
+
+
+def by_name(found: WithoutModel) -> dict[str, Told]:
+    return {each.quantity: each for each in found.told}
+
+
+def noise(size: float, seed: int = 0, count: int = len(TIMES)) -> Array:
+    return size * np.random.default_rng(seed).standard_normal(count)
+
+
+def zener(time_s: Array) -> Array:
+    return 100 + 80 * np.exp(-time_s / 20)
+
+
+def least_squares(readings: Array, rows: Array, held: Array, value: float = 0.0) -> float:
+    """Least sum of squares of non-negative combinations of which a functional has a value."""
+    _, norm = nnls(np.vstack((rows, 1e4 * held)), np.append(readings, 1e4 * value), maxiter=10**5)
+    return float(norm**2)
+
+
+RATES = np.append(0.0, np.geomspace(1e-4, 200.0, 400))
+# Springs and dampers of a solid beside one another, and behind one another under a load; an offset.
+RELAXED = np.exp(-np.outer(TIMES, RATES))
+YIELDED = np.column_stack((1 - RELAXED[:, 1:], TIMES))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_limit_is_where_chi_squared_has_risen(seed: int) -> None:
+    """By plain fits on a grid ten times as fine, to the accuracy of limits."""
+    readings = zener(TIMES) + noise(3.6, seed)
+    found = by_name(tell(TIMES, readings, known=3.6))
+    least = nnls(RELAXED, readings, maxiter=10**5)[1] ** 2
+    left = np.exp(-RATES * 10)
+    slope, omega = 10 * RATES * left, 0.1
+    lossy, elastic = (
+        part * omega / (omega**2 + RATES**2) * (RATES * TIMES[0] <= 1) for part in (RATES, omega)
+    )
+    for quantity, above, below in (
+        ("G(10 s)", left, 0 * left),
+        ("G at rest", (RATES == 0) * 1.0, 0 * left),
+        ("exponent(10 s)", slope, left),
+        ("G'(0.1 rad/s)", elastic, 0 * left),
+        ("tan delta(0.1 rad/s)", lossy, elastic),
+    ):
+        for end in (found[quantity].low, found[quantity].high):
+            if end is not None:
+                held = above - end * below
+                value = 0.0 if below.any() else end
+                risen = least_squares(readings, RELAXED, held, value) - least
+                assert risen / 3.6**2 == pytest.approx(3.841, abs=0.05), quantity
+
+
+def test_limits_of_creep_with_an_offset() -> None:
+    """A constant of either sign is two columns; increments do not feel it."""
+    clean = 2 + 1 / 3 + 0.5 * (1 - np.exp(-TIMES / 20)) + TIMES / 200
+    readings = clean + noise(0.02)
+    found = by_name(tell(TIMES, readings, reads="strain", known=0.02, offset=True))
+    rows = np.column_stack((YIELDED, np.ones_like(TIMES), -np.ones_like(TIMES)))
+    least = nnls(rows, readings, maxiter=10**5)[1] ** 2
+    rise = found["J(1 to 10 s)"]
+    held = np.append(np.exp(-RATES[1:]) - np.exp(-10 * RATES[1:]), [9.0, 0.0, 0.0])
+    for end in (rise.low, rise.high):
+        assert end is not None
+        risen = least_squares(readings, rows, held, end) - least
+        assert risen / 0.02**2 == pytest.approx(3.841, abs=0.05)
+    assert found["J(10 s)"].high is None
+    without = by_name(tell(TIMES, readings - 2, reads="strain", known=0.02))
+    assert without["J(10 s)"].verdict == DETERMINED
+
+
+def test_what_a_clear_trace_tells_is_right() -> None:
+    """Noise of 1e-5 leaves limits of some 1e-4."""
+    found = by_name(tell(TIMES, zener(TIMES) + noise(1e-3)))
+    product = 0.1j * 20 / (1 + 0.1j * 20)
+    for quantity, value in (
+        ("G(1 s)", zener(np.ones(1))[0]),
+        ("exponent(10 s)", 40 * np.exp(-0.5) / zener(np.array([10.0]))[0]),
+        ("G'(0.1 rad/s)", 100 + 80 * product.real),
+        ("G''(0.1 rad/s)", 80 * product.imag),
+        ("tan delta(0.1 rad/s)", 80 * product.imag / (100 + 80 * product.real)),
+    ):
+        assert found[quantity].value == pytest.approx(value, rel=1e-3)
+
+
+def test_a_gripper_tells_the_stiffness_beside_its_arms() -> None:
+    """A Maxwell liquid between arms lets them turn from 1/(k_g + 2 b^2 k) to 1/k_g per torque."""
+    k, c, k_g = 0.2, 3.0, GRIPPER.left.stiffness_Nm_per_rad
+    area = 2 * GRIPPER.lever_m**2
+    rate = k_g * k / (c * (k_g + area * k))
+
+    def turned(time_s: Array) -> Array:
+        left: Array = 1 / k_g - (1 / k_g - 1 / (k_g + area * k)) * np.exp(-rate * time_s)
+        return np.where(time_s > 0, left, 0.0)
+
+    clean = 1.6e-9 * turned(EVEN) - 1.28e-9 * turned(EVEN - 50)
+    size = 1e-3 * float(clean.max())
+    phases = hold(50.0, 1.6e-9), hold(50.0, 0.32e-9)
+    given: dict[str, Any] = {"reads": "rotation", "gripper": GRIPPER}
+    found = by_name(tell(EVEN, clean + noise(size, 0, len(EVEN)), phases, **given))
+    for at in (1.0, 10.0):
+        value = (1 / turned(np.array([at]))[0] - k_g) / area
+        told = found[f"K({at:g} s)"]
+        assert told.unit == "N/m"
+        assert told.low is not None
+        assert told.high is not None
+        assert told.low < value < told.high < 1.1 * told.low
+    at_once, at_rest = found["K at once"], found["K at rest"]
+    assert at_once.verdict == BOUNDED_BELOW
+    assert at_once.low is not None
+    assert 0.9 * k < at_once.low < k
+    assert at_rest.low is None
+
+
+@pytest.mark.parametrize("a_decade", [4, 6, 8])
+@pytest.mark.parametrize("shift", [0.0, 0.4])
+def test_the_grid_changes_nothing(
+    a_decade: int, shift: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Limits move by less than they are accurate to, three percent of their width."""
+    traces = [
+        (zener(TIMES) + noise(3.6), "stress"),
+        (100 * TIMES**-0.2 + noise(0.1), "stress"),
+        (0.01 * TIMES**0.4 + noise(2e-4), "strain"),
+    ]
+    usual = [tell(TIMES, readings, reads=reads) for readings, reads in traces]
+    grid = partial(any_sample.spread_rates, a_decade=a_decade, shift=shift)
+    monkeypatch.setattr(any_sample, "spread_rates", grid)
+    for (readings, reads), expected in zip(traces, usual, strict=True):
+        found = tell(TIMES, readings, reads=reads)
+        for own, other in zip(expected.told, found.told, strict=True):
+            assert own.verdict == other.verdict, own.quantity
+            width = (own.high or 0.0) - (own.low or 0.0)
+            for end in ("low", "high"):
+                if (value := getattr(own, end)) is not None:
+                    assert abs(getattr(other, end) - value) < 0.03 * abs(width), own.quantity
+
+
+def test_limits_beyond_the_readings_are_one_sided() -> None:
+    found = by_name(tell(TIMES, zener(TIMES) + noise(3.6), at_s=[0.01, 1.0, 1000.0]))
+    assert found["G(0.01 s)"].verdict == BOUNDED_BELOW
+    assert found["G(1 s)"].verdict == DETERMINED
+    assert found["G(1000 s)"].verdict == BOUNDED_ABOVE
+    assert found["G at once"].verdict == BOUNDED_BELOW
+    assert found["G at rest"].verdict == BOUNDED_ABOVE
+    assert not {"exponent(0.01 s)", "G'(100 rad/s)", "G'(0.001 rad/s)"} & set(found)
+    assert {"exponent(1 s)", "G'(1 rad/s)"} < set(found)
+    compliance = 1 / 3 + TIMES / 200
+    flows = by_name(tell(TIMES, compliance + noise(0.01), reads="strain", at_s=[0.01, 1.0, 1000.0]))
+    assert flows["J(0.01 s)"].verdict == BOUNDED_ABOVE
+    assert flows["J(1000 s)"].verdict == BOUNDED_BELOW
+    assert flows["viscosity"].verdict == BOUNDED_BELOW
+    assert flows["viscosity"].low == pytest.approx(200, rel=0.1)
+
+
+def test_a_ramp_shows_what_a_step_hides() -> None:
+    """Of a damper beside a spring the force under a step is the spring's alone."""
+    hidden = by_name(tell(TIMES, 100 + noise(1.0)))
+    for quantity, most in (("G''(1 rad/s)", 1.0), ("exponent(1 s)", 0.01)):
+        assert hidden[quantity].low is None
+        assert hidden[quantity].high is not None
+        assert (hidden[quantity].high or 0.0) < most
+    force = 20 * EVEN + 200 * (EVEN < 5)
+    force[EVEN > 5] = 100
+    phases = ramp(5.0, 0.0, 1.0), hold(95.0, 1.0)
+    found = tell(EVEN, force + noise(1.0, 0, len(EVEN)), phases)
+    loss = by_name(found)["G''(1 rad/s)"]
+    assert loss.low is not None
+    assert loss.high is not None
+    assert loss.low < 1000 < loss.high < 1.2 * loss.low
+
+
+def test_weights_count() -> None:
+    """Readings after 10 s with a hundredth of the noise say what there is then."""
+    sd = np.where(TIMES < 10, 3.6, 0.036)
+    readings = zener(TIMES) + noise(1.0) * sd
+    typical = float(np.sqrt(np.mean(sd**2)))
+    plain, weighted = (
+        by_name(tell(TIMES, readings, **given))["G(100 s)"]
+        for given in ({"known": typical}, {"known": typical, "sd": sd})
+    )
+    assert plain.high is not None
+    assert plain.low is not None
+    assert weighted.high is not None
+    assert weighted.low is not None
+    assert weighted.high - weighted.low < 0.05 * (plain.high - plain.low)
+
+
+@pytest.mark.parametrize("known", [None, 3.6])
+def test_what_no_linear_sample_does_is_told(known: float | None) -> None:
+    """Relaxation that rises again; and, in known noise, what is far too large for it."""
+    assert tell(TIMES, zener(TIMES) + noise(3.6), known=known).is_linear
+    risen = zener(TIMES) + 30 * (TIMES > 20)
+    assert not tell(TIMES, risen + noise(3.6), known=known).is_linear
+    assert tell(TIMES, zener(TIMES) + noise(20.0)).is_linear
+    assert not tell(TIMES, zener(TIMES) + noise(20.0), known=3.6).is_linear
+
+
+def test_a_misfit_of_any_sample_widens_limits() -> None:
+    """Limits count as many independent residuals as a wave of ten periods has."""
+    wave = 3.6 * np.sin(2 * np.pi * EVEN / 10)
+    clear, wavy = (
+        by_name(tell(EVEN, zener(EVEN) + each + noise(0.36, 0, len(EVEN))))["G(10 s)"]
+        for each in (0.0, wave)
+    )
+    assert clear.high is not None
+    assert clear.low is not None
+    assert wavy.high is not None
+    assert wavy.low is not None
+    assert wavy.high - wavy.low > 10 * (clear.high - clear.low)
+
+
+def test_a_damper_has_a_loss_tangent_without_an_upper_limit() -> None:
+    flows = by_name(tell(TIMES, TIMES / 200 + noise(0.01), reads="strain"))
+    assert flows["tan delta(0.1 rad/s)"].verdict == BOUNDED_BELOW
+
+
+@pytest.mark.parametrize("count", [4, 6, 10])
+@pytest.mark.parametrize("size", [1e-7, 1e-3])
+def test_few_readings_are_no_error(count: int, size: float) -> None:
+    """As many lags as readings leave nothing to test; limits hold the best fit."""
+    time_s = np.linspace(10.0, 100.0, count)
+    creeps = (time_s / 100) ** 0.3 + noise(size, 0, count)
+    for each in tell(time_s, creeps, reads="strain").told:
+        if each.low is not None and each.high is not None:
+            assert each.value is not None
+            assert each.low <= each.value <= each.high
+
+
+def test_times_at_which_it_is_told() -> None:
+    assert decades(0.1, 100.0) == [0.1, 1.0, 10.0, 100.0]
+    assert decades(0.3, 80.0) == [1.0, 10.0]
+    assert decades(12.0, 80.0) == [20.0, 50.0]
+    assert decades(3.0, 80.0) == [5.0, 10.0, 20.0, 50.0]
+
+
+def test_words_are_those_of_a_verdict() -> None:
+    ends = [(15.0, 14.0, 16.0), (None, 14.0, None), (None, None, 16.0), (None, None, None)]
+    told = [Told("G(1 s)", LEVEL, 1.0, "Pa", *each) for each in ends]
+    verdicts = [DETERMINED, BOUNDED_BELOW, BOUNDED_ABOVE, NOT_DETERMINED]
+    assert [each.verdict for each in told] == verdicts
+    words = ["15.0 Pa (14.0 to 16.0)", "at least 14 Pa", "at most 16 Pa", "not determined"]
+    assert [each.words() for each in told] == words
