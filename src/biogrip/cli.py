@@ -256,11 +256,16 @@ def _groups_parser(stages: Any) -> None:
     groups = stages.add_parser("groups", help=text, description=text)
     groups.set_defaults(command=_groups)
     groups.examples = _examples(
-        "groups found.csv --by dish", "groups found.csv --by treatment --csv compared.csv"
+        "groups found.csv --by treatment --unit dish",
+        "groups found.csv --by treatment --unit dish --csv compared.csv --plot cells.pdf",
     )
     groups.add_argument("found", type=Path, help="CSV file that identify --csv wrote")
     groups.add_argument("--by", required=True, metavar="COLUMN", help="column that makes groups")
+    text = "column of what was repeated: dishes, animals, days [cells]"
+    groups.add_argument("--unit", metavar="COLUMN", help=text)
     groups.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row a median")
+    text = "figure of every cell, by unit: a name that ends with .png or .pdf"
+    groups.add_argument("--plot", type=Path, metavar="FIGURE", help=text)
 
 
 def _design_parser(stages: Any) -> None:
@@ -295,7 +300,7 @@ def _identify(options: argparse.Namespace) -> int:
 def _groups(options: argparse.Namespace) -> int:
     from biogrip.groups import groups
 
-    groups(options.found, options.by, options.csv)
+    groups(options.found, options.by, options.csv, options.unit, options.plot)
     return 0
 
 
