@@ -194,6 +194,8 @@ def test_cells_that_are_only_bounded_are_named_with_what_follows(
     assert "of all cells it is lower." in found
     rows[2] |= {**none, "k verdict": "not determined"}
     assert "too few" in said(rows)
+    rows[3] |= {**none, "k verdict": "not determined"}
+    assert "(at least 30), which the median leaves out. That of all cells is higher." in said(rows)
 
 
 def test_a_median_takes_cells_enough_and_half_of_all() -> None:

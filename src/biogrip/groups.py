@@ -7,9 +7,11 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from math import inf, isnan, nan
 from pathlib import Path
+from textwrap import fill
 
 from biogrip import __version__
-from biogrip.command.outputs import FAILED, LINEAR, WRITTEN_BY, check_output
+from biogrip.command.methods import in_sentences, outcome_in_words, paragraph, together
+from biogrip.command.outputs import FAILED, LINEAR, METHODS, REASONS, WRITTEN_BY, check_output
 from biogrip.digits import counted, plain, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import atomic_write, refuse_inputs
@@ -48,6 +50,7 @@ _ONE_SIDED = {BOUNDED_ABOVE: ("at most", "lower"), BOUNDED_BELOW: ("at least", "
 _UNDATED: dict[str, dict[str, None]] = {"png": {}, "pdf": {"CreationDate": None}}
 # Most names that a line has.
 _FEW = 5
+_WIDTH = 100
 
 
 def groups(
@@ -112,6 +115,13 @@ def groups(
         sound = [cell for cell in cells if not cell.doubtful]
         again = compare(sound, names, confidence, units=unit is not None)
         lines += [f"Without the doubtful {_few(doubtful)}:", _printed(again, names, units, unit)]
+    made = (in_sentences(own[METHODS]) for own in used if own.get(METHODS))
+    outcome = ((it["trace"], it["fit"], it.get(REASONS) or it.get(FAILED, "")) for it in traces)
+    text, latex = paragraph(
+        [*together(made), *outcome_in_words(outcome), *_tests(cells, names, by, unit)],
+        max(own.get(WRITTEN_BY, "") for own in used) or __version__,
+    )
+    lines += ["", "For a paper:", fill(text, _WIDTH), "", "As LaTeX:", fill(latex, _WIDTH)]
     print(visible_lines("\n".join(lines)))
     if table is not None:
         lines_of = ([*key, units[key[0]], *map(row.get, COLUMNS)] for key, row in compared.items())
@@ -303,9 +313,11 @@ def _of_group(
             placed = at_bounds(cells, name, verdict)
             row = compare(placed, [group], confidence, units=unit is not None)[name, group]
             what = f"{name} of {group}: only bounded {said.removeprefix(verdict).strip()}, which"
-            at = f" With them at these bounds it is {plain(row['median'])}, and"
-            at = at if "median" in row else " That"
-            yield f"{what} the median leaves out.{at} of all cells it is {moved}."
+            moves = f"That of all cells is {moved}."
+            if "median" in row:
+                at = f"With them at these bounds it is {plain(row['median'])}"
+                moves = f"{at}, and of all cells it is {moved}."
+            yield f"{what} the median leaves out. {moves}"
     told = {*_ONE_SIDED, FIT_REJECTED}
     if some := [it.name for it in cells if name in it.others and it.others[name][0] not in told]:
         yield f"{name} of {group}: nothing is told by {_few(some)}."
@@ -330,6 +342,30 @@ def _shared(
             f"Column {column} puts {len(cells)} cells into {units} units: if these are what was "
             f"repeated, cells are not independent, and with --unit {column} {then}."
         )
+
+
+def _tests(cells: Sequence[Cell], names: Sequence[str], by: str, unit: str | None) -> Iterator[str]:
+    """Yield sentences for a paper on what was compared, and how."""
+    counts = []
+    for group in names:
+        own = [cell for cell in cells if cell.group == group]
+        of = f" of {counted(len({cell.unit for cell in own}), unit)}" if unit else ""
+        counts.append(f"{group} {counted(len(own), 'cell')}{of}")
+    yield f"Groups are those of {by}: {'; '.join(counts)}."
+    if unit:
+        yield (
+            f"The unit is the {unit}: medians are means of the {unit}s' means of logarithms, with "
+            "limits of Student's t, and ratios are compared by Welch's t test (Lord et al., "
+            "Journal of Cell Biology 219 (2020), e202001064)."
+        )
+    else:
+        yield (
+            "Cells are taken for independent: medians are means of logarithms with random effects "
+            "(DerSimonian and Laird 1986) and limits after Hartung and Knapp, and ratios are "
+            "compared by Welch's t test."
+        )
+    if names[2:]:
+        yield f"Groups are compared with {names[0]}, and p values are adjusted after Holm (1979)."
 
 
 def _few(names: Sequence[str]) -> str:

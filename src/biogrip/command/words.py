@@ -31,6 +31,7 @@ _COLOURS = {
 
 # Most lines on what any linear sample would show.
 _LINES = 5
+_NUMBER = re.compile(r"\d[\d.,]*(e[+-]?\d+)?")
 # What the notes of a weight do to the fit.
 _SAID = {HARMLESS: "note", DOUBT: DOUBTFUL, REJECTION: REJECTED}
 
@@ -141,25 +142,33 @@ def one_sided_in_words(
 
 
 def for_a_paper(found: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return sentences for a paper, as text and as LaTeX: one per quantity with two limits.
+    """Return sentences for a paper, as text and as LaTeX: one per quantity with a limit.
 
-    Nothing if the fit is doubtful or rejected.
+    Each has its condition, if any. Nothing if the fit is doubtful or rejected.
     """
     if found["fit"] != OK:
         return []
     pairs = []
     for each in found["quantities"]:
-        if each["low"] is None or each["high"] is None:
+        low, high, confidence = each["low"], each["high"], 100 * found["confidence"]
+        if low is None and high is None:
             continue
-        name, unit, level = each["quantity"], each["unit"], f"{100 * found['confidence']:g}"
-        numbers = within_limits(each["value"], each["low"], each["high"])
-        value, low, high = numbers
-        text = f"{name} = {f'{value} {unit}'.rstrip()} ({level} % profile-likelihood interval "
-        text += f"{low} to {high}, n = 1 trace)"
-        value, low, high = (re.sub(r"e([+-]\d+)", _power_in_latex, each) for each in numbers)
-        unit = rf"\,\mathrm{{{unit.replace(' ', chr(92) + ',')}}}" if unit else ""
-        latex = rf"${each['symbol'].replace('$', '')} = {value}{unit}$ ({level}\,\% "
-        latex += rf"profile-likelihood interval ${low}$ to ${high}$, $n = 1$ trace)"
+        if low is None or high is None:
+            sign, kind, confidence = "<>"[high is None], "one-sided limit", 50 + confidence / 2
+            numbers = [plain(high if low is None else low, 2)]
+        else:
+            sign, kind = "=", "profile-likelihood interval"
+            numbers = within_limits(each["value"], low, high)
+        provided = f", provided {each['provided']}" if each["provided"] else ""
+        value, reach = f"{numbers[0]} {each['unit']}".rstrip(), " to ".join(numbers[1:])
+        text = f"{each['quantity']} {sign} {value} ({confidence:g} % {f'{kind} {reach}'.rstrip()}, "
+        text += f"n = 1 trace{provided})"
+        numbers = [re.sub(r"e([+-]\d+)", _power_in_latex, it) for it in numbers]
+        unit = each["unit"].replace(" ", r"\,")
+        value = numbers[0] + (rf"\,\mathrm{{{unit}}}" if unit else "")
+        reach = " to ".join(f"${it}$" for it in numbers[1:])
+        latex = rf"${each['symbol'].replace('$', '')} {sign} {value}$ ({confidence:g}\,\% "
+        latex += rf"{f'{kind} {reach}'.rstrip()}, $n = 1$ trace{provided})"
         pairs.append((text, latex))
     return pairs
 
@@ -191,15 +200,27 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)
         lines += _once(found, given_in_words)
-        for each in found:
-            said = [f"{_SAID[note['weight']]}: {note['text']}" for note in each["notes"]]
-            said += [each["advice"]] if each["fit"] == REJECTED and each["advice"] else []
-            lines += [f"{visible(each['trace'])}: {visible(text)}" for text in said]
+        for text, traces in notes_alike(found):
+            of = visible(traces[0])
+            of += f" and {len(traces) - 1} more alike" if traces[1:] else ""
+            lines.append(f"{of}: {visible(text)}")
         lines += _once(found, lambda it: [taken_for_granted(it)] if it["by_default"] else [])
     if refused:
         lines.append(f"Not identified, {len(refused)} of {len(refused) + len(found)}:")
         lines += [indent(visible_lines(reason), "  ") for reason in refused.values()]
     return "\n".join(lines)
+
+
+def notes_alike(found: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[str]]]:
+    """Return notes with the traces that have them; those that differ in numbers alone are one."""
+    alike: dict[str, tuple[str, list[str]]] = {}
+    for each in found:
+        said = [f"{_SAID[note['weight']]}: {note['text']}" for note in each["notes"]]
+        said += [each["advice"]] if each["fit"] == REJECTED and each["advice"] else []
+        for text in said:
+            _, traces = alike.setdefault(_NUMBER.sub("0", text), (text, []))
+            traces.append(each["trace"])
+    return [*alike.values()]
 
 
 def _once(

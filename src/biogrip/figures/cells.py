@@ -41,7 +41,7 @@ _LETTERS = 18, 40
 _WIDE, _FILLED = 0.8, 0.7
 # Steps of this share fill a unit evenly, however many its cells are.
 _GOLDEN = 0.618034
-_NORMAL = 1.96
+_NORMAL, _BEYOND = 1.96, 1.5
 _DECADE, _MARGIN, _MOST_TICKS = 10.0, 1.15, 9
 _SAID: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 6.5, "linespacing": 1.1}
 
@@ -78,6 +78,7 @@ def _draw_quantity(
     axes: Axes, name: str, cells: Sequence[Cell], compared: Compared, groups: Sequence[str]
 ) -> None:
     ends: list[float] = []
+    bars: list[float] = []
     said = False
     for place, group in enumerate(groups):
         these = [cell for cell in cells if cell.group == group and not cell.rejects(name)]
@@ -100,7 +101,7 @@ def _draw_quantity(
             axes.hlines(levels, beside - 0.05, beside + 0.05, color=BLACK, zorder=5)
             left = place - _WIDE / 2
             axes.hlines(row["median"], left, beside, color=BLACK, linewidth=0.8, zorder=2)
-            ends += levels
+            bars += levels
         if "p" in row:
             ratio = with_limits(row["ratio"], row["ratio_low"], row["ratio_high"])
             ratio, _, limits = ratio.partition(" ")
@@ -116,7 +117,10 @@ def _draw_quantity(
         turned = {"rotation": 25, "ha": "right", "rotation_mode": "anchor"}
     axes.set(xlim=(-0.55, len(groups) - 0.4), xticks=range(len(groups)))
     axes.set_xticklabels(names, **turned)
-    _scale(axes, ends)
+    if ends:
+        # Bars that reach far beyond all cells run out of the picture.
+        ends += np.clip(bars, min(ends) / _BEYOND, max(ends) * _BEYOND).tolist()
+        _scale(axes, min(ends), max(ends))
 
 
 def _draw_unit(
@@ -138,9 +142,8 @@ def _draw_unit(
     return levels
 
 
-def _scale(axes: Axes, ends: Sequence[float]) -> None:
+def _scale(axes: Axes, low: float, high: float) -> None:
     """Set the axis of levels, logarithmic where they span a decade, with ticks as numbers."""
-    low, high = (min(ends), max(ends)) if ends else (1.0, 1.0)
     if high > _DECADE * low:
         axes.set_yscale("log")
         subs = (1.0, 2.0, 3.0, 6.0) if high < _DECADE**2 * low else (1.0,)
