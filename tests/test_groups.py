@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 from scipy.stats import ttest_ind
 
 from biogrip.arrays import Array
@@ -123,10 +124,16 @@ def written(folder: Path, rows: Sequence[dict[str, str]], header: Sequence[str] 
 def said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
     """What the command prints of rows."""
 
-    def say(rows: Sequence[dict[str, str]], *options: str, header: Sequence[str] = HEADER) -> str:
+    def say(
+        rows: Sequence[dict[str, str]],
+        *options: str,
+        header: Sequence[str] = HEADER,
+        methods: bool = False,
+    ) -> str:
         found = str(written(tmp_path, rows, header))
         assert main(["groups", found, "--by", "dish", *options]) == 0
-        return capsys.readouterr().out
+        table, _, paragraph = capsys.readouterr().out.partition("\nFor a paper:")
+        return paragraph if methods else table
 
     return say
 
@@ -288,7 +295,16 @@ def test_identify_and_groups_say_the_same_of_a_cell(
     told = {line.split()[0]: line.split()[1] for line in printed.splitlines()[2:15]}
     assert [name for name, fit in told.items() if fit != "ok"] == [str(folder / "b5.csv")]
     table = tmp_path / "compared.csv"
-    command = ["groups", tmp_path / "found.csv", "--by", "treatment", "--unit", "dish", "--csv", table]
+    command = [
+        "groups",
+        tmp_path / "found.csv",
+        "--by",
+        "treatment",
+        "--unit",
+        "dish",
+        "--csv",
+        table,
+    ]
     assert main([*map(str, command)]) == 0
     found = capsys.readouterr().out
     documented = (ROOT / "docs" / "groups.md").read_text(encoding="utf-8")
@@ -450,6 +466,38 @@ def test_what_identify_does_not_write_is_refused_with_its_place(
     error = capsys.readouterr().err
     assert f"found.csv, row 3 (left1.csv), {name}: found '{value}'; allowed is {allowed}" in error
     assert error.count("\n") == 1
+
+
+# The paragraph.
+
+
+def test_the_methods_say_what_was_compared_with_its_numbers(said: Said) -> None:
+    """Every number is one of the table or of the test; none else is there."""
+    rows = of_dishes(np.random.default_rng(3), (3, 4))
+    set_up = "The strain was recorded under 5 Pa. Limits hold with 95 % confidence."
+    more = {"methods": set_up, "reasons": "", "fit": "ok"}
+    rows = [row | more for row in rows]
+    rows[1] |= {"fit": "rejected", "reasons": "The misfit is 4.5 times the noise: it is none."}
+    rows[2] |= {"methods": set_up.replace("5 Pa", "7 Pa")}
+    header = [*DAYS[:-2], "methods", "reasons", *DAYS[-2:]]
+    found = said(rows, "--unit", "day", header=header, methods=True)
+    text, latex = (" ".join(it.split()) for it in found.split("As LaTeX:"))
+    assert text.startswith(
+        "The strain was recorded under 5 Pa (1 likewise with other numbers). Limits hold with "
+        "95 % confidence. 34 of 35 traces were used. Rejected: 1 (left01: The misfit is 4.5 times "
+        "the noise). Groups are those of dish: left 14 cells of 3 days; right 20 cells of 4 days."
+    )
+    assert "The unit is the day" in text
+    assert "Welch's t test (Lord et al., Journal of Cell Biology 219 (2020), e202001064)" in text
+    assert text.endswith(
+        "Computed with biogrip 1.0.0 (The biogrip authors, biogrip: how well a MEMS microgripper "
+        "identifies the viscoelastic parameters of a cell, version 1.0.0, 2026)."
+    )
+    assert r"95 \% confidence" in latex
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    for part in (citation["title"], citation["version"], citation["authors"][0]["name"]):
+        assert str(part) in text
+    assert str(citation["date-released"])[:4] in text
 
 
 # The figure.

@@ -7,6 +7,7 @@ from typing import Any
 from biogrip import __version__
 from biogrip.digits import counted, legible
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
+from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import visible
 
@@ -46,8 +47,8 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     along += ["drift"] if "drift_rad_per_s" in found else []
     along += ["start"] if "onset_s" in found else []
     also = f", along with the instrument's {' and '.join(along)}" if along else ""
-    title = found["model_title"]
-    said.append(f"Least squares fitted the model {title}{fixed}{also}; {_noise(found)}.")
+    title = found["model_title"].removesuffix(" model")
+    said.append(f"The model ({title}{fixed}) was fitted by least squares{also}; {_noise(found)}.")
     level = f"{100 * found['confidence']:g} %"
     said.append(f"Intervals are {level} profile-likelihood limits. {found['limits']}")
     if any((each["low"] is None) != (each["high"] is None) for each in found["quantities"]):
@@ -57,10 +58,22 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     return [*said, *(f"The value of {name} holds provided {it}." for name, it in conditions)]
 
 
+def preferred_in_words(found: Mapping[str, Any]) -> list[str]:
+    """Return a sentence on the model that is preferred to that of the fit, if one is."""
+    lowest = min(found["models"] or [], key=lambda row: row["delta_bic"], default=None)
+    if not found["preferred_model"] or lowest is None:
+        return []
+    return [
+        f"Of {len(found['models'])} models that were compared, that of the lowest BIC is "
+        f"another: {lowest['title']}."
+    ]
+
+
 def _protocol(found: Mapping[str, Any]) -> str:
     """Return what was held, as in: a stress of 5 Pa for 60 s."""
     if "load" in found:
-        return f"a load ({found['load'].rstrip('.')})"
+        controlled = INSTRUMENTS[found["reads"]["quantity"]].controlled.name
+        return f"a {controlled} of {found['load'].partition(': ')[2].rstrip('.')}"
     phases = found["assumed"]["protocol"]["phases"]
     if len(phases) > _MOST_PHASES:
         lasts_s = sum(phase["duration_s"] for phase in phases)
@@ -95,14 +108,16 @@ def outcome_in_words(traces: Iterable[tuple[str, str, str]]) -> list[str]:
     said = [f"{kept}{doubtful}."]
     for rejected, what in ((True, "Rejected"), (False, "Not identified")):
         left = [own for own in every if own[1] not in counts and (own[1] == REJECTED) == rejected]
-        named = [f"{visible(name)}: {_first_of(why)}" for name, _, why in left[:_MOST_NAMED]]
+        named = [f"{visible(own[0])}: {_first_of(*own)}" for own in left[:_MOST_NAMED]]
         more = f"; {len(left) - len(named)} more" if left[len(named) :] else ""
         said += [f"{what}: {len(left)} ({'; '.join(named)}{more})."] if left else []
     return said
 
 
-def _first_of(reason: str) -> str:
-    """Return the first clause of a reason."""
+def _first_of(name: str, _: str, reason: str) -> str:
+    """Return the first clause of a reason, without the place in the file at its beginning."""
+    if reason.startswith(name):
+        reason = reason.partition(": ")[2]
     return re.split(r"[;.](?=\s|$)|: |, as ", reason)[0].strip() or "no reason given"
 
 

@@ -18,7 +18,13 @@ from matplotlib.figure import Figure
 
 from biogrip import __version__
 from biogrip.command import words
-from biogrip.command.methods import outcome_in_words, paragraph, set_up_in_words, together
+from biogrip.command.methods import (
+    outcome_in_words,
+    paragraph,
+    preferred_in_words,
+    set_up_in_words,
+    together,
+)
 from biogrip.command.outputs import FAILED, WRITTEN_BY, Outcome
 from biogrip.digits import with_unit
 from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
@@ -175,6 +181,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
             figure_of_all = _address(drawn)
     outcomes = [(it["trace"], it["fit"], " ".join(it["reasons"])) for it in traces]
     outcomes += [(trace, FAILED, reason) for trace, reason in outcome.refused.items()]
+    further = outcome_in_words(outcomes) if several else preferred_in_words(traces[0])
     set_up = together(map(set_up_in_words, traces))
     assumed: dict[str, dict[str, Any]] = {each["trace"]: each["assumed"] for each in traces}
     shared = common([*assumed.values()])
@@ -193,7 +200,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
         figure_of_all=figure_of_all,
         groups=groups,
         set_up=set_up,
-        methods=paragraph([*set_up, *(outcome_in_words(outcomes) if several else [])]),
+        methods=paragraph([*set_up, *further]),
         several=several,
         columns=columns,
         copied=copied,
