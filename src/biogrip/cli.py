@@ -129,6 +129,14 @@ def _fix(text: str) -> tuple[tuple[str, ...], Any]:
     raise argparse.ArgumentTypeError(f"found '{text}', allowed is NAME=VALUE, as in k_p=0")
 
 
+def _within(text: str) -> tuple[str | None, float]:
+    name, _, percent = text.rpartition("=")
+    with suppress(ValueError):
+        if 0 < float(percent) < math.inf:
+            return name or None, float(percent)
+    raise argparse.ArgumentTypeError(f"found '{text}', allowed is a percentage, or as in k=10")
+
+
 def _at(text: str) -> tuple[tuple[str, ...], Any]:
     with suppress(ValueError):
         return ("identifiability", "at_s"), [float(each) for each in text.split(",")]
@@ -274,13 +282,15 @@ def _design_parser(stages: Any) -> None:
     design.set_defaults(command=_design)
     design.examples = _examples(
         "design my.yaml",
-        "design my.yaml --output designed.yaml",
+        "design my.yaml --within k=10",
         cost="The search takes less than a minute.",
     )
     text = "YAML file with your samples, laid over the default study"
     design.add_argument("config", type=Path, help=text)
     text = "config of the designed study, YAML [CONFIG_designed.yaml]"
     design.add_argument("--output", type=Path, help=text)
+    text = "the shortest protocol that tells a parameter, or all, within PERCENT (95 %% limits)"
+    design.add_argument("--within", type=_within, metavar="[NAME=]PERCENT", help=text)
 
 
 def _identify(options: argparse.Namespace) -> int:
@@ -307,5 +317,5 @@ def _groups(options: argparse.Namespace) -> int:
 def _design(options: argparse.Namespace) -> int:
     from biogrip.design import design
 
-    design(options.config, options.output)
+    design(options.config, options.output, options.within)
     return 0
