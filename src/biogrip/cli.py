@@ -68,11 +68,14 @@ class _Parser(argparse.ArgumentParser):
 
 def _models() -> str:
     """Return the names and titles of the sample models."""
-    from biogrip.physics.models import MODELS
+    from biogrip.physics.models import ALIASES, MODELS
 
     width = max(map(len, MODELS))
-    lines = [f"  {name:<{width}}  {model.title}" for name, model in MODELS.items()]
-    return "\n".join(["\nsample models:", *lines, ""])
+    lines = ["\nsample models (usual names; prony3: generalized_maxwell_3 without c_p):"]
+    for name, model in MODELS.items():
+        usual = ", ".join(alias for alias, of in ALIASES.items() if of == name)
+        lines.append(f"  {name:<{width}}  {model.title}" + (f" ({usual})" if usual else ""))
+    return "\n".join([*lines, ""])
 
 
 def _parser() -> argparse.ArgumentParser:

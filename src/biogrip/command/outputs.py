@@ -94,7 +94,12 @@ def _in_units(name: str, read: Channel) -> str:
 
 
 def write_table(outcome: Outcome, table: Path) -> None:
-    """Write one row per trace as CSV: numbers, their units in the header, and why it failed if so.
+    """Write `table_of` traces as CSV."""
+    write_rows(table, *table_of(outcome))
+
+
+def table_of(outcome: Outcome) -> tuple[list[str], list[list[Any]]]:
+    """Return header and rows, one a trace: numbers with units, and why it failed if so.
 
     Of what any linear sample would show, it has what was asked for, or else levels and exponents.
     Rows are in the order of what is copied.
@@ -128,14 +133,10 @@ def write_table(outcome: Outcome, table: Path) -> None:
     quantities = dict.fromkeys(name for row in rows.values() for name in row if name not in COLUMNS)
     first, *columns = COLUMNS
     header = [first, *words, *columns[: -len(_LAST)], *quantities, *_LAST]
-    write_rows(
-        table,
-        [name if name in words else _in_units(name, read) for name in header],
-        [
-            [{**rows[trace], **own}.get(name, "") for name in header]
-            for trace, own in outcome.copied.items()
-        ],
-    )
+    return [name if name in words else _in_units(name, read) for name in header], [
+        [{**rows[trace], **own}.get(name, "") for name in header]
+        for trace, own in outcome.copied.items()
+    ]
 
 
 def join_tables(parts: Sequence[Path], table: Path) -> None:
