@@ -131,6 +131,8 @@ def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
     assert len(points) == 12 - 2
     assert sum(line.get_marker() == "^" for line in points) == 1
     assert sum(line.get_markerfacecolor() == "white" for line in points) == 1
+    words[names[0]] = {"other": "of another table"}
+    assert draw_traces(replace(dish, copied=words), columns_of(dish.found))[0].axes
     drawn, said = draw_traces(dish, columns_of(dish.found))
     assert said == "Every cell is taken for independent."
     assert [label.get_text() for label in drawn.axes[0].get_xticklabels()] == ["all traces"]

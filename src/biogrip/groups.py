@@ -11,6 +11,7 @@ from textwrap import fill
 
 from biogrip import __version__
 from biogrip.command.methods import in_sentences, outcome_in_words, paragraph, together
+from biogrip.command.outputs import COLUMNS as OF_TRACES
 from biogrip.command.outputs import FAILED, LINEAR, METHODS, REASONS, WRITTEN_BY, check_output
 from biogrip.digits import counted, plain, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
@@ -97,8 +98,10 @@ def groups(
             "traces that were identified."
         )
     (confidence,) = levels
-    copied = header[1 : header.index("fit")]
-    told = [_told(own, {*copied, *made_by}, units) for own in used]
+    # Names of two of the columns end with the unit of what is read.
+    mine = {*OF_TRACES, *columns}
+    copied = {it for it in header if it not in mine and not it.startswith(("noise", "misfit"))}
+    told = [_told(own, copied | {*made_by}, units) for own in used]
     cells = gather(told, by, unit, confidence)
     names = list(dict.fromkeys(own[by] for own in traces if all(own[it] for it in made_by)))
     compared = compare(cells, names, confidence, units=unit is not None)

@@ -142,7 +142,9 @@ def draw_traces(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, s
     Groups are those of the column with the fewest words, units those of one that puts cells of a
     group together.
     """
-    every = [_told(each, outcome.copied.get(each["trace"], {})) for each in outcome.found]
+    names = dict.fromkeys(name for own in outcome.copied.values() for name in own)
+    none = dict.fromkeys(names, "")
+    every = [_told(it, {**none, **outcome.copied.get(it["trace"], {})}) for it in outcome.found]
     words_of = {name: {own.words[name] for own in every} for name in every[0].words}
     few = [name for name, of in words_of.items() if 1 < len(of) <= _MOST_GROUPS and "" not in of]
     by = min(set(few) - {CELL}, key=lambda name: (len(words_of[name]), name), default=_ALL)

@@ -26,6 +26,7 @@ from biogrip.figures.style import (
 )
 from biogrip.judging.cells import Cell, Compared, no_longer_log, unit_means
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW
+from biogrip.terminal import visible
 
 ONE_COLUMN_IN = 85 / 25.4
 """Width of one column of a journal."""
@@ -158,4 +159,5 @@ def _scale(axes: Axes, low: float, high: float) -> None:
 
 
 def _short(text: str) -> str:
+    text = visible(text)
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
