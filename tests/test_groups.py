@@ -421,6 +421,9 @@ def test_of_fewer_than_two_units_a_group_nothing_is_told_but_medians(said: Said)
     assert "(" in lines[3].split("15 of 15")[1]
     median = np.exp(np.mean(np.log([float(row["k value (N/m)"]) for row in rows[15:]])))
     assert lines[4].split()[-4:] == [f"{median:.3g}", "cannot", "be", "told"]
+    turned = said(rows[::-1], "--unit", "day", header=DAYS).splitlines()
+    assert turned[3].split()[-1] == f"{median:.3g}"
+    assert turned[4].endswith("cannot be told")
     for row in rows:
         row["day"] = row["dish"]
     assert "with --unit day whether groups differ cannot be told." in said(rows, header=DAYS)
@@ -488,7 +491,7 @@ def test_the_methods_say_what_was_compared_with_its_numbers(said: Said) -> None:
     assert text.startswith(
         "The strain was recorded under 5 Pa (1 likewise with other numbers). Limits hold with "
         "95 % confidence. 34 of 35 traces were used. Rejected: 1 (left01: The misfit is 4.5 times "
-        "the noise). Groups are those of dish: left 14 cells of 3 days; right 20 cells of 4 days."
+        "the noise). Groups are those of dish: left 14 cells in 3 units; right 20 cells in 4 units."
     )
     assert "The unit is the day" in text
     assert "Welch's t test (Lord et al., Journal of Cell Biology 219 (2020), e202001064)" in text

@@ -231,10 +231,12 @@ def _printed(
         if "low" in row:
             median = with_limits(row["median"], row["low"], row["high"])
         elif "median" in row:
-            median, ratio = plain(row["median"]), "cannot be told"
+            median = plain(row["median"])
         if "p" in row:
             ratio = with_limits(row["ratio"], row["ratio_low"], row["ratio_high"])
             p = f"{row['p']:.2g}"
+        elif unit and group != names[0] and "median" in row:
+            ratio = "cannot be told"
         determined = [f"{row['determined']} of {row['cells']}"]
         if unit:
             scatters = [row.get("scatter_of_cells"), row.get("scatter_of_units")]
@@ -285,12 +287,9 @@ def _not_known(
                 yield from _of_group(name, group, these, confidence, unit)
         else:
             every = [it for it in cells if it.others.get(name, ("",))[0] not in ("", FIT_REJECTED)]
-            if said := [*_bounds(name, every, 0)]:
-                yield f"{name} is determined in none of {counted(len(every), 'cell')}: " + (
-                    f"{'; '.join(said)}."
-                )
-            elif every:
-                yield f"{name}: nothing is told by any of {counted(len(every), 'cell')}."
+            said = "; ".join(_bounds(name, every, 0)) or "nothing is told by any"
+            if every:
+                yield f"{name} is determined in none of {counted(len(every), 'cell')}: {said}."
 
 
 def _bounds(name: str, cells: Sequence[Cell], most: int) -> Iterator[str]:
@@ -352,12 +351,12 @@ def _tests(cells: Sequence[Cell], names: Sequence[str], by: str, unit: str | Non
     counts = []
     for group in names:
         own = [cell for cell in cells if cell.group == group]
-        of = f" of {counted(len({cell.unit for cell in own}), unit)}" if unit else ""
+        of = f" in {counted(len({cell.unit for cell in own}), 'unit')}" if unit else ""
         counts.append(f"{group} {counted(len(own), 'cell')}{of}")
     yield f"Groups are those of {by}: {'; '.join(counts)}."
     if unit:
         yield (
-            f"The unit is the {unit}: medians are means of the {unit}s' means of logarithms, with "
+            f"The unit is the {unit}: medians are means of the units' means of logarithms, with "
             "limits of Student's t, and ratios are compared by Welch's t test (Lord et al., "
             "Journal of Cell Biology 219 (2020), e202001064)."
         )
