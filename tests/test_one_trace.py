@@ -339,8 +339,8 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) 
     for text in (said, page.read_text()):
         assert "not identified" in text.lower()
         assert "bad.csv, line" in text
-    # Fit and profiles of each, and a strip of each quantity.
-    assert page.read_text().count("<img") == 3 * 2 + 4
+    # Fit, profiles and level of each, and one of all.
+    assert page.read_text().count("<img") == 3 * 2 + 1
     # What biogrip wrote is replaced, be there nothing to draw.
     assert identify(bad, missing, *options)[0] == 1
     assert "2 traces: 0 ok, 0 doubtful, 0 rejected, 2 not identified." in page.read_text()
