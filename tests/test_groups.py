@@ -3,16 +3,19 @@
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 from scipy.stats import ttest_ind
 
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.command.outputs import WRITTEN_BY
-from biogrip.groups import FEWEST_CELLS, Cell, adjusted, compare, estimate
+from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
+from biogrip.judging.cells import FEWEST_CELLS, Cell, adjusted, compare, estimate
 from tests.helpers.identified import FEW, identify
 from tests.helpers.places import ROOT
 
@@ -121,10 +124,16 @@ def written(folder: Path, rows: Sequence[dict[str, str]], header: Sequence[str] 
 def said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
     """What the command prints of rows."""
 
-    def say(rows: Sequence[dict[str, str]], *options: str, header: Sequence[str] = HEADER) -> str:
+    def say(
+        rows: Sequence[dict[str, str]],
+        *options: str,
+        header: Sequence[str] = HEADER,
+        methods: bool = False,
+    ) -> str:
         found = str(written(tmp_path, rows, header))
         assert main(["groups", found, "--by", "dish", *options]) == 0
-        return capsys.readouterr().out
+        table, _, paragraph = capsys.readouterr().out.partition("\nFor a paper:")
+        return paragraph if methods else table
 
     return say
 
@@ -180,19 +189,25 @@ def test_cells_that_are_only_bounded_are_named_with_what_follows(
     rows[5] |= {**none, "k verdict": "bounded above", "k high (N/m)": "9"}
     found = said(rows)
     assert "3 of 5" in found
+    # Of errors that are alike, or none of which counts beside the scatter, a plain mean.
+    logs = [float(row["k value (N/m)"]) for row in rows[2:5]]
+    with_one_at_30 = f"{np.exp(np.mean(np.log([*logs, 30]))):.3g}"
     assert (
-        "k of left: only bounded in left0.csv (at least 30), which the median leaves out: that of "
-        "all cells is higher."
+        "k of left: only bounded in left0.csv (at least 30), which the median leaves out. With "
+        f"them at these bounds it is {with_one_at_30}, and of all cells it is higher."
     ) in found
     assert "k of left: nothing is told by left1.csv." in found
-    assert "right0.csv (at most 9), which the median leaves out: that of all cells is low" in found
+    assert "right0.csv (at most 9), which the median leaves out. With them" in found
+    assert "of all cells it is lower." in found
     rows[2] |= {**none, "k verdict": "not determined"}
     assert "too few" in said(rows)
+    rows[3] |= {**none, "k verdict": "not determined"}
+    assert "(at least 30), which the median leaves out. That of all cells is higher." in said(rows)
 
 
 def test_a_median_takes_cells_enough_and_half_of_all() -> None:
     known = [Cell(f"{n}", "a", known={"k": (0.1 * n, 0.1)}) for n in range(4)]
-    others = [Cell(f"o{n}", "a", others={"k": ("bounded above", "1")}) for n in range(5)]
+    others = [Cell(f"o{n}", "a", others={"k": ("bounded above", 1.0)}) for n in range(5)]
     assert "median" not in compare(known[: FEWEST_CELLS - 1], ["a"], 0.95)["k", "a"]
     assert "median" in compare(known[:FEWEST_CELLS], ["a"], 0.95)["k", "a"]
     assert "median" in compare(known + others[:4], ["a"], 0.95)["k", "a"]
@@ -219,7 +234,7 @@ def test_traces_of_a_cell_are_averaged(said: Said, rows: list[dict[str, str]]) -
     one |= {"k low (N/m)": f"{value / error:.6g}", "k high (N/m)": f"{value * error:.6g}"}
     both = said([*rows, *twice])
     alone = said([one, *rows[1:]])
-    assert both == f"{alone}Averages of several traces: c0 (2).\n"
+    assert both.replace("11 traces", "10 traces") == f"{alone}Averages of several traces: c0 (2).\n"
 
 
 def test_several_groups_are_compared_with_the_first(
@@ -280,7 +295,16 @@ def test_identify_and_groups_say_the_same_of_a_cell(
     told = {line.split()[0]: line.split()[1] for line in printed.splitlines()[2:15]}
     assert [name for name, fit in told.items() if fit != "ok"] == [str(folder / "b5.csv")]
     table = tmp_path / "compared.csv"
-    command = ["groups", tmp_path / "found.csv", "--by", "treatment", "--csv", table]
+    command = [
+        "groups",
+        tmp_path / "found.csv",
+        "--by",
+        "treatment",
+        "--unit",
+        "dish",
+        "--csv",
+        table,
+    ]
     assert main([*map(str, command)]) == 0
     found = capsys.readouterr().out
     documented = (ROOT / "docs" / "groups.md").read_text(encoding="utf-8")
@@ -292,3 +316,246 @@ def test_identify_and_groups_say_the_same_of_a_cell(
     for quantity, ratio in (("k", 1.5), ("k_p", 1.5), ("c", 1.0)):
         row = ratios.loc[quantity]
         assert row["ratio_low"] < ratio < row["ratio_high"]
+
+
+# Dishes.
+
+
+def in_dishes(
+    rng: np.random.Generator, scatter: float, ratio: float = 1.0, dishes: Sequence[int] = (3, 3)
+) -> list[Cell]:
+    """Ten cells a dish that scatter by 25 %, each known to 5 %; dishes have the same names."""
+    return [
+        Cell(f"{number}", "ab"[group], f"{dish}", known={"k": (own + mean, 0.05)})
+        for group, count in enumerate(dishes)
+        for dish in range(count)
+        for mean in [rng.normal(0, scatter) + group * np.log(ratio)]
+        for number, own in enumerate(rng.normal(0, np.hypot(0.25, 0.05), 10).tolist())
+    ]
+
+
+def differ(scatter: float, ratio: float, *, units: bool, dishes: Sequence[int] = (3, 3)) -> int:
+    """In how many of 400 tables the groups differ."""
+    rng = np.random.default_rng(4)
+    tables = (in_dishes(rng, scatter, ratio, dishes) for _ in range(400))
+    found = (compare(cells, ["a", "b"], 0.95, units=units)["k", "b"]["p"] for cells in tables)
+    return sum(p < 0.05 for p in found)
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.1, 0.2])
+def test_equal_dishes_seldom_differ(scatter: float) -> None:
+    """20 of 400 are to be expected, and three standard deviations are 13."""
+    assert differ(scatter, 1.0, units=True) <= 32
+
+
+@pytest.mark.nightly
+def test_what_it_costs_and_saves_to_count_dishes() -> None:
+    """Shares of tables that docs/groups.md says; three standard deviations are 7 %."""
+    said = (ROOT / "docs" / "groups.md").read_text(encoding="utf-8")
+    for dishes in (3, 6):
+        for scatter in (0.0, 0.1, 0.2):
+            rows = [f"| {dishes} | {100 * scatter:g} % |"]
+            for ratio in (1.0, 1.3, 1.5):
+                for units in (False, True):
+                    of = differ(scatter, ratio, units=units, dishes=(dishes, dishes))
+                    rows.append(f" {of / 4:.0f} % |")
+            assert "".join(rows) in said
+
+
+def of_dishes(rng: np.random.Generator, dishes: Sequence[int], **more: str) -> list[dict[str, str]]:
+    """Rows of two treatments whose dishes and cells are numbered anew: 1, 2, ... in each."""
+    return [
+        row | {"trace": f"{group}{dish}{n}", "dish": group, "day": f"{dish}", "cell": f"{n}"} | more
+        for group, count in zip(("left", "right"), dishes, strict=True)
+        for dish in range(count)
+        for n, row in enumerate(rows_of(20 * np.exp(rng.normal(rng.normal(0, 0.2), 0.2, 5)), ""))
+    ]
+
+
+DAYS = ["trace", "day", *HEADER[1:]]
+
+
+def test_units_are_compared_by_the_t_test_of_their_means(tmp_path: Path, said: Said) -> None:
+    """Errors of all cells are alike, so that a unit's mean is a plain one; SciPy has the test."""
+    rows, table = of_dishes(np.random.default_rng(5), (3, 4)), tmp_path / "compared.csv"
+    found = said(rows, "--unit", "day", "--csv", str(table), header=DAYS)
+    assert "35 traces, 35 cells, 7 units (day), 95 % limits" in found
+    assert "15 of 15" in found
+    frame = pd.DataFrame(rows)
+    frame["log"] = np.log(frame["k value (N/m)"].astype(float))
+    means = frame.groupby(["dish", "day"])["log"].mean()
+    known = ttest_ind(means["right"], means["left"], equal_var=False)
+    told = pd.read_csv(table).set_index("group").loc["right"]
+    assert told["p"] == pytest.approx(known.pvalue, rel=1e-3)
+    limits = np.exp([*known.confidence_interval(0.95)])
+    assert told[["ratio_low", "ratio_high"]].to_numpy() == pytest.approx(limits, rel=1e-3)
+    assert told["median"] == pytest.approx(np.exp(means["right"].mean()), rel=1e-3)
+    assert told["scatter_of_units"] == pytest.approx(means["right"].std(), rel=1e-2)
+    # Columns may have been moved.
+    moved = said(rows, "--unit", "day", header=sorted(DAYS))
+    assert moved.splitlines()[:5] == found.splitlines()[:5]
+    # Without --unit it is said what that would change; cells of the same number are averaged.
+    plain = said(rows, header=DAYS)
+    assert "35 traces, 10 cells" in plain
+    assert "These differ in day: if cells are numbered anew in each, --unit day takes" in plain
+
+
+def test_a_column_that_nests_tells_cells_apart_and_is_named(said: Said) -> None:
+    rows = of_dishes(np.random.default_rng(6), (3, 3))
+    for row in rows:
+        row["day"] = f"{row['dish']} {row['day']}"
+    found = said(rows, header=DAYS)
+    assert "30 traces, 30 cells, 95 % limits" in found
+    assert "Averages" not in found
+    with_unit = said(rows, "--unit", "day", header=DAYS)
+    p, here = (text.splitlines()[4].split()[-1] for text in (with_unit, found))
+    assert (
+        "Column day puts 30 cells into 6 units: if these are what was repeated, cells are not "
+        f"independent, and with --unit day p is {p} for k (here {here})."
+    ) in found
+
+
+def test_of_fewer_than_two_units_a_group_nothing_is_told_but_medians(said: Said) -> None:
+    rows = of_dishes(np.random.default_rng(7), (3, 1))
+    lines = said(rows, "--unit", "day", header=DAYS).splitlines()
+    assert "(" in lines[3].split("15 of 15")[1]
+    median = np.exp(np.mean(np.log([float(row["k value (N/m)"]) for row in rows[15:]])))
+    assert lines[4].split()[-4:] == [f"{median:.3g}", "cannot", "be", "told"]
+    turned = said(rows[::-1], "--unit", "day", header=DAYS).splitlines()
+    assert turned[3].split()[-1] == f"{median:.3g}"
+    assert turned[4].endswith("cannot be told")
+    for row in rows:
+        row["day"] = row["dish"]
+    assert "with --unit day whether groups differ cannot be told." in said(rows, header=DAYS)
+
+
+def test_a_quantity_that_no_cell_determines_takes_a_line(said: Said) -> None:
+    rows = of_dishes(np.random.default_rng(8), (3, 3))
+    of = [name.replace("k ", "c_p ") for name in HEADER[5:9]]
+    for number, row in enumerate(rows):
+        row |= {of[0]: "bounded above", of[3]: f"{6 + number}"}
+    found = said(rows, "--unit", "day", header=[*DAYS[:-2], *of, *DAYS[-2:]])
+    lines = [line for line in found.splitlines() if "c_p" in line]
+    assert lines == [
+        "c_p is determined in none of 30 cells: bounded above in 30 (at most 6 to 35)."
+    ]
+
+
+def test_limits_of_traces_without_noise_may_be_equal(said: Said) -> None:
+    values = np.array([20.0, 22.0, 21.0])
+    rows = [*rows_of(values, "left"), *rows_of(values, "right")]
+    for number, row in enumerate(rows):
+        row |= dict.fromkeys(("k low (N/m)", "k high (N/m)"), row["k value (N/m)"])
+        row["day"] = f"{number % 3}"
+    assert "1.00 (0.90 to 1.11)  1" in said(rows)
+    again = said(rows, "--unit", "day", header=DAYS)
+    assert again.splitlines()[4].split()[-1] == "1"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("k value (N/m)", "10,1", "a number of at least"),
+        ("k low (N/m)", "nan", "a number above 0"),
+        ("k high (N/m)", "inf", "a number of at least"),
+        ("k verdict", "certain", "determined, bounded below"),
+        ("fit", "good", "ok, doubtful, rejected, failed"),
+        ("confidence", "95", "a number from 0.5 to 0.99"),
+    ],
+)
+def test_what_identify_does_not_write_is_refused_with_its_place(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, value: str, allowed: str
+) -> None:
+    rows = rows_of(np.array([20.0, 21.0, 22.0]), "left")
+    rows[1][name] = value
+    assert main(["groups", str(written(tmp_path, rows)), "--by", "dish"]) == 1
+    error = capsys.readouterr().err
+    assert f"found.csv, row 3 (left1.csv), {name}: found '{value}'; allowed is {allowed}" in error
+    assert error.count("\n") == 1
+
+
+# The paragraph.
+
+
+def test_the_methods_say_what_was_compared_with_its_numbers(said: Said) -> None:
+    """Every number is one of the table or of the test; none else is there."""
+    rows = of_dishes(np.random.default_rng(3), (3, 4))
+    set_up = "The strain was recorded under 5 Pa. Limits hold with 95 % confidence."
+    more = {"methods": set_up, "reasons": "", "fit": "ok"}
+    rows = [row | more for row in rows]
+    rows[1] |= {"fit": "rejected", "reasons": "The misfit is 4.5 times the noise: it is none."}
+    rows[2] |= {"methods": set_up.replace("5 Pa", "7 Pa")}
+    header = [*DAYS[:-2], "methods", "reasons", *DAYS[-2:]]
+    found = said(rows, "--unit", "day", header=header, methods=True)
+    text, latex = (" ".join(it.split()) for it in found.split("As LaTeX:"))
+    assert text.startswith(
+        "The strain was recorded under 5 Pa (1 likewise with other numbers). Limits hold with "
+        "95 % confidence. 34 of 35 traces were used. Rejected: 1 (left01: The misfit is 4.5 times "
+        "the noise). Groups are those of dish: left 14 cells in 3 units; right 20 cells in 4 units."
+    )
+    assert "The unit is the day" in text
+    assert "Welch's t test (Lord et al., Journal of Cell Biology 219 (2020), e202001064)" in text
+    assert text.endswith(
+        "Computed with biogrip 1.0.0 (The biogrip authors, biogrip: how well a MEMS microgripper "
+        "identifies the viscoelastic parameters of a cell, version 1.0.0, 2026)."
+    )
+    assert r"95 \% confidence" in latex
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    for part in (citation["title"], citation["version"], citation["authors"][0]["name"]):
+        assert str(part) in text
+    assert str(citation["date-released"])[:4] in text
+
+
+# The figure.
+
+
+def test_the_figure_has_every_cell_every_unit_and_every_group(tmp_path: Path, said: Said) -> None:
+    rows = of_dishes(np.random.default_rng(9), (3, 3))
+    none = {"k value (N/m)": "", "k low (N/m)": ""}
+    rows[0] |= {**none, "k verdict": "bounded above", "k high (N/m)": "90"}
+    for name in ("cells.png", "cells.pdf"):
+        said(rows, "--unit", "day", "--plot", str(tmp_path / name), header=DAYS)
+        before = (tmp_path / name).read_bytes()
+        said(rows, "--unit", "day", "--plot", str(tmp_path / name), header=DAYS)
+        assert (tmp_path / name).read_bytes() == before
+
+
+def drawn_of(cells: Sequence[Cell], *, units: bool) -> Any:
+    compared = compare(cells, ["a", "b"], 0.95, units=units)
+    return draw_cells(cells, compared, {"k": "N/m"}, ONE_COLUMN_IN).axes[0], compared
+
+
+def test_points_lie_where_the_numbers_are() -> None:
+    cells = in_dishes(np.random.default_rng(1), 0.2, 1.5)
+    cells[0].known, cells[0].others = {}, {"k": ("bounded above", 90.0)}
+    axes, compared = drawn_of(cells, units=True)
+    points = [line for line in axes.lines if line.get_markersize() == 3]
+    levels = [float(np.ravel(line.get_ydata())[0]) for line in points]
+    assert levels == pytest.approx([90.0, *(np.exp(it.known["k"][0]) for it in cells[1:])])
+    assert [line.get_marker() for line in points] == ["v", *["o"] * 59]
+    assert len(axes.lines) == 60 + 6
+    told = [text.get_text() for text in axes.texts]
+    assert f"p = {compared['k', 'b']['p']:.2g}" in told[0]
+    assert axes.get_ylabel() == "k (N/m)"
+    # Two colours of one unit would be two dishes.
+    assert len({line.get_color() for line in points[:30]}) == 3
+
+
+def test_an_axis_is_logarithmic_where_values_span_a_decade() -> None:
+    near = in_dishes(np.random.default_rng(1), 0.2)
+    assert drawn_of(near, units=False)[0].get_yscale() == "linear"
+    for number, cell in enumerate(near):
+        cell.known["k"] = np.log(4) + number / 30, 0.05
+    axes = drawn_of(near, units=False)[0]
+    assert axes.get_yscale() == "linear"
+    near[-1].known["k"] = np.log(50), 0.05
+    axes = drawn_of(near, units=False)[0]
+    assert axes.get_yscale() == "log"
+    axes.figure.draw_without_rendering()
+    low, high = axes.get_ylim()
+    shown = [
+        label.get_text()
+        for label, place in zip(axes.get_yticklabels(), axes.get_yticks(), strict=True)
+        if low <= place <= high
+    ]
+    assert shown == ["6", "10", "20", "30"] or shown == ["6", "10", "20", "30", "60"]

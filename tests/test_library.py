@@ -9,10 +9,11 @@ import yaml
 
 import biogrip
 from biogrip import library
+from biogrip.command.settings import Asked, Setting, case_of
 from biogrip.judging.verdicts import DETERMINED
 from tests.helpers.default import STUDY
 from tests.helpers.identified import identified
-from tests.helpers.places import ROOT
+from tests.helpers.places import EXAMPLE, ROOT
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "library.md"
 POSTERIOR = DOCUMENT.parent / "howto" / "posterior.md"
@@ -89,6 +90,7 @@ def test_columns_of_pandas_are_identified_as_by_the_command(tmp_path: Path) -> N
     options += " --model zener_kelvin --offset --noise 2e-4"
     given = yaml.safe_dump(config["config"])
     told = *options.split(), "--hold", "5e-3 kPa"
+    told += "--csv", str(tmp_path / "found.csv")
     found = identified(tmp_path, tmp_path / "trace.csv", *told, config=given)
     assert found["load"] == f"Held: 0.005 kPa from 85 s to {FRAME['t'].iloc[-1]:g} s."
     assert f"\nHeld: 5 Pa from 85 s to {FRAME['t'].iloc[-1]:g} s.\n" in str(result)
@@ -102,12 +104,45 @@ def test_columns_of_pandas_are_identified_as_by_the_command(tmp_path: Path) -> N
     assert all(quantity["in_words"] in str(result) for quantity in found["quantities"])
     assert len(repr(result).splitlines()) == 5
     assert list(result.to_frame("models")["model"]) == models
+    # One panel a quantity; and a table as the command writes it, but for its digits.
+    assert len(result.plot("profiles").axes) >= len(frame)
+    words = {"one": {"dish": "d1"}, "two": {"dish": "d2"}}
+    table = library.to_table({"one": result, "two": result}, words)
+    assert table[["trace", "dish"]].to_numpy().tolist() == [["one", "d1"], ["two", "d2"]]
+    csv = pd.read_csv(tmp_path / "found.csv")
+    assert set(table) - {"dish"} == set(csv)
+    assert float(table["k_s low (Pa)"][0]) == pytest.approx(csv["k_s low (Pa)"][0], rel=1e-4)
     # J = 1/k_s + 1/(k_v + i omega c_v)
     omega, storage, loss = result.to_frame("moduli").to_numpy().T
     assert omega[[0, -1]] == pytest.approx([1 / np.ptp(SECONDS), 1 / 0.2])
     modulus = 1 / (1 / 300 + 1 / (200 + 900j * omega))
     np.testing.assert_allclose(storage + 1j * loss, modulus, rtol=0.03)
     assert found["moduli"]["loss_Pa"] == pytest.approx(loss, rel=1e-4)
+
+
+def test_a_trace_is_identified_again_with_other_arguments_by_the_model_s_usual_name() -> None:
+    """A model with a spring and a damper is no model of a Zener solid."""
+    told = library.identify_trace(FRAME["t"], FRAME["strain"], **HELD, **compared(), start=85)
+    other = told.refit(model="KV")
+    assert (other.data["model"], other.status) == ("kelvin_voigt", "rejected")
+    assert told.data["model"] == "zener_kelvin"
+    assert told.status != "rejected"
+    assert other.data["load"] == told.data["load"]
+
+
+@pytest.mark.parametrize(
+    ("name", "model", "branches", "fixed"),
+    [
+        *(("SLS", "zener_maxwell", 1, {}), ("zener", "zener_maxwell", 1, {})),
+        ("Prony3", "generalized_maxwell", 3, {"c_p": 0.0}),
+        ("prony_1", "generalized_maxwell", 1, {"c_p": 0.0}),
+    ],
+)
+def test_models_have_usual_names(
+    name: str, model: str, branches: int, fixed: dict[str, float]
+) -> None:
+    case = case_of(Asked(EXAMPLE, None, (Setting("--model", ("sample", "model"), name),)))
+    assert (case.sample.name, case.sample.branches, case.fixed) == (model, branches, fixed)
 
 
 def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read() -> None:
@@ -126,7 +161,7 @@ def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read() -> N
         ({"reads": "strian"}, "reads: found 'strian', allowed are rotation, displacement, strain,"),
         ({"hold": None}, "hold: is missing; allowed is the stress in Pa that was held"),
         ({"hold": 0.0}, "hold: protocol.phases: no phase has a stress"),
-        ({"model": "zener"}, "model: .*found 'zener'. Did you mean 'zener_kelvin'"),
+        ({"model": "zener_k"}, "model: .*found 'zener_k'. Did you mean 'zener_kelvin'"),
         ({"sd": [1.0]}, "found 325 of time_s and 325 of strain and 1 of sd; allowed are as many"),
         ({"config": {"protocol": {}}}, "found hold and protocol; allowed is one of them."),
         ({"start": "soon"}, "start: measurement.start_s: found 'soon', allowed is a number"),

@@ -14,11 +14,12 @@ import pytest
 
 from biogrip.command import files as command
 from biogrip.command.files import identify_batch
+from biogrip.command.methods import set_up_in_words
 from biogrip.command.outputs import Outcome
-from biogrip.command.page import draw_strip, write_page
+from biogrip.command.page import beyond, common, draw_traces, write_page
 from biogrip.command.settings import Asked, Setting
+from biogrip.command.words import columns_of
 from biogrip.digits import within_limits
-from biogrip.figures.style import BLUE
 from tests.helpers.browser import Opened
 from tests.helpers.identified import FEW
 from tests.helpers.places import EXAMPLE
@@ -82,7 +83,7 @@ def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path
     parts = ("Fit ok", "What the trace tells", "For a paper", "its best fit", "Profile likelihoods")
     places = [text.index(part) for part in parts]
     assert places == sorted(places)
-    assert "Distributions" not in text
+    assert "Each trace" not in text
     unfolded = re.sub("<details>.*?</details>", "", text, flags=re.DOTALL)
     assert "search_range:" in text
     assert "search_range:" not in unfolded
@@ -91,16 +92,21 @@ def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path
     for item in told["quantities"]:
         value, *ends = within_limits(item["value"], item["low"] or 0, item["high"] or 0)
         line = f"<p>{item['quantity']} = {value} {item['unit']} (95 % profile-likelihood "
-        line += f"interval {' to '.join(ends)}, n = 1 trace)</p>"
+        provided = f", provided {item['provided']}" if item["provided"] else ""
+        line += f"interval {' to '.join(ends)}, n = 1 trace{provided})</p>"
         assert (line in text) == (item["verdict"] == "determined")
+        if item["verdict"] == "bounded above":
+            bound = f"<p>{item['quantity']} < {item['high']:.2g} {item['unit']} (97.5 % one-sided"
+            assert bound in text
+    assert ", provided the branch relaxes within the experiment)" in text
     assert r"$k_{p} = 5.01\,\mathrm{N/m}$ (95\,\% profile-likelihood interval $" in text
 
 
 def test_pictures_are_small_and_in_the_page(page: Path) -> None:
     text = page.read_text()
     pictures = re.findall('src="data:image/png;base64,([^"]+)"', text)
-    # Two a trace, and one a quantity.
-    assert len(pictures) == 3 * 12 + 6 == len(re.findall("<img", text))
+    # Two a trace, a level where there is one, and one of all.
+    assert len(pictures) == 3 * 12 + 1 == len(re.findall("<img", text))
     for encoded in pictures:
         content = base64.b64decode(encoded)
         assert len(content) < 60_000
@@ -109,23 +115,66 @@ def test_pictures_are_small_and_in_the_page(page: Path) -> None:
     assert not re.search("(src|href)=.(?!data:|#)", text)
 
 
-def test_a_strip_shows_values_with_limits_or_the_only_limit(dish: Outcome) -> None:
-    axes = draw_strip("k", dish.found).axes[0]
-    assert axes.get_ylabel() == "$k$ (N/m)"
-    marks = {
-        number: (line.get_marker(), value, line.get_markerfacecolor())
-        for line in axes.lines
-        for number, value in line.get_xydata().tolist()  # type: ignore[union-attr]
+def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
+    """Groups are of the column with the fewest words, units of one that puts cells together."""
+    names = [each["trace"] for each in dish.found]
+    words = {
+        name: {"day": f"{number % 4}", "drug": "ab"[number % 2], "size": f"{number}"}
+        for number, name in enumerate(names)
     }
-    bars = {start[0]: (start[1], end[1]) for start, end in axes.collections[0].get_segments()}  # type: ignore[attr-defined]
-    for number, each in enumerate(dish.found, 1):
-        item = each["quantities"][0]
-        face = BLUE if each["fit"] == "ok" else "white"
-        low, high = item["low"], item["high"]
-        mark = ("o", item["value"], face) if high else ("^", low, face) if low else None
-        assert marks.get(number) == mark
-        assert bars.get(number) == ((low, high) if low and high else None)
-    assert {line.get_marker() for line in draw_strip("c_p", dish.found).axes[0].lines} == {"v"}
+    drawn, said = draw_traces(replace(dish, copied=words), columns_of(dish.found))
+    assert said == "Groups: drug. Units, of which the large marks are means: day."
+    axes = drawn.axes[0]
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["a", "b"]
+    points = [line for line in axes.lines if line.get_markersize() == 3]
+    # Not the rejected one, and not the one that is not determined.
+    assert len(points) == 12 - 2
+    assert sum(line.get_marker() == "^" for line in points) == 1
+    assert sum(line.get_markerfacecolor() == "white" for line in points) == 1
+    words[names[0]] = {"other": "of another table"}
+    assert draw_traces(replace(dish, copied=words), columns_of(dish.found))[0].axes
+    drawn, said = draw_traces(dish, columns_of(dish.found))
+    assert said == "Every cell is taken for independent."
+    assert [label.get_text() for label in drawn.axes[0].get_xticklabels()] == ["all traces"]
+
+
+def test_what_all_share_is_said_once() -> None:
+    one = {"noise": {"kind": "white", "level": 0.1}, "rate": 2.0, "range": {"k": 1}}
+    other = {"noise": {"kind": "white", "level": 0.2}, "rate": 2.0, "range": {"k": 2}}
+    shared = common([one, other])
+    assert shared == {"noise": {"kind": "white"}, "rate": 2.0}
+    assert beyond(one, shared) == {"noise": {"level": 0.1}, "range": {"k": 1}}
+    assert beyond(other, common([other])) == {}
+
+
+def test_the_methods_have_the_numbers_of_the_study(dish: Outcome, page: Path) -> None:
+    """Each number of the paragraph is found in what was assumed and found, and no other is."""
+    text = unescape(page.read_text()).partition("Methods, for a paper</h2>\n<p>")[2]
+    said = text.partition("</p>")[0]
+    assumed = dish.found[0]["assumed"]
+    arms, phases = assumed["gripper"], assumed["protocol"]["phases"]
+    known = {value for phase in phases for value in phase.values()}
+    known |= {arms["arm_length_m"], arms["reference_angle_deg"]}
+    known |= {arms[arm]["stiffness_Nm_per_rad"] for arm in ("left", "right")}
+    # Confidence of limits on both sides and on one; traces used, of all, doubtful; two left out.
+    known |= {95.0, 97.5, 11.0, 13.0, 1.0, 2.0, 8.0, 2026.0}
+    plain = said.replace("\u00a0", " ").replace("dish/8.csv", "").replace("1.0.0", "")
+    power = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+    numbers = re.findall(r"(\d[\d.]*\d|\d)(?:·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?", plain)
+    assert len(numbers) > 12
+    for number, tens in numbers:
+        assert float(f"{number}e{tens.translate(power) or 0}") in known
+    assert "Not identified: 1 (bad.csv: found 'high')" in said
+    assert "provided the branch relaxes within the experiment" in said
+    assert "rejected" in said.lower()
+    assert set_up_in_words(dish.found[0])[0] == (
+        "The rotation of an arm of a microgripper was recorded under a torque of 1.6e-09 N m for "
+        "200 s, then of 3.2e-10 N m for 200 s."
+    )
+    latex = text.partition("<pre>")[2].partition("</pre>")[0]
+    assert r"$1.6 \times 10^{-9}$ N m" in latex
+    assert r"95 \% profile-likelihood" in latex
+    assert not re.search(r"(?<!\\)[%_#&]", latex)
 
 
 def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(
@@ -136,7 +185,7 @@ def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(
     model = [Setting("--model", ("sample", "model"), "liquid_drop")]
     assert command.identify_files(traces, few, model, report=tmp_path / "page.html") == 0
     text = (tmp_path / "page.html").read_text()
-    assert text.count("<img") == 4
+    assert text.count("<img") == 1
     assert "too many traces for pictures" in text
     assert 'href="#trace-' not in text
 
@@ -188,6 +237,25 @@ def test_the_table_sorts_by_a_heading_and_its_names_are_text(opened: Opened) -> 
     assert page.locator("#trace-12 h2").inner_text() == HOSTILE
     assert page.locator("b").count() == 0
     assert HOSTILE in str(page.locator("#trace-12 img").first.get_attribute("alt"))
+
+
+def test_sixty_traces_are_two_screens_and_six_sheets(
+    browser: Any, dish: Outcome, tmp_path: Path
+) -> None:
+    """Pictures of each are folded, and not printed; the table is no wider than the screen."""
+    (pictures,) = {tuple(own) for own in dish.pictures.values()}
+    traces = [made_up(dish.found[0], 20 + number) for number in range(60)]
+    names = [each["trace"] for each in traces]
+    copied = {name: {"cell": name, "dish": f"d{n % 6}"} for n, name in enumerate(names)}
+    every = Outcome(traces, {}, {name: [*pictures] for name in names}, copied)
+    write_page(every, tmp_path / "page.html")
+    opened = Opened(browser, tmp_path / "page.html", viewport={"width": 1400, "height": 900})
+    assert opened.page.evaluate("document.documentElement.scrollHeight") <= 2 * 900
+    table = opened.page.locator(".screen")
+    assert table.evaluate("it => it.scrollWidth <= it.clientWidth")
+    printed = opened.page.pdf(format="A4")
+    assert 1 <= len(re.findall(rb"/Type /Page\b", printed)) <= 6
+    opened.context.close()
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,13 @@
 """Identify the viscoelastic parameters of samples in recorded traces."""
 
 import argparse
+import math
 import os
 import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -74,11 +76,14 @@ class _Parser(argparse.ArgumentParser):
 
 def _models() -> str:
     """Return the names and titles of the sample models."""
-    from biogrip.physics.models import MODELS
+    from biogrip.physics.models import ALIASES, MODELS
 
     width = max(map(len, MODELS))
-    lines = [f"  {name:<{width}}  {model.title}" for name, model in MODELS.items()]
-    return "\n".join(["\nsample models:", *lines, ""])
+    lines = ["\nsample models (usual names; prony3: generalized_maxwell_3 without c_p):"]
+    for name, model in MODELS.items():
+        usual = ", ".join(alias for alias, of in ALIASES.items() if of == name)
+        lines.append(f"  {name:<{width}}  {model.title}" + (f" ({usual})" if usual else ""))
+    return "\n".join([*lines, ""])
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -95,6 +100,14 @@ def _examples(*commands: str, cost: str = "") -> str:
     """Return examples of a command, and a sentence on what takes long."""
     lines = ["\nexamples:", *(f"  biogrip {command}" for command in commands), ""]
     return "\n".join([*lines, cost, ""] if cost else lines)
+
+
+def _within(text: str) -> tuple[str | None, float]:
+    name, _, percent = text.rpartition("=")
+    with suppress(ValueError):
+        if 0 < float(percent) < math.inf:
+            return name or None, float(percent)
+    raise argparse.ArgumentTypeError(f"found '{text}', allowed is a percentage, or as in k=10")
 
 
 def _any_key(text: str) -> tuple[tuple[str, ...], Any]:
@@ -227,11 +240,16 @@ def _groups_parser(stages: Any) -> None:
     groups = stages.add_parser("groups", help=text, description=text)
     groups.set_defaults(command=_groups)
     groups.examples = _examples(
-        "groups found.csv --by dish", "groups found.csv --by treatment --csv compared.csv"
+        "groups found.csv --by treatment --unit dish",
+        "groups found.csv --by treatment --unit dish --csv compared.csv --plot cells.pdf",
     )
     groups.add_argument("found", type=Path, help="CSV file that identify --csv wrote")
     groups.add_argument("--by", required=True, metavar="COLUMN", help="column that makes groups")
+    text = "column of what was repeated: dishes, animals, days [cells]"
+    groups.add_argument("--unit", metavar="COLUMN", help=text)
     groups.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row a median")
+    text = "figure of every cell, by unit: a name that ends with .png or .pdf"
+    groups.add_argument("--plot", type=Path, metavar="FIGURE", help=text)
 
 
 def _design_parser(stages: Any) -> None:
@@ -240,13 +258,15 @@ def _design_parser(stages: Any) -> None:
     design.set_defaults(command=_design)
     design.examples = _examples(
         "design my.yaml",
-        "design my.yaml --output designed.yaml",
+        "design my.yaml --within k=10",
         cost="The search takes less than a minute.",
     )
     text = "YAML file with your samples, laid over the default study"
     design.add_argument("config", type=Path, help=text)
     text = "config of the designed study, YAML [CONFIG_designed.yaml]"
     design.add_argument("--output", type=Path, help=text)
+    text = "the shortest protocol that tells a parameter, or all, within PERCENT (95 %% limits)"
+    design.add_argument("--within", type=_within, metavar="[NAME=]PERCENT", help=text)
 
 
 def _identify(options: argparse.Namespace) -> int:
@@ -266,12 +286,12 @@ def _identify(options: argparse.Namespace) -> int:
 def _groups(options: argparse.Namespace) -> int:
     from biogrip.groups import groups
 
-    groups(options.found, options.by, options.csv)
+    groups(options.found, options.by, options.csv, options.unit, options.plot)
     return 0
 
 
 def _design(options: argparse.Namespace) -> int:
     from biogrip.design import design
 
-    design(options.config, options.output)
+    design(options.config, options.output, options.within)
     return 0

@@ -18,13 +18,15 @@ import yaml
 from biogrip import __version__
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.command.outputs import WRITTEN_BY, check_output
-from biogrip.errors import BiogripError
+from biogrip.digits import with_unit
+from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs, write_text
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.protocol import Phase, hold, join_phases, largest_load, sample_times
 from biogrip.physics.response import jaw_force_response, linear_jaw_force
 from biogrip.physics.simulation import compute_grip, simulated_response
+from biogrip.physics.whitening import without
 from biogrip.study.config import DesignBlock
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config, overlaid, read_config
@@ -43,6 +45,9 @@ _SEED, _POPSIZE, _TRIED = 1, 5, 512
 _FEWEST, _KEPT = 5, 0.01
 _MOST = 100_000  # readings of a train
 _FINE = 10_000  # levels in the largest
+# Of a table of costs: generations and steps of each search, durations, and halvings of what is
+# left to the shortest; of a normal distribution what holds 95 %.
+_QUICK, _FEWER, _FEW_STEPS, _HALVED, _BISECTIONS, _NORMAL = 25, 100, 4, 6, 3, 1.96
 # Score of a train under which the jaws would have to pull: above all logarithms of bounds.
 _PULLS = 10.0
 
@@ -94,6 +99,10 @@ class Specimen:
     """Standard deviation of the noise, in the SI unit of what is read."""
     required: BoolArray
     """True for the parameters asked for, (n_parameters,)."""
+    nuisance: Array
+    """Offset and drift that are fitted along, an orthonormal basis, (n_functions, n_readings).
+
+    Without jaws that is one reading less: at 0 nothing tells on which side of the step it is."""
     unit: Array
     """After a unit step, derivatives of what is read by the log-parameters, and the force of the
     jaws if there are any, at `Limits.elapsed_s`, (n_parameters + 1 or 0, n_times)."""
@@ -116,7 +125,8 @@ class Specimen:
             rows[:, start:] += jump * self.unit[:, : rows.shape[1] - start]
         slopes, force = np.split(rows, [len(self.required)])
         least = float(force.min() / force.max()) if force.size else 1.0
-        return relative_bounds(slopes[:, ::2], self.noise), least
+        slopes = slopes[:, ::2][:, -self.nuisance.shape[1] :]
+        return relative_bounds(without(self.nuisance, slopes), self.noise), least
 
 
 def relative_bounds(slopes: Array, noise: float) -> Array:
@@ -146,11 +156,14 @@ class Experiment:
     """Least force of the jaws, if there are jaws; negative if they have to pull."""
 
 
-def design(config: Path, output: Path | None) -> None:
+def design(
+    config: Path, output: Path | None, within: tuple[str | None, float] | None = None
+) -> None:
     """Search for a train of steps, print what it tells, and write a config that runs it.
 
     The config, a YAML file, is laid over the default study. By default the output is beside it,
-    with `_designed` in its name; a file that biogrip did not write is not replaced.
+    with `_designed` in its name; a file that biogrip did not write is not replaced. If a parameter,
+    or None for all, is to be known within some percent, the train is the shortest that does it.
     A `BiogripError` says what cannot be used, or that no train tells anything.
     """
     output = output or config.with_stem(f"{config.stem}_designed")
@@ -158,20 +171,104 @@ def design(config: Path, output: Path | None) -> None:
     check_output(output)
     files = [default_config(), config]
     study = load_study(read_configs(files), files)
+    cases, block = list(study.cases.values()), study.config.design
+    costs: list[str] = []
+    rate_Hz = None
+    if within is not None:
+        name, percent = within
+        names = dict.fromkeys(it for case in cases for it in case.experiment.searched.names)
+        if name and name not in names:
+            allowed = f"allowed are {', '.join(names)}.{nearest(name, names)}"
+            raise BiogripError(f"--within: found '{name}', {allowed}")
+        block = replace(block, parameters=(name,)) if name else block
+        cost, costs = cheapest(cases, block, percent)
+        block, rate_Hz = replace(block, duration_s=cost.duration_s), cost.rate_Hz
     try:
-        limits, specimens = set_up(list(study.cases.values()), study.config.design)
+        limits, specimens = set_up(cases, block, rate_Hz)
     except BiogripError as error:
         raise BiogripError(f"{config}: {error}") from error
-    train, reached = search(specimens, limits)
+    train, reached = search(specimens, limits, GENERATIONS if within is None else _FEWER)
     before = [rated(one, one.case.phases, one.case.block.measurement.rate_Hz) for one in specimens]
     after = [rated(one, train.phases, limits.rate_Hz) for one in specimens]
     write_text(output, as_config(read_config(config), specimens, after, limits.rate_Hz))
     then = f"snakemake -j2 --configfile {output} simulates and fits it"
-    said = [*_said(specimens, before, after, reached), f"Written to {output}; {then}."]
+    said = [*costs, *_said(specimens, before, after, reached), f"Written to {output}; {then}."]
     print(visible_lines("\n".join(said)))
 
 
-def set_up(cases: Sequence[Case], block: DesignBlock) -> tuple[Limits, list[Specimen]]:
+@dataclass(frozen=True)
+class Cost:
+    """What a protocol costs, and how well the worst parameter is known by it."""
+
+    duration_s: float
+    rate_Hz: float
+    percent: float
+    """Half of the 95 % interval of the worst parameter; infinite if nothing is told."""
+
+
+def cheapest(cases: Sequence[Case], block: DesignBlock, percent: float) -> tuple[Cost, list[str]]:
+    """Return the shortest protocol by which all that is asked for is known within some percent.
+
+    It is one at the config's rate, or else one with as many readings; if there is none, the most
+    precise. Lines have a table of what others cost.
+    """
+    limits, specimens = set_up(cases, block)
+    longest_s = limits.intervals / limits.rate_Hz
+
+    def cost(duration_s: float, rate_Hz: float) -> Cost:
+        own = replace(block, duration_s=duration_s, steps=min(block.steps, _FEW_STEPS))
+        try:
+            limits, specimens = set_up(cases, own, rate_Hz)
+            train, reached = search(specimens, limits, _QUICK, _TRIED // 8)
+        except BiogripError:
+            return Cost(duration_s, rate_Hz, np.inf)
+        bounds = [one.told(train)[0][it] for one, it in zip(specimens, reached, strict=True)]
+        return Cost(duration_s, rate_Hz, 100 * _NORMAL * float(np.concatenate(bounds).max()))
+
+    def rate_Hz(duration_s: float, *, keeps: bool) -> float:
+        return limits.rate_Hz if keeps else limits.intervals / duration_s
+
+    own_rate, own_count = (
+        [cost(longest_s / 2**n, rate_Hz(longest_s / 2**n, keeps=keeps)) for n in range(_HALVED)]
+        for keeps in (True, False)
+    )
+    found = [*own_rate, *own_count[1:]]
+    good = [each for each in own_rate if each.percent <= percent]
+    keeps, good = bool(good), good or [each for each in found if each.percent <= percent]
+    best = min(good or found, key=lambda each: each.duration_s if good else each.percent)
+    short_s, long_s = best.duration_s / 2, best.duration_s
+    for _ in range(_BISECTIONS if good else 0):
+        duration_s = float(np.sqrt(short_s * long_s))
+        more = cost(duration_s, rate_Hz(duration_s, keeps=keeps))
+        if more.percent <= percent:
+            best, long_s = more, duration_s
+        else:
+            short_s = duration_s
+    noise = {one.noise for one in specimens}
+    rows = [
+        (
+            *(f"{each.duration_s:.3g}", f"{each.rate_Hz:.4g}"),
+            f"{each.duration_s * each.rate_Hz + 1:.0f}",
+            f"{each.percent:.3g}" if each.percent < 100 * NO_BOUND else "none",
+            f"{percent / each.percent * min(noise):.3g}" if each.percent < np.inf else "",
+        )
+        for each in sorted({*found, best}, key=lambda it: (it.duration_s, it.rate_Hz))
+    ]
+    read = specimens[0].case.instrument.read
+    header = ["duration (s)", "rate (Hz)", "readings", "known within (%)"]
+    header += [with_unit(f"noise for {percent:g} %", read.unit)]
+    words = "Designed is the shortest"
+    if not good:
+        words = f"No protocol tells it within {percent:g} %; designed is the most precise"
+    return best, [
+        aligned(rows, header),
+        f"{words}, {best.duration_s:.3g} s at {best.rate_Hz:.4g} Hz.",
+    ]
+
+
+def set_up(
+    cases: Sequence[Case], block: DesignBlock, rate_Hz: float | None = None
+) -> tuple[Limits, list[Specimen]]:
     """Return the limits of a block, by default those of all protocols, and the samples of cases.
 
     A `BiogripError` says which case cannot be judged, and why; or that there is no room for a step.
@@ -182,7 +279,7 @@ def set_up(cases: Sequence[Case], block: DesignBlock) -> tuple[Limits, list[Spec
     largest = min((largest_load(case.phases) for case in cases), key=abs)
     if block.largest is not None:
         largest = float(np.copysign(block.largest, largest))
-    rate_Hz = min(case.block.measurement.rate_Hz for case in cases)
+    rate_Hz = rate_Hz or min(case.block.measurement.rate_Hz for case in cases)
     duration_s = block.duration_s or min(case.experiment.torque.end_s for case in cases)
     intervals = int(duration_s * rate_Hz * (1 + 1e-12))
     if not _FEWEST <= intervals <= _MOST:
@@ -197,7 +294,7 @@ def set_up(cases: Sequence[Case], block: DesignBlock) -> tuple[Limits, list[Spec
 
 def _problem(case: Case, first: Case) -> str | None:
     """Return what of a case cannot be judged, and what is allowed."""
-    measured, controlled = case.block.measurement, case.instrument.controlled
+    controlled = case.instrument.controlled
     if case.recorded:
         return "found a recorded trace, allowed is a sample with values."
     for name in case.experiment.searched.names:
@@ -209,8 +306,6 @@ def _problem(case: Case, first: Case) -> str | None:
     of_signal = case.noise.level_rad is None and case.noise.reference == "signal"
     if case.noise.absent or not case.noise.white or of_signal:
         return "measurement.noise: allowed is white noise, of a share of the peak or a level_rad."
-    if measured.fits_offset or measured.fits_drift:
-        return "measurement: found an offset or drift to be fitted along, allowed is neither."
     if case.nonlinear_target:
         return "models.target: found nonlinear, allowed is linear."
     return None
@@ -229,11 +324,15 @@ def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
     if case.instrument.has_jaws:
         pressing = jaw_force_response(case.gripper, network, inertia=False)
         unit = np.vstack((unit, linear_jaw_force(pressing, step, elapsed_s)))
-    return Specimen(case, noise, required, unit)
+    read_s = elapsed_s[0 if case.instrument.has_jaws else 2 :: 2]
+    return Specimen(case, noise, required, problem.nuisance(read_s), unit)
 
 
 def search(
-    specimens: Sequence[Specimen], limits: Limits, generations: int = GENERATIONS
+    specimens: Sequence[Specimen],
+    limits: Limits,
+    generations: int = GENERATIONS,
+    trials: int = _TRIED,
 ) -> tuple[Train, list[BoolArray]]:
     """Search for the train with the lowest worst bound of all parameters within reach.
 
@@ -245,7 +344,7 @@ def search(
     from scipy.optimize import differential_evolution
 
     unknowns, rng = 2 * limits.steps, np.random.default_rng(_SEED)
-    tried = [decode(each, limits) for each in rng.random((_TRIED, unknowns))]
+    tried = [decode(each, limits) for each in rng.random((trials, unknowns))]
     reached = [
         np.any([one.told(train)[0] < NO_BOUND for train in tried], axis=0) & one.required
         for one in specimens
@@ -295,9 +394,13 @@ def rated(specimen: Specimen, phases: tuple[Phase, ...], rate_Hz: float) -> Expe
     """
     case, problem = specimen.case, replace(specimen.case.experiment, phases=phases)
     times_s, model = sample_times(problem.torque.end_s, rate_Hz), problem.searched
+    if not case.instrument.has_jaws:
+        # As `identify` does, which leaves out readings at the very instant of a step.
+        times_s = times_s[~np.isin(problem.torque.snapped(times_s), problem.torque.jumps_s)]
     given = problem.gripper, model, problem.torque, times_s, specimen.parameters[None]
-    read, *slopes = linear_responses(*given)[0]
-    bounds = relative_bounds(np.array(slopes), specimen.noise)
+    read, slopes = np.split(linear_responses(*given)[0], [1])
+    slopes = without(problem.nuisance(times_s), slopes)
+    bounds = relative_bounds(slopes, specimen.noise)
     if not case.instrument.has_jaws:
         return Experiment(phases, times_s, bounds, None)
     if read.max() > case.stroke:
@@ -348,8 +451,8 @@ def _said(
             if one.required[index] and not within[index]:
                 notes.append(f"No train that was tried tells {parameter} of {name}.")
         values = {
-            f"noise of the {read.name} ({read.unit})": [one.noise, one.noise],
-            f"largest {controlled.name} ({controlled.unit})": [
+            with_unit(f"noise of the {read.name}", read.unit): [one.noise, one.noise],
+            with_unit(f"largest {controlled.name}", controlled.unit): [
                 largest_load(each.phases) for each in both
             ],
             "highest rate (Hz)": [1 / np.diff(each.times_s).min() for each in both],
@@ -362,7 +465,8 @@ def _said(
     yield from notes
     yield (
         "The noise is taken for white, and for the instrument's: the same under both protocols. "
-        "Bounds are standard deviations of logarithms, all parameters unknown."
+        "Bounds are standard deviations of logarithms, with all parameters unknown that are not "
+        "fixed."
     )
 
 

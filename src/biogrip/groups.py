@@ -1,186 +1,217 @@
-"""Medians and ratios of groups of cells, from the table that ``biogrip identify --csv`` writes.
+"""The command ``biogrip groups``: compare cells by the table of ``biogrip identify --csv``.
 
-The logarithm of a quantity varies from cell to cell with the variance tau^2, and is known of cell i
-with the standard error s_i, from its limits. The mean of a group weighs each cell by
-1/(s_i^2 + tau^2), with tau^2 after DerSimonian and Laird (Controlled Clinical Trials 7 (1986),
-177-188). Its limits are those of Student's t after Hartung and Knapp, never closer than the weights
-say (Roever, Knapp and Friede, BMC Medical Research Methodology 15 (2015), 99). Two groups are
-compared by Welch's t, several with the first after Holm (Scandinavian Journal of Statistics 6
-(1979), 65-70).
+`biogrip.judging.cells` has the statistics.
 """
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from math import exp, log, sqrt
+from math import inf, isnan, nan
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from scipy.special import ndtri, stdtr, stdtrit
+from textwrap import fill
 
 from biogrip import __version__
-from biogrip.arrays import Array
-from biogrip.command.outputs import FAILED, LINEAR, WRITTEN_BY, check_output
-from biogrip.digits import counted, rounded_numbers, with_limits, with_unit
+from biogrip.command.methods import in_sentences, outcome_in_words, paragraph, together
+from biogrip.command.outputs import COLUMNS as OF_TRACES
+from biogrip.command.outputs import FAILED, LINEAR, METHODS, REASONS, WRITTEN_BY, check_output
+from biogrip.digits import counted, plain, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
-from biogrip.files import refuse_inputs
-from biogrip.judging.doubts import OK, REJECTED
-from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, FIT_REJECTED
+from biogrip.files import atomic_write, refuse_inputs
+from biogrip.judging.cells import (
+    COLUMNS,
+    Cell,
+    Compared,
+    Told,
+    at_bounds,
+    compare,
+    gather,
+    shared_columns,
+)
+from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
+from biogrip.judging.verdicts import (
+    BOUNDED_ABOVE,
+    BOUNDED_BELOW,
+    DETERMINED,
+    FIT_REJECTED,
+    NOT_DETERMINED,
+)
 from biogrip.records.rows import read_rows, write_rows
 from biogrip.terminal import aligned, visible, visible_lines
 from biogrip.traces.columns import trace_file_problem
 
-FEWEST_CELLS = 3
-"""Fewest cells of which a median is estimated."""
-
-COLUMNS = "cells", "determined", "median", "low", "high", "ratio", "ratio_low", "ratio_high", "p"
-"""What is said of a quantity in a group."""
-
-Compared = dict[tuple[str, str], dict[str, Any]]
-
-_VALUE = re.compile(r"(.*) value(?: \((.*)\))?")
+_OF_QUANTITY = re.compile(r"(.*) (verdict|low|value|high)(?: \((.*)\))?")
+# By verdict the numbers that tell it, ascending.
+_NUMBERS: dict[str, tuple[str, ...]] = {
+    DETERMINED: ("low", "value", "high"),
+    BOUNDED_BELOW: ("low",),
+    BOUNDED_ABOVE: ("high",),
+    **{NOT_DETERMINED: (), FIT_REJECTED: (), "": ()},
+}
+_CONFIDENCES = 0.5, 0.99
 _ONE_SIDED = {BOUNDED_ABOVE: ("at most", "lower"), BOUNDED_BELOW: ("at least", "higher")}
+_UNDATED: dict[str, dict[str, None]] = {"png": {}, "pdf": {"CreationDate": None}}
+# Most names that a line has.
+_FEW = 5
+_WIDTH = 100
 
 
-@dataclass
-class Cell:
-    """A cell, and what its traces tell of each quantity."""
+def groups(
+    found: Path, by: str, table: Path | None, unit: str | None = None, plot: Path | None = None
+) -> None:
+    """Compare groups of cells, print the comparison, write it as CSV and draw it if asked.
 
-    name: str
-    group: str
-    doubtful: bool = False
-    traces: list[Mapping[str, str]] = field(default_factory=list)
-    known: dict[str, tuple[float, float]] = field(default_factory=dict)
-    """Logarithm of each quantity that is determined, and its standard error."""
-    others: dict[str, tuple[str, str]] = field(default_factory=dict)
-    """Verdict of each other quantity, and its only limit as text, or ""."""
-
-    def rejects(self, quantity: str) -> bool:
-        """Return True if a quantity is of a model that the traces reject."""
-        return self.others.get(quantity, ("",))[0] == FIT_REJECTED
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A mean of logarithms with its standard error, from some degrees of freedom."""
-
-    mean: float
-    error: float
-    freedom: float
-
-    def over(self, other: "Estimate") -> "Estimate":
-        """Return the difference from another, with Satterthwaite's degrees of freedom."""
-        own, others = self.error**2, other.error**2
-        freedom = (own + others) ** 2 / (own**2 / self.freedom + others**2 / other.freedom)
-        return Estimate(self.mean - other.mean, sqrt(own + others), freedom)
-
-    def limits(self, confidence: float) -> tuple[float, float, float]:
-        """Return the value, no longer a logarithm, and its limits."""
-        reach = float(stdtrit(self.freedom, (1 + confidence) / 2)) * self.error
-        return exp(self.mean), exp(self.mean - reach), exp(self.mean + reach)
-
-    @property
-    def p_value(self) -> float:
-        """Two-sided p value of a mean of 0."""
-        return 2 * float(stdtr(self.freedom, -abs(self.mean) / self.error))
-
-
-def estimate(values: Array, errors: Array) -> Estimate:
-    """Estimate the mean of a population from values (n,) with standard errors (n,)."""
-    weights, freedom = errors**-2.0, len(values) - 1
-    squares = weights @ (values - np.average(values, weights=weights)) ** 2
-    beyond = (squares - freedom) / (weights.sum() - weights @ weights / weights.sum())
-    weights = 1 / (errors**2 + max(beyond, 0.0))
-    mean = np.average(values, weights=weights)
-    variance = max(weights @ (values - mean) ** 2 / freedom, 1.0) / weights.sum()
-    return Estimate(float(mean), float(variance) ** 0.5, freedom)
-
-
-def adjusted(p_values: Sequence[float]) -> list[float]:
-    """Return p values adjusted for their number by Holm's method."""
-    found, largest = [0.0] * len(p_values), 0.0
-    for rank, index in enumerate(np.argsort(p_values)):
-        largest = max(largest, min(1.0, (len(p_values) - rank) * p_values[index]))
-        found[index] = largest
-    return found
-
-
-def compare(cells: Sequence[Cell], groups: Sequence[str], confidence: float) -> Compared:
-    """Return `COLUMNS` by quantity and group; ratio and p value are against the first group.
-
-    A median takes `FEWEST_CELLS` that determine the quantity, and no fewer than do not. Of cells
-    whose fit is rejected it takes what is told without a model.
-    """
-    found: Compared = {}
-    for quantity in dict.fromkeys(name for cell in cells for name in cell.known | cell.others):
-        estimates: dict[str, Estimate] = {}
-        for group in groups:
-            these = [it for it in cells if it.group == group and not it.rejects(quantity)]
-            all_known = [cell.known.get(quantity) for cell in these]
-            known = [own for own in all_known if own]
-            found[quantity, group] = {"cells": len(all_known), "determined": len(known)}
-            if len(known) >= max(FEWEST_CELLS, len(all_known) / 2):
-                estimates[group] = estimate(*np.array(known).T)
-                median = estimates[group].limits(confidence)
-                found[quantity, group] |= zip(COLUMNS[2:5], median, strict=True)
-        if groups[0] in estimates:
-            first = estimates.pop(groups[0])
-            ratios = {group: own.over(first) for group, own in estimates.items()}
-            p_values = adjusted([own.p_value for own in ratios.values()])
-            for (group, own), p in zip(ratios.items(), p_values, strict=True):
-                ratio = *own.limits(confidence), p
-                found[quantity, group] |= zip(COLUMNS[5:], ratio, strict=True)
-    return found
-
-
-def groups(found: Path, by: str, table: Path | None) -> None:
-    """Compare groups of cells, print the comparison, and write it as CSV if asked.
-
-    Found is the CSV file of ``biogrip identify --csv``, a column of it makes the groups, and traces
-    of a cell, as a column `cell` says, are averaged. Another file, or a column that is not there,
-    is a `BiogripError`.
+    Found is the CSV file of ``biogrip identify --csv``; a column of it makes the groups, another
+    may say what was repeated. Traces of a cell, as a column `cell` says, are averaged. Another
+    file, or a column that is not there, is a `BiogripError`.
     """
     if problem := trace_file_problem(found):
         raise BiogripError(f"FOUND: {problem}")
+    if unit == by:
+        raise BiogripError("--unit: found the column of --by; allowed is another, as of dishes.")
     header, *rows = read_rows(found)
-    traces = [dict(zip(header, map(visible, row), strict=False)) for row in rows]
-    for name in ("trace", "fit", "confidence", by):
-        if name not in header:
+    units = _units(header)
+    columns = [column for item in units.items() for column in _columns(*item).values()]
+    made_by = [by] if unit is None else [by, unit]
+    for name in ("trace", "fit", "confidence", *made_by, *columns):
+        if header.count(name) != 1:
+            many, near = ("two", "") if name in header else ("no", nearest(name, header))
             raise BiogripError(
-                f"{visible(found)}: found no column '{name}'; allowed is a table that `biogrip "
-                f"identify --csv` wrote, and of --by a column of it.{nearest(name, header)}"
+                f"{visible(found)}: found {many} column '{name}'; allowed is a table that `biogrip "
+                f"identify --csv` wrote, and of --by and --unit columns of it.{near}"
             )
-    if table is not None:
-        refuse_inputs([table], [found])
-        check_output(table)
-    used = [own for own in traces if own[by] and _is_used(own)]
-    levels = sorted({own["confidence"] for own in used})
+    traces = [dict(zip(header, map(visible, row), strict=True)) for row in rows]
+    for number, own in enumerate(traces, start=2):
+        for column, allowed in _complaints(own, made_by, units):
+            where = f"{visible(found)}, row {number} ({own['trace']}), {column}"
+            raise BiogripError(f"{where}: found '{own[column]}'; allowed is {allowed}.")
+    for path in filter(None, (table, plot)):
+        refuse_inputs([path], [found])
+        check_output(path)
+    if plot is not None and plot.suffix not in (".png", ".pdf"):
+        text = f"found {visible(plot)}; allowed is a name that ends with .png or .pdf."
+        raise BiogripError(f"--plot: {text}")
+    used = [own for own in traces if all(own[name] for name in made_by) and _is_used(own)]
+    levels = sorted({float(own["confidence"]) for own in used})
     if len(levels) != 1:
+        of = " and ".join(map(str, levels)) or "no trace of a group"
         raise BiogripError(
-            f"{visible(found)}: found limits of {' and '.join(levels) or 'no trace of a group'}; "
-            "allowed are those of one confidence, of traces that were identified."
+            f"{visible(found)}: found limits of {of}; allowed are those of one confidence, of "
+            "traces that were identified."
         )
-    confidence = float(levels[0])
-    names = list(dict.fromkeys(own[by] for own in traces if own[by]))
-    units = {it[1]: it[2] or "" for name in header if (it := _VALUE.fullmatch(name))}
-    cells = _cells(used, by, units, confidence)
-    compared = compare(cells, names, confidence)
+    (confidence,) = levels
+    # Names of two of the columns end with the unit of what is read.
+    mine = {*OF_TRACES, *columns}
+    copied = {it for it in header if it not in mine and not it.startswith(("noise", "misfit"))}
+    told = [_told(own, copied | {*made_by}, units) for own in used]
+    cells = gather(told, by, unit, confidence)
+    names = list(dict.fromkeys(own[by] for own in traces if all(own[it] for it in made_by)))
+    compared = compare(cells, names, confidence, units=unit is not None)
+    counts = [counted(len(used), "trace"), counted(len(cells), "cell")]
+    counts += [f"{len({(it.group, it.unit) for it in cells})} units ({unit})"] if unit else []
     lines = [
-        f"{visible(found)}: {counted(len(cells), 'cell')}, {100 * confidence:g} % limits",
-        _printed(compared, names[0], units),
-        *_left_out(traces, by, cells),
-        *_not_known(cells, compared),
+        f"{visible(found)}: {', '.join(counts)}, {100 * confidence:g} % limits",
+        _printed(compared, names, units, unit),
+        *_left_out(traces, made_by, cells, told),
+        *_not_known(cells, compared, confidence, unit),
+        *([] if unit else _shared(told, by, names, confidence, compared)),
     ]
     if doubtful := [cell.name for cell in cells if cell.doubtful]:
-        again = compare([cell for cell in cells if not cell.doubtful], names, confidence)
-        lines += [f"Without the doubtful {', '.join(doubtful)}:", _printed(again, names[0], units)]
+        sound = [cell for cell in cells if not cell.doubtful]
+        again = compare(sound, names, confidence, units=unit is not None)
+        lines += [f"Without the doubtful {_few(doubtful)}:", _printed(again, names, units, unit)]
+    made = (in_sentences(own[METHODS]) for own in used if own.get(METHODS))
+    outcome = ((it["trace"], it["fit"], it.get(REASONS) or it.get(FAILED, "")) for it in traces)
+    text, latex = paragraph(
+        [*together(made), *outcome_in_words(outcome), *_tests(cells, names, by, unit)],
+        max(own.get(WRITTEN_BY, "") for own in used) or __version__,
+    )
+    lines += ["", "For a paper:", fill(text, _WIDTH), "", "As LaTeX:", fill(latex, _WIDTH)]
     print(visible_lines("\n".join(lines)))
     if table is not None:
-        own = ([*key, units[key[0]], *map(row.get, COLUMNS)] for key, row in compared.items())
-        names = ["quantity", "group", "unit", *COLUMNS, WRITTEN_BY]
-        write_rows(table, names, ([*rounded_numbers(row), __version__] for row in own))
-        print(f"Written to {visible(table)}.")
+        lines_of = ([*key, units[key[0]], *map(row.get, COLUMNS)] for key, row in compared.items())
+        columns = ["quantity", "group", "unit", *COLUMNS, WRITTEN_BY]
+        write_rows(table, columns, ([*rounded_numbers(row), __version__] for row in lines_of))
+    if plot is not None:
+        _draw(cells, compared, units, plot)
+    if said := [visible(path) for path in (table, plot) if path]:
+        print(f"Written to {', '.join(said)}.")
+
+
+def _draw(cells: Sequence[Cell], compared: Compared, units: Mapping[str, str], plot: Path) -> None:
+    """Draw cells in one column of a journal."""
+    # Imported here: loading Matplotlib takes long.
+    from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
+    from biogrip.figures.style import styled
+
+    with styled(), atomic_write(plot) as scratch:
+        drawn = draw_cells(cells, compared, units, ONE_COLUMN_IN)
+        kind = plot.suffix.removeprefix(".")
+        mark = {"Creator" if kind == "pdf" else "Software": f"{WRITTEN_BY} {__version__}"}
+        drawn.savefig(scratch, format=kind, dpi=300, metadata=mark | _UNDATED[kind])
+
+
+def _told(own: Mapping[str, str], copied: set[str], units: Mapping[str, str]) -> Told:
+    """Return what a row tells; `_complaints` has seen it."""
+
+    def number(text: str) -> float | None:
+        return None if isnan(found := _number(text)) else found
+
+    quantities = {}
+    for name, unit in units.items():
+        verdict, low, value, high = (own[column] for column in _columns(name, unit).values())
+        quantities[name] = (verdict, number(value), number(low), number(high))
+    words = {name: own[name] for name in own if name in copied}
+    return Told(own["trace"], own["fit"], words, quantities)
+
+
+def _units(header: Sequence[str]) -> dict[str, str]:
+    """Return quantities with their units; other columns, as a lone ``p value``, are the user's."""
+    found: dict[str, dict[str, str]] = {}
+    for name, what, unit in (it.groups("") for it in map(_OF_QUANTITY.fullmatch, header) if it):
+        found.setdefault(name, {})[what] = unit
+    return {name: max(of.values()) for name, of in found.items() if "verdict" in of or len(of) == 3}
+
+
+def _columns(name: str, unit: str) -> dict[str, str]:
+    """Return the columns of a quantity by what they have."""
+    numbers = {what: with_unit(f"{name} {what}", unit) for what in _NUMBERS[DETERMINED]}
+    return {"verdict": f"{name} verdict"} | numbers
+
+
+def _complaints(
+    own: Mapping[str, str], made_by: Sequence[str], units: Mapping[str, str]
+) -> Iterator[tuple[str, str]]:
+    """Yield columns of a row with what `identify` does not write there, and what is allowed.
+
+    Of a trace that is left out only its fit counts.
+    """
+    fits = OK, DOUBTFUL, REJECTED, FAILED
+    if own["fit"] not in fits:
+        yield "fit", ", ".join(fits)
+    if not (_is_used(own) and all(own[name] for name in made_by)):
+        return
+    low, high = _CONFIDENCES
+    if not low <= _number(own["confidence"]) <= high:
+        yield "confidence", f"a number from {low} to {high}"
+    for columns in map(_columns, units, units.values()):
+        verdict = columns["verdict"]
+        if own[verdict] not in _NUMBERS:
+            yield verdict, ", ".join(_NUMBERS).rstrip(", ")
+            return
+        least, above = 0.0, "above 0"
+        for what in _NUMBERS[own[verdict]]:
+            number = _number(own[columns[what]])
+            if not (least <= number < inf and number > 0):
+                yield columns[what], f"a number {above}"
+                return
+            least, above = number, f"of at least {number:g}, its {what}"
+
+
+def _number(text: str) -> float:
+    """Return the number in a cell, nan if there is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return nan
 
 
 def _is_used(trace: Mapping[str, str]) -> bool:
@@ -188,67 +219,157 @@ def _is_used(trace: Mapping[str, str]) -> bool:
     return trace["fit"] != FAILED and (trace["fit"] != REJECTED or trace.get(LINEAR) == "yes")
 
 
-def _cells(
-    traces: Sequence[Mapping[str, str]], by: str, units: Mapping[str, str], confidence: float
-) -> list[Cell]:
-    """Return cells; what their traces tell is averaged by the inverse squares of errors."""
-    cells: dict[tuple[str, str], Cell] = {}
-    for own in traces:
-        name = own.get("cell") or own["trace"]
-        cells.setdefault((name, own[by]), Cell(name, own[by])).traces.append(own)
-    width = 2 * float(ndtri((1 + confidence) / 2))
-    for cell in cells.values():
-        cell.doubtful = any(own["fit"] != OK for own in cell.traces)
-        for name, unit in units.items():
-            value, low, high = (with_unit(f"{name} {it}", unit) for it in ("value", "low", "high"))
-            some = [own for own in cell.traces if own[f"{name} verdict"] == DETERMINED]
-            if some:
-                logs = [log(float(own[value])) for own in some]
-                weights = [(width / log(float(own[high]) / float(own[low]))) ** 2 for own in some]
-                cell.known[name] = float(np.average(logs, weights=weights)), sum(weights) ** -0.5
-            elif verdict := cell.traces[0][f"{name} verdict"]:
-                cell.others[name] = verdict, cell.traces[0][low] or cell.traces[0][high]
-    return [*cells.values()]
-
-
-def _printed(compared: Compared, first: str, units: Mapping[str, str]) -> str:
-    """Return a comparison as a table."""
+def _printed(
+    compared: Compared, names: Sequence[str], units: Mapping[str, str], unit: str | None
+) -> str:
+    """Return a comparison as a table, but for quantities that no cell determines."""
     rows = []
     for (name, group), row in compared.items():
+        if not any(compared[name, each]["determined"] for each in names):
+            continue
         median, ratio, p = "too few", "", ""
-        if "median" in row:
+        if "low" in row:
             median = with_limits(row["median"], row["low"], row["high"])
+        elif "median" in row:
+            median = plain(row["median"])
         if "p" in row:
             ratio = with_limits(row["ratio"], row["ratio_low"], row["ratio_high"])
             p = f"{row['p']:.2g}"
-        determined = f"{row['determined']} of {row['cells']}"
-        rows.append((with_unit(name, units[name]), group, determined, median, ratio, p))
-    header = ("quantity", "group", "determined in", "median", f"ratio to {first}", "p")
-    return aligned(rows, header)
+        elif unit and group != names[0] and "median" in row:
+            ratio = "cannot be told"
+        determined = [f"{row['determined']} of {row['cells']}"]
+        if unit:
+            scatters = [row.get("scatter_of_cells"), row.get("scatter_of_units")]
+            shown = ("?" if it is None else f"{plain(100 * it, 2)} %" for it in scatters)
+            determined += [str(row["units"]), ", ".join(shown)]
+        rows.append((with_unit(name, units[name]), group, *determined, median, ratio, p))
+    of_units = [unit, f"scatter of cells, {unit}"] if unit else []
+    ratio_to = f"ratio to {names[0]}"
+    return aligned(rows, ("quantity", "group", "determined in", *of_units, "median", ratio_to, "p"))
 
 
-def _left_out(traces: Sequence[Mapping[str, str]], by: str, cells: Sequence[Cell]) -> Iterator[str]:
+def _left_out(
+    traces: Sequence[Mapping[str, str]],
+    made_by: Sequence[str],
+    cells: Sequence[Cell],
+    told: Sequence[Told],
+) -> Iterator[str]:
     """Say which traces are left out, and which are averaged."""
     for status, why in ((REJECTED, "the fit is rejected"), (FAILED, "not identified")):
         if names := [it["trace"] for it in traces if it["fit"] == status and not _is_used(it)]:
             yield f"Left out, {why}: {', '.join(names)}."
     if names := [own["trace"] for own in traces if own["fit"] == REJECTED and _is_used(own)]:
         yield f"Of the model left out, whose fit is rejected: {', '.join(names)}."
-    if names := [own["trace"] for own in traces if not own[by]]:
-        yield f"Left out, nothing under {by}: {', '.join(names)}."
-    if names := [f"{it.name} ({len(it.traces)})" for it in cells if len(it.traces) > 1]:
-        yield f"Averages of several traces: {', '.join(names)}."
+    for column in made_by:
+        if names := [own["trace"] for own in traces if not own[column]]:
+            yield f"Left out, nothing under {column}: {', '.join(names)}."
+    if several := [cell for cell in cells if len(cell.traces) > 1]:
+        names = [f"{cell.name} ({len(cell.traces)})" for cell in several]
+        yield f"Averages of several traces: {_few(names)}."
+        for column, nests in shared_columns(told, made_by[0]):
+            words = ({own.words[column] for own in cell.traces} for cell in several)
+            if column not in made_by and not nests and max(map(len, words)) > 1:
+                yield (
+                    f"These differ in {column}: if cells are numbered anew in each, "
+                    f"--unit {column} takes them for different ones."
+                )
 
 
-def _not_known(cells: Sequence[Cell], compared: Compared) -> Iterator[str]:
+def _not_known(
+    cells: Sequence[Cell], compared: Compared, confidence: float, unit: str | None
+) -> Iterator[str]:
     """Say which cells are in no median, as they do not determine the quantity."""
-    for name, group in compared:
-        own = [cell for cell in cells if cell.group == group and name in cell.others]
-        others = [(cell.name, *cell.others[name]) for cell in own]
-        for verdict, (words, moved) in _ONE_SIDED.items():
-            if some := [f"{cell} ({words} {end})" for cell, it, end in others if it == verdict]:
-                what = f"{name} of {group}: only bounded in {', '.join(some)}, which the median"
-                yield f"{what} leaves out: that of all cells is {moved}."
-        told = {*_ONE_SIDED, FIT_REJECTED}
-        if some := [cell for cell, verdict, _ in others if verdict not in told]:
-            yield f"{name} of {group}: nothing is told by {', '.join(some)}."
+    for name in dict.fromkeys(name for name, _ in compared):
+        if any(row["determined"] for (own, _), row in compared.items() if own == name):
+            groups = [group for own, group in compared if own == name]
+            for group in groups:
+                these = [cell for cell in cells if cell.group == group]
+                yield from _of_group(name, group, these, confidence, unit)
+        else:
+            every = [it for it in cells if it.others.get(name, ("",))[0] not in ("", FIT_REJECTED)]
+            said = "; ".join(_bounds(name, every, 0)) or "nothing is told by any"
+            if every:
+                yield f"{name} is determined in none of {counted(len(every), 'cell')}: {said}."
+
+
+def _bounds(name: str, cells: Sequence[Cell], most: int) -> Iterator[str]:
+    """Say how many cells bound a quantity, and by what; of few by name."""
+    for verdict, (words, _) in _ONE_SIDED.items():
+        some = [cell for cell in cells if cell.others.get(name, ("",))[0] == verdict]
+        ends = sorted(end for cell in some if (end := cell.others[name][1]))
+        if some and len(some) <= most:
+            named = (f"{cell.name} ({words} {plain(cell.others[name][1] or 0)})" for cell in some)
+            yield f"in {', '.join(named)}"
+        elif some:
+            reach = " to ".join(dict.fromkeys(plain(end) for end in (ends[0], ends[-1])))
+            yield f"{verdict} in {len(some)} ({words} {reach})"
+
+
+def _of_group(
+    name: str, group: str, cells: Sequence[Cell], confidence: float, unit: str | None
+) -> Iterator[str]:
+    """Say what cells of a group leave open, and what median bounds would give as values."""
+    for verdict, (_, moved) in _ONE_SIDED.items():
+        own = [cell for cell in cells if cell.others.get(name, ("",))[0] == verdict]
+        for said in _bounds(name, own, _FEW):
+            placed = at_bounds(cells, name, verdict)
+            row = compare(placed, [group], confidence, units=unit is not None)[name, group]
+            what = f"{name} of {group}: only bounded {said.removeprefix(verdict).strip()}, which"
+            moves = f"That of all cells is {moved}."
+            if "median" in row:
+                at = f"With them at these bounds it is {plain(row['median'])}"
+                moves = f"{at}, and of all cells it is {moved}."
+            yield f"{what} the median leaves out. {moves}"
+    told = {*_ONE_SIDED, FIT_REJECTED}
+    if some := [it.name for it in cells if name in it.others and it.others[name][0] not in told]:
+        yield f"{name} of {group}: nothing is told by {_few(some)}."
+
+
+def _shared(
+    told: Sequence[Told], by: str, names: Sequence[str], confidence: float, compared: Compared
+) -> Iterator[str]:
+    """Say what columns that cells share would change as units."""
+    for column, _ in shared_columns(told, by):
+        cells = gather(told, by, column, confidence)
+        again = compare(cells, names, confidence, units=True)
+        ps = [
+            f"{row['p']:.2g} for {name}{f' of {group}' if names[2:] else ''} (here {here})"
+            for (name, group), row in again.items()
+            if "p" in row
+            and (here := f"{own['p']:.2g}" if "p" in (own := compared[name, group]) else "none")
+        ]
+        units = len({(cell.group, cell.unit) for cell in cells})
+        then = f"p is {', '.join(ps)}" if ps else "whether groups differ cannot be told"
+        yield (
+            f"Column {column} puts {len(cells)} cells into {units} units: if these are what was "
+            f"repeated, cells are not independent, and with --unit {column} {then}."
+        )
+
+
+def _tests(cells: Sequence[Cell], names: Sequence[str], by: str, unit: str | None) -> Iterator[str]:
+    """Yield sentences for a paper on what was compared, and how."""
+    counts = []
+    for group in names:
+        own = [cell for cell in cells if cell.group == group]
+        of = f" in {counted(len({cell.unit for cell in own}), 'unit')}" if unit else ""
+        counts.append(f"{group} {counted(len(own), 'cell')}{of}")
+    yield f"Groups are those of {by}: {'; '.join(counts)}."
+    if unit:
+        yield (
+            f"The unit is the {unit}: medians are means of the units' means of logarithms, with "
+            "limits of Student's t, and ratios are compared by Welch's t test (Lord et al., "
+            "Journal of Cell Biology 219 (2020), e202001064)."
+        )
+    else:
+        yield (
+            "Cells are taken for independent: medians are means of logarithms with random effects "
+            "(DerSimonian and Laird 1986) and limits after Hartung and Knapp, and ratios are "
+            "compared by Welch's t test."
+        )
+    if names[2:]:
+        yield f"Groups are compared with {names[0]}, and p values are adjusted after Holm (1979)."
+
+
+def _few(names: Sequence[str]) -> str:
+    """Return names, of many their number."""
+    return ", ".join(names) if len(names) <= _FEW else f"{len(names)} cells"

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array, as_column
-from biogrip.command.notebook import TraceResult, identify_trace, one_blas_thread
+from biogrip.command.notebook import TraceResult, identify_trace, one_blas_thread, to_table
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
@@ -186,4 +186,5 @@ __all__ = [
     "plot",
     "set_up",
     "simulate",
+    "to_table",
 ]

@@ -25,7 +25,7 @@ LEFT = {
         *("first.json", "second.json", "results/summaries/mine.html"),
         "results/tables/verdicts_longer.md",
     ],
-    "groups.md": ["found.csv"],
+    "groups.md": ["found.csv", "cells.png"],
     "design.md": ["my_designed.yaml"],
     "howto/case.md": ["results/tables/errors_my_cell.html", "results/summaries/my_cell.html"],
     "howto/trace.md": [

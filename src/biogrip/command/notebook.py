@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from biogrip.arrays import as_column
 from biogrip.command.files import data_of
+from biogrip.command.outputs import Outcome, table_of
 from biogrip.command.settings import MODEL, Asked, Setting, read_trace
 from biogrip.command.words import in_words
 from biogrip.errors import BiogripError
@@ -38,7 +39,7 @@ _ARGUMENTS = (
     ("--(offset|drift)", r"\1=True"),
     (r"--model (\w+)", r'model="\1"'),
     (r"--noise-model (\w+)", r'noise_model="\1"'),
-    (r"--noise-share (\S+)\.", r"measurement.noise_share \1 in config."),
+    (r"--noise-share (\S+)\.", r"noise_share=\1."),
     ("--(from|until)", r"measurement.\1_s in config"),
     ("--load", "measurement.load of the command"),
     ("--(?=[a-z])", ""),
@@ -64,6 +65,8 @@ class TraceResult:
     """The fit and all that was tested."""
     data: dict[str, Any]
     """The same as plain data, not rounded, with the keys of the command's JSON file."""
+    arguments: Mapping[str, Any]
+    """Arguments of `identify_trace`."""
 
     @property
     def status(self) -> str:
@@ -97,11 +100,20 @@ class TraceResult:
         frame = pd.DataFrame(found.told)[columns]
         return frame.astype(dict.fromkeys(["at_s", "value", "low", "high"], float))
 
-    def plot(self) -> "Figure":
-        """Draw the trace, its fit and the residuals."""
-        from biogrip.command.page import draw_best
+    def refit(self, **changed: Any) -> "TraceResult":
+        """Identify the trace again with some other arguments, as ``model="sls"``."""
+        return identify_trace(**{**self.arguments, **changed})
 
-        return draw_best(self.diagnosis)
+    def plot(self, what: str = "fit") -> "Figure":
+        """Draw the trace, its fit and the residuals, or instead the ``"profiles"``."""
+        from biogrip.command.page import draw_best
+        from biogrip.figures.likelihood import draw_profiles_of
+        from biogrip.figures.style import styled
+
+        if what == "fit":
+            return draw_best(self.diagnosis)
+        with styled():
+            return draw_profiles_of(self.data)
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""
@@ -124,6 +136,7 @@ def identify_trace(
     start: float | str | None = None,
     sd: ArrayLike | None = None,
     noise: float | None = None,
+    noise_share: float | None = None,
     noise_model: str | None = None,
     offset: bool | None = None,
     drift: bool | None = None,
@@ -150,6 +163,8 @@ def identify_trace(
         Standard deviations of the readings; weights are 1/sd^2.
     noise
         Standard deviation of the noise, SI units, if it is known.
+    noise_share
+        The same as a share of what is read.
     noise_model
         ``"white"`` or ``"coloured"``.
     offset, drift
@@ -164,6 +179,7 @@ def identify_trace(
     BiogripError
         If a setting or the trace cannot be used; the message says what is allowed.
     """
+    arguments = locals()
     for name, block in (("fixed", fixed or {}), ("config", config or {})):
         if not isinstance(block, Mapping) or not all(isinstance(it, str) for it in block):
             raise BiogripError(f"{name}: found {block!r:.40}, allowed are values by name.")
@@ -184,6 +200,7 @@ def identify_trace(
         ("start", f"measurement.{onset[0]}", onset[1]),
         ("sd", "measurement.sd", None if sd is None else "sd"),
         ("noise", "measurement.noise_rad", noise),
+        ("noise_share", "measurement.noise_share", noise_share),
         ("noise_model", "measurement.noise_model", noise_model),
         ("offset", "measurement.offset", offset),
         ("drift", "measurement.drift", drift),
@@ -197,4 +214,20 @@ def identify_trace(
     except BiogripError as error:
         raise BiogripError(_with_arguments(str(error))) from None
     data = data_of(diagnosis, case, _TRACE, asked.given)
-    return TraceResult(diagnosis, _with_arguments(data))
+    return TraceResult(diagnosis, _with_arguments(data), arguments)
+
+
+def to_table(
+    results: Mapping[str, TraceResult], words: Mapping[str, Mapping[str, str]] | None = None
+) -> "pd.DataFrame":
+    """Return results of several traces, by name, as the command's CSV: a row each.
+
+    Words are those of a table of traces, by name and column, as of the treatment and the dish.
+    ``to_csv("found.csv", index=False)`` makes a file for ``biogrip groups``.
+    """
+    import pandas as pd
+
+    found = [{**own.data, "trace": name} for name, own in results.items()]
+    copied = {name: (words or {}).get(name, {}) for name in results}
+    header, rows = table_of(Outcome(found, {}, copied=copied))
+    return pd.DataFrame(rows, columns=header)

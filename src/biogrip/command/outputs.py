@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from biogrip import __version__
+from biogrip.command.methods import set_up_in_words
 from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_path, write_text
@@ -27,12 +28,16 @@ FAILED = "failed"
 LINEAR = "linear"
 """Column that is ``yes`` if a linear sample leaves noise of the trace, else ``no``."""
 
+REASONS, METHODS = "reasons", "methods"
+"""Columns of why a fit is doubtful or rejected, and of how it was made, in sentences."""
+
 COLUMNS = (
     *("trace", "fit", "confidence", "model", "preferred_model", "samples"),
-    *("noise_rad", "misfit_rad", "fixed", LINEAR, FAILED, WRITTEN_BY),
+    *("noise_rad", "misfit_rad", "fixed", LINEAR, REASONS, METHODS, FAILED, WRITTEN_BY),
 )
 """Columns of the table of traces, but for those of quantities."""
 
+_LAST = COLUMNS[-4:]
 _OF_QUANTITY = ("verdict", "value", "low", "high")
 _RADIANS = re.compile("_rad(?=$|_per_s$)")
 # A header that may be long has its mark at the end.
@@ -122,7 +127,12 @@ def _in_units(name: str, read: Channel) -> str:
 
 
 def write_table(outcome: Outcome, table: Path) -> None:
-    """Write one row per trace as CSV: numbers, their units in the header, and why it failed if so.
+    """Write `table_of` traces as CSV."""
+    write_rows(table, *table_of(outcome))
+
+
+def table_of(outcome: Outcome) -> tuple[list[str], list[list[Any]]]:
+    """Return header and rows, one a trace: numbers with units, and why it failed if so.
 
     Of what any linear sample would show, it has what was asked for, or else levels and exponents.
     Rows are in the order of what is copied.
@@ -136,6 +146,8 @@ def write_table(outcome: Outcome, table: Path) -> None:
         row |= {
             "preferred_model": each["preferred_model"] or "",
             "fixed": "; ".join(each.get("fixed", ())),
+            REASONS: " ".join(each["reasons"]),
+            METHODS: " ".join(set_up_in_words(each)),
         }
         row[LINEAR] = "yes" if each["without_model"]["is_linear"] else "no"
         without = each["without_model"]["quantities"]
@@ -153,15 +165,11 @@ def write_table(outcome: Outcome, table: Path) -> None:
     words = dict.fromkeys(name for own in outcome.copied.values() for name in own)
     quantities = dict.fromkeys(name for row in rows.values() for name in row if name not in COLUMNS)
     first, *columns = COLUMNS
-    header = [first, *words, *columns[:-2], *quantities, *columns[-2:]]
-    write_rows(
-        table,
-        [name if name in words else _in_units(name, read) for name in header],
-        [
-            [{**rows[trace], **own}.get(name, "") for name in header]
-            for trace, own in outcome.copied.items()
-        ],
-    )
+    header = [first, *words, *columns[: -len(_LAST)], *quantities, *_LAST]
+    return [name if name in words else _in_units(name, read) for name in header], [
+        [{**rows[trace], **own}.get(name, "") for name in header]
+        for trace, own in outcome.copied.items()
+    ]
 
 
 def join_tables(parts: Sequence[Path], table: Path, rows: int) -> None:
@@ -174,5 +182,5 @@ def join_tables(parts: Sequence[Path], table: Path, rows: int) -> None:
     if len(every) != rows:
         text = f"found {len(every)} traces in the tables of its batches, wanted {rows}"
         raise BiogripError(f"{parts[0].parent}: {text}. {AGAIN}")
-    last = list(COLUMNS[-2:])
+    last = list(_LAST)
     write_text(table, every[[*every.columns.drop(last), *last]].to_csv(index=False))

@@ -1,6 +1,6 @@
-"""An HTML page of identified traces, self-contained: a table, distributions, and each trace.
+"""An HTML page of identified traces, self-contained: a figure, a table, and each trace.
 
-Pictures are Matplotlib's. A page of very many traces has the table and the distributions only.
+Pictures are Matplotlib's. A page of very many traces has the figure and the table only.
 """
 
 import base64
@@ -15,20 +15,27 @@ import numpy as np
 import PIL.Image
 import yaml
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from biogrip import __version__
 from biogrip.command import words
-from biogrip.command.outputs import WRITTEN_BY, Outcome
+from biogrip.command.methods import (
+    outcome_in_words,
+    paragraph,
+    preferred_in_words,
+    set_up_in_words,
+    together,
+)
+from biogrip.command.outputs import FAILED, WRITTEN_BY, Outcome
 from biogrip.digits import with_unit
+from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
 from biogrip.figures.fit import draw_fit
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.figures.results import fit_of
 from biogrip.figures.style import (
-    BLUE,
     COLUMN_IN,
     FITTED,
     MEASURED,
+    PAGE_IN,
     SHADE,
     figure,
     is_over_decades,
@@ -36,6 +43,7 @@ from biogrip.figures.style import (
     styled,
 )
 from biogrip.files import write_text
+from biogrip.judging.cells import CELL, Told, compare, gather, shared_columns
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.without_model import LEVEL, level_turned
@@ -45,8 +53,10 @@ from biogrip.records.traces import of_recording
 from biogrip.terminal import visible, visible_lines
 
 _MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
-# Ratio of the largest to the smallest limit above which an axis is logarithmic.
-_WIDE = 5.0
+# Most groups of a column that a figure shows, and the word of all traces where there is no such.
+_MOST_GROUPS, _ALL, _MOST_PANELS = 6, "all traces", 6
+# Most traces whose pictures are open, and printed.
+_MOST_OPEN = 3
 # Times at which a level is drawn.
 _BAND = 25
 
@@ -126,33 +136,38 @@ def _address(drawn: Figure) -> str:
     return f"data:image/png;base64,{base64.b64encode(few.getvalue()).decode()}"
 
 
-def draw_strip(label: str, traces: Sequence[Mapping[str, Any]]) -> Figure:
-    """Draw a quantity of all traces in their order: values with limits, or the only limit."""
-    drawn = figure(COLUMN_IN, 2.2)
-    axes = drawn.subplots()
-    title, bars, ends = label, [], list[float]()
-    marks: dict[tuple[str, str], list[tuple[int, float]]] = {}
-    for number, each in enumerate(traces, 1):
-        item = next((q for q in each["quantities"] if q["quantity"] == label), None)
-        if item is None or item["low"] is item["high"] is None:
-            continue
-        title, low, high = with_unit(item["symbol"], item["unit"]), item["low"], item["high"]
-        kind, value = ("v", high) if low is None else ("^", low)
-        if low is not None and high is not None:
-            kind, value = "o", item["value"]
-            bars.append((number, low, high))
-        marks.setdefault((kind, BLUE if each["fit"] == OK else "white"), []).append((number, value))
-        ends += [end for end in (low, value, high) if end]
-    axes.vlines(*np.reshape(bars, (-1, 3)).T, color=BLUE, linewidth=0.8)
-    for (kind, face), points in marks.items():
-        axes.plot(*np.transpose(points), kind, color=BLUE, markersize=4, markerfacecolor=face)
-    if ends and max(ends) > _WIDE * min(ends):
-        axes.set_yscale("log")
-    axes.set_xlim(0.5, len(traces) + 0.5)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel("number of the trace")
-    axes.set_ylabel(title)
-    return drawn
+def draw_traces(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, str]:
+    """Draw quantities of all traces, and return the figure with what its groups are.
+
+    Groups are those of the column with the fewest words, units those of one that puts cells of a
+    group together.
+    """
+    names = dict.fromkeys(name for own in outcome.copied.values() for name in own)
+    none = dict.fromkeys(names, "")
+    every = [_told(it, {**none, **outcome.copied.get(it["trace"], {})}) for it in outcome.found]
+    words_of = {name: {own.words[name] for own in every} for name in every[0].words}
+    few = [name for name, of in words_of.items() if 1 < len(of) <= _MOST_GROUPS and "" not in of]
+    by = min(set(few) - {CELL}, key=lambda name: (len(words_of[name]), name), default=_ALL)
+    shared = sorted(shared_columns(every, by), key=lambda own: not own[1])
+    unit = shared[0][0] if shared and by != _ALL else None
+    confidence = outcome.found[0]["confidence"]
+    cells = gather(every, by, unit, confidence)
+    groups = sorted({cell.group for cell in cells})
+    compared = compare(cells, groups, confidence, units=unit is not None)
+    units = {each["quantity"]: each["unit"] for own in outcome.found for each in own["quantities"]}
+    said = f"Groups: {by}. " if by != _ALL else ""
+    said += f"Units, of which the large marks are means: {unit}." if unit else "Every cell is taken"
+    said += "" if unit else " for independent."
+    # A panel each side by side, as many as a screen has room for.
+    width_in = max(PAGE_IN, ONE_COLUMN_IN / 2 * min(len(columns), _MOST_PANELS))
+    return draw_cells(cells, compared, {name: units[name] for name in columns}, width_in), said
+
+
+def _told(found: Mapping[str, Any], copied: Mapping[str, str]) -> Told:
+    """Return what a trace tells, with the cells of its row in a table of traces."""
+    numbers = ("verdict", "value", "low", "high")
+    told = {each["quantity"]: tuple(map(each.get, numbers)) for each in found["quantities"]}
+    return Told(found["trace"], found["fit"], {**copied, _ALL: "all traces"}, told)
 
 
 def write_page(outcome: Outcome, page: Path) -> None:
@@ -161,11 +176,18 @@ def write_page(outcome: Outcome, page: Path) -> None:
     traces, copied = outcome.found, outcome.copied
     columns = words.columns_of(traces)
     several = len(traces) != 1 or bool(outcome.refused)
-    with styled():
-        strips = {name: _address(draw_strip(name, traces)) for name in columns if several}
-    assumed: dict[str, list[str]] = {}
-    for each in traces:
-        assumed.setdefault(_assumed(each), []).append(each["trace"])
+    figure_of_all = groups = ""
+    if several and traces:
+        with styled():
+            drawn, groups = draw_traces(outcome, columns)
+            figure_of_all = _address(drawn)
+    outcomes = [(it["trace"], it["fit"], " ".join(it["reasons"])) for it in traces]
+    outcomes += [(trace, FAILED, reason) for trace, reason in outcome.refused.items()]
+    further = outcome_in_words(outcomes) if several else preferred_in_words(traces[0])
+    set_up = together(map(set_up_in_words, traces))
+    assumed: dict[str, dict[str, Any]] = {each["trace"]: each["assumed"] for each in traces}
+    shared = common([*assumed.values()])
+    own = {trace: _as_yaml(beyond(block, shared)) for trace, block in assumed.items()}
     environment = jinja2.Environment(
         autoescape=True,
         trim_blocks=True,
@@ -177,12 +199,17 @@ def write_page(outcome: Outcome, page: Path) -> None:
         traces=traces,
         refused={trace: visible_lines(reason) for trace, reason in outcome.refused.items()},
         pictures=outcome.pictures,
-        strips=strips,
+        figure_of_all=figure_of_all,
+        groups=groups,
+        set_up=set_up,
+        methods=paragraph([*set_up, *further]),
         several=several,
         columns=columns,
         copied=copied,
         names=list(dict.fromkeys(name for own in copied.values() for name in own)),
-        assumed=assumed,
+        shared=_as_yaml(shared),
+        own=own,
+        many=len(traces) > _MOST_OPEN,
         marks=_MARKS,
         counts={status: sum(each["fit"] == status for each in traces) for status in _MARKS},
         words=words,
@@ -192,11 +219,30 @@ def write_page(outcome: Outcome, page: Path) -> None:
     write_text(page, text)
 
 
-def _assumed(found: Mapping[str, Any]) -> str:
-    """Return what a trace assumes as YAML, without its name, so that it is said once of several."""
-    assumed = dict(found["assumed"])
-    assumed["measurement"] = {**assumed["measurement"]}
-    assumed["measurement"].pop("file", None)
+def common(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what all of several nested blocks say alike."""
+    found = {}
+    for key in several[0] if several else ():
+        every: list[Any] = [own.get(key) for own in several]
+        if all(own == every[0] for own in every):
+            found[key] = every[0]
+        elif all(isinstance(own, dict) for own in every) and (alike := common(every)):
+            found[key] = alike
+    return found
+
+
+def beyond(one: Mapping[str, Any], shared: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what one of nested blocks says beyond what all share."""
+    found = {}
+    for key, value in one.items():
+        if key not in shared:
+            found[key] = value
+        elif value != shared[key]:
+            found[key] = beyond(value, shared[key])
+    return found
+
+
+def _as_yaml(block: Mapping[str, Any]) -> str:
     dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-    text: str = yaml.dump(assumed, Dumper=dumper, sort_keys=False, allow_unicode=True)
+    text: str = yaml.dump(block, Dumper=dumper, sort_keys=False, allow_unicode=True)
     return text

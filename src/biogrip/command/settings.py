@@ -33,7 +33,7 @@ from biogrip.command.outputs import COLUMNS
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
-from biogrip.physics.models import CANDIDATES
+from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.study.experiment_blocks import LONGEST_S, SHORTEST_S
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.measurement_block import ARRAYS, READINGS, MeasurementBlock
@@ -64,6 +64,7 @@ LOAD = ("measurement", "load")
 
 _OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
+_PRONY = re.compile(r"prony_?([1-8])")
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
@@ -139,8 +140,11 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
         for name in (name for group in _ONE_OF if group & {*path[1:2]} for name in group):
             measured.pop(name, None)
     # A candidate's name says its branches, too.
-    sample = CANDIDATES.get(str(value)) if path == ("sample", "model") else None
-    if sample:
+    name = str(value).lower() if path == ("sample", "model") else ""
+    if prony := _PRONY.fullmatch(name):
+        name = f"generalized_maxwell_{prony[1]}".removesuffix("_1")
+        blocks = overlaid(blocks, {"fixed": {"c_p": 0.0}})
+    if sample := CANDIDATES.get(ALIASES.get(name, name)):
         path, value = ("sample",), {"model": sample.name, "branches": sample.branches}
     for part in reversed(path):
         value = {part: value}

@@ -3,8 +3,7 @@
 import os
 import re
 import sys
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import log
 from textwrap import indent
 from typing import Any
@@ -32,8 +31,9 @@ _COLOURS = {
 
 # Most lines on what any linear sample would show.
 _LINES = 5
-# Most names of traces that are told what another one is.
+# Most names of traces that are refused for what another one is.
 _MOST_NAMED = 5
+_NUMBER = re.compile(r"\d[\d.e+-]*")
 # What the notes of a weight do to the fit.
 _MEANS = {
     OK: "what the model leaves looks like noise",
@@ -149,25 +149,33 @@ def one_sided_in_words(
 
 
 def for_a_paper(found: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return sentences for a paper, as text and as LaTeX: one per quantity with two limits.
+    """Return sentences for a paper, as text and as LaTeX: one per quantity with a limit.
 
-    Nothing if the fit is doubtful or rejected.
+    Each has its condition, if any. Nothing if the fit is doubtful or rejected.
     """
     if found["fit"] != OK:
         return []
     pairs = []
     for each in found["quantities"]:
-        if each["low"] is None or each["high"] is None:
+        low, high, confidence = each["low"], each["high"], 100 * found["confidence"]
+        if low is None and high is None:
             continue
-        name, unit, level = each["quantity"], each["unit"], f"{100 * found['confidence']:g}"
-        numbers = within_limits(each["value"], each["low"], each["high"])
-        value, low, high = numbers
-        text = f"{name} = {f'{value} {unit}'.rstrip()} ({level} % profile-likelihood interval "
-        text += f"{low} to {high}, n = 1 trace)"
-        value, low, high = (re.sub(r"e([+-]\d+)", _power_in_latex, each) for each in numbers)
-        unit = rf"\,\mathrm{{{unit.replace(' ', chr(92) + ',')}}}" if unit else ""
-        latex = rf"${each['symbol'].replace('$', '')} = {value}{unit}$ ({level}\,\% "
-        latex += rf"profile-likelihood interval ${low}$ to ${high}$, $n = 1$ trace)"
+        if low is None or high is None:
+            sign, kind, confidence = "<>"[high is None], "one-sided limit", 50 + confidence / 2
+            numbers = [plain(high if low is None else low, 2)]
+        else:
+            sign, kind = "=", "profile-likelihood interval"
+            numbers = within_limits(each["value"], low, high)
+        provided = f", provided {each['provided']}" if each["provided"] else ""
+        value, reach = f"{numbers[0]} {each['unit']}".rstrip(), " to ".join(numbers[1:])
+        text = f"{each['quantity']} {sign} {value} ({confidence:g} % {f'{kind} {reach}'.rstrip()}, "
+        text += f"n = 1 trace{provided})"
+        numbers = [re.sub(r"e([+-]\d+)", _power_in_latex, it) for it in numbers]
+        unit = each["unit"].replace(" ", r"\,")
+        value = numbers[0] + (rf"\,\mathrm{{{unit}}}" if unit else "")
+        reach = " to ".join(f"${it}$" for it in numbers[1:])
+        latex = rf"${each['symbol'].replace('$', '')} {sign} {value}$ ({confidence:g}\,\% "
+        latex += rf"{f'{kind} {reach}'.rstrip()}, $n = 1$ trace{provided})"
         pairs.append((text, latex))
     return pairs
 
@@ -201,34 +209,43 @@ def in_columns(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)
         lines += _once(found, given_in_words)
-        every = []
-        for each in found:
-            said = [f"{_SAID[note['weight']]}: {note['text']}" for note in each["notes"]]
-            said += [each["advice"]] if each["fit"] == REJECTED and each["advice"] else []
-            every += [(name := visible(each["trace"]), f"{name}: {visible(text)}") for text in said]
-        lines += _first_of_alike(every)
+        for text, traces in notes_alike(found):
+            of = visible(traces[0])
+            of += f" and {len(traces) - 1} more alike" if traces[1:] else ""
+            lines.append(f"{of}: {visible(text)}")
         lines += _once(found, lambda it: [taken_for_granted(it)] if it["by_default"] else [])
     if refused:
         lines.append(f"Not identified, {len(refused)} of {len(refused) + len(found)}:")
-        reasons = [(visible(name), visible_lines(reason)) for name, reason in refused.items()]
-        lines += [indent(text, "  ") for text in _first_of_alike(reasons)]
+        for text, traces in _alike([*refused.items()]):
+            more = ", ".join(traces[1 : _MOST_NAMED + 1]) + ", ..." * (
+                len(traces) > _MOST_NAMED + 1
+            )
+            like = f" The like holds for {len(traces) - 1} more: {visible(more)}."
+            lines.append(indent(visible_lines(text) + like * (len(traces) > 1), "  "))
     return "\n".join(lines)
 
 
-def _first_of_alike(said: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Yield the first of each kind of texts on traces, and names of others that are told the like.
+def notes_alike(found: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[str]]]:
+    """Return notes with the traces that have them, those that are alike once."""
+    said = []
+    for each in found:
+        texts = [f"{_SAID[note['weight']]}: {note['text']}" for note in each["notes"]]
+        texts += [each["advice"]] if each["fit"] == REJECTED and each["advice"] else []
+        said += [(each["trace"], text) for text in texts]
+    return _alike(said)
 
-    Texts are alike if, names and numbers apart, they are the same up to their third colon.
+
+def _alike(said: Sequence[tuple[str, str]]) -> list[tuple[str, list[str]]]:
+    """Return texts on traces with their names, the first of those that are alike.
+
+    They are alike if, names and numbers apart, they are the same up to their third colon.
     """
-    alike = defaultdict[str, list[tuple[str, str]]](list)
+    found: dict[str, tuple[str, list[str]]] = {}
     for trace, text in said:
-        bare = re.sub(r"\d[\d.e+-]*", "", text.replace(trace, ""))
-        alike[":".join(bare.split(":")[:3])].append((trace, text))
-    for (_, text), *others in alike.values():
-        names = [trace for trace, _ in others[:_MOST_NAMED]]
-        names += ["..."] if others[_MOST_NAMED:] else []
-        like = f" The like holds for {len(others)} more: {', '.join(names)}." if others else ""
-        yield text + like
+        bare = _NUMBER.sub("", text.replace(trace, ""))
+        _, traces = found.setdefault(":".join(bare.split(":")[:3]), (text, []))
+        traces.append(trace)
+    return [*found.values()]
 
 
 def _once(

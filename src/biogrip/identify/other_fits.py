@@ -205,19 +205,25 @@ def _at_own_onset(
     return found.replaced(np.exp(best.log_parameters), best.misfit, converged=found.converged)
 
 
+_SAME_NETWORK = "liquid_drop", "zener_maxwell"
+
+
 def _candidates(experiment: Experiment, fit: TraceFit) -> tuple[str, ...]:
     """Return the names of the models to fit to a trace, none if nothing is compared."""
     if experiment.fixed or experiment.simulated:
         return ()
     residuals, chosen = fit.problem.residuals, experiment.sample.candidate
-    every = dict.fromkeys([*experiment.models, chosen])
+    # One network has one name: that asked for, or else that which is usual for the instrument.
+    usual = "liquid_drop" if experiment.instrument.has_jaws else "zener_maxwell"
+    own = chosen if chosen in _SAME_NETWORK else usual
+    names = (own if it in _SAME_NETWORK else it for it in (*experiment.models, chosen))
+    every = dict.fromkeys(names)
     # With very many samples the dozens of modes of a springpot would take gigabytes.
     few = residuals.samples <= _MOST_SAMPLES and experiment.torque.end_s <= LONGEST_S
     if few and experiment.cheap_models:
         every |= dict.fromkeys(_POWER_LAWS)
     most = _most(experiment, fit)
-    names = (it for it in every if len(CANDIDATES[it].model.names) <= most or it == chosen)
-    found = tuple(names)
+    found = tuple(it for it in every if len(CANDIDATES[it].model.names) <= most or it == chosen)
     return found if len(found) > 1 else ()
 
 

@@ -315,6 +315,12 @@ MODELS: dict[str, SampleModel] = {
     model.name: model for model in (*MAXWELL_MODELS, *FRACTIONAL_MODELS)
 }
 
+ALIASES = {
+    **dict.fromkeys(("sls", "standard_linear_solid", "zener"), "zener_maxwell"),
+    **{"kv": "kelvin_voigt", "dashpot": "damper", "power_law": "springpot", "drop": "liquid_drop"},
+}
+"""Usual names of models; ``prony3`` is `generalized_maxwell_3` without c_p."""
+
 
 @dataclass(frozen=True)
 class Sample:
