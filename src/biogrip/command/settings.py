@@ -456,7 +456,9 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
         header = text.partition("\n")[0]
         separator = "\t" if path.suffix == ".tsv" else max(_SEPARATORS, key=header.count)
         reader = csv.reader(StringIO(text), delimiter=separator, skipinitialspace=True, strict=True)
-        return [(reader.line_num, [*map(str.strip, row)]) for row in reader]
+        if rows := [(reader.line_num, [*map(str.strip, row)]) for row in reader]:
+            return rows
+        raise ValueError("it is empty")
     except (OSError, ValueError, csv.Error) as error:
         raise BiogripError(f"{place(path)}: cannot be read as a table: {error}.") from error
 

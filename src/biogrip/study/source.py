@@ -131,6 +131,9 @@ def value_of(text: str, key: str = "") -> Any:
     try:
         node = yaml.compose(text, yaml.SafeLoader)
         problem = scalar_problem(node) if isinstance(node, yaml.ScalarNode) else None
+        if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text)):
+            # One of itself has no end.
+            raise ValueError("found an alias, allowed is the value itself")
         value = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError) as error:
         problem = f"not valid YAML: {' '.join(str(error).split())}."
