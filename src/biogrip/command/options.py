@@ -2,6 +2,7 @@
 
 KEYS = {
     "time": "measurement.time",
+    "frequency": "measurement.frequency",
     "sd": "measurement.sd",
     "load": "measurement.load",
     "from": "measurement.from_s",

@@ -71,6 +71,8 @@ _OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
+# The protocol of a sweep, of which only the frequencies matter.
+_STRAINED = {"duration_s": 1.0}
 _MOST_SHOWN = 10
 _SEPARATORS = ",;\t"
 # Blocks whose numbers are an instrument's.
@@ -211,13 +213,19 @@ def _with_instrument(
     if not isinstance(merged["measurement"], dict):
         return merged, None, None
     instrument = _instrument(merged, given)
-    usual = {"time": "time_s", instrument.read.name: instrument.read.column}
+    axis = {"frequency": "omega_rad_per_s"} if instrument.sweeps else {"time": "time_s"}
+    usual = {**axis, instrument.read.name: instrument.read.column}
     file = ARRAYS if asked.arrays else str(asked.trace)
     measurement = usual | merged["measurement"] | {"file": file}
     measurement = schema_of(MeasurementBlock).with_numbers(measurement)
     kind, controlled = given.get("instrument", instrument.kind), instrument.controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
     of_column = measurement.get(LOAD[-1]) is not None
+    if instrument.sweeps:
+        if level is not None:
+            text = "is of a trace in time, and this is a frequency sweep; leave it out."
+            raise BiogripError(f"--hold: {text}")
+        return {**found, "protocol": {"phases": [_STRAINED | {controlled.column: 1.0}]}}, None, None
     if level is None and not of_column:
         if "protocol" in given or instrument.has_jaws:
             return found, None, None

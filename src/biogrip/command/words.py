@@ -18,6 +18,7 @@ from biogrip.judging.verdicts import (
     NOT_DETERMINED,
 )
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
+from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
 
@@ -42,8 +43,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines = [
         f"{visible(found['trace'])}: fit {found['fit']}",
         *(f"  {visible(reason)}" for reason in found["reasons"]),
-        f"{found['samples']} samples, {noise_in_words(found)}, "
-        f"misfit {in_unit(found['misfit_rad'], found)}",
+        misfit_in_words(found),
         *(without_model_in_words(found) if rejected else []),
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
         *(
@@ -66,7 +66,9 @@ def in_words(found: Mapping[str, Any]) -> str:
 def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return lines on what any linear sample would show."""
     own, told = found["without_model"], foremost(found)
-    left = f"{in_unit(own['misfit_rad'], found)}, {counted(plain(own['times_noise'], 2), 'noise')}"
+    left = counted(plain(own["times_noise"], 2), "noise")
+    if not sweeps(found):
+        left = f"{in_unit(own['misfit_rad'], found)}, {left}"
     if not told:
         return [f"The nearest of all linear samples leaves {left}: it tells nothing, either."]
     width = max(len(each["quantity"]) for each in told)
@@ -95,6 +97,22 @@ def foremost(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [each for each in told if each in chosen]
 
 
+def misfit_in_words(found: Mapping[str, Any]) -> str:
+    """Return the number of samples, their noise, and the misfit of the best fit."""
+    said, noise = f"{found['samples']} samples", noise_in_words(found)
+    if not sweeps(found):
+        noise = f"{noise} {in_unit(found['scatter_rad'], found)}"
+        return f"{said}, {noise}, misfit {in_unit(found['misfit_rad'], found)}"
+    return (
+        f"{said}, misfit {plain(found['misfit_rad'] / found['scatter_rad'], 2)} times the {noise}"
+    )
+
+
+def sweeps(found: Mapping[str, Any]) -> bool:
+    """Return True if the trace is a frequency sweep, whose readings span decades."""
+    return INSTRUMENTS[found["reads"]["quantity"]].sweeps
+
+
 def noise_in_words(found: Mapping[str, Any]) -> str:
     """Return the noise that a misfit is held against: given, modelled, or seen in the trace."""
     if found["fit"] == REJECTED and found["noise_model"]:
@@ -103,7 +121,7 @@ def noise_in_words(found: Mapping[str, Any]) -> str:
     what = "noise as modelled" if found["noise_model"] else "scatter of neighbours"
     if any(given.get(key) is not None for key in KNOWN_NOISE):
         what = "noise as given"
-    return f"{what} {in_unit(found['scatter_rad'], found)}"
+    return what
 
 
 def in_unit(value: float, found: Mapping[str, Any]) -> str:

@@ -19,6 +19,7 @@ from biogrip.physics.noise import stream
 from biogrip.physics.protocol import Course, Phase, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
+from biogrip.physics.sweep import SWEEP, SweptRows
 from biogrip.physics.whitening import (
     WEIGHTED,
     NoiseModel,
@@ -95,6 +96,8 @@ class Experiment:
     @cached_property
     def torque(self) -> Course:
         """Torque of both arms, or what else is held, against time."""
+        if self.instrument.sweeps:
+            return SWEEP
         if self.record is not None:
             # Imported here: few experiments have a record.
             from biogrip.physics.recorded_course import follow_rows
@@ -118,14 +121,15 @@ class Experiment:
         ranges = {name: genes for name, genes in self.ranges.items() if name in chosen}
         return replace(self, ranges=ranges, coloured=False, uncertainty={})
 
-    def weighted(self, sd: Array | None) -> "Experiment":
+    def weighted(self, sd: Array | None, *, known: bool = True) -> "Experiment":
         """Divide the readings of a trace by their standard deviations, if these are known.
 
-        The noise becomes white, with their root mean square as its standard deviation.
+        The noise becomes white, with their root mean square as its standard deviation, which is not
+        `known` if only their ratios are.
         """
         if sd is None:
             return self
-        return replace(self, sd=sd, noise_sd=float(np.sqrt(np.mean(sd**2))))
+        return replace(self, sd=sd, noise_sd=_mean_size(sd) if known else None)
 
     @property
     def offset_and_drift(self) -> int:
@@ -190,7 +194,9 @@ class Experiment:
         `model`, `noise_sd`, and `condensed` from `in_noise` replace those of the case.
         """
         rows = condensed or self._condensed(time_s)
-        trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd)
+        # Deviations of which only the ratios count are as neighbours scatter.
+        neighbours = None if self.sd is None or self.noise_sd else _mean_size(self.sd)
+        trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd, neighbours)
         given = self.gripper, model or self.searched, self.torque, trace
         return make_problem(Residuals(*given, instrument=self.instrument), self.ranges)
 
@@ -239,12 +245,17 @@ class Experiment:
         if noise_model is not None:
             whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
         basis = with_uncertain(nuisance, uncertain)
-        return Condensed(self.torque, self.torque.snapped(time_s), basis, whitening)
+        rows = SweptRows if self.torque.sweeps else Condensed
+        return rows(self.torque, self.torque.snapped(time_s), basis, whitening)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""
         chosen = [(parameters[p.name], self.ranges[p.range_name]) for p in self.searched.parameters]
         return np.log([max(value, genes.low) for value, genes in chosen])
+
+
+def _mean_size(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def pose(

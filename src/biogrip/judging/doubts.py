@@ -22,7 +22,7 @@ from functools import partial
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.digits import counted, plain
+from biogrip.digits import counted, one_in, plain
 from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
@@ -54,6 +54,7 @@ from biogrip.judging.levels import (
     UNRESOLVED,
 )
 from biogrip.judging.likelihood import Likelihood
+from biogrip.judging.sweeps import about_moduli
 from biogrip.judging.whiteness import (
     as_correlated,
     by_leverage,
@@ -105,8 +106,6 @@ def find_reasons(notes: Sequence[Note]) -> list[str]:
 
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
 MANY = 100_000
-# Smaller chances are not told apart.
-_NEVER = 1e-6
 # Most outliers that are named, and lines of a spectrum.
 _NAMED, _MOST_LINES = 5, 3
 
@@ -153,7 +152,8 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     correlation, chance = correlated(bulk, basis)
     notes = list(_about_given(likelihood, bulk))
     found = None
-    lines = list(_lines(bulk, basis, residuals, scale)) if whole else []
+    in_time = not residuals.course.sweeps
+    lines = list(_lines(bulk, basis, residuals, scale)) if whole and in_time else []
     if chance < CERTAIN_MISFIT and times > TOO_MUCH and not lines:
         found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
         notes.clear()
@@ -170,11 +170,11 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     # Outliers distort a fit, so that all that it leaves is correlated.
     if whole:
         suspects = partial(name_suspects, residuals, times, scale)
-        colour = list(_about_colour(bulk, basis, correlation, chance, suspects))
+        colour = list(_about_colour(bulk, basis, correlation, chance, suspects, in_time=in_time))
         changes = _about_changes(residuals, bulk, basis, growth, coloured=bool(colour))
         doubts += lines or changes or (colour if not found else [])
     notes += (Note(DOUBT, doubt) for doubt in doubts)
-    if notes and not residuals.coloured and compute_status(notes) == DOUBTFUL:
+    if notes and in_time and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         notes.append(
             Note(
                 HARMLESS,
@@ -219,7 +219,7 @@ def _misfit(
             "Most readings repeat the one before, as of a sensor that is read less often than it "
             "is logged: keep one of each."
         )
-    elif has_fast_noise(residuals, *left):
+    elif not residuals.course.sweeps and has_fast_noise(residuals, *left):
         text = (
             f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
             "correlated for a short time."
@@ -249,15 +249,16 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     fit = fit_any_sample(residuals)
     other = fit.sd / scale
     noises = counted(plain(other, 2), "noise")
+    if residuals.course.sweeps:
+        culprits, protocol = "inertia, slip, a strain beyond the linear range, or a change", ""
+    else:
+        culprits, protocol = "load, clock, contact or drift", " under this protocol"
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
     if correlated(*fit.left_of_readings())[1] >= FALSE_ALARM:
         return inadequate
     if other * TOO_MUCH < times:
-        return f"{inadequate}; what that leaves is of load, clock, contact or drift"
-    return (
-        "no linear sample gives this trace under this protocol, but leaves at least "
-        f"{noises}: load, clock, contact or drift"
-    )
+        return f"{inadequate}; what that leaves is of {culprits}"
+    return f"no linear sample gives this trace{protocol}, but leaves at least {noises}: {culprits}"
 
 
 def _about_growth(
@@ -288,23 +289,25 @@ def _about_colour(
     correlation: float,
     chance: float,
     suspects: Callable[[], str],
+    *,
+    in_time: bool,
 ) -> Iterator[str]:
     """Yield a sentence for each test of white noise that residuals, (n_samples,), fail.
 
-    The correlation of neighbours and its chance are given.
+    The correlation of neighbours and its chance are given. A spectrum is of residuals `in_time`.
     """
     if chance < FALSE_ALARM:
         yield (
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
             f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {suspects()}."
         )
-    elif (chance := uneven(residual, basis)) < FALSE_ALARM:
+    elif in_time and (chance := uneven(residual, basis)) < FALSE_ALARM:
         yield (
             "The residual has more of some frequencies than of others, as white noise has only "
             f"{one_in(chance)} traces: the intervals are wrong, or {suspects()}."
         )
     chance = wandering(residual, basis)
-    if chance < FALSE_ALARM:
+    if in_time and chance < FALSE_ALARM:
         yield (
             "The residual wanders: its means over stretches of the trace scatter as much as those "
             f"of white noise do only {one_in(chance)} traces. It contains something slow that the "
@@ -342,6 +345,8 @@ def _about_changes(
     Residuals, (n_samples,), are over the growth of the noise; they may seem to be coloured.
     """
     trace = residuals.trace
+    if residuals.course.sweeps:
+        return [] if coloured else list(about_moduli(residuals, residual, basis, growth))
     step = find_step(residual, basis, lambda rows: trace.condensed.cleared(rows) / growth)
     if step and step.chance < FALSE_ALARM and not (coloured and _is_coloured(step)):
         before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
@@ -382,15 +387,16 @@ def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
     """Yield a sentence that names outliers by their times."""
     far = residuals.trace.time_s[struck]
     if len(far):
-        named = ", ".join(f"{each:.6g} s" for each in far[:_NAMED])
+        named = ", ".join(map(residuals.course.place, far[:_NAMED]))
         more = f" and {len(far) - _NAMED} more" if len(far) > _NAMED else ""
+        of = "" if residuals.course.sweeps else " of the protocol"
         at_step = (
             " Readings at the very instant of a step may be of either side of it: leave them out."
             if np.isin(far, residuals.course.steps_s).any()
             else ""
         )
         yield (
-            f"{counted(len(far), 'outlier')}, at {named}{more} of the protocol: further from the "
+            f"{counted(len(far), 'outlier')}, at {named}{more}{of}: further from the "
             f"fit than noise as that of the other readings is. Outliers distort the fit.{at_step}"
         )
 
@@ -421,13 +427,6 @@ def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
             DOUBT if much else HARMLESS,
             f"What the fit leaves is {plain(share, 3)} times the noise that was given: {so}.",
         )
-
-
-def one_in(chance: float) -> str:
-    """Return a probability in words, e.g. ``"once in 2000"``."""
-    if chance < _NEVER:
-        return "less than once in a million"
-    return f"once in {plain(1 / chance, 1)}"
 
 
 # Of so many stretches of a trace with stationary noise, which is correlated for less than half a

@@ -93,6 +93,33 @@ class Course:
         """
         return self.time_s[np.any(self.changes[:, : 1 + self.deforms], axis=1)]
 
+    @property
+    def sweeps(self) -> bool:
+        """True if frequencies are swept: see `biogrip.physics.sweep`."""
+        return False
+
+    def responses_at(self, rates: Array, places: Array, *, slopes: bool) -> Array | None:
+        """Return what modes show at all places at once; None of a course in time."""
+        return None
+
+    def spread_s(self, time_s: Array) -> tuple[float, float]:
+        """Return the shortest and the longest time that readings are apart."""
+        return float(np.min(np.diff(time_s))), float(np.ptp(time_s))
+
+    def covered_s(self, time_s: Array) -> tuple[float, float]:
+        """Return from when to when after a change of what is controlled there are readings."""
+        after = time_s[time_s > self.changes_s[0]]
+        elapsed = after - self.changes_s[self.changes_s.searchsorted(after) - 1]
+        return float(elapsed.min()), float(after[-1] - self.changes_s[0])
+
+    def lasts_s(self, time_s: Array) -> float:
+        """Return the longest time that readings tell of."""
+        return float(time_s[-1])
+
+    def place(self, time_s: float) -> str:
+        """Return in words where a reading is."""
+        return f"{time_s:.6g} s"
+
     def times(self, factor: float) -> "Course":
         """Return the protocol with all that is controlled multiplied by a factor."""
         scaled = factor * self.changes, factor * self.within_phases

@@ -14,7 +14,14 @@ from pydantic import BeforeValidator, Field, Tag
 from biogrip.keys import BY_KIND, Block, Complaint, OneOf
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION
 from biogrip.physics.noise import Noise
-from biogrip.traces.columns import TIME_UNITS, Columns, known_unit, trace_file_problem
+from biogrip.traces.columns import (
+    FREQUENCY_UNITS,
+    PARTNERS,
+    TIME_UNITS,
+    Columns,
+    known_unit,
+    trace_file_problem,
+)
 
 COLOURED = "coloured"
 NOISE_MODELS = ("white", COLOURED)
@@ -29,8 +36,8 @@ READINGS = tuple(INSTRUMENTS)
 
 _OF_FILE = (
     *("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "scale", "block"),
-    *("rows", "load", "load_unit"),
-    *("average_repeated", "from_s", "until_s", *KNOWN_NOISE, "start_s", "fit_start"),
+    *("rows", "load", "load_unit", "frequency", "frequency_unit", *PARTNERS, "partner_unit"),
+    *("loss_sd", "average_repeated", "from_s", "until_s", *KNOWN_NOISE, "start_s", "fit_start"),
 )
 
 
@@ -73,6 +80,26 @@ class MeasurementBlock(Block):
     modulus: _Name = None
     """Name of that of relaxation moduli: stresses over the largest strain that is held
     (relaxation)."""
+    storage: _Name = None
+    """Name of that of storage moduli of a frequency sweep (`instrument: oscillation`)."""
+    complex_modulus: _Name = None
+    """Name of that of absolute values of the complex modulus (oscillation)."""
+    storage_stiffness: _Name = None
+    """Name of that of storage moduli in N/m (oscillation)."""
+    frequency: _Name = None
+    """Name of the file's column of frequencies of a sweep, in any order."""
+    loss: _Name = None
+    """Name of that of loss moduli; a sweep has this, phase or loss_factor."""
+    phase: _Name = None
+    """Name of that of phases between strain and stress."""
+    loss_factor: _Name = None
+    """Name of that of loss factors, loss over storage modulus (tan delta)."""
+    frequency_unit: Annotated[str | None, OneOf(FREQUENCY_UNITS), _unit(FREQUENCY_UNITS)] = None
+    """Unit of the frequencies, where the column's name does not end in it."""
+    partner_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
+    """Unit of loss moduli or phases, likewise; of loss moduli by default that of the readings."""
+    loss_sd: _Name = None
+    """Name of that of standard deviations of the loss moduli, where sd has those of the others."""
     time_unit: Annotated[str | None, OneOf(TIME_UNITS), _unit(TIME_UNITS)] = None
     """Unit of the times, where the column's name does not end in it."""
     rotation_unit: Annotated[str | None, OneOf(ROTATION.units), _unit(ROTATION.units)] = None
@@ -96,9 +123,11 @@ class MeasurementBlock(Block):
     """If true, average the readings of equal times, as a rounded clock writes them."""
     from_s: Annotated[float | None, Field(ge=-1e12, le=1e12)] = None
     """First time of the file's clock to use: readings before it are left out, as where a rheometer
-    has not yet reached its strain. The protocol stays. By default all are used."""
+    has not yet reached its strain. The protocol stays. Of a sweep the lowest frequency to use, in
+    the unit of its column. By default all are used."""
     until_s: Annotated[float | None, Field(ge=-1e12, le=1e12)] = None
-    """Last time of the file's clock to use, as before a sample slips."""
+    """Last time of the file's clock to use, as before a sample slips; or the highest frequency, as
+    below that from which inertia shows."""
     scale: Annotated[float | None, Field(ge=-1e30, le=1e30)] = None
     """Rotation, in its unit, over the number in the column: for a sensor's volts, or -1 for a
     rotation that is positive where the arm opens. By default 1."""
@@ -139,19 +168,28 @@ class MeasurementBlock(Block):
     def columns(self) -> Columns:
         """Columns of a recorded trace's file."""
         (name,) = self.readings
-        assert self.time is not None
+        axis = self.frequency if INSTRUMENTS[name].sweeps else self.time
+        assert axis is not None
+        partner = next((each for each in INSTRUMENTS[name].partners if self._has(each.name)), None)
         same = (
-            *("time_unit", "start_s", "sd", "block", "average_repeated", "from_s", "until_s"),
-            *("rows", "load", "load_unit"),
+            *("start_s", "sd", "block", "average_repeated", "from_s", "until_s"),
+            *("rows", "load", "load_unit", "partner_unit", "loss_sd"),
         )
         return Columns(
-            self.time,
+            axis,
             getattr(self, name),
+            time_unit=self.time_unit or self.frequency_unit,
+            partner=partner,
+            partner_column=getattr(self, partner.name) if partner else "",
             reading_unit=self.rotation_unit or self.reading_unit,
             scale=1.0 if self.scale is None else self.scale,
             quantity=INSTRUMENTS[name].read,
             **{key: getattr(self, key) for key in same},
         )
+
+    def _has(self, key: str) -> bool:
+        """Return True if a key is given."""
+        return getattr(self, key) is not None
 
     @property
     def readings(self) -> list[str]:
@@ -192,11 +230,33 @@ class MeasurementBlock(Block):
                 if given is not None and given is not False:
                     yield (key,), "is only for a recorded trace, whose measurement has a file."
             return
-        if self.time is None:
+        swept = bool(self.readings) and INSTRUMENTS[self.readings[0]].sweeps
+        if swept:
+            yield from self._sweep_complaints()
+        elif self.time is None:
             yield ("time",), "is missing: a recorded trace needs the name of its time column."
         yield from self._reading_complaints()
         if self.file != ARRAYS and (complaint := trace_file_problem(self.file)):
             yield ("file",), complaint
+
+    def _sweep_complaints(self) -> Iterator[Complaint]:
+        """Find what a sweep lacks, and what only a trace in time has."""
+        if self.frequency is None:
+            yield ("frequency",), "is missing: a sweep needs the name of its frequency column."
+        partners = [name for name in PARTNERS if self._has(name)]
+        if len(partners) != 1:
+            found = " and ".join(partners) or "nothing"
+            text = f"beside {self.readings[0]} found {found}, allowed is one of"
+            yield (self.readings[0],), f"{text} {', '.join(PARTNERS)}, as in --reading loss=COLUMN."
+        if self._has("sd") != self._has("loss_sd") or (self._has("sd") and not self._has("loss")):
+            yield ("sd",), "of a sweep goes with loss and loss_sd: both moduli need deviations."
+        for key in ("start_s", "load"):
+            if self._has(key):
+                yield (key,), "is of a trace in time, and this is a frequency sweep; leave it out."
+        for key in ("fit_start", "offset", "drift", "coloured"):
+            if getattr(self, key):
+                key = "noise_model" if key == "coloured" else key
+                yield (key,), "is of a trace in time, and this is a frequency sweep; leave it out."
 
     def _reading_complaints(self) -> Iterator[Complaint]:
         if not self.readings:

@@ -7,13 +7,15 @@ A unit is stated, stands at the end of the column's name, as in ``rotation_urad`
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from math import pi
 from pathlib import Path
 from unicodedata import normalize
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
+from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel, Instrument
 from biogrip.terminal import visible
 
+FREQUENCY_UNITS = {"rad/s": 1.0, "Hz": 2 * pi, "1/s": 1.0, "mHz": 2e-3 * pi, "kHz": 2e3 * pi}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86_400.0}
 
 # In any case of letters; no time has a unit with a capital.
@@ -43,13 +45,22 @@ _SURELY = (
 _PERHAPS = (r"[_\s]([^\s_]+)$", r"(?i)(%|‰|percent|pct|(?:micro|milli|[um])strain)$")
 # Pa^-1, Pa**-1, Pa-1, and with digits above the line, which `plain_name` brings down.
 _RECIPROCAL = re.compile(r"([A-Za-z]+)(?:\^|\*\*)?\(?[-\u2212]1\)?")
-# Names of pure numbers that have no unit: a word, or more that end with one for a strain.
+# Names of pure numbers that have no unit: a word, more that end with one for a strain, and names
+# of tan(delta).
 _PURE = re.compile(
-    r"[^\W\d_]+|(?:[\w.,-]*[\w.,]?[ _-])*(?:strain|deformation|gamma|epsilon|eps|[γεϵ])", re.I
+    r"[^\W\d_]+|(?:[\w.,-]*[\w.,]?[ _-])*(?:strain|deformation|gamma|epsilon|eps|[γεϵ])"
+    r"|(?:(?:loss|damping)[ _]?(?:factor|tangent) *)?\(?(?:tan[ _]?\(?(?:delta|[dδ])\)?)?\)?",
+    re.I,
 )
 # Of two lengths, as Lp/Rp, and units that no column here has.
 _RATIO = re.compile(r"[^\W\d_]+\d*\s*/\s*([^\W_]+)")
-_UNITS = {*TIME_UNITS, *["V", "mV", "uV", "A", "mA", "px", "pixel", "pixels", "counts"]}
+# 1/s in a column of this name is rad/s; in another it may as well be Hz.
+_ANGULAR = re.compile("ang|omega|ω|kreis", re.I)
+_UNITS = {
+    *TIME_UNITS,
+    *FREQUENCY_UNITS,
+    *["V", "mV", "uV", "A", "mA", "px", "pixel", "pixels", "counts"],
+}
 _UNITS |= {unit for each in INSTRUMENTS.values() for unit in each.read.units}
 _NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
 # A number with what may be its unit behind it.
@@ -57,6 +68,9 @@ _SIZED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*?)\s*", r
 # Keys that no option of the command sets but `--set`, with what they may say.
 _BY_SET = {
     "time_unit": "UNIT",
+    "frequency_unit": "UNIT",
+    "partner_unit": "UNIT",
+    "loss_sd": "COLUMN",
     "rotation_unit": "UNIT",
     "reading_unit": "UNIT",
     "load_unit": "UNIT",
@@ -64,6 +78,8 @@ _BY_SET = {
     "average_repeated": "true",
     "scale": "-1",
 }
+PARTNERS = {each.name: each for of in INSTRUMENTS.values() for each in of.partners}
+"""What sweeps read beside another modulus, by name."""
 _MOST_LISTED = 50
 _LONGEST_SHOWN = 40
 _LONGEST_PATH = 200
@@ -74,11 +90,11 @@ class Columns:
     """Names and units of the columns of a trace, and which of its rows are used."""
 
     time: str
-    """Name of the column of times."""
+    """Name of the column of times, or of a sweep's frequencies."""
     reading: str
     """Name of that of what the instrument reads."""
     time_unit: str | None = None
-    """Key of `TIME_UNITS`; None if the file has the unit."""
+    """Key of `axis_units`; None if the file has the unit."""
     reading_unit: str | None = None
     """Key of the quantity's units, likewise."""
     scale: float = 1.0
@@ -105,6 +121,29 @@ class Columns:
     """Name of the column of what was controlled, if that is to be read."""
     load_unit: str | None = None
     """Key of its units."""
+    partner: Channel | None = None
+    """What a sweep reads beside the quantity."""
+    partner_column: str = ""
+    """Name of its column."""
+    partner_unit: str | None = None
+    """Key of its units; None if the file has the unit."""
+    loss_sd: str | None = None
+    """Name of the column of standard deviations of the loss modulus."""
+
+    @property
+    def instrument(self) -> Instrument:
+        """What reads it."""
+        return INSTRUMENTS[self.quantity.name]
+
+    @property
+    def axis(self) -> str:
+        """What readings follow: frequency or time."""
+        return "frequency" if self.instrument.sweeps else "time"
+
+    @property
+    def axis_units(self) -> Mapping[str, float]:
+        """Its units, as multiples of rad/s or s."""
+        return FREQUENCY_UNITS if self.instrument.sweeps else TIME_UNITS
 
     @property
     def unit_key(self) -> str:
@@ -114,14 +153,15 @@ class Columns:
     @property
     def named(self) -> dict[str, str]:
         """Names of the columns by the key that says them, in the order of reading."""
-        names = {"time": self.time, self.quantity.name: self.reading}
-        more = {"sd": self.sd, "load": self.load}
+        names = {self.axis: self.time, self.quantity.name: self.reading}
+        names |= {self.partner.name: self.partner_column} if self.partner else {}
+        more = {"sd": self.sd, "loss_sd": self.loss_sd, "load": self.load}
         return names | {key: name for key, name in more.items() if name is not None}
 
     @property
     def controlled(self) -> Channel:
         """What was controlled."""
-        return INSTRUMENTS[self.quantity.name].controlled
+        return self.instrument.controlled
 
     def said_by(self, *keys: str) -> str:
         """Return the options or config keys that say something, for messages."""
@@ -134,7 +174,11 @@ class Columns:
 def _option(key: str) -> str:
     if key in _BY_SET:
         return f"--set measurement.{key}={_BY_SET[key]}"
-    return "--reading" if key in INSTRUMENTS else f"--{key}"
+    return (
+        f"--reading {key}=COLUMN"
+        if key in PARTNERS
+        else ("--reading" if key in INSTRUMENTS else f"--{key}")
+    )
 
 
 def unit_of(
@@ -160,6 +204,8 @@ def unit_of(
     unit = (at_end or in_row) if given is None else known_unit(given, allowed)
     if given is not None and unit is None:
         raise BiogripError(f"{where}: found the unit '{given}', allowed are {choices}.")
+    if unit == "1/s" and "Hz" in allowed and not _ANGULAR.search(plain_name(column)):
+        raise BiogripError(f"{where}: found the unit 1/s; allowed are rad/s or Hz, by {said_by}.")
     if unit is None and "1" in allowed and _bare(below) in ("", "-") and _is_pure(column):
         return "1"
     if unit is None:
@@ -190,8 +236,9 @@ def in_brackets(cell: str) -> bool:
 
 
 def plain_name(name: str) -> str:
-    """Return a name without padding, with either micro sign written as u, and ° as deg."""
-    return normalize("NFKC", name).strip().replace("\u03bc", "u").replace("°", "deg")
+    """Return a name without padding, with either micro sign as u, ° as deg, and primes as '."""
+    plain = normalize("NFKC", name).strip().replace("\u03bc", "u").replace("°", "deg")
+    return plain.replace("\u2032", "'").replace('"', "''")
 
 
 def known_unit(written: str, allowed: Collection[str]) -> str | None:

@@ -11,9 +11,9 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
+from biogrip.physics.instruments import PHASE
 from biogrip.terminal import visible
 from biogrip.traces.columns import (
-    TIME_UNITS,
     Columns,
     listed,
     place,
@@ -33,7 +33,19 @@ from biogrip.traces.tables import (
 )
 
 FEWEST_SAMPLES = 10
+SUFFIXES = {"time": "_s", "frequency": "_rad_per_s"}
+"""Ends of keys for the first and the last place of the readings."""
+_BEYOND_A_QUARTER = (
+    "The phase is beyond 90 degrees, as where the inertia of instrument or sample outweighs the "
+    "sample at high frequencies: correct for it, or leave these rows out (--until). Of a liquid it "
+    "may be noise, too."
+)
+_BELOW_ZERO = (
+    "The sample would give energy instead of losing it: the phase has the wrong sign or offset, or "
+    "the loss is below the noise."
+)
 
+_AXES = {"time": "times", "frequency": "frequencies"}
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
@@ -48,7 +60,8 @@ def form_in_words(path: Path, form: Mapping[str, Any]) -> str:
     columns = form["columns"].items()
     named = {key: f"{each['column']}, in {each['unit']}" for key, each in columns}
     found = {key: value for key, value in form.items() if key != "columns"} | named
-    rows = (f"\n  {key:<13}{visible(value)}" for key, value in found.items())
+    width = max(13, 2 + max(map(len, found)))
+    rows = (f"\n  {key:<{width}}{visible(value)}" for key, value in found.items())
     return f"{visible(path)} is read as{''.join(rows)}"
 
 
@@ -71,6 +84,8 @@ class Recording:
     """Units of the times and of the readings in the file."""
     sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
+    sd_known: bool = True
+    """False if only their ratios are, as of a sweep of which nothing says the noise."""
     onset_s: float | None = None
     """Time of the clock at which the protocol starts, if that was given or fitted."""
     gaps: int = 0
@@ -120,7 +135,8 @@ class Recording:
             said.append(f"Left out for want of a number: {rows}.")
         form = self.form
         if "averaged" in form:
-            said.append(f"Averaged at repeated times: {counted(form['averaged'], 'reading')}.")
+            axis = _AXES[self.read.axis]
+            said.append(f"Averaged at repeated {axis}: {counted(form['averaged'], 'reading')}.")
         if "outside" in form:
             said.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
         if "others" in form:
@@ -215,7 +231,7 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     }
     others = int(np.count_nonzero(~chosen)) or None
     form |= {"rows": len(values), "gaps": None, "averaged": None, "outside": None, "others": others}
-    found = _checked(path, columns, (units[0], units[1]), values[chosen], lines[chosen])
+    found = _checked(path, columns, units, values[chosen], lines[chosen])
     form |= found.form
     return replace(
         found, form={key: value for key, value in form.items() if value is not None}, load=load
@@ -242,52 +258,104 @@ def recording_of_arrays(columns: Columns, *arrays: Array) -> Recording:
     for row, column in np.argwhere(np.isinf(values))[:1]:
         name = [*columns.named.values()][column]
         raise BiogripError(f"{place(None, row, name)}: found inf, allowed are finite numbers.")
-    return _checked(None, columns, (units[0], units[1]), values, np.arange(len(values)))
+    return _checked(None, columns, units, values, np.arange(len(values)))
 
 
 def _checked(
-    path: Path | None, columns: Columns, units: tuple[str, str], values: Array, lines: IntArray
+    path: Path | None, columns: Columns, units: list[str], values: Array, lines: IntArray
 ) -> Recording:
     """Return the readings that are numbers, in SI units; refuse those that no trace can have.
 
-    Values are times, readings and perhaps standard deviations, (n_rows, 2) or (n_rows, 3).
+    Values are times, readings and perhaps standard deviations, (n_rows, 2) or (n_rows, 3); of a
+    sweep frequencies, and as many columns as are named.
     """
     gaps = np.any(np.isnan(values), axis=1)
     values, lines, without_number = values[~gaps], lines[~gaps], int(np.count_nonzero(gaps))
     _check_count(path, columns, len(values), without_number)
-    if columns.sd is not None:
-        _check_positive(path, columns.sd, values[:, 2], lines)
+    for key, place_of in (("sd", -1 if columns.loss_sd is None else -2), ("loss_sd", -1)):
+        if (column := columns.named.get(key)) is not None:
+            _check_positive(path, column, values[:, place_of], lines)
+    if columns.partner:
+        downwards = np.argsort(values[:, 0], kind="stable")
+        values, lines = values[downwards], lines[downwards]
     averaged = 0
     if columns.average_repeated:
         values, lines, averaged = _averaged(values, lines)
     _check_order(path, columns, values[:, 0], lines)
-    time_s = values[:, 0] * TIME_UNITS[units[0]]
-    used = np.ones(len(time_s), bool)
+    time_s = values[:, 0] * columns.axis_units[units[0]]
+    used, clock = np.ones(len(time_s), bool), values[:, 0] if columns.partner else time_s
     if columns.from_s is not None:
-        used &= time_s >= columns.from_s
+        used &= clock >= columns.from_s
     if columns.until_s is not None:
-        used &= time_s <= columns.until_s
+        used &= clock <= columns.until_s
     values, lines, time_s = values[used], lines[used], time_s[used]
-    _check_count(path, columns, len(values), without_number, "usable time")
+    _check_count(path, columns, len(values), without_number, f"usable {columns.axis}")
     unit = columns.quantity.units[units[1]]
     form = {
         "gaps": without_number,
         "averaged": averaged or None,
         "outside": int(np.count_nonzero(~used)) or None,
-        "first_s": float(time_s[0]),
-        "last_s": float(time_s[-1]),
+        f"first{SUFFIXES[columns.axis]}": float(time_s[0]),
+        f"last{SUFFIXES[columns.axis]}": float(time_s[-1]),
     }
+    if columns.partner:
+        found = _swept(path, columns, units, time_s, values, lines)
+        return replace(
+            found, gaps=without_number, form={key: it for key, it in form.items() if it is not None}
+        )
     return Recording(
         time_s,
         values[:, 1] * (unit * columns.scale),
         lines,
         path,
         columns,
-        units,
+        (units[0], units[1]),
         sd=None if columns.sd is None else values[:, 2] * (unit * abs(columns.scale)),
         gaps=without_number,
         form={key: value for key, value in form.items() if value is not None},
     )
+
+
+def _swept(
+    path: Path | None,
+    columns: Columns,
+    units: list[str],
+    omega: Array,
+    values: Array,
+    lines: IntArray,
+) -> Recording:
+    """Return a sweep with both moduli, which a passive sample has above zero; or refuse it."""
+    from biogrip.physics.sweep import joined
+
+    partner, read = columns.partner, columns.quantity
+    assert partner is not None
+    size = read.units[units[1]] * columns.scale
+    first, second = values[:, 1] * size, values[:, 2] * partner.units[units[2]]
+    if partner.unit == read.unit:
+        second = second * columns.scale
+        storage, loss = first, second
+        if read.name == "complex_modulus":
+            storage = np.sqrt(np.maximum(first**2 - second**2, 0.0))
+    else:
+        phase = second if partner == PHASE else np.arctan(second)
+        whole = first if read.name == "complex_modulus" else first / np.cos(phase)
+        storage, loss = whole * np.cos(phase), whole * np.sin(phase)
+    for of, wrong, cause in (
+        ("storage", storage <= 0, _BEYOND_A_QUARTER),
+        ("loss", loss <= 0, _BELOW_ZERO),
+    ):
+        for row in np.flatnonzero(wrong)[:1]:
+            shown = values[row, 0], units[0], (storage if of == "storage" else loss)[row]
+            raise BiogripError(
+                f"{place(path, lines[row])}: found at {shown[0]:g} {shown[1]} a {of} modulus of "
+                f"{shown[2]:.3g} {read.unit}; allowed is one above 0. {cause}"
+            )
+    places, readings = joined(omega, storage, loss)
+    sd = None
+    if columns.sd is not None:
+        sd = joined(omega, *(abs(size) * values[:, [-2, -1]].T))[1]
+    both = np.append(lines[::-1], lines)
+    return Recording(places, readings, both, path, columns, (units[0], units[1]), sd=sd)
 
 
 def _columns_of(
@@ -321,7 +389,7 @@ def _columns_of(
         found[same[0]] = key
         below = table.units[same[0]] if table.units else ""
         try:
-            timed = clock and key == "time"
+            timed = clock and key == columns.axis
             units.append("s" if timed else _unit(path, key, below, columns, units))
         except BiogripError as error:
             problems.append(str(error))
@@ -334,11 +402,16 @@ def _unit(path: Path | None, key: str, below: str, columns: Columns, units: list
     """Return the unit of a column; standard deviations have that of the readings before them."""
     name, given, unit_key = columns.named[key], columns.reading_unit, columns.unit_key
     allowed = columns.quantity.units
-    if key == "time":
-        given, unit_key, allowed = columns.time_unit, "time_unit", TIME_UNITS
+    if key == columns.axis:
+        given, unit_key, allowed = columns.time_unit, f"{key}_unit", columns.axis_units
+    elif columns.partner and key == columns.partner.name:
+        allowed, given = columns.partner.units, columns.partner_unit
+        if given is None and allowed == columns.quantity.units:
+            given = columns.reading_unit
+        unit_key = "partner_unit"
     elif key == "load":
         given, unit_key, allowed = columns.load_unit, "load_unit", columns.controlled.units
-    elif key == "sd":
+    elif key in ("sd", "loss_sd"):
         given = units[1] if len(units) > 1 else given
     return unit_of(path, name, given, allowed, columns.said_by(unit_key), below)
 
@@ -420,7 +493,7 @@ def _load(path: Path, columns: Columns, history: Array, lines: IntArray, units: 
     if columns.average_repeated:
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
-    sizes: Array = history * [TIME_UNITS[units[0]], columns.controlled.units[units[-1]]]
+    sizes: Array = history * [columns.axis_units[units[0]], columns.controlled.units[units[-1]]]
     return sizes
 
 
@@ -467,9 +540,9 @@ def _check_order(path: Path | None, columns: Columns, time: Array, lines: IntArr
         if now == before:
             found = f"{now:.15g} repeated"
             way = columns.said_by("average_repeated")
-            hint = f" The readings of equal times are averaged by {way}."
+            hint = f" The readings of equal {_AXES[columns.axis]} are averaged by {way}."
         by = f", by more than {least:.1g}" if now > before else ""
         raise BiogripError(
             f"{place(path, lines[row + 1], columns.time)}: found {found} "
-            f"({earlier}), allowed are times that increase{by}.{hint}"
+            f"({earlier}), allowed are {_AXES[columns.axis]} that increase{by}.{hint}"
         )
