@@ -34,6 +34,8 @@ from biogrip.physics.sweep import SWEEP, is_storage
 _SHORTEST, _LONGEST, _A_DECADE, _LASTING = 0.01, 10.0, 4, 1e6
 # The same beyond the frequencies of a sweep.
 _WIDER = 100.0
+# Second differences over their median that are of outliers.
+_OUTLYING = 6.0
 # The smooth rotation and the weights are found in turn.
 _ROUNDS = 4
 # Share of the readings whose scatter bounds the noise from below, and fewest of them.
@@ -269,9 +271,16 @@ def swept_deviations(
         smooth = np.clip(amplitudes @ family, 0.5 * readings, 2.0 * readings)
         if share is None:
             ratios = readings / smooth
-            twice = (np.diff(ratios[of], 2) for of in (storage, ~storage))
-            shares = [max(float(np.sqrt(np.mean(of**2) / 6)), _ROUNDING) for of in twice]
+            shares = [_scatter(ratios[of]) for of in (storage, ~storage)]
     return np.hypot(np.where(storage, *shares) * smooth, more), shares
+
+
+def _scatter(ratios: Array) -> float:
+    """Return the standard deviation of neighbouring values, but for outliers, (n_values,)."""
+    second = np.abs(np.diff(ratios, 2))
+    # The median of a normal distribution's is 0.67 standard deviations.
+    within = second[second <= _OUTLYING * np.median(second)]
+    return max(float(np.sqrt(np.mean(within**2) / 6)), _ROUNDING)
 
 
 def _least(sizes: Array, rest: Array, share: float) -> float:

@@ -194,11 +194,14 @@ class Experiment:
         `model`, `noise_sd`, and `condensed` from `in_noise` replace those of the case.
         """
         rows = condensed or self._condensed(time_s)
-        # Deviations of which only the ratios count are as neighbours scatter.
-        neighbours = None if self.sd is None or self.noise_sd else _mean_size(self.sd)
+        neighbours, freedom = None, np.inf
+        if self.sd is not None and self.noise_sd is None:
+            # Only ratios count: deviations are as neighbours scatter in each half of the readings.
+            neighbours, freedom = _mean_size(self.sd), 0.5 * len(readings) - 2
         trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd, neighbours)
         given = self.gripper, model or self.searched, self.torque, trace
-        return make_problem(Residuals(*given, instrument=self.instrument), self.ranges)
+        posed = Residuals(*given, instrument=self.instrument, freedom=freedom)
+        return make_problem(posed, self.ranges)
 
     def of_each(
         self, time_s: Array, traces: Sequence[Array], model: SampleModel | None = None

@@ -54,7 +54,7 @@ from biogrip.judging.levels import (
     UNRESOLVED,
 )
 from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.sweeps import about_moduli
+from biogrip.judging.sweeps import about_moduli, find_inertia
 from biogrip.judging.whiteness import (
     as_correlated,
     by_leverage,
@@ -212,7 +212,8 @@ def _misfit(
         return Remainder([Note(DOUBT, text)])
     more, read = plain(times, 2), residuals.trace.readings
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak
-    of_peak = f"{plain(100 * share, 2)} % of the peak"
+    relative = residuals.course.sweeps and residuals.coloured
+    of_peak = f"{plain(100 * share, 2)} % of the {'moduli' if relative else 'peak'}"
     suspects = name_suspects(residuals, times, scale)
     if not residuals.rounding and np.mean(read[1:] == read[:-1]) > REPEATED:
         text = (
@@ -234,7 +235,8 @@ def _misfit(
         return Remainder([Note(REJECTION, text)])
     misfit = as_correlated(*bulk)
     if misfit[0] < 1:
-        text += " It is as slow as the trace, which the limits allow for."
+        slow = "broad as the sweep" if residuals.course.sweeps else "slow as the trace"
+        text += f" It is as {slow}, which the limits allow for."
     else:
         counted_as = f"{plain(misfit[0], 2)} independent ones"
         text += f" The limits count the {len(bulk[0])} residuals as {counted_as}."
@@ -249,16 +251,16 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     fit = fit_any_sample(residuals)
     other = fit.sd / scale
     noises = counted(plain(other, 2), "noise")
+    gives, culprits = "gives this trace under this protocol", "load, clock, contact or drift"
+    left = fit.left_of_readings()
     if residuals.course.sweeps:
-        culprits, protocol = "inertia, slip, a strain beyond the linear range, or a change", ""
-    else:
-        culprits, protocol = "load, clock, contact or drift", " under this protocol"
+        gives, culprits = "has both moduli (Kramers-Kronig)", find_inertia(residuals, *left)
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
-    if correlated(*fit.left_of_readings())[1] >= FALSE_ALARM:
+    if correlated(*left)[1] >= FALSE_ALARM:
         return inadequate
     if other * TOO_MUCH < times:
         return f"{inadequate}; what that leaves is of {culprits}"
-    return f"no linear sample gives this trace{protocol}, but leaves at least {noises}: {culprits}"
+    return f"no linear sample {gives}, but leaves at least {noises}: {culprits}"
 
 
 def _about_growth(

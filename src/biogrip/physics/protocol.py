@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import factorial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -64,6 +65,9 @@ class Course:
     """End of the protocol."""
     deforms: bool = False
     """True if a deformation is controlled, and the load is read: relaxation."""
+    sweeps: ClassVar[bool] = False
+    """True if it is a `biogrip.physics.sweep.Sweep`, whose readings do not follow one another in
+    time."""
 
     @property
     def jumps(self) -> list[tuple[float, int, float]]:
@@ -92,11 +96,6 @@ class Course:
         Of a deformation, they are also those at which its rate jumps, and with it a damper's force.
         """
         return self.time_s[np.any(self.changes[:, : 1 + self.deforms], axis=1)]
-
-    @property
-    def sweeps(self) -> bool:
-        """True if frequencies are swept: see `biogrip.physics.sweep`."""
-        return False
 
     def responses_at(self, rates: Array, places: Array, *, slopes: bool) -> Array | None:
         """Return what modes show at all places at once; None of a course in time."""

@@ -25,10 +25,7 @@ from biogrip.physics.protocol import Course
 class Sweep(Course):
     """The course of a sweep of small strains, over all frequencies; moduli are over the strain."""
 
-    @property
-    def sweeps(self) -> bool:
-        """True."""
-        return True
+    sweeps = True
 
     def responses_at(self, rates: Array, places: Array, *, slopes: bool) -> Array:
         """Return moduli of springs that forget at negative rates, (1 + slopes, ..., n_places).
@@ -48,9 +45,7 @@ class Sweep(Course):
         omega = np.abs(time_s)
         return float(1 / omega.max()), float(1 / omega.min())
 
-    def covered_s(self, time_s: Array) -> tuple[float, float]:
-        """Return the same."""
-        return self.spread_s(time_s)
+    covered_s = spread_s
 
     def lasts_s(self, time_s: Array) -> float:
         """Return the inverse of the lowest frequency."""
