@@ -34,10 +34,12 @@ ARRAYS = "<arrays>"
 READINGS = tuple(INSTRUMENTS)
 """Keys that name the column of the readings, one for each quantity that an instrument reads."""
 
+_SWEPT = tuple(name for name, instrument in INSTRUMENTS.items() if instrument.sweeps)
+_OF_SWEEPS = ("frequency", "frequency_unit", *PARTNERS, "partner_unit", "loss_sd")
 _OF_FILE = (
-    *("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "scale", "block"),
-    *("rows", "load", "load_unit", "frequency", "frequency_unit", *PARTNERS, "partner_unit"),
-    *("loss_sd", "average_repeated", "from_s", "until_s", *KNOWN_NOISE, "start_s", "fit_start"),
+    *("time", *READINGS, *_OF_SWEEPS, "time_unit", "rotation_unit", "reading_unit", "scale"),
+    *("block", "rows", "load", "load_unit", "average_repeated", "from_s", "until_s"),
+    *(*KNOWN_NOISE, "start_s", "fit_start"),
 )
 
 
@@ -170,7 +172,9 @@ class MeasurementBlock(Block):
         (name,) = self.readings
         axis = self.frequency if INSTRUMENTS[name].sweeps else self.time
         assert axis is not None
-        partner = next((each for each in INSTRUMENTS[name].partners if self._has(each.name)), None)
+        partner = next(
+            (each for each in INSTRUMENTS[name].partners if getattr(self, each.name)), None
+        )
         same = (
             *("start_s", "sd", "block", "average_repeated", "from_s", "until_s"),
             *("rows", "load", "load_unit", "partner_unit", "loss_sd"),
@@ -186,10 +190,6 @@ class MeasurementBlock(Block):
             quantity=INSTRUMENTS[name].read,
             **{key: getattr(self, key) for key in same},
         )
-
-    def _has(self, key: str) -> bool:
-        """Return True if a key is given."""
-        return getattr(self, key) is not None
 
     @property
     def readings(self) -> list[str]:
@@ -230,33 +230,32 @@ class MeasurementBlock(Block):
                 if given is not None and given is not False:
                     yield (key,), "is only for a recorded trace, whose measurement has a file."
             return
-        swept = bool(self.readings) and INSTRUMENTS[self.readings[0]].sweeps
-        if swept:
-            yield from self._sweep_complaints()
-        elif self.time is None:
-            yield ("time",), "is missing: a recorded trace needs the name of its time column."
+        yield from self._axis_complaints()
         yield from self._reading_complaints()
         if self.file != ARRAYS and (complaint := trace_file_problem(self.file)):
             yield ("file",), complaint
 
-    def _sweep_complaints(self) -> Iterator[Complaint]:
-        """Find what a sweep lacks, and what only a trace in time has."""
+    def _axis_complaints(self) -> Iterator[Complaint]:
+        """Find what a sweep or a trace in time lacks, and what only the other one has."""
+        given = {key for key, value in vars(self).items() if value not in (None, False)}
+        if not any(INSTRUMENTS[name].sweeps for name in self.readings):
+            if self.time is None:
+                yield ("time",), "is missing: a recorded trace needs the name of its time column."
+            for key in sorted(given & {*_OF_SWEEPS}):
+                yield (key,), f"is of a frequency sweep, which reads {' or '.join(_SWEPT)}."
+            return
         if self.frequency is None:
             yield ("frequency",), "is missing: a sweep needs the name of its frequency column."
-        partners = [name for name in PARTNERS if self._has(name)]
-        if len(partners) != 1:
-            found = " and ".join(partners) or "nothing"
-            text = f"beside {self.readings[0]} found {found}, allowed is one of"
-            yield (self.readings[0],), f"{text} {', '.join(PARTNERS)}, as in --reading loss=COLUMN."
-        if self._has("sd") != self._has("loss_sd") or (self._has("sd") and not self._has("loss")):
+        if len(partners := given & {*PARTNERS}) != 1:
+            found = " and ".join(sorted(partners)) or "none"
+            text = f"goes with one of {', '.join(PARTNERS)}; found {found}"
+            yield (self.readings[0],), f"{text}. Say which, as in --reading loss=COLUMN."
+        if len(given & {"sd", "loss_sd"}) == 1 or ("sd" in given and "loss" not in given):
             yield ("sd",), "of a sweep goes with loss and loss_sd: both moduli need deviations."
-        for key in ("start_s", "load"):
-            if self._has(key):
-                yield (key,), "is of a trace in time, and this is a frequency sweep; leave it out."
-        for key in ("fit_start", "offset", "drift", "coloured"):
-            if getattr(self, key):
-                key = "noise_model" if key == "coloured" else key
-                yield (key,), "is of a trace in time, and this is a frequency sweep; leave it out."
+        for key in sorted(given & {"start_s", "load", "fit_start", "offset", "drift"}):
+            yield (key,), "is of a trace in time, and this is a frequency sweep; leave it out."
+        if self.coloured:
+            yield ("noise_model",), "found coloured, allowed with a frequency sweep is white."
 
     def _reading_complaints(self) -> Iterator[Complaint]:
         if not self.readings:

@@ -49,18 +49,14 @@ _RECIPROCAL = re.compile(r"([A-Za-z]+)(?:\^|\*\*)?\(?[-\u2212]1\)?")
 # of tan(delta).
 _PURE = re.compile(
     r"[^\W\d_]+|(?:[\w.,-]*[\w.,]?[ _-])*(?:strain|deformation|gamma|epsilon|eps|[γεϵ])"
-    r"|(?:(?:loss|damping)[ _]?(?:factor|tangent) *)?\(?(?:tan[ _]?\(?(?:delta|[dδ])\)?)?\)?",
+    r"|(?:loss|damping)[ _](?:factor|tangent)|(?:.* )?tan[ _]?\(?(?:delta|[dδ])\)?",
     re.I,
 )
 # Of two lengths, as Lp/Rp, and units that no column here has.
 _RATIO = re.compile(r"[^\W\d_]+\d*\s*/\s*([^\W_]+)")
 # 1/s in a column of this name is rad/s; in another it may as well be Hz.
 _ANGULAR = re.compile("ang|omega|ω|kreis", re.I)
-_UNITS = {
-    *TIME_UNITS,
-    *FREQUENCY_UNITS,
-    *["V", "mV", "uV", "A", "mA", "px", "pixel", "pixels", "counts"],
-}
+_UNITS = {*TIME_UNITS, *["V", "mV", "uV", "A", "mA", "px", "pixel", "pixels", "counts"]}
 _UNITS |= {unit for each in INSTRUMENTS.values() for unit in each.read.units}
 _NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
 # A number with what may be its unit behind it.
@@ -174,11 +170,9 @@ class Columns:
 def _option(key: str) -> str:
     if key in _BY_SET:
         return f"--set measurement.{key}={_BY_SET[key]}"
-    return (
-        f"--reading {key}=COLUMN"
-        if key in PARTNERS
-        else ("--reading" if key in INSTRUMENTS else f"--{key}")
-    )
+    if key in PARTNERS:
+        return f"--reading {key}=COLUMN"
+    return "--reading" if key in INSTRUMENTS else f"--{key}"
 
 
 def unit_of(

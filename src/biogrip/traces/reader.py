@@ -12,6 +12,7 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
 from biogrip.physics.instruments import PHASE
+from biogrip.physics.sweep import joined
 from biogrip.terminal import visible
 from biogrip.traces.columns import (
     Columns,
@@ -33,18 +34,15 @@ from biogrip.traces.tables import (
 )
 
 FEWEST_SAMPLES = 10
-SUFFIXES = {"time": "_s", "frequency": "_rad_per_s"}
-"""Ends of keys for the first and the last place of the readings."""
-_BEYOND_A_QUARTER = (
-    "The phase is beyond 90 degrees, as where the inertia of instrument or sample outweighs the "
-    "sample at high frequencies: correct for it, or leave these rows out (--until). Of a liquid it "
-    "may be noise, too."
-)
-_BELOW_ZERO = (
-    "The sample would give energy instead of losing it: the phase has the wrong sign or offset, or "
-    "the loss is below the noise."
-)
-
+# What makes a modulus negative.
+_CAUSES = {
+    "frequency": "",
+    "storage": " The phase is beyond 90 degrees, as where inertia of the instrument or the sample "
+    "outweighs the sample at high frequencies: correct for it, or leave these rows out (--until). "
+    "Of a liquid it may be noise.",
+    "loss": " The sample would give energy instead of losing it: the phase has the wrong sign or "
+    "an offset, or the loss is below the noise.",
+}
 _AXES = {"time": "times", "frequency": "frequencies"}
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
@@ -272,15 +270,15 @@ def _checked(
     gaps = np.any(np.isnan(values), axis=1)
     values, lines, without_number = values[~gaps], lines[~gaps], int(np.count_nonzero(gaps))
     _check_count(path, columns, len(values), without_number)
-    for key, place_of in (("sd", -1 if columns.loss_sd is None else -2), ("loss_sd", -1)):
-        if (column := columns.named.get(key)) is not None:
-            _check_positive(path, column, values[:, place_of], lines)
+    for index, (key, column) in enumerate(columns.named.items()):
+        if key in ("sd", "loss_sd"):
+            _check_positive(path, column, values[:, index], lines)
     if columns.partner:
-        downwards = np.argsort(values[:, 0], kind="stable")
-        values, lines = values[downwards], lines[downwards]
+        ascending = np.argsort(values[:, 0], kind="stable")
+        values, lines = values[ascending], lines[ascending]
     averaged = 0
     if columns.average_repeated:
-        values, lines, averaged = _averaged(values, lines)
+        values, lines, averaged = _averaged(values, lines, 3 if columns.partner else 2)
     _check_order(path, columns, values[:, 0], lines)
     time_s = values[:, 0] * columns.axis_units[units[0]]
     used, clock = np.ones(len(time_s), bool), values[:, 0] if columns.partner else time_s
@@ -290,72 +288,63 @@ def _checked(
         used &= clock <= columns.until_s
     values, lines, time_s = values[used], lines[used], time_s[used]
     _check_count(path, columns, len(values), without_number, f"usable {columns.axis}")
-    unit = columns.quantity.units[units[1]]
+    unit, end = columns.quantity.units[units[1]], "rad_per_s" if columns.partner else "s"
     form = {
         "gaps": without_number,
         "averaged": averaged or None,
         "outside": int(np.count_nonzero(~used)) or None,
-        f"first{SUFFIXES[columns.axis]}": float(time_s[0]),
-        f"last{SUFFIXES[columns.axis]}": float(time_s[-1]),
+        f"first_{end}": float(time_s[0]),
+        f"last_{end}": float(time_s[-1]),
     }
+    readings, sd = values[:, 1] * (unit * columns.scale), None
+    if columns.sd is not None:
+        sd = values[:, 2] * (unit * abs(columns.scale))
     if columns.partner:
-        found = _swept(path, columns, units, time_s, values, lines)
-        return replace(
-            found, gaps=without_number, form={key: it for key, it in form.items() if it is not None}
+        moduli = _both_moduli(path, columns, units, values, lines)
+        sd = (
+            None
+            if sd is None
+            else joined(time_s, *(unit * abs(columns.scale) * values[:, 3:].T))[1]
         )
+        time_s, readings = joined(time_s, *moduli)
+        lines = np.append(lines[::-1], lines)
     return Recording(
         time_s,
-        values[:, 1] * (unit * columns.scale),
+        readings,
         lines,
         path,
         columns,
         (units[0], units[1]),
-        sd=None if columns.sd is None else values[:, 2] * (unit * abs(columns.scale)),
+        sd=sd,
         gaps=without_number,
         form={key: value for key, value in form.items() if value is not None},
     )
 
 
-def _swept(
-    path: Path | None,
-    columns: Columns,
-    units: list[str],
-    omega: Array,
-    values: Array,
-    lines: IntArray,
-) -> Recording:
-    """Return a sweep with both moduli, which a passive sample has above zero; or refuse it."""
-    from biogrip.physics.sweep import joined
-
+def _both_moduli(
+    path: Path | None, columns: Columns, units: list[str], values: Array, lines: IntArray
+) -> tuple[Array, Array]:
+    """Return storage and loss moduli of a sweep, (n_rows,) in SI units, all above zero."""
     partner, read = columns.partner, columns.quantity
     assert partner is not None
-    size = read.units[units[1]] * columns.scale
-    first, second = values[:, 1] * size, values[:, 2] * partner.units[units[2]]
+    first = values[:, 1] * (read.units[units[1]] * columns.scale)
+    second = values[:, 2] * partner.units[units[2]]
+    is_whole = read.name == "complex_modulus"
     if partner.unit == read.unit:
-        second = second * columns.scale
-        storage, loss = first, second
-        if read.name == "complex_modulus":
-            storage = np.sqrt(np.maximum(first**2 - second**2, 0.0))
+        loss = second * columns.scale
+        storage = np.sqrt(np.maximum(first**2 - loss**2, 0.0)) if is_whole else first
     else:
         phase = second if partner == PHASE else np.arctan(second)
-        whole = first if read.name == "complex_modulus" else first / np.cos(phase)
-        storage, loss = whole * np.cos(phase), whole * np.sin(phase)
-    for of, wrong, cause in (
-        ("storage", storage <= 0, _BEYOND_A_QUARTER),
-        ("loss", loss <= 0, _BELOW_ZERO),
-    ):
-        for row in np.flatnonzero(wrong)[:1]:
-            shown = values[row, 0], units[0], (storage if of == "storage" else loss)[row]
+        storage = first * np.cos(phase) if is_whole else first
+        loss = storage * np.tan(phase)
+    for name, moduli in {"frequency": values[:, 0], "storage": storage, "loss": loss}.items():
+        for row in np.flatnonzero(moduli <= 0)[:1]:
+            what = columns.time if name == "frequency" else f"{name} modulus"
             raise BiogripError(
-                f"{place(path, lines[row])}: found at {shown[0]:g} {shown[1]} a {of} modulus of "
-                f"{shown[2]:.3g} {read.unit}; allowed is one above 0. {cause}"
+                f"{place(path, lines[row])}: found a {what} of {moduli[row]:.3g} at "
+                f"{values[row, 0]:g} {units[0]}; allowed are numbers above 0.{_CAUSES[name]}"
             )
-    places, readings = joined(omega, storage, loss)
-    sd = None
-    if columns.sd is not None:
-        sd = joined(omega, *(abs(size) * values[:, [-2, -1]].T))[1]
-    both = np.append(lines[::-1], lines)
-    return Recording(places, readings, both, path, columns, (units[0], units[1]), sd=sd)
+    return storage, loss
 
 
 def _columns_of(
@@ -497,29 +486,32 @@ def _load(path: Path, columns: Columns, history: Array, lines: IntArray, units: 
     return sizes
 
 
-def _averaged(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:
+def _averaged(values: Array, lines: IntArray, first_sd: int = 2) -> tuple[Array, IntArray, int]:
     """Average rows of equal times; return the means, their first lines, and how many rows it were.
 
-    The standard deviation of a mean is the root of the sum of squares over the number.
+    From a column on they have standard deviations; that of a mean is the
+    root of the sum of squares over the number.
     """
     starts = np.flatnonzero(np.append(True, np.diff(values[:, 0]) != 0))
     counts = np.diff(np.append(starts, len(values)))
     means = np.add.reduceat(values, starts) / counts[:, None]
     means[:, 0] = values[starts, 0]
-    means[:, 2:] = np.hypot.reduceat(values[:, 2:], starts) / counts[:, None]
+    means[:, first_sd:] = np.hypot.reduceat(values[:, first_sd:], starts) / counts[:, None]
     return means, lines[starts], int(np.sum(counts[counts > 1]))
 
 
 def _check_count(
     path: Path | None, columns: Columns, found: int, without_number: int, what: str = "row"
 ) -> None:
-    if found < FEWEST_SAMPLES:
+    # Each row of a sweep has two readings.
+    fewest = FEWEST_SAMPLES // (2 if columns.partner else 1)
+    if found < fewest:
         gaps = f" ({counted(without_number, 'row')} with NaN)" if without_number else ""
         *names, last = columns.named.values()
         which = f"{'both ' if len(names) == 1 else ''}{', '.join(names)} and {last}"
         raise BiogripError(
             f"{place(path)}: found {counted(found, what)} with a number in {which}{gaps}, "
-            f"allowed are at least {FEWEST_SAMPLES}."
+            f"allowed are at least {fewest}."
         )
 
 
