@@ -115,7 +115,7 @@ def test_files_of_instruments_tell_the_same(tmp_path: Path, written: Any) -> Non
     [
         ("w,G' (Pa),G'' (Pa)", [], "column 'w': found no unit"),
         ("frequency (1/s),G' (Pa),G'' (Pa)", [], "found the unit 1/s; allowed are rad/s or Hz"),
-        ("w (rad/s),G' (Pa),G'' (Pa)", ["--hold", "1"], "this is a frequency sweep; leave it out"),
+        ("w (rad/s),G' (Pa),G'' (Pa)", ["--hold", "1"], "is of a trace in time, not of a sweep"),
         ("w (rad/s),G' (Pa),G'' (Pa)", ["--drift"], "this is a frequency sweep; leave it out"),
         ("w (rad/s),G' (Pa),G'' (Pa)", ["--reading", "phase=x"], "found loss and phase"),
         ("w (rad/s),G' (Pa),G'' (Pa)", ["--sd", "x"], "both moduli need deviations"),

@@ -100,11 +100,6 @@ def _reading(text: str) -> tuple[tuple[str, ...], Any]:
     return ("measurement", text if text in INSTRUMENTS else "rotation"), text
 
 
-def _sd(text: str) -> tuple[tuple[str, ...], Any]:
-    loss, found, column = text.partition("loss=")
-    return ("measurement", "loss_sd" if found and not loss else "sd"), column or text
-
-
 def _start(text: str) -> tuple[tuple[str, ...], Any]:
     if text == "fit":
         return ("measurement", "fit_start"), True
@@ -163,10 +158,7 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
             "force, stress, modulus (relaxation); of a sweep storage, complex_modulus or "
             "storage_stiffness, and loss, phase or loss_factor by a second --reading",
         ),
-        (
-            *("--sd", _sd, "[loss=]COLUMN"),
-            "of the readings' standard deviations; of a sweep again for the loss modulus",
-        ),
+        ("--sd", KEYS["sd"], "COLUMN", "of the readings' standard deviations"),
     ],
     "what was done": [
         (
@@ -177,14 +169,8 @@ _SETTINGS: dict[str, list[tuple[str, str | Callable[[str], Any], str, str]]] = {
         ),
         ("--load", KEYS["load"], "COLUMN", "of what was held, as recorded, instead"),
         ("--start", _start, "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
-        (
-            *("--from", KEYS["from"], "SECONDS"),
-            "first time of the clock to use, or lowest frequency in its column's unit [all]",
-        ),
-        (
-            *("--until", KEYS["until"], "SECONDS"),
-            "last time of the clock to use, or highest frequency [all]",
-        ),
+        ("--from", KEYS["from"], "PLACE", "first time, s, or frequency as written, to use [all]"),
+        ("--until", KEYS["until"], "PLACE", "last time, s, or frequency as written, to use [all]"),
     ],
     "the noise and the instrument": [
         ("--noise", KEYS["noise"], "SD", "known noise, in the readings' SI unit"),

@@ -71,8 +71,6 @@ _OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
-# The protocol of a sweep, of which only the frequencies matter.
-_STRAINED = {"duration_s": 1.0}
 _MOST_SHOWN = 10
 _SEPARATORS = ",;\t"
 # Blocks whose numbers are an instrument's.
@@ -223,9 +221,10 @@ def _with_instrument(
     of_column = measurement.get(LOAD[-1]) is not None
     if instrument.sweeps:
         if level is not None:
-            text = "is of a trace in time, and this is a frequency sweep; leave it out."
-            raise BiogripError(f"--hold: {text}")
-        return {**found, "protocol": {"phases": [_STRAINED | {controlled.column: 1.0}]}}, None, None
+            raise BiogripError("--hold: is of a trace in time, not of a sweep; leave it out.")
+        # Of its protocol only the frequencies matter.
+        phase = {"duration_s": 1.0, controlled.column: 1.0}
+        return {**found, "protocol": {"phases": [phase]}}, None, None
     if level is None and not of_column:
         if "protocol" in given or instrument.has_jaws:
             return found, None, None

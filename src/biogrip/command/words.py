@@ -103,9 +103,8 @@ def misfit_in_words(found: Mapping[str, Any]) -> str:
     if not sweeps(found):
         noise = f"{noise} {in_unit(found['scatter_rad'], found)}"
         return f"{said}, {noise}, misfit {in_unit(found['misfit_rad'], found)}"
-    return (
-        f"{said}, misfit {plain(found['misfit_rad'] / found['scatter_rad'], 2)} times the {noise}"
-    )
+    ratio = plain(found["misfit_rad"] / found["scatter_rad"], 2)
+    return f"{said}, misfit {ratio} times the {noise}"
 
 
 def sweeps(found: Mapping[str, Any]) -> bool:

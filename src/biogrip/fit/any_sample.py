@@ -253,8 +253,8 @@ def proportional_deviations(problem: Experiment, time_s: Array, readings: Array)
 
 def swept_deviations(
     places: Array, readings: Array, share: float | None, more: float
-) -> tuple[Array, list[float]]:
-    """Compute standard deviations of a sweep's readings, (n_samples,), and the shares of both.
+) -> tuple[Array, dict[str, float]]:
+    """Compute standard deviations of a sweep's readings, (n_samples,), and the shares of moduli.
 
     They are in proportion to the moduli of the linear sample that is nearest, and `more` is added,
     squared. Without a share, each modulus has that by which its readings over these scatter from
@@ -272,7 +272,8 @@ def swept_deviations(
         if share is None:
             ratios = readings / smooth
             shares = [_scatter(ratios[of]) for of in (storage, ~storage)]
-    return np.hypot(np.where(storage, *shares) * smooth, more), shares
+    sd = np.hypot(np.where(storage, *shares) * smooth, more)
+    return sd, dict(zip(("storage", "loss"), shares, strict=True))
 
 
 def _scatter(ratios: Array) -> float:

@@ -30,6 +30,8 @@ from biogrip.physics.whitening import (
 
 # Key of an arm that fits leave out, and its uncertainty with it.
 _NOT_FITTED = "inertia_kgm2"
+# Degrees of freedom a reading, with which second differences of white noise tell its variance.
+_OF_DIFFERENCES = 18 / 35
 
 
 @dataclass(frozen=True)
@@ -197,7 +199,7 @@ class Experiment:
         neighbours, freedom = None, np.inf
         if self.sd is not None and self.noise_sd is None:
             # Only ratios count: deviations are as neighbours scatter in each half of the readings.
-            neighbours, freedom = _mean_size(self.sd), 0.5 * len(readings) - 2
+            neighbours, freedom = _mean_size(self.sd), 0.5 * _OF_DIFFERENCES * len(readings)
         trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd, neighbours)
         given = self.gripper, model or self.searched, self.torque, trace
         posed = Residuals(*given, instrument=self.instrument, freedom=freedom)

@@ -54,7 +54,7 @@ from biogrip.judging.levels import (
 )
 from biogrip.judging.likelihood import compute_fall, make_likelihood
 from biogrip.judging.verdicts import Finding
-from biogrip.physics.fractional import LONGEST_S, in_band
+from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.models import CANDIDATES
 from biogrip.physics.protocol import is_held
 from biogrip.physics.whitening import drift_is_flow, without
@@ -211,9 +211,9 @@ def _candidates(experiment: Experiment, fit: TraceFit) -> tuple[str, ...]:
     residuals, chosen = fit.problem.residuals, experiment.sample.candidate
     every = dict.fromkeys([*experiment.models, chosen])
     # With very many samples the dozens of modes of a springpot would take gigabytes.
-    few = residuals.samples <= _MOST_SAMPLES and experiment.torque.end_s <= LONGEST_S
-    if experiment.instrument.sweeps:
-        few = in_band(experiment.torque.spread_s(residuals.trace.time_s))
+    shortest_s, longest_s = experiment.torque.spread_s(residuals.trace.time_s)
+    few = residuals.samples <= _MOST_SAMPLES and longest_s <= LONGEST_S
+    few &= shortest_s >= SHORTEST_S
     if few and experiment.cheap_models:
         every |= dict.fromkeys(_POWER_LAWS)
     most = _most(experiment, fit)

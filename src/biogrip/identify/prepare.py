@@ -130,12 +130,9 @@ def _with_deviations(sweep: Recording, share: float | None, noise_sd: float | No
     sd, shares = swept_deviations(sweep.time_s, sweep.readings, share, noise_sd or 0.0)
     if share is not None:
         return replace(sweep, sd=sd)
-    of_storage, of_loss = (plain(100 * each, 2) for each in shares)
-    text = (
-        "Readings are weighted as they scatter from one frequency to the next, by some "
-        f"{of_storage} % of the storage and {of_loss} % of the loss modulus."
-    )
-    said = (*sweep.remarks_before, text)
+    percents = [f"{plain(100 * of, 2)} % of the {name} modulus" for name, of in shares.items()]
+    how = f"as they scatter from one frequency to the next: by {' and '.join(percents)}"
+    said = (*sweep.remarks_before, f"Readings are weighted {how}.")
     return replace(sweep, sd=sd, sd_known=False, remarks_before=said)
 
 

@@ -58,6 +58,9 @@ def about_moduli(
             "The storage and the loss modulus, each fitted by itself, differ as those with white "
             f"noise do only {one_in(chance)} sweeps: {cause}."
         )
+    if residuals.freedom < np.inf:
+        # Their weights are how they scatter.
+        return
     columns = storage, ~storage
     free = [float(np.sum(of) - np.sum(basis[:, of] ** 2)) for of in columns]
     means = [float(np.sum(residual[of] ** 2)) / n for of, n in zip(columns, free, strict=True)]
@@ -67,5 +70,5 @@ def about_moduli(
         yield (
             f"For its weights the {('storage', 'loss')[larger]} modulus scatters "
             f"{plain(np.sqrt(ratio), 2)} times as much as the other: give standard deviations of "
-            "both, by --sd and --sd loss=COLUMN."
+            "both (--sd, --set measurement.loss_sd=COLUMN)."
         )

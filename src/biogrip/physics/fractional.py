@@ -75,12 +75,6 @@ from biogrip.physics.sample_model import C_P, K_P, C, K, Network, Parameter, Sam
 SHORTEST_S, LONGEST_S = 1e-5, 1e5
 """Range of times, and of reciprocal rates, in which the ladder is a springpot to 1e-6."""
 
-
-def in_band(spread_s: tuple[float, float]) -> bool:
-    """Return True if a shortest and a longest time are within this range."""
-    return spread_s[0] >= SHORTEST_S and spread_s[1] <= LONGEST_S
-
-
 _STEP, _COUNT = 0.6, 45
 _SLOWEST_PER_S = 0.5e-5
 _NODES = 3

@@ -144,6 +144,9 @@ INSTRUMENTS: dict[str, Instrument] = {
 }
 """Instruments by the name of the quantity that they read."""
 
+PARTNERS = {each.name: each for of in INSTRUMENTS.values() for each in of.partners}
+"""What sweeps read beside another modulus, by name."""
+
 KINDS = tuple(dict.fromkeys(instrument.kind for instrument in INSTRUMENTS.values()))
 """Values of the config key `instrument`."""
 

@@ -111,10 +111,6 @@ class Course:
         elapsed = after - self.changes_s[self.changes_s.searchsorted(after) - 1]
         return float(elapsed.min()), float(after[-1] - self.changes_s[0])
 
-    def lasts_s(self, time_s: Array) -> float:
-        """Return the longest time that readings tell of."""
-        return float(time_s[-1])
-
     def place(self, time_s: float) -> str:
         """Return in words where a reading is."""
         return f"{time_s:.6g} s"

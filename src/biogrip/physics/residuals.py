@@ -94,7 +94,8 @@ class Residuals:
     @property
     def duration_s(self) -> float:
         """Time of the last reading, or the longest that a sweep tells of."""
-        return self.course.lasts_s(self.trace.time_s)
+        time_s = self.trace.time_s
+        return self.course.spread_s(time_s)[1] if self.course.sweeps else float(time_s[-1])
 
     @property
     def noise_scale(self) -> float:

@@ -47,10 +47,6 @@ class Sweep(Course):
 
     covered_s = spread_s
 
-    def lasts_s(self, time_s: Array) -> float:
-        """Return the inverse of the lowest frequency."""
-        return self.spread_s(time_s)[1]
-
     def place(self, time_s: float) -> str:
         """Return modulus and frequency in words."""
         return f"{abs(time_s):.4g} rad/s ({'storage' if is_storage(time_s) else 'loss'})"

@@ -12,16 +12,9 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field, Tag
 
 from biogrip.keys import BY_KIND, Block, Complaint, OneOf
-from biogrip.physics.instruments import INSTRUMENTS, ROTATION
+from biogrip.physics.instruments import INSTRUMENTS, PARTNERS, ROTATION
 from biogrip.physics.noise import Noise
-from biogrip.traces.columns import (
-    FREQUENCY_UNITS,
-    PARTNERS,
-    TIME_UNITS,
-    Columns,
-    known_unit,
-    trace_file_problem,
-)
+from biogrip.traces.columns import AXES, TIME_UNITS, Columns, known_unit, trace_file_problem
 
 COLOURED = "coloured"
 NOISE_MODELS = ("white", COLOURED)
@@ -34,6 +27,7 @@ ARRAYS = "<arrays>"
 READINGS = tuple(INSTRUMENTS)
 """Keys that name the column of the readings, one for each quantity that an instrument reads."""
 
+_FREQUENCIES = AXES["frequency"]
 _SWEPT = tuple(name for name, instrument in INSTRUMENTS.items() if instrument.sweeps)
 _OF_SWEEPS = ("frequency", "frequency_unit", *PARTNERS, "partner_unit", "loss_sd")
 _OF_FILE = (
@@ -96,7 +90,7 @@ class MeasurementBlock(Block):
     """Name of that of phases between strain and stress."""
     loss_factor: _Name = None
     """Name of that of loss factors, loss over storage modulus (tan delta)."""
-    frequency_unit: Annotated[str | None, OneOf(FREQUENCY_UNITS), _unit(FREQUENCY_UNITS)] = None
+    frequency_unit: Annotated[str | None, OneOf(_FREQUENCIES), _unit(_FREQUENCIES)] = None
     """Unit of the frequencies, where the column's name does not end in it."""
     partner_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
     """Unit of loss moduli or phases, likewise; of loss moduli by default that of the readings."""

@@ -12,11 +12,15 @@ from pathlib import Path
 from unicodedata import normalize
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel, Instrument
+from biogrip.physics.instruments import INSTRUMENTS, PARTNERS, ROTATION, Channel
 from biogrip.terminal import visible
 
-FREQUENCY_UNITS = {"rad/s": 1.0, "Hz": 2 * pi, "1/s": 1.0, "mHz": 2e-3 * pi, "kHz": 2e3 * pi}
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86_400.0}
+AXES = {
+    "time": TIME_UNITS,
+    "frequency": {"rad/s": 1.0, "Hz": 2 * pi, "1/s": 1.0, "mHz": 2e-3 * pi, "kHz": 2e3 * pi},
+}
+"""What readings follow, with its units as multiples of s or rad/s."""
 
 # In any case of letters; no time has a unit with a capital.
 _SPELLED_OUT = {
@@ -74,8 +78,6 @@ _BY_SET = {
     "average_repeated": "true",
     "scale": "-1",
 }
-PARTNERS = {each.name: each for of in INSTRUMENTS.values() for each in of.partners}
-"""What sweeps read beside another modulus, by name."""
 _MOST_LISTED = 50
 _LONGEST_SHOWN = 40
 _LONGEST_PATH = 200
@@ -90,7 +92,7 @@ class Columns:
     reading: str
     """Name of that of what the instrument reads."""
     time_unit: str | None = None
-    """Key of `axis_units`; None if the file has the unit."""
+    """Key of its `AXES`; None if the file has the unit."""
     reading_unit: str | None = None
     """Key of the quantity's units, likewise."""
     scale: float = 1.0
@@ -127,19 +129,9 @@ class Columns:
     """Name of the column of standard deviations of the loss modulus."""
 
     @property
-    def instrument(self) -> Instrument:
-        """What reads it."""
-        return INSTRUMENTS[self.quantity.name]
-
-    @property
     def axis(self) -> str:
-        """What readings follow: frequency or time."""
-        return "frequency" if self.instrument.sweeps else "time"
-
-    @property
-    def axis_units(self) -> Mapping[str, float]:
-        """Its units, as multiples of rad/s or s."""
-        return FREQUENCY_UNITS if self.instrument.sweeps else TIME_UNITS
+        """What readings follow: a key of `AXES`."""
+        return "frequency" if self.partner else "time"
 
     @property
     def unit_key(self) -> str:
@@ -157,7 +149,7 @@ class Columns:
     @property
     def controlled(self) -> Channel:
         """What was controlled."""
-        return self.instrument.controlled
+        return INSTRUMENTS[self.quantity.name].controlled
 
     def said_by(self, *keys: str) -> str:
         """Return the options or config keys that say something, for messages."""

@@ -15,6 +15,7 @@ from biogrip.physics.instruments import PHASE
 from biogrip.physics.sweep import joined
 from biogrip.terminal import visible
 from biogrip.traces.columns import (
+    AXES,
     Columns,
     listed,
     place,
@@ -37,13 +38,13 @@ FEWEST_SAMPLES = 10
 # What makes a modulus negative.
 _CAUSES = {
     "frequency": "",
-    "storage": " The phase is beyond 90 degrees, as where inertia of the instrument or the sample "
-    "outweighs the sample at high frequencies: correct for it, or leave these rows out (--until). "
-    "Of a liquid it may be noise.",
-    "loss": " The sample would give energy instead of losing it: the phase has the wrong sign or "
-    "an offset, or the loss is below the noise.",
+    "storage modulus": " The phase is beyond 90 degrees, as where inertia outweighs the sample at "
+    "high frequencies: correct for it, or leave these rows out (--until). Of a liquid it may be "
+    "noise.",
+    "loss modulus": " The sample would give energy instead of losing it: the phase has the wrong "
+    "sign or an offset, or the loss is below the noise.",
 }
-_AXES = {"time": "times", "frequency": "frequencies"}
+_PLURALS = {"time": "times", "frequency": "frequencies"}
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
@@ -133,7 +134,7 @@ class Recording:
             said.append(f"Left out for want of a number: {rows}.")
         form = self.form
         if "averaged" in form:
-            axis = _AXES[self.read.axis]
+            axis = _PLURALS[self.read.axis]
             said.append(f"Averaged at repeated {axis}: {counted(form['averaged'], 'reading')}.")
         if "outside" in form:
             said.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
@@ -280,7 +281,7 @@ def _checked(
     if columns.average_repeated:
         values, lines, averaged = _averaged(values, lines, 3 if columns.partner else 2)
     _check_order(path, columns, values[:, 0], lines)
-    time_s = values[:, 0] * columns.axis_units[units[0]]
+    time_s = values[:, 0] * AXES[columns.axis][units[0]]
     used, clock = np.ones(len(time_s), bool), values[:, 0] if columns.partner else time_s
     if columns.from_s is not None:
         used &= clock >= columns.from_s
@@ -337,12 +338,13 @@ def _both_moduli(
         phase = second if partner == PHASE else np.arctan(second)
         storage = first * np.cos(phase) if is_whole else first
         loss = storage * np.tan(phase)
-    for name, moduli in {"frequency": values[:, 0], "storage": storage, "loss": loss}.items():
+    moduli_of = {"frequency": values[:, 0], "storage modulus": storage, "loss modulus": loss}
+    for name, moduli in moduli_of.items():
         for row in np.flatnonzero(moduli <= 0)[:1]:
-            what = columns.time if name == "frequency" else f"{name} modulus"
+            what, at = _CAUSES[name], f"{values[row, 0]:g} {units[0]}"
             raise BiogripError(
-                f"{place(path, lines[row])}: found a {what} of {moduli[row]:.3g} at "
-                f"{values[row, 0]:g} {units[0]}; allowed are numbers above 0.{_CAUSES[name]}"
+                f"{place(path, lines[row])}: found a {name} of {moduli[row]:.3g}, at {at}; "
+                f"allowed is one above 0.{what}"
             )
     return storage, loss
 
@@ -392,7 +394,7 @@ def _unit(path: Path | None, key: str, below: str, columns: Columns, units: list
     name, given, unit_key = columns.named[key], columns.reading_unit, columns.unit_key
     allowed = columns.quantity.units
     if key == columns.axis:
-        given, unit_key, allowed = columns.time_unit, f"{key}_unit", columns.axis_units
+        given, unit_key, allowed = columns.time_unit, f"{key}_unit", AXES[columns.axis]
     elif columns.partner and key == columns.partner.name:
         allowed, given = columns.partner.units, columns.partner_unit
         if given is None and allowed == columns.quantity.units:
@@ -482,7 +484,7 @@ def _load(path: Path, columns: Columns, history: Array, lines: IntArray, units: 
     if columns.average_repeated:
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
-    sizes: Array = history * [columns.axis_units[units[0]], columns.controlled.units[units[-1]]]
+    sizes: Array = history * [AXES[columns.axis][units[0]], columns.controlled.units[units[-1]]]
     return sizes
 
 
@@ -532,9 +534,9 @@ def _check_order(path: Path | None, columns: Columns, time: Array, lines: IntArr
         if now == before:
             found = f"{now:.15g} repeated"
             way = columns.said_by("average_repeated")
-            hint = f" The readings of equal {_AXES[columns.axis]} are averaged by {way}."
+            hint = f" The readings of equal {_PLURALS[columns.axis]} are averaged by {way}."
         by = f", by more than {least:.1g}" if now > before else ""
         raise BiogripError(
             f"{place(path, lines[row + 1], columns.time)}: found {found} "
-            f"({earlier}), allowed are {_AXES[columns.axis]} that increase{by}.{hint}"
+            f"({earlier}), allowed are {_PLURALS[columns.axis]} that increase{by}.{hint}"
         )

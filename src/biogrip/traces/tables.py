@@ -26,6 +26,7 @@ from biogrip.arrays import IntArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.traces.columns import (
+    AXES,
     Columns,
     in_brackets,
     listed,
@@ -336,7 +337,7 @@ def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
         if (
             (is_step and numbers > _count_numbers(units))
             or (all(in_brackets(unit) for unit in units if unit) and (has_columns or numbers > 0))
-            or (has_columns and any(unit_in_cell(unit, columns.axis_units) for unit in times))
+            or (has_columns and any(unit_in_cell(unit, AXES[columns.axis]) for unit in times))
         ):
             return replace(table, units=units, first=below[0] + 1)
     return table if has_columns else None
