@@ -33,6 +33,7 @@ one_blas_thread: Callable[[_Function], _Function] = threadpool_limits.wrap(
 _TRACE = "trace"
 # Options of the command in what it says, and the arguments and keys that they are here.
 _ARGUMENTS = (
+    ("--reading loss=COLUMN", "loss=..."),
     ("--start fit", 'start="fit"'),
     ("--offset --drift", "offset=True, drift=True"),
     ("--(offset|drift)", r"\1=True"),

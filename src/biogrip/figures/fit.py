@@ -116,16 +116,17 @@ def draw_sweep(fit: Fit, title: str) -> Figure:
     """Draw both moduli of a sweep, their fit, and the residuals in percent of it."""
     drawn = figure(COLUMN_IN, 3.6)
     moduli, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
-    storage, omega = is_storage(fit.time_s), np.abs(fit.time_s)
-    for name, of, marker, color in (
+    storage, style = is_storage(fit.time_s), {"linestyle": "", "markersize": 3}
+    for name, of, marker, face in (
         ("storage", storage, "o", BLUE),
-        ("loss", ~storage, "s", FITTED),
+        ("loss", ~storage, "s", "white"),
     ):
-        points: dict[str, Any] = {"linestyle": "", "color": color, "marker": marker}
-        points |= {"markersize": 3, "markerfacecolor": "white" if name == "loss" else color}
-        moduli.plot(omega[of], fit.measured[of], **points, label=f"{name} modulus")
-        moduli.plot(omega[of], fit.fitted[of], "--", color=color, label=f"{name}, best fit")
-        residuals.plot(omega[of], 100 * (fit.measured / fit.fitted - 1)[of], **points)
+        color = BLUE if name == "storage" else FITTED
+        points: dict[str, Any] = style | {"marker": marker, "color": color, "markerfacecolor": face}
+        omega, residual = np.abs(fit.time_s[of]), 100 * (fit.measured / fit.fitted - 1)[of]
+        moduli.plot(omega, fit.measured[of], **points, label=f"{name} modulus")
+        moduli.plot(omega, fit.fitted[of], "--", color=color, label=f"{name}, best fit")
+        residuals.plot(omega, residual, **points)
     moduli.set(xscale="log", yscale="log", title=literal(title))
     moduli.set_ylabel(with_unit("modulus", fit.read.unit))
     drawn.legend(loc="outside upper left", ncols=2)

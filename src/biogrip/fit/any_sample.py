@@ -34,8 +34,8 @@ from biogrip.physics.sweep import SWEEP, is_storage
 _SHORTEST, _LONGEST, _A_DECADE, _LASTING = 0.01, 10.0, 4, 1e6
 # The same beyond the frequencies of a sweep.
 _WIDER = 100.0
-# Second differences over their median that are of outliers.
-_OUTLYING = 6.0
+# Squares of second differences over their median that are of outliers.
+_OUTLYING = 36.0
 # The smooth rotation and the weights are found in turn.
 _ROUNDS = 4
 # Share of the readings whose scatter bounds the noise from below, and fewest of them.
@@ -266,22 +266,14 @@ def swept_deviations(
     family = lag_course(SWEEP, lags_s)(places)
     smooth, shares = readings, [share or 1.0] * 2
     for _ in range(_ROUNDS):
-        deviations = np.where(storage, *shares) * smooth
-        amplitudes, _ = fit_responses(readings / deviations, family / deviations)
+        amplitudes, _ = fit_responses(readings / smooth, family / smooth)
         smooth = np.clip(amplitudes @ family, 0.5 * readings, 2.0 * readings)
-        if share is None:
-            ratios = readings / smooth
-            shares = [_scatter(ratios[of]) for of in (storage, ~storage)]
+    if share is None:
+        twice = (np.diff((readings / smooth)[of], 2) ** 2 for of in (storage, ~storage))
+        usual = (each[each <= _OUTLYING * np.median(each)] for each in twice)
+        shares = [max(float(np.sqrt(np.mean(each) / 6)), _ROUNDING) for each in usual]
     sd = np.hypot(np.where(storage, *shares) * smooth, more)
     return sd, dict(zip(("storage", "loss"), shares, strict=True))
-
-
-def _scatter(ratios: Array) -> float:
-    """Return the standard deviation of neighbouring values, but for outliers, (n_values,)."""
-    second = np.abs(np.diff(ratios, 2))
-    # The median of a normal distribution's is 0.67 standard deviations.
-    within = second[second <= _OUTLYING * np.median(second)]
-    return max(float(np.sqrt(np.mean(within**2) / 6)), _ROUNDING)
 
 
 def _least(sizes: Array, rest: Array, share: float) -> float:

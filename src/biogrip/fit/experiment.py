@@ -131,7 +131,7 @@ class Experiment:
         """
         if sd is None:
             return self
-        return replace(self, sd=sd, noise_sd=_mean_size(sd) if known else None)
+        return replace(self, sd=sd, noise_sd=float(np.sqrt(np.mean(sd**2))) if known else None)
 
     @property
     def offset_and_drift(self) -> int:
@@ -199,7 +199,8 @@ class Experiment:
         neighbours, freedom = None, np.inf
         if self.sd is not None and self.noise_sd is None:
             # Only ratios count: deviations are as neighbours scatter in each half of the readings.
-            neighbours, freedom = _mean_size(self.sd), 0.5 * _OF_DIFFERENCES * len(readings)
+            neighbours = float(np.sqrt(np.mean(self.sd**2)))
+            freedom = 0.5 * _OF_DIFFERENCES * len(readings)
         trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd, neighbours)
         given = self.gripper, model or self.searched, self.torque, trace
         posed = Residuals(*given, instrument=self.instrument, freedom=freedom)
@@ -257,10 +258,6 @@ class Experiment:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""
         chosen = [(parameters[p.name], self.ranges[p.range_name]) for p in self.searched.parameters]
         return np.log([max(value, genes.low) for value, genes in chosen])
-
-
-def _mean_size(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def pose(

@@ -24,6 +24,7 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.fitted_onset import OnsetFits, estimate_onset
 from biogrip.fit.genome import GeneRange
 from biogrip.identify.plausibility import check_recording
+from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.protocol import Course, is_held, largest_load
 from biogrip.physics.whitening import MOST_SAMPLES, drift_is_flow, estimate_noise
 from biogrip.traces.columns import place
@@ -116,6 +117,12 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
         )
     share = experiment.noise_share
     if experiment.instrument.sweeps:
+        shortest_s, longest_s = experiment.torque.spread_s(trace.time_s)
+        if experiment.model.power_law and (shortest_s < SHORTEST_S or longest_s > LONGEST_S):
+            raise BiogripError(
+                f"{place(trace.path)}: found {1 / longest_s:.3g} to {1 / shortest_s:.3g} rad/s, "
+                f"allowed with {experiment.model.name} are {1 / LONGEST_S:g} to {1 / SHORTEST_S:g}."
+            )
         return _with_deviations(trace, share, experiment.noise_sd)
     trace = replace(trace, suspicion=check_recording(trace, experiment, _noise(trace, experiment)))
     if share is None:

@@ -170,7 +170,10 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     # Outliers distort a fit, so that all that it leaves is correlated.
     if whole:
         suspects = partial(name_suspects, residuals, times, scale)
-        colour = list(_about_colour(bulk, basis, correlation, chance, suspects, in_time=in_time))
+        colour = list(_about_colour(bulk, basis, correlation, chance, suspects))
+        if not in_time:
+            # Nothing has a spectrum, or wanders, over places of two moduli.
+            colour = colour[: chance < FALSE_ALARM]
         changes = _about_changes(residuals, bulk, basis, growth, coloured=bool(colour))
         doubts += lines or changes or (colour if not found else [])
     notes += (Note(DOUBT, doubt) for doubt in doubts)
@@ -291,25 +294,23 @@ def _about_colour(
     correlation: float,
     chance: float,
     suspects: Callable[[], str],
-    *,
-    in_time: bool,
 ) -> Iterator[str]:
     """Yield a sentence for each test of white noise that residuals, (n_samples,), fail.
 
-    The correlation of neighbours and its chance are given. A spectrum is of residuals `in_time`.
+    The correlation of neighbours and its chance are given.
     """
     if chance < FALSE_ALARM:
         yield (
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
             f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {suspects()}."
         )
-    elif in_time and (chance := uneven(residual, basis)) < FALSE_ALARM:
+    elif (chance := uneven(residual, basis)) < FALSE_ALARM:
         yield (
             "The residual has more of some frequencies than of others, as white noise has only "
             f"{one_in(chance)} traces: the intervals are wrong, or {suspects()}."
         )
     chance = wandering(residual, basis)
-    if in_time and chance < FALSE_ALARM:
+    if chance < FALSE_ALARM:
         yield (
             "The residual wanders: its means over stretches of the trace scatter as much as those "
             f"of white noise do only {one_in(chance)} traces. It contains something slow that the "

@@ -115,9 +115,10 @@ MODULUS = Channel("modulus", "Pa", STRESS_UNITS)
 _STIFFNESSES = {"N/m": 1.0, "mN/m": 1e-3, "N/mm": 1e3, "nN/um": 1e-3, "pN/um": 1e-6, "pN/nm": 1e-3}
 PHASE = Channel("phase", "rad", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180})
 LOSS_FACTOR = Channel("loss_factor", "", {"1": 1.0, "%": 1e-2})
-LOSS = Channel("loss", "Pa", STRESS_UNITS)
-LOSS_STIFFNESS = Channel("loss", "N/m", _STIFFNESSES)
-_PARTNERS = LOSS, PHASE, LOSS_FACTOR
+_LOSSES = Channel("loss", "Pa", STRESS_UNITS), PHASE, LOSS_FACTOR
+_STIFF_LOSSES = Channel("loss", "N/m", _STIFFNESSES), PHASE, LOSS_FACTOR
+_MODULI = [Channel(name, "Pa", STRESS_UNITS) for name in ("storage", "complex_modulus")]
+_STIFF = Channel("storage_stiffness", "N/m", _STIFFNESSES)
 
 INSTRUMENTS: dict[str, Instrument] = {
     instrument.read.name: instrument
@@ -129,17 +130,8 @@ INSTRUMENTS: dict[str, Instrument] = {
         Instrument("relaxation", DISPLACEMENT, FORCE),
         Instrument("relaxation", STRAIN, STRESS, per_area=True),
         Instrument("relaxation", STRAIN, MODULUS, per_area=True, relative=True),
-        *(
-            Instrument("oscillation", STRAIN, read, True, True, _PARTNERS)
-            for read in (
-                Channel(name, "Pa", STRESS_UNITS) for name in ("storage", "complex_modulus")
-            )
-        ),
-        Instrument(
-            *("oscillation", DISPLACEMENT, Channel("storage_stiffness", "N/m", _STIFFNESSES)),
-            relative=True,
-            partners=(LOSS_STIFFNESS, PHASE, LOSS_FACTOR),
-        ),
+        *(Instrument("oscillation", STRAIN, each, True, True, _LOSSES) for each in _MODULI),
+        Instrument("oscillation", DISPLACEMENT, _STIFF, False, True, _STIFF_LOSSES),
     )
 }
 """Instruments by the name of the quantity that they read."""

@@ -97,10 +97,6 @@ class Course:
         """
         return self.time_s[np.any(self.changes[:, : 1 + self.deforms], axis=1)]
 
-    def responses_at(self, rates: Array, places: Array, *, slopes: bool) -> Array | None:
-        """Return what modes show at all places at once; None of a course in time."""
-        return None
-
     def spread_s(self, time_s: Array) -> tuple[float, float]:
         """Return the shortest and the longest time that readings are apart."""
         return float(np.min(np.diff(time_s))), float(np.ptp(time_s))

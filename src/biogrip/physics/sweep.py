@@ -1,17 +1,8 @@
 """A frequency sweep: the storage and loss moduli of a sample that is strained by sines.
 
 Both are parts of one complex modulus, of which a response has one axis: the loss modulus stands at
-minus the angular frequency in rad/s, the storage modulus at plus it. A spring that forgets its
-deformation at the rate r, as a Maxwell branch does, shows of its stiffness
-
-    i w / (i w + r):    w^2 / (w^2 + r^2)  at w,    w r / (w^2 + r^2)  at -w
-
-and a sample the sum over its branches [1]_. A frequency w tells of times about 1/w.
-
-References
-----------
-.. [1] J. D. Ferry, Viscoelastic Properties of Polymers, Wiley, 1980, chapter 3: moduli of a
-   generalized Maxwell model.
+minus the angular frequency in rad/s, the storage modulus at plus it. Both are sums over branches
+(`biogrip.physics.modes.moduli_of_modes`). A frequency w tells of times about 1/w.
 """
 
 import numpy as np
@@ -26,19 +17,6 @@ class Sweep(Course):
     """The course of a sweep of small strains, over all frequencies; moduli are over the strain."""
 
     sweeps = True
-
-    def responses_at(self, rates: Array, places: Array, *, slopes: bool) -> Array:
-        """Return moduli of springs that forget at negative rates, (1 + slopes, ..., n_places).
-
-        Slopes are derivatives by the rate.
-        """
-        omega, stores, forgets = np.abs(places), is_storage(places), -rates[..., None]
-        size = omega**2 + forgets**2
-        found = np.where(stores, omega**2, omega * forgets) / size
-        if not slopes:
-            return found[None]
-        of_loss = omega * (forgets**2 - omega**2)
-        return np.stack((found, np.where(stores, 2 * forgets * omega**2, of_loss) / size**2))
 
     def spread_s(self, time_s: Array) -> tuple[float, float]:
         """Return the inverse of the highest and of the lowest frequency."""

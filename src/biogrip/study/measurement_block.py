@@ -166,9 +166,7 @@ class MeasurementBlock(Block):
         (name,) = self.readings
         axis = self.frequency if INSTRUMENTS[name].sweeps else self.time
         assert axis is not None
-        partner = next(
-            (each for each in INSTRUMENTS[name].partners if getattr(self, each.name)), None
-        )
+        partner = next((it for it in INSTRUMENTS[name].partners if getattr(self, it.name)), None)
         same = (
             *("start_s", "sd", "block", "average_repeated", "from_s", "until_s"),
             *("rows", "load", "load_unit", "partner_unit", "loss_sd"),

@@ -190,7 +190,8 @@ def unit_of(
     unit = (at_end or in_row) if given is None else known_unit(given, allowed)
     if given is not None and unit is None:
         raise BiogripError(f"{where}: found the unit '{given}', allowed are {choices}.")
-    if unit == "1/s" and "Hz" in allowed and not _ANGULAR.search(plain_name(column)):
+    of_frequency = unit == "1/s" and "Hz" in allowed
+    if of_frequency and not _ANGULAR.search(plain_name(column)):
         raise BiogripError(f"{where}: found the unit 1/s; allowed are rad/s or Hz, by {said_by}.")
     if unit is None and "1" in allowed and _bare(below) in ("", "-") and _is_pure(column):
         return "1"
@@ -208,7 +209,7 @@ def unit_of(
                 f"{where}: found the unit '{given or unit}' where {said} says '{other}', allowed "
                 "is one unit."
             )
-    return unit
+    return "rad/s" if of_frequency else unit
 
 
 def unit_in_cell(cell: str, allowed: Collection[str]) -> str | None:
