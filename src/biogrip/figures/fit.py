@@ -22,7 +22,7 @@ from biogrip.figures.style import (
     literal,
 )
 from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.physics.sweep import is_storage
+from biogrip.physics.protocol import is_storage
 from biogrip.records.identifications import read_verdicts
 from biogrip.records.traces import read_measurements
 from biogrip.stages.judgement import TRACE, experiment_for

@@ -25,9 +25,8 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.physics.modes import Modes, lag_course, mode_responses
-from biogrip.physics.protocol import Course
+from biogrip.physics.protocol import SWEEP, Course, is_storage
 from biogrip.physics.residuals import Residuals
-from biogrip.physics.sweep import SWEEP, is_storage
 
 # Lags: shortest over the time between the closest readings, longest over the protocol; how many a
 # decade smooth a trace, and that of what does not relax.

@@ -11,15 +11,14 @@ from biogrip.arrays import Array
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.problem import TraceProblem, make_problem
-from biogrip.physics.condensed import Condensed
+from biogrip.physics.condensed import Condensed, SweptRows
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
 from biogrip.physics.noise import stream
-from biogrip.physics.protocol import Course, Phase, join_phases
+from biogrip.physics.protocol import SWEEP, Course, Phase, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.physics.sweep import SWEEP, SweptRows
 from biogrip.physics.whitening import (
     WEIGHTED,
     NoiseModel,

@@ -31,7 +31,7 @@ from biogrip.fit.noise_model_fit import (
     compute_growth,
     outliers_of,
 )
-from biogrip.judging.changes import Step, compare_halves, find_step
+from biogrip.judging.changes import Step, about_moduli, compare_halves, find_inertia, find_step
 from biogrip.judging.levels import (
     AS_THE_SCATTER,
     CERTAIN_MISFIT,
@@ -54,7 +54,6 @@ from biogrip.judging.levels import (
     UNRESOLVED,
 )
 from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.sweeps import about_moduli, find_inertia
 from biogrip.judging.whiteness import (
     as_correlated,
     by_leverage,

@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, BoolArray
 
 # Share of the largest level that a step is more than.
 _LEAST_STEP = 1e-13
@@ -66,8 +66,7 @@ class Course:
     deforms: bool = False
     """True if a deformation is controlled, and the load is read: relaxation."""
     sweeps: ClassVar[bool] = False
-    """True if it is a `biogrip.physics.sweep.Sweep`, whose readings do not follow one another in
-    time."""
+    """True if it is a `Sweep`, whose readings do not follow one another in time."""
 
     @property
     def jumps(self) -> list[tuple[float, int, float]]:
@@ -134,6 +133,41 @@ class Course:
     def only_steps(self) -> bool:
         """True if what is controlled is piecewise constant."""
         return not np.any(self.changes[:, 1:])
+
+
+class Sweep(Course):
+    """A frequency sweep, in which a sample is strained by sines, and moduli are over the strain.
+
+    Both have one axis: the loss modulus stands at minus the angular frequency in rad/s, the storage
+    modulus at plus it. A frequency w tells of times about 1/w.
+    """
+
+    sweeps = True
+
+    def spread_s(self, time_s: Array) -> tuple[float, float]:
+        """Return the inverse of the highest and of the lowest frequency."""
+        omega = np.abs(time_s)
+        return float(1 / omega.max()), float(1 / omega.min())
+
+    covered_s = spread_s
+
+    def place(self, time_s: float) -> str:
+        """Return modulus and frequency in words."""
+        return f"{abs(time_s):.4g} rad/s ({'storage' if is_storage(time_s) else 'loss'})"
+
+
+SWEEP = Sweep(np.zeros(1), np.zeros((1, 1)), np.zeros((1, 1)), 1.0, deforms=True)
+"""Any sweep."""
+
+
+def is_storage(places: Array | float) -> BoolArray:
+    """Return which places are of the storage modulus; the others are of the loss modulus."""
+    return np.asarray(places) > 0
+
+
+def joined(omega: Array, storage: Array, loss: Array) -> tuple[Array, Array]:
+    """Return places and readings of a sweep, (2 n_omega,), from ascending frequencies in rad/s."""
+    return np.append(-omega[::-1], omega), np.append(loss[::-1], storage)
 
 
 def hold(duration_s: float, level: float) -> Phase:

@@ -12,7 +12,7 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
 from biogrip.physics.instruments import PHASE
-from biogrip.physics.sweep import joined
+from biogrip.physics.protocol import joined
 from biogrip.terminal import visible
 from biogrip.traces.columns import (
     AXES,
