@@ -222,9 +222,8 @@ def _with_instrument(
     if instrument.sweeps:
         if level is not None:
             raise BiogripError("--hold: is of a trace in time, not of a sweep; leave it out.")
-        # Of its protocol only the frequencies matter.
-        phase = {"duration_s": 1.0, controlled.column: 1.0}
-        return {**found, "protocol": {"phases": [phase]}}, None, None
+        held = {"phases": [{"duration_s": 1.0, controlled.column: 1.0}]}
+        return {**found, "protocol": held}, None, None
     if level is None and not of_column:
         if "protocol" in given or instrument.has_jaws:
             return found, None, None

@@ -18,7 +18,6 @@ from biogrip.judging.verdicts import (
     NOT_DETERMINED,
 )
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
-from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
 
@@ -30,6 +29,8 @@ _COLOURS = {
     FIT_REJECTED: 90,
 }
 
+# Instrument whose readings span decades: their misfit is told over their noise.
+_SWEEPS = "oscillation"
 # Most lines on what any linear sample would show.
 _LINES = 5
 # What the notes of a weight do to the fit.
@@ -67,7 +68,7 @@ def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return lines on what any linear sample would show."""
     own, told = found["without_model"], foremost(found)
     left = counted(plain(own["times_noise"], 2), "noise")
-    if not sweeps(found):
+    if found["instrument"] != _SWEEPS:
         left = f"{in_unit(own['misfit_rad'], found)}, {left}"
     if not told:
         return [f"The nearest of all linear samples leaves {left}: it tells nothing, either."]
@@ -100,16 +101,11 @@ def foremost(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 def misfit_in_words(found: Mapping[str, Any]) -> str:
     """Return the number of samples, their noise, and the misfit of the best fit."""
     said, noise = f"{found['samples']} samples", noise_in_words(found)
-    if not sweeps(found):
+    if found["instrument"] != _SWEEPS:
         noise = f"{noise} {in_unit(found['scatter_rad'], found)}"
         return f"{said}, {noise}, misfit {in_unit(found['misfit_rad'], found)}"
     ratio = plain(found["misfit_rad"] / found["scatter_rad"], 2)
     return f"{said}, misfit {ratio} times the {noise}"
-
-
-def sweeps(found: Mapping[str, Any]) -> bool:
-    """Return True if the trace is a frequency sweep, whose readings span decades."""
-    return INSTRUMENTS[found["reads"]["quantity"]].sweeps
 
 
 def noise_in_words(found: Mapping[str, Any]) -> str:
