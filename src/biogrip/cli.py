@@ -137,10 +137,12 @@ def _read(reader: Callable[[str], Any]) -> Callable[[str], Any]:
 _SETTINGS: dict[str, list[tuple[str, str, str]]] = {
     "the file's columns": [
         ("--time", "COLUMN", "of times [time_s]"),
+        ("--frequency", "COLUMN", "of frequencies, of a sweep"),
         (
             *("--reading", "[QUANTITY=]COLUMN"),
             "of readings [rotation=rotation_rad]; or displacement, strain, compliance (creep), "
-            "force, stress, modulus (relaxation)",
+            "force, stress, modulus (relaxation); of a sweep storage, complex_modulus or "
+            "storage_stiffness, and loss, phase or loss_factor by a second --reading",
         ),
         ("--sd", "COLUMN", "of the readings' standard deviations"),
     ],
@@ -153,8 +155,8 @@ _SETTINGS: dict[str, list[tuple[str, str, str]]] = {
         ),
         ("--load", "COLUMN", "of what was held, as recorded, instead"),
         ("--start", "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
-        ("--from", "SECONDS", "first time of the clock to use [all]"),
-        ("--until", "SECONDS", "last time of the clock to use [all]"),
+        ("--from", "PLACE", "first time, s, or frequency as written, to use [all]"),
+        ("--until", "PLACE", "last time, s, or frequency as written, to use [all]"),
     ],
     "the noise and the instrument": [
         ("--noise", "SD", "known noise, in the readings' SI unit"),

@@ -132,3 +132,14 @@ def legible(text: str) -> str:
         return f"{found[1]}·10{tens}" if "e" in number else number
 
     return _BEFORE_UNIT.sub("\u00a0", _MINUS.sub("−", _POWER.sub(power, text)))
+
+
+# Smaller chances are not told apart.
+_NEVER = 1e-6
+
+
+def one_in(chance: float) -> str:
+    """Return a probability in words, e.g. ``"once in 2000"``."""
+    if chance < _NEVER:
+        return "less than once in a million"
+    return f"once in {plain(1 / chance, 1)}"

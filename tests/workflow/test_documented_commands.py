@@ -34,6 +34,7 @@ LEFT = {
     ],
     "howto/creep.md": ["mucus.json", "hl60.json"],
     "howto/relaxation.md": ["fish.json", "dwell.json"],
+    "howto/sweep.md": ["sweep.json", "sweep.png"],
     "howto/modulus.md": ["pipette.json"],
     "howto/noise.md": [
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),
@@ -47,7 +48,14 @@ LEFT = {
     "howto/figure.md": ["results/figures/heights.png"],
 }
 # The code of posterior.md runs in test_library.py, with a shorter chain.
-TAKES_LONG = {"howto/relaxation.md", "howto/creep.md", "design.md", "groups.md", "tutorial.md"}
+TAKES_LONG = {
+    "howto/relaxation.md",
+    "howto/sweep.md",
+    "howto/creep.md",
+    "design.md",
+    "groups.md",
+    "tutorial.md",
+}
 # What module.md, modulus.md and groups.md do, other tests do quickly.
 LONG_HOWTOS = ("case", "trace", "noise", "figure", "noise_kind", "posterior", "module", "modulus")
 TAKES_LONG |= {f"howto/{name}.md" for name in LONG_HOWTOS}

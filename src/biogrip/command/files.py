@@ -331,7 +331,7 @@ def _assumed(diagnosis: Diagnosis, case: Case, tried: Sequence[str]) -> dict[str
     asked = case.block.identifiability
     blocks = ["instrument", "protocol", "search_range", "measurement", "models", "least_squares"]
     blocks += ["gripper"] if case.instrument.has_jaws else []
-    if case.record is not None:
+    if case.record is not None or case.instrument.sweeps:
         blocks.remove("protocol")
     terms: dict[str, Any] = {"offset": found.offset, "drift": found.drift}
     left_out = {name: it for name, it in terms.items() if it != getattr(case.experiment, name)}

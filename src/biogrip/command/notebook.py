@@ -34,6 +34,7 @@ one_blas_thread: Callable[[_Function], _Function] = threadpool_limits.wrap(
 _TRACE = "trace"
 # Options of the command in what it says, and the arguments and keys that they are here.
 _ARGUMENTS = (
+    ("--reading loss=COLUMN", "loss=..."),
     ("--start fit", 'start="fit"'),
     ("--offset --drift", "offset=True, drift=True"),
     ("--(offset|drift)", r"\1=True"),
@@ -135,6 +136,7 @@ def identify_trace(
     hold: float | str | None = None,
     start: float | str | None = None,
     sd: ArrayLike | None = None,
+    loss: ArrayLike | None = None,
     noise: float | None = None,
     noise_share: float | None = None,
     noise_model: str | None = None,
@@ -148,10 +150,11 @@ def identify_trace(
     Parameters
     ----------
     time_s, readings : (n_samples,)
-        Ascending times in s, and readings in SI units: arrays, lists, or columns of pandas.
+        Ascending times in s, and readings in SI units: arrays, lists, or columns of pandas; of a
+        sweep angular frequencies in rad/s, and storage moduli.
     reads
         What is read: rotation (gripper); displacement, strain, compliance (creep); force, stress,
-        modulus (relaxation).
+        modulus (relaxation), storage, storage_stiffness (sweep).
     model
         Name of the sample model.
     hold
@@ -161,6 +164,8 @@ def identify_trace(
         Start of the protocol on the clock of `time_s`, in s, or ``"fit"``.
     sd : (n_samples,), optional
         Standard deviations of the readings; weights are 1/sd^2.
+    loss : (n_samples,), optional
+        Loss moduli of a sweep.
     noise
         Standard deviation of the noise, SI units, if it is known.
     noise_share
@@ -186,7 +191,10 @@ def identify_trace(
     if not isinstance(reads, str) or reads not in INSTRUMENTS:
         raise BiogripError(f"reads: found '{reads}', allowed are {', '.join(INSTRUMENTS)}.")
     column = INSTRUMENTS[reads].read.column
-    given = {"time_s": time_s, column: readings, **({} if sd is None else {"sd": sd})}
+    axis = "omega_rad_per_s" if INSTRUMENTS[reads].sweeps else "time_s"
+    beside = f"loss in {INSTRUMENTS[reads].read.unit}"
+    more = {beside: loss, "sd": sd}
+    given = {axis: time_s, column: readings} | {n: it for n, it in more.items() if it is not None}
     columns = {name: as_column(values, name) for name, values in given.items()}
     if len({len(values) for values in columns.values()}) > 1:
         found = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
@@ -197,6 +205,7 @@ def identify_trace(
         ("model", "sample.model", model),
         ("hold", *HOLD, hold),
         ("reads", f"measurement.{reads}", column),
+        ("loss", "measurement.loss", None if loss is None else beside),
         ("start", f"measurement.{onset[0]}", onset[1]),
         ("sd", "measurement.sd", None if sd is None else "sd"),
         ("noise", "measurement.noise_rad", noise),

@@ -58,6 +58,7 @@ def _at(text: str) -> tuple[Path, Any]:
 
 OPTIONS: dict[str, str | Callable[[str], tuple[Path, Any]]] = {
     "time": "measurement.time",
+    "frequency": "measurement.frequency",
     "reading": _reading,
     "sd": "measurement.sd",
     "hold": _hold,

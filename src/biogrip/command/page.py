@@ -94,7 +94,7 @@ def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
     axes.plot(times, turned(best), "--", color=FITTED, label="best fit")
     after = recording.time_s > 0
     held = evaluate(experiment.torque, recording.time_s[after])
-    if not (np.ptp(held) or experiment.offset_and_drift):
+    if not (experiment.instrument.sweeps or np.ptp(held) or experiment.offset_and_drift):
         readings = turned(recording.readings[after] / held)
         axes.plot(recording.time_s[after], readings, ".", color=MEASURED, markersize=1.2)
     ends = float(np.nanmin(low)), float(np.nanmax(high))

@@ -223,13 +223,19 @@ def _with_instrument(
     if not isinstance(merged["measurement"], dict):
         return merged, None, None
     instrument = _instrument(merged, given)
-    usual = {"time": "time_s", instrument.read.name: instrument.read.column}
+    axis = {"frequency": "omega_rad_per_s"} if instrument.sweeps else {"time": "time_s"}
+    usual = {**axis, instrument.read.name: instrument.read.column}
     file = ARRAYS if asked.arrays else str(asked.trace)
     measurement = usual | merged["measurement"] | {"file": file}
     measurement = schema_of(MeasurementBlock).with_numbers(measurement)
     kind, controlled = given.get("instrument", instrument.kind), instrument.controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
     of_column = measurement.get(LOAD[-1]) is not None
+    if instrument.sweeps:
+        if level is not None:
+            raise BiogripError("--hold: is of a trace in time, not of a sweep; leave it out.")
+        held = {"phases": [{"duration_s": 1.0, controlled.column: 1.0}]}
+        return {**found, "protocol": held}, None, None
     if level is None and not of_column:
         if "protocol" in given or instrument.has_jaws:
             return found, None, None

@@ -29,6 +29,8 @@ _COLOURS = {
     FIT_REJECTED: 90,
 }
 
+# Instrument whose readings span decades: their misfit is told over their noise.
+_SWEEPS = "oscillation"
 # Most lines on what any linear sample would show.
 _LINES = 5
 # Most names of traces that are refused for what another one is.
@@ -50,8 +52,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines = [
         f"{visible(found['trace'])}: fit {found['fit']}: {_MEANS[found['fit']]}.",
         *(f"  {visible(reason)}" for reason in found["reasons"]),
-        f"{found['samples']} samples, {noise_in_words(found)}, "
-        f"misfit {in_unit(found['misfit_rad'], found)}",
+        misfit_in_words(found),
         *(without_model_in_words(found) if rejected else []),
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
         *(
@@ -74,7 +75,9 @@ def in_words(found: Mapping[str, Any]) -> str:
 def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return lines on what any linear sample would show."""
     own, told = found["without_model"], foremost(found)
-    left = f"{in_unit(own['misfit_rad'], found)}, {counted(plain(own['times_noise'], 2), 'noise')}"
+    left = counted(plain(own["times_noise"], 2), "noise")
+    if found["instrument"] != _SWEEPS:
+        left = f"{in_unit(own['misfit_rad'], found)}, {left}"
     if not told:
         return [f"The nearest of all linear samples leaves {left}: it tells nothing, either."]
     width = max(len(each["quantity"]) for each in told)
@@ -103,6 +106,16 @@ def foremost(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [each for each in told if each in chosen]
 
 
+def misfit_in_words(found: Mapping[str, Any]) -> str:
+    """Return the number of samples, their noise, and the misfit of the best fit."""
+    said, noise = f"{found['samples']} samples", noise_in_words(found)
+    if found["instrument"] != _SWEEPS:
+        noise = f"{noise} {in_unit(found['scatter_rad'], found)}"
+        return f"{said}, {noise}, misfit {in_unit(found['misfit_rad'], found)}"
+    ratio = plain(found["misfit_rad"] / found["scatter_rad"], 2)
+    return f"{said}, misfit {ratio} times the {noise}"
+
+
 def noise_in_words(found: Mapping[str, Any]) -> str:
     """Return the noise that a misfit is held against: given, modelled, or seen in the trace."""
     if found["fit"] == REJECTED and found["noise_model"]:
@@ -111,7 +124,7 @@ def noise_in_words(found: Mapping[str, Any]) -> str:
     what = "noise as modelled" if found["noise_model"] else "scatter of neighbours"
     if any(given.get(key) is not None for key in KNOWN_NOISE):
         what = "noise as given"
-    return f"{what} {in_unit(found['scatter_rad'], found)}"
+    return what
 
 
 def in_unit(value: float, found: Mapping[str, Any]) -> str:

@@ -22,6 +22,8 @@ from biogrip.figures.style import (
     is_over_decades,
     literal,
 )
+from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.protocol import is_storage
 from biogrip.records.identifications import read_verdicts
 from biogrip.records.traces import read_measurements
 from biogrip.stages.judgement import TRACE, experiment_for
@@ -96,6 +98,8 @@ def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = 
     Of further fits, which are to other traces of the same target, the target's residuals are drawn.
     """
     fit, *others = fits.values()
+    if INSTRUMENTS[fit.read.name].sweeps:
+        return draw_sweep(fit, title)
     drawn = figure(COLUMN_IN, 3.6)
     traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
     factor, unit = draw_traces(traces, fits)
@@ -123,5 +127,29 @@ def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = 
         residuals.set_xscale("log")
         if low > 0:
             traces.set(yscale="log", ylim=(0.8 * factor * low, 1.25 * factor * high))
+    drawn.align_ylabels()
+    return drawn
+
+
+def draw_sweep(fit: Fit, title: str) -> Figure:
+    """Draw both moduli of a sweep, their fit, and the residuals in percent of it."""
+    drawn = figure(COLUMN_IN, 3.6)
+    moduli, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
+    storage, style = is_storage(fit.time_s), {"linestyle": "", "markersize": 3}
+    for name, of, marker, face in (
+        ("storage", storage, "o", BLUE),
+        ("loss", ~storage, "s", "white"),
+    ):
+        color = BLUE if name == "storage" else FITTED
+        points: dict[str, Any] = style | {"marker": marker, "color": color, "markerfacecolor": face}
+        omega, residual = np.abs(fit.time_s[of]), 100 * (fit.measured / fit.fitted - 1)[of]
+        moduli.plot(omega, fit.measured[of], **points, label=f"{name} modulus")
+        moduli.plot(omega, fit.fitted[of], "--", color=color, label=f"{name}, best fit")
+        residuals.plot(omega, residual, **points)
+    moduli.set(xscale="log", yscale="log", title=literal(title))
+    moduli.set_ylabel(with_unit("modulus", fit.read.unit))
+    drawn.legend(loc="outside upper left", ncols=2)
+    residuals.axhline(0, color=MEASURED, linestyle="--", linewidth=0.8)
+    residuals.set(xlabel="angular frequency (rad/s)", ylabel="residual (%)")
     drawn.align_ylabels()
     return drawn

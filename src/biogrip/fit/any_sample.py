@@ -25,12 +25,16 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.physics.modes import Modes, lag_course, mode_responses
-from biogrip.physics.protocol import Course
+from biogrip.physics.protocol import SWEEP, Course, is_storage
 from biogrip.physics.residuals import Residuals
 
 # Lags: shortest over the time between the closest readings, longest over the protocol; how many a
 # decade smooth a trace, and that of what does not relax.
 _SHORTEST, _LONGEST, _A_DECADE, _LASTING = 0.01, 10.0, 4, 1e6
+# The same beyond the frequencies of a sweep.
+_WIDER = 100.0
+# Squares of second differences over their median that are of outliers.
+_OUTLYING = 36.0
 # The smooth rotation and the weights are found in turn.
 _ROUNDS = 4
 # Share of the readings whose scatter bounds the noise from below, and fewest of them.
@@ -163,10 +167,7 @@ def fit_any_sample(residuals: Residuals) -> AnySampleFit:
 
     The grid of rates is divided next to those that are needed until that changes the fit no more.
     """
-    changes_s, time_s = residuals.course.changes_s, residuals.trace.time_s
-    after = time_s[time_s > changes_s[0]]
-    elapsed = after - changes_s[changes_s.searchsorted(after) - 1]
-    covered_s = float(elapsed.min()), float(after[-1] - changes_s[0])
+    covered_s = residuals.course.covered_s(residuals.trace.time_s)
     measured = residuals.condensed_trace / residuals.noise_scale
     lags, least = show_lags(residuals, covered_s, np.zeros(0)), np.inf
     for _ in range(_MOST_DIVISIONS):
@@ -247,6 +248,31 @@ def proportional_deviations(problem: Experiment, time_s: Array, readings: Array)
         else:
             deviations = np.maximum(deviations, _least(np.abs(smooth), rest, share))
     return np.maximum(deviations, _ROUNDING * float(np.max(np.abs(readings))))
+
+
+def swept_deviations(
+    places: Array, readings: Array, share: float | None, more: float
+) -> tuple[Array, dict[str, float]]:
+    """Compute standard deviations of a sweep's readings, (n_samples,), and the shares of moduli.
+
+    They are in proportion to the moduli of the linear sample that is nearest, and `more` is added,
+    squared. Without a share, each modulus has that by which its readings over these scatter from
+    one frequency to the next.
+    """
+    storage, (shortest_s, longest_s) = is_storage(places), SWEEP.spread_s(places)
+    count = int(_RATES_A_DECADE * np.log10(_WIDER**2 * longest_s / shortest_s))
+    lags_s = [*np.geomspace(shortest_s / _WIDER, longest_s * _WIDER, count), _LASTING * longest_s]
+    family = lag_course(SWEEP, lags_s)(places)
+    smooth, shares = readings, [share or 1.0] * 2
+    for _ in range(_ROUNDS):
+        amplitudes, _ = fit_responses(readings / smooth, family / smooth)
+        smooth = np.clip(amplitudes @ family, 0.5 * readings, 2.0 * readings)
+    if share is None:
+        twice = (np.diff((readings / smooth)[of], 2) ** 2 for of in (storage, ~storage))
+        usual = (each[each <= _OUTLYING * np.median(each)] for each in twice)
+        shares = [max(float(np.sqrt(np.mean(each) / 6)), _ROUNDING) for each in usual]
+    sd = np.hypot(np.where(storage, *shares) * smooth, more)
+    return sd, dict(zip(("storage", "loss"), shares, strict=True))
 
 
 def _least(sizes: Array, rest: Array, share: float) -> float:

@@ -11,12 +11,12 @@ from biogrip.arrays import Array
 from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.problem import TraceProblem, make_problem
-from biogrip.physics.condensed import Condensed
+from biogrip.physics.condensed import Condensed, SweptRows
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
 from biogrip.physics.noise import stream
-from biogrip.physics.protocol import Course, Phase, join_phases
+from biogrip.physics.protocol import SWEEP, Course, Phase, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.physics.whitening import (
@@ -29,6 +29,8 @@ from biogrip.physics.whitening import (
 
 # Key of an arm that fits leave out, and its uncertainty with it.
 _NOT_FITTED = "inertia_kgm2"
+# Degrees of freedom a reading, with which second differences of white noise tell its variance.
+_OF_DIFFERENCES = 18 / 35
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,8 @@ class Experiment:
     @cached_property
     def torque(self) -> Course:
         """Torque of both arms, or what else is held, against time."""
+        if self.instrument.sweeps:
+            return SWEEP
         if self.record is not None:
             # Imported here: few experiments have a record.
             from biogrip.physics.recorded_course import follow_rows
@@ -118,14 +122,15 @@ class Experiment:
         ranges = {name: genes for name, genes in self.ranges.items() if name in chosen}
         return replace(self, ranges=ranges, coloured=False, uncertainty={})
 
-    def weighted(self, sd: Array | None) -> "Experiment":
+    def weighted(self, sd: Array | None, *, known: bool = True) -> "Experiment":
         """Divide the readings of a trace by their standard deviations, if these are known.
 
-        The noise becomes white, with their root mean square as its standard deviation.
+        The noise becomes white, with their root mean square as its standard deviation, which is not
+        `known` if only their ratios are.
         """
         if sd is None:
             return self
-        return replace(self, sd=sd, noise_sd=float(np.sqrt(np.mean(sd**2))))
+        return replace(self, sd=sd, noise_sd=float(np.sqrt(np.mean(sd**2))) if known else None)
 
     @property
     def offset_and_drift(self) -> int:
@@ -190,9 +195,15 @@ class Experiment:
         `model`, `noise_sd`, and `condensed` from `in_noise` replace those of the case.
         """
         rows = condensed or self._condensed(time_s)
-        trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd)
+        neighbours, freedom = None, np.inf
+        if self.sd is not None and self.noise_sd is None:
+            # Only ratios count: deviations are as neighbours scatter in each half of the readings.
+            neighbours = float(np.sqrt(np.mean(self.sd**2)))
+            freedom = 0.5 * _OF_DIFFERENCES * len(readings)
+        trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd, neighbours)
         given = self.gripper, model or self.searched, self.torque, trace
-        return make_problem(Residuals(*given, instrument=self.instrument), self.ranges)
+        posed = Residuals(*given, instrument=self.instrument, freedom=freedom)
+        return make_problem(posed, self.ranges)
 
     def of_each(
         self, time_s: Array, traces: Sequence[Array], model: SampleModel | None = None
@@ -239,7 +250,8 @@ class Experiment:
         if noise_model is not None:
             whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
         basis = with_uncertain(nuisance, uncertain)
-        return Condensed(self.torque, self.torque.snapped(time_s), basis, whitening)
+        rows = SweptRows if self.torque.sweeps else Condensed
+        return rows(self.torque, self.torque.snapped(time_s), basis, whitening)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""

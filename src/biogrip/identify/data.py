@@ -110,8 +110,10 @@ def _moduli(
 ) -> dict[str, list[float]]:
     """Return moduli of the fit from one over the duration to one over the first interval."""
     time_s = recording.time_s
-    first_s = np.diff(time_s)[np.searchsorted(time_s[:-2], 0.0)]
-    ends = 1 / float(np.ptp(time_s)), 1 / float(first_s)
+    first_s, last_s = experiment.torque.spread_s(time_s)
+    if not experiment.instrument.sweeps:
+        first_s = float(np.diff(time_s)[np.searchsorted(time_s[:-2], 0.0)])
+    ends = 1 / last_s, 1 / first_s
     best = np.exp(diagnosis.likelihood.best).tolist()
     values = dict(zip(experiment.searched.names, best, strict=True))
     table = experiment.model.moduli({**experiment.fixed, **values}, np.geomspace(*ends, 31))

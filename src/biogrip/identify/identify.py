@@ -92,7 +92,8 @@ def identify_alike(
     for index, (recording, experiment) in enumerate(traces):
         if experiment.fit_start:
             judged[index], onsets_s[index] = profile_over_onset(judged[index], recording.time_s)
-    doing("trying an offset and a drift")
+    if not experiments[0].instrument.sweeps:
+        doing("trying an offset and a drift")
     notes = [_notes_on_fit(*pair) for pair in zip(fits, experiments, strict=True)]
     if not first.simulated:
         notes = _notes_on_traces(traces, judged, notes)
@@ -138,6 +139,9 @@ def _notes_on_traces(
                 Note(HARMLESS, f"Other models are not compared, because {names} {verb} fixed.")
             )
         said += on_fits[index]
+        if experiment.instrument.sweeps:
+            notes.append(said)
+            continue
         given = recording.time_s, recording.readings, judged[index]
         start = notes_on_start(experiment, *given)
         said += start

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from biogrip.digits import plain
+from biogrip.digits import one_in, plain
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.fitted_onset import OnsetFits
 from biogrip.fit.nested_fits import (
@@ -42,7 +42,6 @@ from biogrip.judging.doubts import (
     Note,
     compute_status,
     examine_residuals,
-    one_in,
 )
 from biogrip.judging.levels import (
     CLEARLY,
@@ -55,7 +54,7 @@ from biogrip.judging.levels import (
 )
 from biogrip.judging.likelihood import compute_fall, make_likelihood
 from biogrip.judging.verdicts import Finding
-from biogrip.physics.fractional import LONGEST_S
+from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.models import CANDIDATES
 from biogrip.physics.protocol import is_held
 from biogrip.physics.whitening import drift_is_flow, without
@@ -219,7 +218,9 @@ def _candidates(experiment: Experiment, fit: TraceFit) -> tuple[str, ...]:
     names = (own if it in _SAME_NETWORK else it for it in (*experiment.models, chosen))
     every = dict.fromkeys(names)
     # With very many samples the dozens of modes of a springpot would take gigabytes.
-    few = residuals.samples <= _MOST_SAMPLES and experiment.torque.end_s <= LONGEST_S
+    shortest_s, longest_s = experiment.torque.spread_s(residuals.trace.time_s)
+    few = residuals.samples <= _MOST_SAMPLES and longest_s <= LONGEST_S
+    few &= shortest_s >= SHORTEST_S
     if few and experiment.cheap_models:
         every |= dict.fromkeys(_POWER_LAWS)
     most = _most(experiment, fit)
@@ -271,7 +272,8 @@ def second_opinions(traces: Sequence[Trace], diagnoses: Sequence[Diagnosis]) -> 
     which = [
         index
         for index, (recording, experiment) in enumerate(traces)
-        if not (experiment.coloured or (experiment.offset and experiment.drift))
+        if not experiment.instrument.sweeps
+        and not (experiment.coloured or (experiment.offset and experiment.drift))
         and len(recording.time_s) > experiment.unknowns + _TERMS
     ]
     both = _better(traces, diagnoses, which, drift=True)

@@ -17,12 +17,14 @@ from dataclasses import replace
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.digits import plain
 from biogrip.errors import BiogripError
-from biogrip.fit.any_sample import proportional_deviations
+from biogrip.fit.any_sample import proportional_deviations, swept_deviations
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.fitted_onset import OnsetFits, estimate_onset
 from biogrip.fit.genome import GeneRange
 from biogrip.identify.plausibility import check_recording
+from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.protocol import Course, is_held, largest_load
 from biogrip.physics.whitening import MOST_SAMPLES, drift_is_flow, estimate_noise
 from biogrip.traces.columns import place
@@ -79,7 +81,7 @@ def for_trace(experiment: Experiment, recording: Recording) -> Experiment:
     """Return the experiment with what follows from a recording: see `prepare`."""
     if experiment.coloured:
         experiment = _without_likenesses(experiment, recording.time_s)
-    experiment = experiment.weighted(recording.sd)
+    experiment = experiment.weighted(recording.sd, known=recording.sd_known)
     ranges = ranges_of(experiment, recording.time_s, recording.readings)
     found = {name: it for name, it in ranges.items() if name not in experiment.given_ranges}
     return replace(experiment, ranges={**experiment.ranges, **found})
@@ -113,10 +115,32 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
             f"{place(trace.path)}: found {len(trace.time_s)} readings for {experiment.unknowns} "
             "unknown parameters; allowed are more readings than parameters, or a simpler model."
         )
+    share = experiment.noise_share
+    if experiment.instrument.sweeps:
+        shortest_s, longest_s = experiment.torque.spread_s(trace.time_s)
+        if experiment.model.power_law and (shortest_s < SHORTEST_S or longest_s > LONGEST_S):
+            raise BiogripError(
+                f"{place(trace.path)}: found {1 / longest_s:.3g} to {1 / shortest_s:.3g} rad/s, "
+                f"allowed with {experiment.model.name} are {1 / LONGEST_S:g} to {1 / SHORTEST_S:g}."
+            )
+        return _with_deviations(trace, share, experiment.noise_sd)
     trace = replace(trace, suspicion=check_recording(trace, experiment, _noise(trace, experiment)))
-    if experiment.noise_share is None:
+    if share is None:
         return trace
     return replace(trace, sd=proportional_deviations(experiment, trace.time_s, trace.readings))
+
+
+def _with_deviations(sweep: Recording, share: float | None, noise_sd: float | None) -> Recording:
+    """Return a sweep with standard deviations of its readings, or of their ratios."""
+    if sweep.sd is not None or (share is None and noise_sd is not None):
+        return sweep
+    sd, shares = swept_deviations(sweep.time_s, sweep.readings, share, noise_sd or 0.0)
+    if share is not None:
+        return replace(sweep, sd=sd)
+    percents = [f"{plain(100 * of, 2)} % of the {name} modulus" for name, of in shares.items()]
+    how = f"as they scatter from one frequency to the next: by {' and '.join(percents)}"
+    said = (*sweep.remarks_before, f"Readings are weighted {how}.")
+    return replace(sweep, sd=sd, sd_known=False, remarks_before=said)
 
 
 def without_steps(trace: Recording, protocol: Course) -> Recording:
@@ -182,7 +206,7 @@ def ranges_of(experiment: Experiment, time_s: Array, readings: Array) -> dict[st
     if experiment.instrument.deforms:
         stiffness = largest / load
     low, high = stiffness / softer, stiffness * stiffer
-    short_s, long_s = float(np.min(np.diff(time_s))), float(np.ptp(time_s))
+    short_s, long_s = experiment.torque.spread_s(time_s)
     dampers = _decades(low * short_s, high * long_s)
     springpots = _decades(low * min(short_s, 1.0), high * max(long_s, 1.0))
     return {"k": springpots, "k_p": _decades(low, high), "c": dampers, "c_p": dampers}

@@ -6,6 +6,8 @@ its share of the sum of squares is beta-distributed in white noise. `find_step` 
 `compare_halves` asks whether two parts of the trace, fitted apart, agree (a change of the gain, or
 of the sample): Chow's test [1]_, with the fit's slopes.
 
+Of a frequency sweep the parts are its moduli, and inertia is one direction more (`about_moduli`).
+
 The chance that a scan of correlated statistics exceeds a level is that of the first one, and for
 each further one that of a random walk's upcrossing, which steps from reading to reading [2]_.
 
@@ -20,14 +22,18 @@ References
    maximum of a process on a grid.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
+from biogrip.digits import one_in, plain
 from biogrip.fit.noise_model_fit import absorbed
+from biogrip.judging.levels import FALSE_ALARM
+from biogrip.physics.protocol import is_storage
+from biogrip.physics.residuals import Residuals
 from biogrip.physics.whitening import without
 
 # Least share of a step's squares that a fit leaves of one that can be told.
@@ -152,3 +158,63 @@ def compare_halves(residual: Array, basis: Array, split: int) -> float:
     gained = float(np.sum((more @ residual) ** 2))
     rest = max(float(residual @ residual) - gained, 1e-300)
     return float(fdtrc(len(more), left, gained / len(more) * left / rest))
+
+
+def find_inertia(
+    residuals: Residuals, residual: Array, basis: Array, growth: Array | float = 1.0
+) -> str:
+    """Return in words what may make moduli wrong: inertia, if an F test tells it, or what else.
+
+    Inertia adds a part to the storage modulus that goes with the frequency squared.
+    """
+    from scipy.special import fdtrc
+
+    places, free = residuals.trace.time_s, len(residual) - len(basis)
+    squared = np.where(is_storage(places), places**2, 0.0)
+    shape = without(basis, residuals.trace.condensed.cleared(squared) / growth)
+    total, square = float(residual @ residual), float(shape @ shape)
+    size = float(shape @ residual) / square
+    explained = size**2 * square
+    if fdtrc(1, free - 1, explained * (free - 1) / (total - explained)) >= FALSE_ALARM:
+        return "a column of something else, slip, too large a strain, or a sample that changed"
+    part = plain(100 * abs(size) * float(places[-1]) ** 2 / float(residuals.trace.readings[-1]), 2)
+    return (
+        "inertia of the instrument or the sample, as the storage modulus has a part that goes with "
+        f"the frequency squared, {part} % at the highest: correct for it, or leave the highest "
+        "frequencies out (--until)"
+    )
+
+
+def about_moduli(
+    residuals: Residuals, residual: Array, basis: Array, growth: Array
+) -> Iterator[str]:
+    """Yield a sentence for each test that residuals over the growth of the noise fail.
+
+    The tests are for inertia; for moduli that differ, if each is fitted by itself; and for one that
+    scatters more than the other for its weights, by an F test.
+    """
+    from scipy.special import fdtrc
+
+    storage = is_storage(residuals.trace.time_s)
+    cause = find_inertia(residuals, residual, basis, growth)
+    if cause.startswith("inertia"):
+        yield f"The fit leaves what is of {cause}."
+    elif (chance := compare_halves(residual, basis, int(np.sum(~storage)))) < FALSE_ALARM:
+        yield (
+            "The storage and the loss modulus, each fitted by itself, differ as those with white "
+            f"noise do only {one_in(chance)} sweeps: {cause}."
+        )
+    if residuals.freedom < np.inf:
+        # Their weights are how they scatter.
+        return
+    columns = storage, ~storage
+    free = [float(np.sum(of) - np.sum(basis[:, of] ** 2)) for of in columns]
+    means = [float(np.sum(residual[of] ** 2)) / n for of, n in zip(columns, free, strict=True)]
+    larger = int(means[1] > means[0])
+    ratio = means[larger] / means[1 - larger]
+    if 2 * fdtrc(free[larger], free[1 - larger], ratio) < FALSE_ALARM:
+        yield (
+            f"For its weights the {('storage', 'loss')[larger]} modulus scatters "
+            f"{plain(np.sqrt(ratio), 2)} times as much as the other: give standard deviations of "
+            "both (--sd, --set measurement.loss_sd=COLUMN)."
+        )

@@ -117,8 +117,8 @@ class Diagnosis:
         """Errors that the trace could hide, none of a rejected fit, see `find_hidden`."""
         from biogrip.judging.hidden import find_hidden
 
-        rejected = self.status == REJECTED
-        return [] if rejected else find_hidden(self.likelihood, self.findings)
+        none = self.status == REJECTED or self.likelihood.problem.residuals.course.sweeps
+        return [] if none else find_hidden(self.likelihood, self.findings)
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""

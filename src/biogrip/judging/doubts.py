@@ -22,7 +22,7 @@ from functools import partial
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.digits import counted, plain
+from biogrip.digits import counted, one_in, plain
 from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
@@ -31,7 +31,7 @@ from biogrip.fit.noise_model_fit import (
     compute_growth,
     outliers_of,
 )
-from biogrip.judging.changes import Step, compare_halves, find_step
+from biogrip.judging.changes import Step, about_moduli, compare_halves, find_inertia, find_step
 from biogrip.judging.levels import (
     AS_THE_SCATTER,
     CERTAIN_MISFIT,
@@ -105,8 +105,6 @@ def find_reasons(notes: Sequence[Note]) -> list[str]:
 
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
 MANY = 100_000
-# Smaller chances are not told apart.
-_NEVER = 1e-6
 # Most outliers that are named, and lines of a spectrum.
 _NAMED, _MOST_LINES = 5, 3
 
@@ -153,7 +151,8 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     correlation, chance = correlated(bulk, basis)
     notes = list(_about_given(likelihood, bulk))
     found = None
-    lines = list(_lines(bulk, basis, residuals, scale)) if whole else []
+    in_time = not residuals.course.sweeps
+    lines = list(_lines(bulk, basis, residuals, scale)) if whole and in_time else []
     if chance < CERTAIN_MISFIT and times > TOO_MUCH and not lines:
         found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
         notes.clear()
@@ -171,10 +170,13 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     if whole:
         suspects = partial(name_suspects, residuals, times, scale)
         colour = list(_about_colour(bulk, basis, correlation, chance, suspects))
+        if not in_time:
+            # Nothing has a spectrum, or wanders, over places of two moduli.
+            colour = colour[: chance < FALSE_ALARM]
         changes = _about_changes(residuals, bulk, basis, growth, coloured=bool(colour))
         doubts += lines or changes or (colour if not found else [])
     notes += (Note(DOUBT, doubt) for doubt in doubts)
-    if notes and not residuals.coloured and compute_status(notes) == DOUBTFUL:
+    if notes and in_time and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         notes.append(
             Note(
                 HARMLESS,
@@ -212,14 +214,15 @@ def _misfit(
         return Remainder([Note(DOUBT, text)])
     more, read = plain(times, 2), residuals.trace.readings
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak
-    of_peak = f"{plain(100 * share, 2)} % of the peak"
+    relative = residuals.course.sweeps and residuals.coloured
+    of_peak = f"{plain(100 * share, 2)} % of the {'moduli' if relative else 'peak'}"
     suspects = name_suspects(residuals, times, scale)
     if not residuals.rounding and np.mean(read[1:] == read[:-1]) > REPEATED:
         text = (
             "Most readings repeat the one before, as of a sensor that is read less often than it "
             "is logged: keep one of each."
         )
-    elif has_fast_noise(residuals, *left):
+    elif not residuals.course.sweeps and has_fast_noise(residuals, *left):
         text = (
             f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
             "correlated for a short time."
@@ -234,7 +237,8 @@ def _misfit(
         return Remainder([Note(REJECTION, text)])
     misfit = as_correlated(*bulk)
     if misfit[0] < 1:
-        text += " It is as slow as the trace, which the limits allow for."
+        slow = "broad as the sweep" if residuals.course.sweeps else "slow as the trace"
+        text += f" It is as {slow}, which the limits allow for."
     else:
         counted_as = f"{plain(misfit[0], 2)} independent ones"
         text += f" The limits count the {len(bulk[0])} residuals as {counted_as}."
@@ -249,15 +253,16 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     fit = fit_any_sample(residuals)
     other = fit.sd / scale
     noises = counted(plain(other, 2), "noise")
+    gives, culprits = "gives this trace under this protocol", "load, clock, contact or drift"
+    left = fit.left_of_readings()
+    if residuals.course.sweeps:
+        gives, culprits = "has both moduli (Kramers-Kronig)", find_inertia(residuals, *left)
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
-    if correlated(*fit.left_of_readings())[1] >= FALSE_ALARM:
+    if correlated(*left)[1] >= FALSE_ALARM:
         return inadequate
     if other * TOO_MUCH < times:
-        return f"{inadequate}; what that leaves is of load, clock, contact or drift"
-    return (
-        "no linear sample gives this trace under this protocol, but leaves at least "
-        f"{noises}: load, clock, contact or drift"
-    )
+        return f"{inadequate}; what that leaves is of {culprits}"
+    return f"no linear sample {gives}, but leaves at least {noises}: {culprits}"
 
 
 def _about_growth(
@@ -342,6 +347,8 @@ def _about_changes(
     Residuals, (n_samples,), are over the growth of the noise; they may seem to be coloured.
     """
     trace = residuals.trace
+    if residuals.course.sweeps:
+        return [] if coloured else list(about_moduli(residuals, residual, basis, growth))
     step = find_step(residual, basis, lambda rows: trace.condensed.cleared(rows) / growth)
     if step and step.chance < FALSE_ALARM and not (coloured and _is_coloured(step)):
         before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
@@ -382,15 +389,16 @@ def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
     """Yield a sentence that names outliers by their times."""
     far = residuals.trace.time_s[struck]
     if len(far):
-        named = ", ".join(f"{each:.6g} s" for each in far[:_NAMED])
+        named = ", ".join(map(residuals.course.place, far[:_NAMED]))
         more = f" and {len(far) - _NAMED} more" if len(far) > _NAMED else ""
+        of = "" if residuals.course.sweeps else " of the protocol"
         at_step = (
             " Readings at the very instant of a step may be of either side of it: leave them out."
             if np.isin(far, residuals.course.steps_s).any()
             else ""
         )
         yield (
-            f"{counted(len(far), 'outlier')}, at {named}{more} of the protocol: further from the "
+            f"{counted(len(far), 'outlier')}, at {named}{more}{of}: further from the "
             f"fit than noise as that of the other readings is. Outliers distort the fit.{at_step}"
         )
 
@@ -421,13 +429,6 @@ def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
             DOUBT if much else HARMLESS,
             f"What the fit leaves is {plain(share, 3)} times the noise that was given: {so}.",
         )
-
-
-def one_in(chance: float) -> str:
-    """Return a probability in words, e.g. ``"once in 2000"``."""
-    if chance < _NEVER:
-        return "less than once in a million"
-    return f"once in {plain(1 / chance, 1)}"
 
 
 # Of so many stretches of a trace with stationary noise, which is correlated for less than half a

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array
-from biogrip.physics.modes import mode_responses, responses_in_turn
+from biogrip.physics.modes import Modes, mode_responses, responses_in_turn, sum_of_modes
 from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import ModeRows, SpanningModes
 from biogrip.physics.whitening import Whitening, without
@@ -257,3 +257,15 @@ class Condensed:
             triangle = np.asarray(np.linalg.qr(np.concatenate((triangle, more)), mode="r"))
             triangle *= np.where(np.diagonal(triangle) < 0, -1.0, 1.0)[:, None]
         return triangle
+
+
+class SweptRows(Condensed):
+    """Rows that are the readings themselves: a sweep has few."""
+
+    def of_trace(self, readings: Array) -> Array:
+        """Return readings without nuisance as they are, (n_samples,)."""
+        return readings
+
+    def of_modes(self, modes: Modes) -> Array:  # type: ignore[override]
+        """Return rows of samples, (n, 1 + n_parameters, n_samples)."""
+        return self.cleared(sum_of_modes(modes, self.course, self.all_s))

@@ -3,7 +3,8 @@
 A gripper controls a torque. Creep controls a load and reads what a sample yields: micropipettes,
 stretchers, rheometers. A sample under the force F is displaced by x, F(s) = [k_p + c_p s + ...]
 x(s); under a stress it is strained, and its springs and dampers are in Pa and Pa s. Relaxation
-controls a deformation and reads the load that is left: AFM dwells, rheometers.
+controls a deformation and reads the load that is left: AFM dwells, rheometers. Oscillation strains
+by sines, one frequency after the other, and reads two moduli: rheometers, microrheology.
 """
 
 import math
@@ -51,7 +52,7 @@ class Instrument:
     """What an instrument controls and reads."""
 
     kind: str
-    """`gripper`, `creep` or `relaxation`."""
+    """`gripper`, `creep`, `relaxation` or `oscillation`."""
     controlled: Channel
     """What the protocol sets."""
     read: Channel
@@ -60,11 +61,18 @@ class Instrument:
     """True if stiffness is a modulus, in Pa."""
     relative: bool = False
     """True if what is read is divided by the largest controlled value."""
+    partners: tuple[Channel, ...] = ()
+    """What may be read beside it at each frequency of a sweep, so that both tell both moduli."""
 
     @property
     def deforms(self) -> bool:
         """True if a deformation is controlled and a load is read."""
-        return self.kind == "relaxation"
+        return self.kind == "relaxation" or self.sweeps
+
+    @property
+    def sweeps(self) -> bool:
+        """True if frequencies are swept; else readings follow one another in time."""
+        return bool(self.partners)
 
     @property
     def has_jaws(self) -> bool:
@@ -104,6 +112,14 @@ COMPLIANCE = Channel(
 
 MODULUS = Channel("modulus", "Pa", STRESS_UNITS)
 
+_STIFFNESSES = {"N/m": 1.0, "mN/m": 1e-3, "N/mm": 1e3, "nN/um": 1e-3, "pN/um": 1e-6, "pN/nm": 1e-3}
+PHASE = Channel("phase", "rad", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180})
+LOSS_FACTOR = Channel("loss_factor", "", {"1": 1.0, "%": 1e-2})
+_LOSSES = Channel("loss", "Pa", STRESS_UNITS), PHASE, LOSS_FACTOR
+_STIFF_LOSSES = Channel("loss", "N/m", _STIFFNESSES), PHASE, LOSS_FACTOR
+_MODULI = [Channel(name, "Pa", STRESS_UNITS) for name in ("storage", "complex_modulus")]
+_STIFF = Channel("storage_stiffness", "N/m", _STIFFNESSES)
+
 INSTRUMENTS: dict[str, Instrument] = {
     instrument.read.name: instrument
     for instrument in (
@@ -114,9 +130,14 @@ INSTRUMENTS: dict[str, Instrument] = {
         Instrument("relaxation", DISPLACEMENT, FORCE),
         Instrument("relaxation", STRAIN, STRESS, per_area=True),
         Instrument("relaxation", STRAIN, MODULUS, per_area=True, relative=True),
+        *(Instrument("oscillation", STRAIN, each, True, True, _LOSSES) for each in _MODULI),
+        Instrument("oscillation", DISPLACEMENT, _STIFF, False, True, _STIFF_LOSSES),
     )
 }
 """Instruments by the name of the quantity that they read."""
+
+PARTNERS = {each.name: each for of in INSTRUMENTS.values() for each in of.partners}
+"""What sweeps read beside another modulus, by name."""
 
 KINDS = tuple(dict.fromkeys(instrument.kind for instrument in INSTRUMENTS.values()))
 """Values of the config key `instrument`."""

@@ -26,6 +26,7 @@ References
    functions, SIAM Review 40 (1998), 110-112.
 .. [2] J. R. R. A. Martins, P. Sturdza and J. J. Alonso, The complex-step derivative
    approximation, ACM Transactions on Mathematical Software 29 (2003), 245-262.
+.. [3] J. D. Ferry, Viscoelastic Properties of Polymers, Wiley, 1980, chapter 3.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -90,6 +91,11 @@ def linear_responses(
         Readings, and their derivatives; without `slopes`, (n, 1, n_times).
     """
     modes = compute_modes(gripper, model, course, parameters, slopes=slopes)
+    return sum_of_modes(modes, course, time_s)
+
+
+def sum_of_modes(modes: Modes, course: Course, time_s: Array) -> Array:
+    """Return what samples show by all their modes, see `linear_responses`."""
     n, count, m = modes.rate_slopes.shape
     # Sums of responses of modes, w g, and their derivatives, d(w g) = dw g + w dr dg/dr.
     by_response = np.concatenate((modes.weights[:, None], modes.weight_slopes), axis=1)
@@ -279,6 +285,9 @@ def responses_in_turn(
 
     The end of a phase is the initial state of the next, so that phases cost no more than readings.
     """
+    if course.sweeps:
+        yield slice(None), moduli_of_modes(rates, time_s)[: 1 + slopes]
+        return
     at_once = max(1, _NUMBERS_AT_ONCE // max(rates.size, 1))
     lengths = np.diff(course.time_s, append=course.end_s)
     # What precedes a step is read at its instant.
@@ -305,6 +314,19 @@ def responses_in_turn(
                 yield here, found
             else:
                 yield here, go_on.after(states, own, elapsed)
+
+
+def moduli_of_modes(rates: Array, places: Array) -> Array:
+    """Compute moduli of branches of unit stiffness, and dg/dr, (2, n, n_modes, n_places) [3]_.
+
+    A branch that forgets at the rate -r has the complex modulus i w / (i w + r). Its storage part,
+    w^2 / (w^2 + r^2), stands at the place w, in rad/s, its loss part, w r / (w^2 + r^2), at -w.
+    """
+    omega, stores, forgets = np.abs(places), places > 0, -rates[..., None]
+    size = omega**2 + forgets**2
+    found = np.where(stores, omega**2, omega * forgets) / size
+    of_loss = omega * (forgets**2 - omega**2)
+    return np.stack((found, np.where(stores, 2 * forgets * omega**2, of_loss) / size**2))
 
 
 class _Motion:

@@ -9,11 +9,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import factorial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, BoolArray
 
 # Share of the largest level that a step is more than.
 _LEAST_STEP = 1e-13
@@ -64,6 +65,8 @@ class Course:
     """End of the protocol."""
     deforms: bool = False
     """True if a deformation is controlled, and the load is read: relaxation."""
+    sweeps: ClassVar[bool] = False
+    """True if it is a `Sweep`, whose readings do not follow one another in time."""
 
     @property
     def jumps(self) -> list[tuple[float, int, float]]:
@@ -93,6 +96,20 @@ class Course:
         """
         return self.time_s[np.any(self.changes[:, : 1 + self.deforms], axis=1)]
 
+    def spread_s(self, time_s: Array) -> tuple[float, float]:
+        """Return the shortest and the longest time that readings are apart."""
+        return float(np.min(np.diff(time_s))), float(np.ptp(time_s))
+
+    def covered_s(self, time_s: Array) -> tuple[float, float]:
+        """Return from when to when after a change of what is controlled there are readings."""
+        after = time_s[time_s > self.changes_s[0]]
+        elapsed = after - self.changes_s[self.changes_s.searchsorted(after) - 1]
+        return float(elapsed.min()), float(after[-1] - self.changes_s[0])
+
+    def place(self, time_s: float) -> str:
+        """Return in words where a reading is."""
+        return f"{time_s:.6g} s"
+
     def times(self, factor: float) -> "Course":
         """Return the protocol with all that is controlled multiplied by a factor."""
         scaled = factor * self.changes, factor * self.within_phases
@@ -116,6 +133,41 @@ class Course:
     def only_steps(self) -> bool:
         """True if what is controlled is piecewise constant."""
         return not np.any(self.changes[:, 1:])
+
+
+class Sweep(Course):
+    """A frequency sweep, in which a sample is strained by sines, and moduli are over the strain.
+
+    Both have one axis: the loss modulus stands at minus the angular frequency in rad/s, the storage
+    modulus at plus it. A frequency w tells of times about 1/w.
+    """
+
+    sweeps = True
+
+    def spread_s(self, time_s: Array) -> tuple[float, float]:
+        """Return the inverse of the highest and of the lowest frequency."""
+        omega = np.abs(time_s)
+        return float(1 / omega.max()), float(1 / omega.min())
+
+    covered_s = spread_s
+
+    def place(self, time_s: float) -> str:
+        """Return modulus and frequency in words."""
+        return f"{abs(time_s):.4g} rad/s ({'storage' if is_storage(time_s) else 'loss'})"
+
+
+SWEEP = Sweep(np.zeros(1), np.zeros((1, 1)), np.zeros((1, 1)), 1.0, deforms=True)
+"""Any sweep."""
+
+
+def is_storage(places: Array | float) -> BoolArray:
+    """Return which places are of the storage modulus; the others are of the loss modulus."""
+    return np.asarray(places) > 0
+
+
+def joined(omega: Array, storage: Array, loss: Array) -> tuple[Array, Array]:
+    """Return places and readings of a sweep, (2 n_omega,), from ascending frequencies in rad/s."""
+    return np.append(-omega[::-1], omega), np.append(loss[::-1], storage)
 
 
 def hold(duration_s: float, level: float) -> Phase:

@@ -33,7 +33,7 @@ class Trace:
     known_noise: float | None = None
     """Standard deviation of the noise; None to estimate it from neighbouring readings."""
     known_scatter: float | None = None
-    """That of neighbouring readings, if it is another trace's; None to estimate it."""
+    """That of neighbouring readings, if it is known; None to estimate it."""
 
     @cached_property
     def cleared(self) -> Array:
@@ -93,8 +93,9 @@ class Residuals:
 
     @property
     def duration_s(self) -> float:
-        """Time of the last reading."""
-        return float(self.trace.time_s[-1])
+        """Time of the last reading, or the longest that a sweep tells of."""
+        time_s = self.trace.time_s
+        return self.course.spread_s(time_s)[1] if self.course.sweeps else float(time_s[-1])
 
     @property
     def noise_scale(self) -> float:

@@ -85,7 +85,8 @@ class Shared(Block):
         OneOf(KINDS),
         Field(
             description="`gripper`: a torque is held and a rotation read; `creep`: a force is held "
-            "and a displacement read, or a stress and a strain; `relaxation`: the other way round. "
+            "and a displacement read, or a stress and a strain; `relaxation`: the other way round; "
+            "`oscillation`: a recorded frequency sweep of moduli, for `biogrip identify`. "
             "The blocks gripper, actuator and calibration are of the first alone."
         ),
     ] = GRIPPER.kind
@@ -209,6 +210,8 @@ class CaseBlock(Shared):
                 yield ("measurement", name), f"{text}allowed is {used.read.name}."
         if used.has_jaws:
             return
+        if used.sweeps and not self.recorded:
+            yield ("instrument",), f"found {self.instrument}, allowed in a simulation are others."
         for key, value in vars(self.models).items():
             if value != "linear":
                 yield ("models", key), f"found {value}, allowed with {self.instrument} is linear."

@@ -12,9 +12,9 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field, Tag
 
 from biogrip.keys import BY_KIND, Block, Complaint, OneOf
-from biogrip.physics.instruments import INSTRUMENTS, ROTATION
+from biogrip.physics.instruments import INSTRUMENTS, PARTNERS, ROTATION
 from biogrip.physics.noise import Noise
-from biogrip.traces.columns import TIME_UNITS, Columns, known_unit, trace_file_problem
+from biogrip.traces.columns import AXES, TIME_UNITS, Columns, known_unit, trace_file_problem
 
 COLOURED = "coloured"
 NOISE_MODELS = ("white", COLOURED)
@@ -27,10 +27,13 @@ ARRAYS = "<arrays>"
 READINGS = tuple(INSTRUMENTS)
 """Keys that name the column of the readings, one for each quantity that an instrument reads."""
 
+_FREQUENCIES = AXES["frequency"]
+_SWEPT = tuple(name for name, instrument in INSTRUMENTS.items() if instrument.sweeps)
+_OF_SWEEPS = ("frequency", "frequency_unit", *PARTNERS, "partner_unit", "loss_sd")
 _OF_FILE = (
-    *("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "scale", "block"),
-    *("rows", "load", "load_unit"),
-    *("average_repeated", "from_s", "until_s", *KNOWN_NOISE, "start_s", "fit_start"),
+    *("time", *READINGS, *_OF_SWEEPS, "time_unit", "rotation_unit", "reading_unit", "scale"),
+    *("block", "rows", "load", "load_unit", "average_repeated", "from_s", "until_s"),
+    *(*KNOWN_NOISE, "start_s", "fit_start"),
 )
 
 
@@ -73,6 +76,26 @@ class MeasurementBlock(Block):
     modulus: _Name = None
     """Name of that of relaxation moduli: stresses over the largest strain that is held
     (relaxation)."""
+    storage: _Name = None
+    """Name of that of storage moduli of a frequency sweep (`instrument: oscillation`)."""
+    complex_modulus: _Name = None
+    """Name of that of absolute values of the complex modulus (oscillation)."""
+    storage_stiffness: _Name = None
+    """Name of that of storage moduli in N/m (oscillation)."""
+    frequency: _Name = None
+    """Name of the file's column of frequencies of a sweep, in any order."""
+    loss: _Name = None
+    """Name of that of loss moduli; a sweep has this, phase or loss_factor."""
+    phase: _Name = None
+    """Name of that of phases between strain and stress."""
+    loss_factor: _Name = None
+    """Name of that of loss factors, loss over storage modulus (tan delta)."""
+    frequency_unit: Annotated[str | None, OneOf(_FREQUENCIES), _unit(_FREQUENCIES)] = None
+    """Unit of the frequencies, where the column's name does not end in it."""
+    partner_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
+    """Unit of loss moduli or phases, likewise; of loss moduli by default that of the readings."""
+    loss_sd: _Name = None
+    """Name of that of standard deviations of the loss moduli, where sd has those of the others."""
     time_unit: Annotated[str | None, OneOf(TIME_UNITS), _unit(TIME_UNITS)] = None
     """Unit of the times, where the column's name does not end in it."""
     rotation_unit: Annotated[str | None, OneOf(ROTATION.units), _unit(ROTATION.units)] = None
@@ -96,9 +119,11 @@ class MeasurementBlock(Block):
     """If true, average the readings of equal times, as a rounded clock writes them."""
     from_s: Annotated[float | None, Field(ge=-1e12, le=1e12)] = None
     """First time of the file's clock to use: readings before it are left out, as where a rheometer
-    has not yet reached its strain. The protocol stays. By default all are used."""
+    has not yet reached its strain. The protocol stays. Of a sweep the lowest frequency to use, in
+    the unit of its column. By default all are used."""
     until_s: Annotated[float | None, Field(ge=-1e12, le=1e12)] = None
-    """Last time of the file's clock to use, as before a sample slips."""
+    """Last time of the file's clock to use, as before a sample slips; or the highest frequency, as
+    below that from which inertia shows."""
     scale: Annotated[float | None, Field(ge=-1e30, le=1e30)] = None
     """Rotation, in its unit, over the number in the column: for a sensor's volts, or -1 for a
     rotation that is positive where the arm opens. By default 1."""
@@ -139,14 +164,19 @@ class MeasurementBlock(Block):
     def columns(self) -> Columns:
         """Columns of a recorded trace's file."""
         (name,) = self.readings
-        assert self.time is not None
+        axis = self.frequency if INSTRUMENTS[name].sweeps else self.time
+        assert axis is not None
+        partner = next((it for it in INSTRUMENTS[name].partners if getattr(self, it.name)), None)
         same = (
-            *("time_unit", "start_s", "sd", "block", "average_repeated", "from_s", "until_s"),
-            *("rows", "load", "load_unit"),
+            *("start_s", "sd", "block", "average_repeated", "from_s", "until_s"),
+            *("rows", "load", "load_unit", "partner_unit", "loss_sd"),
         )
         return Columns(
-            self.time,
+            axis,
             getattr(self, name),
+            time_unit=self.time_unit or self.frequency_unit,
+            partner=partner,
+            partner_column=getattr(self, partner.name) if partner else "",
             reading_unit=self.rotation_unit or self.reading_unit,
             scale=1.0 if self.scale is None else self.scale,
             quantity=INSTRUMENTS[name].read,
@@ -192,11 +222,32 @@ class MeasurementBlock(Block):
                 if given is not None and given is not False:
                     yield (key,), "is only for a recorded trace, whose measurement has a file."
             return
-        if self.time is None:
-            yield ("time",), "is missing: a recorded trace needs the name of its time column."
+        yield from self._axis_complaints()
         yield from self._reading_complaints()
         if self.file != ARRAYS and (complaint := trace_file_problem(self.file)):
             yield ("file",), complaint
+
+    def _axis_complaints(self) -> Iterator[Complaint]:
+        """Find what a sweep or a trace in time lacks, and what only the other one has."""
+        given = {key for key, value in vars(self).items() if value not in (None, False)}
+        if not any(INSTRUMENTS[name].sweeps for name in self.readings):
+            if self.time is None:
+                yield ("time",), "is missing: a recorded trace needs the name of its time column."
+            for key in sorted(given & {*_OF_SWEEPS}):
+                yield (key,), f"is of a frequency sweep, which reads {' or '.join(_SWEPT)}."
+            return
+        if self.frequency is None:
+            yield ("frequency",), "is missing: a sweep needs the name of its frequency column."
+        if len(partners := given & {*PARTNERS}) != 1:
+            found = " and ".join(sorted(partners)) or "none"
+            text = f"goes with one of {', '.join(PARTNERS)}; found {found}"
+            yield (self.readings[0],), f"{text}. Say which, as in --reading loss=COLUMN."
+        if len(given & {"sd", "loss_sd"}) == 1 or ("sd" in given and "loss" not in given):
+            yield ("sd",), "of a sweep goes with loss and loss_sd: both moduli need deviations."
+        for key in sorted(given & {"start_s", "load", "fit_start", "offset", "drift"}):
+            yield (key,), "is of a trace in time, and this is a frequency sweep; leave it out."
+        if self.coloured:
+            yield ("noise_model",), "found coloured, allowed with a frequency sweep is white."
 
     def _reading_complaints(self) -> Iterator[Complaint]:
         if not self.readings:

@@ -7,14 +7,20 @@ A unit is stated, stands at the end of the column's name, as in ``rotation_urad`
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from math import pi
 from pathlib import Path
 from unicodedata import normalize
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
+from biogrip.physics.instruments import INSTRUMENTS, PARTNERS, ROTATION, Channel
 from biogrip.terminal import visible
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86_400.0}
+AXES = {
+    "time": TIME_UNITS,
+    "frequency": {"rad/s": 1.0, "Hz": 2 * pi, "1/s": 1.0, "mHz": 2e-3 * pi, "kHz": 2e3 * pi},
+}
+"""What readings follow, with its units as multiples of s or rad/s."""
 
 # In any case of letters; no time has a unit with a capital.
 _SPELLED_OUT = {
@@ -43,12 +49,17 @@ _SURELY = (
 _PERHAPS = (r"[_\s]([^\s_]+)$", r"(?i)(%|‰|percent|pct|(?:micro|milli|[um])strain)$")
 # Pa^-1, Pa**-1, Pa-1, and with digits above the line, which `plain_name` brings down.
 _RECIPROCAL = re.compile(r"([A-Za-z]+)(?:\^|\*\*)?\(?[-\u2212]1\)?")
-# Names of pure numbers that have no unit: a word, or more that end with one for a strain.
+# Names of pure numbers that have no unit: a word, more that end with one for a strain, and names
+# of tan(delta).
 _PURE = re.compile(
-    r"[^\W\d_]+|(?:[\w.,-]*[\w.,]?[ _-])*(?:strain|deformation|gamma|epsilon|eps|[γεϵ])", re.I
+    r"[^\W\d_]+|(?:[\w.,-]*[\w.,]?[ _-])*(?:strain|deformation|gamma|epsilon|eps|[γεϵ])"
+    r"|(?:loss|damping)[ _](?:factor|tangent)|(?:.* )?tan[ _]?\(?(?:delta|[dδ])\)?",
+    re.I,
 )
 # Of two lengths, as Lp/Rp, and units that no column here has.
 _RATIO = re.compile(r"[^\W\d_]+\d*\s*/\s*([^\W_]+)")
+# 1/s in a column of this name is rad/s; in another it may as well be Hz.
+_ANGULAR = re.compile("ang|omega|ω|kreis", re.I)
 _UNITS = {*TIME_UNITS, *["V", "mV", "uV", "A", "mA", "px", "pixel", "pixels", "counts"]}
 _UNITS |= {unit for each in INSTRUMENTS.values() for unit in each.read.units}
 _NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
@@ -57,6 +68,9 @@ _SIZED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*?)\s*", r
 # Keys that no option of the command sets but `--set`, with what they may say.
 _BY_SET = {
     "time_unit": "UNIT",
+    "frequency_unit": "UNIT",
+    "partner_unit": "UNIT",
+    "loss_sd": "COLUMN",
     "rotation_unit": "UNIT",
     "reading_unit": "UNIT",
     "load_unit": "UNIT",
@@ -74,11 +88,11 @@ class Columns:
     """Names and units of the columns of a trace, and which of its rows are used."""
 
     time: str
-    """Name of the column of times."""
+    """Name of the column of times, or of a sweep's frequencies."""
     reading: str
     """Name of that of what the instrument reads."""
     time_unit: str | None = None
-    """Key of `TIME_UNITS`; None if the file has the unit."""
+    """Key of its `AXES`; None if the file has the unit."""
     reading_unit: str | None = None
     """Key of the quantity's units, likewise."""
     scale: float = 1.0
@@ -105,6 +119,19 @@ class Columns:
     """Name of the column of what was controlled, if that is to be read."""
     load_unit: str | None = None
     """Key of its units."""
+    partner: Channel | None = None
+    """What a sweep reads beside the quantity."""
+    partner_column: str = ""
+    """Name of its column."""
+    partner_unit: str | None = None
+    """Key of its units; None if the file has the unit."""
+    loss_sd: str | None = None
+    """Name of the column of standard deviations of the loss modulus."""
+
+    @property
+    def axis(self) -> str:
+        """What readings follow: a key of `AXES`."""
+        return "frequency" if self.partner else "time"
 
     @property
     def unit_key(self) -> str:
@@ -114,8 +141,9 @@ class Columns:
     @property
     def named(self) -> dict[str, str]:
         """Names of the columns by the key that says them, in the order of reading."""
-        names = {"time": self.time, self.quantity.name: self.reading}
-        more = {"sd": self.sd, "load": self.load}
+        names = {self.axis: self.time, self.quantity.name: self.reading}
+        names |= {self.partner.name: self.partner_column} if self.partner else {}
+        more = {"sd": self.sd, "loss_sd": self.loss_sd, "load": self.load}
         return names | {key: name for key, name in more.items() if name is not None}
 
     @property
@@ -134,6 +162,8 @@ class Columns:
 def _option(key: str) -> str:
     if key in _BY_SET:
         return f"--set measurement.{key}={_BY_SET[key]}"
+    if key in PARTNERS:
+        return f"--reading {key}=COLUMN"
     return "--reading" if key in INSTRUMENTS else f"--{key}"
 
 
@@ -160,6 +190,9 @@ def unit_of(
     unit = (at_end or in_row) if given is None else known_unit(given, allowed)
     if given is not None and unit is None:
         raise BiogripError(f"{where}: found the unit '{given}', allowed are {choices}.")
+    of_frequency = unit == "1/s" and "Hz" in allowed
+    if of_frequency and not _ANGULAR.search(plain_name(column)):
+        raise BiogripError(f"{where}: found the unit 1/s; allowed are rad/s or Hz, by {said_by}.")
     if unit is None and "1" in allowed and _bare(below) in ("", "-") and _is_pure(column):
         return "1"
     if unit is None:
@@ -176,7 +209,7 @@ def unit_of(
                 f"{where}: found the unit '{given or unit}' where {said} says '{other}', allowed "
                 "is one unit."
             )
-    return unit
+    return "rad/s" if of_frequency else unit
 
 
 def unit_in_cell(cell: str, allowed: Collection[str]) -> str | None:
@@ -190,8 +223,9 @@ def in_brackets(cell: str) -> bool:
 
 
 def plain_name(name: str) -> str:
-    """Return a name without padding, with either micro sign written as u, and ° as deg."""
-    return normalize("NFKC", name).strip().replace("\u03bc", "u").replace("°", "deg")
+    """Return a name without padding, with either micro sign as u, ° as deg, and primes as '."""
+    plain = normalize("NFKC", name).strip().replace("\u03bc", "u").replace("°", "deg")
+    return plain.replace("\u2032", "'").replace('"', "''")
 
 
 def known_unit(written: str, allowed: Collection[str]) -> str | None:

@@ -11,10 +11,11 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.instruments import INSTRUMENTS, PHASE
+from biogrip.physics.protocol import joined
 from biogrip.terminal import visible
 from biogrip.traces.columns import (
-    TIME_UNITS,
+    AXES,
     Columns,
     listed,
     place,
@@ -34,7 +35,16 @@ from biogrip.traces.tables import (
 )
 
 FEWEST_SAMPLES = 5
-
+# What makes a modulus negative.
+_CAUSES = {
+    "frequency": "",
+    "storage modulus": " The phase is beyond 90 degrees, as where inertia outweighs the sample at "
+    "high frequencies: correct for it, or leave these rows out (--until). Of a liquid it may be "
+    "noise.",
+    "loss modulus": " The sample would give energy instead of losing it: the phase has the wrong "
+    "sign or an offset, or the loss is below the noise.",
+}
+_PLURALS = {"time": "times", "frequency": "frequencies"}
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
@@ -49,7 +59,8 @@ def form_in_words(path: Path, form: Mapping[str, Any]) -> str:
     columns = form["columns"].items()
     named = {key: f"{each['column']}, in {each['unit']}" for key, each in columns}
     found = {key: value for key, value in form.items() if key != "columns"} | named
-    rows = (f"\n  {key:<13}{visible(value)}" for key, value in found.items())
+    width = max(13, 2 + max(map(len, found)))
+    rows = (f"\n  {key:<{width}}{visible(value)}" for key, value in found.items())
     return f"{visible(path)} is read as{''.join(rows)}"
 
 
@@ -72,6 +83,8 @@ class Recording:
     """Units of the times and of the readings in the file."""
     sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
+    sd_known: bool = True
+    """False if only their ratios are, as of a sweep of which nothing says the noise."""
     onset_s: float | None = None
     """Time of the clock at which the protocol starts, if that was given or fitted."""
     gaps: int = 0
@@ -121,7 +134,8 @@ class Recording:
             said.append(f"Left out for want of a number: {rows}.")
         form = self.form
         if "averaged" in form:
-            said.append(f"Averaged at repeated times: {counted(form['averaged'], 'reading')}.")
+            axis = _PLURALS[self.read.axis]
+            said.append(f"Averaged at repeated {axis}: {counted(form['averaged'], 'reading')}.")
         if "outside" in form:
             said.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
         if "others" in form:
@@ -219,7 +233,7 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     }
     others = int(np.count_nonzero(~chosen)) or None
     form |= {"rows": len(values), "gaps": None, "averaged": None, "outside": None, "others": others}
-    found = _checked(path, columns, (units[0], units[1]), values[chosen], lines[chosen])
+    found = _checked(path, columns, units, values[chosen], lines[chosen])
     form |= found.form
     return replace(
         found, form={key: value for key, value in form.items() if value is not None}, load=load
@@ -246,49 +260,66 @@ def recording_of_arrays(columns: Columns, *arrays: Array) -> Recording:
     for row, column in np.argwhere(np.isinf(values))[:1]:
         name = [*columns.named.values()][column]
         raise BiogripError(f"{place(None, row, name)}: found inf, allowed are finite numbers.")
-    return _checked(None, columns, (units[0], units[1]), values, np.arange(len(values)))
+    return _checked(None, columns, units, values, np.arange(len(values)))
 
 
 def _checked(
-    path: Path | None, columns: Columns, units: tuple[str, str], values: Array, lines: IntArray
+    path: Path | None, columns: Columns, units: list[str], values: Array, lines: IntArray
 ) -> Recording:
     """Return the readings that are numbers, in SI units; refuse those that no trace can have.
 
-    Values are times, readings and perhaps standard deviations, (n_rows, 2) or (n_rows, 3).
+    Values are times, readings and perhaps standard deviations, (n_rows, 2) or (n_rows, 3); of a
+    sweep frequencies, and as many columns as are named.
     """
     gaps = np.any(np.isnan(values), axis=1)
     values, lines, without_number = values[~gaps], lines[~gaps], int(np.count_nonzero(gaps))
     _check_count(path, columns, len(values), without_number)
-    if columns.sd is not None:
-        _check_positive(path, columns.sd, values[:, 2], lines)
+    for index, (key, column) in enumerate(columns.named.items()):
+        if key in ("sd", "loss_sd"):
+            _check_positive(path, column, values[:, index], lines)
+    if columns.partner:
+        ascending = np.argsort(values[:, 0], kind="stable")
+        values, lines = values[ascending], lines[ascending]
     averaged = 0
     if columns.average_repeated:
-        values, lines, averaged = _averaged(values, lines)
+        values, lines, averaged = _averaged(values, lines, 3 if columns.partner else 2)
     _check_order(path, columns, values[:, 0], lines)
-    time_s = values[:, 0] * TIME_UNITS[units[0]]
-    used = np.ones(len(time_s), bool)
+    time_s = values[:, 0] * AXES[columns.axis][units[0]]
+    used, clock = np.ones(len(time_s), bool), values[:, 0] if columns.partner else time_s
     if columns.from_s is not None:
-        used &= time_s >= columns.from_s
+        used &= clock >= columns.from_s
     if columns.until_s is not None:
-        used &= time_s <= columns.until_s
+        used &= clock <= columns.until_s
     values, lines, time_s = values[used], lines[used], time_s[used]
-    _check_count(path, columns, len(values), without_number, "usable time")
-    unit = columns.quantity.units[units[1]]
+    _check_count(path, columns, len(values), without_number, f"usable {columns.axis}")
+    unit, end = columns.quantity.units[units[1]], "rad_per_s" if columns.partner else "s"
     form = {
         "gaps": without_number,
         "averaged": averaged or None,
         "outside": int(np.count_nonzero(~used)) or None,
-        "first_s": float(time_s[0]),
-        "last_s": float(time_s[-1]),
+        f"first_{end}": float(time_s[0]),
+        f"last_{end}": float(time_s[-1]),
     }
+    readings, sd = values[:, 1] * (unit * columns.scale), None
+    if columns.sd is not None:
+        sd = values[:, 2] * (unit * abs(columns.scale))
+    if columns.partner:
+        moduli = _both_moduli(path, columns, units, values, lines)
+        sd = (
+            None
+            if sd is None
+            else joined(time_s, *(unit * abs(columns.scale) * values[:, 3:].T))[1]
+        )
+        time_s, readings = joined(time_s, *moduli)
+        lines = np.append(lines[::-1], lines)
     return Recording(
         time_s,
-        values[:, 1] * (unit * columns.scale),
+        readings,
         lines,
         path,
         columns,
-        units,
-        sd=None if columns.sd is None else values[:, 2] * (unit * abs(columns.scale)),
+        (units[0], units[1]),
+        sd=sd,
         gaps=without_number,
         form={key: value for key, value in form.items() if value is not None},
     )
@@ -303,6 +334,33 @@ def _as_in(names: Sequence[str]) -> str:
     """Return the option for a column that is named after what is read, or nothing."""
     found = ((name, own) for name in INSTRUMENTS for own in names if own.lower().startswith(name))
     return next((f", as --reading {name}={own}" for name, own in found), "")
+
+
+def _both_moduli(
+    path: Path | None, columns: Columns, units: list[str], values: Array, lines: IntArray
+) -> tuple[Array, Array]:
+    """Return storage and loss moduli of a sweep, (n_rows,) in SI units, all above zero."""
+    partner, read = columns.partner, columns.quantity
+    assert partner is not None
+    first = values[:, 1] * (read.units[units[1]] * columns.scale)
+    second = values[:, 2] * partner.units[units[2]]
+    is_whole = read.name == "complex_modulus"
+    if partner.unit == read.unit:
+        loss = second * columns.scale
+        storage = np.sqrt(np.maximum(first**2 - loss**2, 0.0)) if is_whole else first
+    else:
+        phase = second if partner == PHASE else np.arctan(second)
+        storage = first * np.cos(phase) if is_whole else first
+        loss = storage * np.tan(phase)
+    moduli_of = {"frequency": values[:, 0], "storage modulus": storage, "loss modulus": loss}
+    for name, moduli in moduli_of.items():
+        for row in np.flatnonzero(moduli <= 0)[:1]:
+            what, at = _CAUSES[name], f"{values[row, 0]:g} {units[0]}"
+            raise BiogripError(
+                f"{place(path, lines[row])}: found a {name} of {moduli[row]:.3g}, at {at}; "
+                f"allowed is one above 0.{what}"
+            )
+    return storage, loss
 
 
 def _columns_of(
@@ -335,7 +393,7 @@ def _columns_of(
         found[same[0]] = key
         below = table.units[same[0]] if table.units else ""
         try:
-            timed = clock and key == "time"
+            timed = clock and key == columns.axis
             units.append("s" if timed else _unit(path, key, below, columns, units))
         except BiogripError as error:
             problems.append(str(error))
@@ -348,11 +406,16 @@ def _unit(path: Path | None, key: str, below: str, columns: Columns, units: list
     """Return the unit of a column; standard deviations have that of the readings before them."""
     name, given, unit_key = columns.named[key], columns.reading_unit, columns.unit_key
     allowed = columns.quantity.units
-    if key == "time":
-        given, unit_key, allowed = columns.time_unit, "time_unit", TIME_UNITS
+    if key == columns.axis:
+        given, unit_key, allowed = columns.time_unit, f"{key}_unit", AXES[columns.axis]
+    elif columns.partner and key == columns.partner.name:
+        allowed, given = columns.partner.units, columns.partner_unit
+        if given is None and allowed == columns.quantity.units:
+            given = columns.reading_unit
+        unit_key = "partner_unit"
     elif key == "load":
         given, unit_key, allowed = columns.load_unit, "load_unit", columns.controlled.units
-    elif key == "sd":
+    elif key in ("sd", "loss_sd"):
         given = units[1] if len(units) > 1 else given
     return unit_of(path, name, given, allowed, columns.said_by(unit_key), below)
 
@@ -434,33 +497,36 @@ def _load(path: Path, columns: Columns, history: Array, lines: IntArray, units: 
     if columns.average_repeated:
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
-    sizes: Array = history * [TIME_UNITS[units[0]], columns.controlled.units[units[-1]]]
+    sizes: Array = history * [AXES[columns.axis][units[0]], columns.controlled.units[units[-1]]]
     return sizes
 
 
-def _averaged(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:
+def _averaged(values: Array, lines: IntArray, first_sd: int = 2) -> tuple[Array, IntArray, int]:
     """Average rows of equal times; return the means, their first lines, and how many rows it were.
 
-    The standard deviation of a mean is the root of the sum of squares over the number.
+    From a column on they have standard deviations; that of a mean is the
+    root of the sum of squares over the number.
     """
     starts = np.flatnonzero(np.append(True, np.diff(values[:, 0]) != 0))
     counts = np.diff(np.append(starts, len(values)))
     means = np.add.reduceat(values, starts) / counts[:, None]
     means[:, 0] = values[starts, 0]
-    means[:, 2:] = np.hypot.reduceat(values[:, 2:], starts) / counts[:, None]
+    means[:, first_sd:] = np.hypot.reduceat(values[:, first_sd:], starts) / counts[:, None]
     return means, lines[starts], int(np.sum(counts[counts > 1]))
 
 
 def _check_count(
     path: Path | None, columns: Columns, found: int, without_number: int, what: str = "row"
 ) -> None:
-    if found < FEWEST_SAMPLES:
+    # Each row of a sweep has two readings.
+    fewest = FEWEST_SAMPLES // (2 if columns.partner else 1)
+    if found < fewest:
         gaps = f" ({counted(without_number, 'row')} with NaN)" if without_number else ""
         *names, last = columns.named.values()
         which = f"{'both ' if len(names) == 1 else ''}{', '.join(names)} and {last}"
         raise BiogripError(
             f"{place(path)}: found {counted(found, what)} with a number in {which}{gaps}, "
-            f"allowed are at least {FEWEST_SAMPLES}."
+            f"allowed are at least {fewest}."
         )
 
 
@@ -481,9 +547,9 @@ def _check_order(path: Path | None, columns: Columns, time: Array, lines: IntArr
         if now == before:
             found = f"{now:.15g} repeated"
             way = columns.said_by("average_repeated")
-            hint = f" The readings of equal times are averaged by {way}."
+            hint = f" The readings of equal {_PLURALS[columns.axis]} are averaged by {way}."
         by = f", by more than {least:.1g}" if now > before else ""
         raise BiogripError(
             f"{place(path, lines[row + 1], columns.time)}: found {found} "
-            f"({earlier}), allowed are times that increase{by}.{hint}"
+            f"({earlier}), allowed are {_PLURALS[columns.axis]} that increase{by}.{hint}"
         )

@@ -26,7 +26,7 @@ from biogrip.arrays import IntArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.traces.columns import (
-    TIME_UNITS,
+    AXES,
     Columns,
     in_brackets,
     listed,
@@ -50,6 +50,7 @@ _BEFORE_UNITS = re.compile(r"units?\s*[:=]\s*", re.I)
 # Cells between blanks: quoted, or with a unit in brackets after a blank.
 _CELL = re.compile(r'"[^"]*"|[^\s"]+(?:[ \t]+[\[(][^\])\s]*[\])])?')
 _OTHERWISE = re.compile(r"[,;\t][\"\s]|[\"\s][,;\t]")
+_QUOTED = re.compile(r'^\s*"(.*)"\s*$')
 _WIDE_GAP = re.compile(r"\s{2,}|\t")
 # Begins like a row of numbers.
 _ROW = re.compile(r'[\s",;]*[-+]?[.\d][\d.,:eE+-]*[\s",;]')
@@ -244,7 +245,7 @@ def _has(line: str, wanted: set[str]) -> bool:
 
 
 def _names(cells: Sequence[str]) -> set[str]:
-    return {plain_name(cell.strip('" ')) for cell in cells}
+    return {plain_name(_QUOTED.sub(r"\1", cell)) for cell in cells}
 
 
 def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -> str:
@@ -336,7 +337,7 @@ def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
         if (
             (is_step and numbers > _count_numbers(units))
             or (all(in_brackets(unit) for unit in units if unit) and (has_columns or numbers > 0))
-            or (has_columns and any(unit_in_cell(unit, TIME_UNITS) for unit in times))
+            or (has_columns and any(unit_in_cell(unit, AXES[columns.axis]) for unit in times))
         ):
             return replace(table, units=units, first=below[0] + 1)
     return table if has_columns else None

@@ -1,0 +1,251 @@
+"""Frequency sweeps from files to verdicts: moduli, columns and units, limits, and what is refused.
+
+Samples are written down here, or in `tests.helpers.laplace`, as impedances.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.library import INSTRUMENTS, Sample, hold, set_up, simulate
+from biogrip.physics.models import MODELS
+from tests.helpers.identified import by_quantity, identified, identify, told
+from tests.helpers.laplace import IMPEDANCES
+
+OMEGA: Array = np.geomspace(0.1, 100.0, 25)
+SOLID = {"k": 3000.0, "k_p": 500.0, "c": 2000.0}
+GIVEN = {"reads": "storage", "model": "zener_maxwell"}
+
+
+def moduli(model: str, omega: Array, *parameters: float) -> Array:
+    """Storage and loss modulus, (2, n_omega)."""
+    whole = np.asarray(IMPEDANCES[model](1j * omega, *parameters))
+    return np.stack((whole.real, whole.imag))
+
+
+def noisy(clean: Array, share: float = 0.02, seed: int = 0) -> Array:
+    return clean * (1 + share * np.random.default_rng(seed).standard_normal(clean.shape))
+
+
+def swept(values: Array, omega: Array = OMEGA, **given: Any) -> Any:
+    """What a sweep tells in a notebook."""
+    return told(omega, values[0], loss=values[1], **(GIVEN | given))
+
+
+def solid(seed: int = 1, **given: Any) -> Array:
+    return noisy(moduli("zener_maxwell", OMEGA, *(SOLID | given).values()), seed=seed)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model_has_the_moduli_of_its_impedance_and_their_slopes(name: str) -> None:
+    """A springpot is a ladder to 1e-6 (`biogrip.physics.fractional`)."""
+    model, per_area = MODELS[name], True
+    experiment = set_up(INSTRUMENTS["storage"], (hold(1.0, 1.0),), Sample(name, per_area=per_area))
+    values = dict(zip(model.names, model.example, strict=True))
+    places = np.append(-OMEGA[::-1], OMEGA)
+    loss, storage = np.split(simulate(experiment, values, places), 2)
+    expected = moduli(name, OMEGA, *model.example)
+    size = np.abs(expected[0] + 1j * expected[1])
+    assert np.max(np.abs([storage, loss[::-1]] - expected) / size) < 2e-6
+    residuals = experiment.of(places, np.append(loss, storage)).residuals
+    x, step = np.log(model.example), 1e-5
+    for index, slope in enumerate(residuals(x)[1]):
+        ahead, behind = (residuals.response(x + s * step * np.eye(len(x))[index]) for s in (1, -1))
+        # Central differences of step h err by h^2, and by rounding over h.
+        assert np.max(np.abs((ahead - behind) / (2 * step) - slope)) < 1e-7 * size.max()
+
+
+def trios(values: Array, omega: Array) -> tuple[str, list[str]]:
+    rows = np.c_[omega, values.T, values[1] / values[0]]
+    lines = ["Filename\tgel.tri", "", "[step]", "Frequency sweep - 1"]
+    lines += ["Angular frequency\tStorage modulus\tLoss modulus\tTan(delta)", "rad/s\tPa\tPa\t"]
+    lines += ["\t".join(f"{value:.9g}" for value in row) for row in rows]
+    return "\n".join(lines), ["Angular frequency", "storage=Storage modulus", "loss=Loss modulus"]
+
+
+def anton_paar(values: Array, omega: Array) -> tuple[str, list[str]]:
+    """From high to low frequencies, in kPa, with decimal commas."""
+    rows = np.c_[omega, values.T / 1e3][::-1]
+    lines = [
+        "Projekt:;Zellen",
+        "",
+        "Intervall-Daten:;Punktnr.;Kreisfrequenz;Speichermodul;Verlustmodul",
+    ]
+    lines += [";;;;", ";;[1/s];[kPa];[kPa]"]
+    text = [";".join(f"{value:.9g}" for value in row) for row in rows]
+    lines += [f";{number};{row}".replace(".", ",") for number, row in enumerate(text, 1)]
+    return "\n".join(lines), ["Kreisfrequenz", "storage=Speichermodul", "loss=Verlustmodul"]
+
+
+def bare(values: Array, omega: Array) -> tuple[str, list[str]]:
+    whole = values[0] + 1j * values[1]
+    rows = np.c_[omega / (2 * np.pi), abs(whole), np.degrees(np.angle(whole))]
+    lines = ["f (Hz),|G*| (Pa),phase (deg)", *(",".join(f"{it:.9g}" for it in row) for row in rows)]
+    return "\n".join(lines), ["f (Hz)", "complex_modulus=|G*| (Pa)", "phase=phase (deg)"]
+
+
+def of_factor(values: Array, omega: Array) -> tuple[str, list[str]]:
+    rows = np.c_[omega, values[0] / 1e6, values[1] / values[0]]
+    lines = ["w in rad/s,E' in MPa,tan(delta)", *(",".join(f"{it:.9g}" for it in r) for r in rows)]
+    return "\n".join(lines), ["w in rad/s", "storage=E\u2032 in MPa", "loss_factor=tan(delta)"]
+
+
+@pytest.mark.parametrize("written", [trios, anton_paar, bare, of_factor])
+def test_files_of_instruments_tell_the_same(tmp_path: Path, written: Any) -> None:
+    values, trace = solid(), tmp_path / "sweep.txt"
+    text, (frequency, *readings) = written(values, OMEGA)
+    trace.write_text(text, encoding="utf-8")
+    options = [option for each in readings for option in ("--reading", each)]
+    more = ["--frequency", frequency, *options, "--model", "zener_maxwell"]
+    found = by_quantity(identified(tmp_path, trace, *more, config="model_selection: {models: []}"))
+    expected = by_quantity(swept(values).data)
+    for name, truth in (SOLID | {"tau": 2 / 3}).items():
+        assert found[name]["value"] == pytest.approx(expected[name]["value"], rel=1e-4)
+        # Twice the half width of 95 % limits: four standard deviations.
+        assert abs(found[name]["value"] - truth) < found[name]["high"] - found[name]["low"]
+
+
+@pytest.mark.parametrize(
+    ("header", "options", "said"),
+    [
+        ("w,G' (Pa),G'' (Pa)", [], "column 'w': found no unit"),
+        ("frequency (1/s),G' (Pa),G'' (Pa)", [], "found the unit 1/s; allowed are rad/s or Hz"),
+        ("w (rad/s),G' (Pa),G'' (Pa)", ["--hold", "1"], "is of a trace in time, not of a sweep"),
+        ("w (rad/s),G' (Pa),G'' (Pa)", ["--drift"], "this is a frequency sweep; leave it out"),
+        ("w (rad/s),G' (Pa),G'' (Pa)", ["--reading", "phase=x"], "found loss and phase"),
+        ("w (rad/s),G' (Pa),G'' (Pa)", ["--sd", "x"], "both moduli need deviations"),
+    ],
+)
+def test_what_a_sweep_cannot_have_is_refused(
+    tmp_path: Path, header: str, options: list[str], said: str
+) -> None:
+    trace, names = tmp_path / "sweep.csv", header.split(",")
+    np.savetxt(trace, np.c_[OMEGA, solid().T], "%.6g", ",", header=header, comments="")
+    given = ["--frequency", names[0], "--reading", f"storage={names[1]}"]
+    status, _, complained = identify(trace, *given, "--reading", f"loss={names[2]}", *options)
+    assert (status, said in complained) == (1, True), complained
+
+
+@pytest.mark.parametrize(
+    ("row", "said"), [(0, "The phase is beyond 90 degrees"), (1, "The sample would give energy")]
+)
+def test_moduli_of_no_passive_sample_are_refused(row: int, said: str) -> None:
+    values = solid()
+    values[row, -1] *= -1
+    with pytest.raises(BiogripError, match=said):
+        swept(values)
+
+
+def test_limits_are_those_of_scipy_and_lmfit(tmp_path: Path) -> None:
+    """The profile of SciPy's fits is 3.841 above its least at the limits; lmfit 1.3.4 has them.
+
+    lmfit's are of `conf_interval`, with `weights=1 / sd, scale_covar=False` and
+    `prob_func=lambda best, other: chi2.cdf(other.chisqr - best.chisqr, 1)`.
+    """
+    clean = moduli("zener_maxwell", OMEGA, *SOLID.values())
+    sd = np.array([[0.02], [0.03]]) * clean
+    scatter = np.random.default_rng(3).standard_normal(2 * len(OMEGA)).reshape(clean.shape)
+    values, trace = clean + sd * scatter, tmp_path / "sweep.csv"
+    header = "w in rad/s,stored in Pa,lost in Pa,a in Pa,b in Pa"
+    np.savetxt(trace, np.c_[OMEGA, values.T, sd.T], "%.12g", ",", header=header, comments="")
+    options = ["--frequency", "w in rad/s", "--reading", "storage=stored in Pa"]
+    options += ["--reading", "loss=lost in Pa", "--sd", "a in Pa", "--model", "zener_maxwell"]
+    options += ["--set", "measurement.loss_sd=b in Pa"]
+    found = by_quantity(identified(tmp_path, trace, *options))
+
+    def residual(x: Array) -> Array:
+        left = (moduli("zener_maxwell", OMEGA, *np.exp(x)) - values) / sd
+        return left.ravel()
+
+    def least(name: str, held: float) -> float:
+        """Chi-squared of the best fit that has a parameter."""
+        index = [*SOLID].index(name)
+        free = np.delete(np.log([*SOLID.values()]), index)
+        cost = least_squares(lambda y: residual(np.insert(y, index, np.log(held))), free).cost
+        return 2 * float(cost)
+
+    best = 2 * least_squares(residual, np.log([*SOLID.values()]), xtol=1e-12).cost
+    by_lmfit = {"k": (2983.907, 3034.939), "k_p": (485.820, 504.160), "c": (1983.893, 2043.440)}
+    for name, ends in by_lmfit.items():
+        # Limits have five digits in the file, and a standard deviation is 1e-2 of them.
+        assert (found[name]["low"], found[name]["high"]) == pytest.approx(ends, rel=5e-5)
+        for end in ("low", "high"):
+            assert least(name, found[name][end]) - best == pytest.approx(3.841, rel=0.02)
+
+
+def test_creep_relaxation_and_sweep_of_a_sample_agree() -> None:
+    """Limits of differences are roots of sums of squares: each of nine is missed once in 20."""
+    times = np.geomspace(0.02, 30.0, 120)
+    solid_of = {"model": "zener_maxwell"}
+    whole, share = SOLID["k"] + SOLID["k_p"], SOLID["k"] / (SOLID["k"] + SOLID["k_p"])
+    tau = SOLID["c"] / SOLID["k"]
+    relaxing = SOLID["k_p"] + SOLID["k"] * np.exp(-times / tau)
+    creeping = (1 - share * np.exp(-times * (1 - share) / tau)) / SOLID["k_p"]
+    scatter = np.random.default_rng(4).standard_normal((2, len(times)))
+    results = [
+        swept(solid(seed=4)),
+        told(times, relaxing + 0.005 * whole * scatter[0], reads="modulus", **solid_of),
+        told(times, creeping * (1 + 0.01 * scatter[1]), reads="compliance", **solid_of),
+    ]
+    frames = [result.to_frame() for result in results]
+    for name in SOLID:
+        for one, other in ((0, 1), (0, 2), (1, 2)):
+            both = [
+                np.log(frames[i].loc[name, ["value", "low", "high"]].astype(float))
+                for i in (one, other)
+            ]
+            half = np.hypot(*(0.5 * (each["high"] - each["low"]) for each in both))
+            assert abs(both[0]["value"] - both[1]["value"]) < 1.5 * half
+
+
+def test_a_relaxation_time_beyond_the_sweep_is_only_bounded() -> None:
+    found = by_quantity(swept(solid(c=3e7)).data)
+    assert found["tau"]["high"] is None or found["tau"]["high"] > 100 * found["tau"]["low"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda values: values - [[1.0], [0.0]] * OMEGA**2, "inertia of the instrument"),
+        (lambda values: values - [[0.4], [0.0]] * OMEGA**2, "inertia of the instrument"),
+        (lambda values: values * [[1.0], [1.3]], r"both moduli \(Kramers-Kronig\)"),
+    ],
+)
+def test_moduli_that_do_not_belong_to_one_sample_are_told(wrong: Any, said: str) -> None:
+    clean = moduli("zener_maxwell", OMEGA, 30000.0, 5000.0, 20000.0)
+    found = swept(noisy(wrong(clean)))
+    assert found.status != "ok"
+    assert any(said.replace("\\", "") in reason for reason in found.data["reasons"])
+
+
+def test_another_model_is_rejected() -> None:
+    assert swept(solid(), model="kelvin_voigt").status == "rejected"
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("model", "truth"),
+    [
+        ("zener_maxwell", [3000.0, 500.0, 2000.0]),
+        ("burgers", [3000.0, 9000.0, 2000.0, 1500.0]),
+        ("springpot", [600.0, 0.2]),
+        ("springpot_beside_damper", [600.0, 0.2, 3.0]),
+        ("fractional_maxwell", [800.0, 0.3, 2000.0]),
+    ],
+)
+def test_limits_hold_the_truth_as_often_as_they_say(model: str, truth: list[float]) -> None:
+    """Of 200 sweeps 93 to 97 %, and two standard deviations more, of each parameter."""
+    clean, names = moduli(model, OMEGA, *truth), MODELS[model].names
+    held = np.zeros((200, len(truth)))
+    for seed in range(len(held)):
+        scatter = np.random.default_rng(seed).standard_normal(clean.shape)
+        frame = swept(clean * (1 + np.array([[0.02], [0.03]]) * scatter), model=model).to_frame()
+        for column, (name, value) in enumerate(zip(names, truth, strict=True)):
+            low, high = frame.loc[name, ["low", "high"]]
+            held[seed, column] = not (low > value or high < value)
+    assert np.all(np.abs(held.mean(axis=0) - 0.95) < 0.02 + 2 * np.sqrt(0.95 * 0.05 / 200))
