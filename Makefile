@@ -26,7 +26,7 @@ locked = $(1)/bin/python -m pip install --quiet --require-hashes -r requirements
   $(1)/bin/python -m uv pip install --quiet --python $(1)/bin/python --require-hashes \
   $(addprefix -r ,$(2))
 # Overlays whose tables are published, each under its name; see `overlaid`.
-OVERLAYS := calibration coverage interpretations measured power_law recorded robustness soft
+OVERLAYS := calibration coverage measured power_law readings recorded repaired robustness soft
 # $(call overlaid,TARGET): every overlay in a folder of its own, from where traces are found, too.
 overlaid = failed=; for overlay in $(OVERLAYS); do \
   mkdir -p overlays/$$overlay && ln -sfn ../../data overlays/$$overlay/data && \

@@ -22,7 +22,7 @@ from biogrip.digits import with_unit
 from biogrip.fit.methods import identifier
 from biogrip.fit.problem import silent
 from biogrip.page.answers import (
-    compared_rows,
+    rows_beside_the_paper,
     say_what_claims_are,
     say_what_the_study_gives,
     say_what_traces_tell,
@@ -37,6 +37,7 @@ from tests.helpers.default import study_of
 from tests.helpers.key_reference import file_schema, reference
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH, ROOT
 from tests.published_numbers import renewed_numbers
+from workflow.paper.claims import Results, add_columns, judge_all
 
 PUBLISHED = ROOT / "results" / "published"
 MEASURED = PUBLISHED / "measured"
@@ -72,33 +73,142 @@ _SLOW = 1000
 
 
 def paper_against_study() -> str:
-    """The table "paper | this study", from the published error table."""
-    errors = read_table(PUBLISHED / "tables" / "errors.csv")
-    return _table(iter(compared_rows(errors, _verdicts(), _CASES)))
+    """Tables 5 to 7 beside this study, of the published runs under readings."""
+    beside = read_table(PUBLISHED / "readings" / "tables" / "tables_5_to_7.csv")
+    return _table(iter(rows_beside_the_paper(beside, _CASES)))
 
 
-def _verdicts() -> list[dict[str, str]]:
-    return [
-        row
-        for file in sorted((PUBLISHED / "tables").glob("verdicts_*.csv"))
-        for row in read_table(file)
-    ]
+def readings_compared() -> str:
+    """What each reading can print, how likely it prints it, and when it last improves."""
+    table = read_table(PUBLISHED / "readings" / "tables" / "readings.csv")
+
+    def likelihood(row: dict[str, str], end: str) -> str:
+        value, error = (float(row[f"likelihood{name}{end}"]) for name in ("", "_error"))
+        return f"{round(value, 1) + 0.0:.1f} ± {error:.1f}"
+
+    lost = [f"“{row['reading']}”" for row in table if row["verdict"] == "excluded"]
+    said = f"**By their likelihood {', '.join(lost) or 'none'} are excluded; the other "
+    said += f"{len(table) - len(lost)} are not told apart.**"
+    rows = _table(
+        {
+            "reading": row["reading"],
+            "values held": f"{row['with_error']} of {row['values']}",
+            "log₁₀ likelihood": likelihood(row, ""),
+            "half the width": likelihood(row, "_half"),
+            "twice": likelihood(row, "_twice"),
+            "last improvement, Tables 5, 6, 7": ", ".join(
+                f"{float(row[f'last_improvement_{number}']):.0f}" for number in (5, 6, 7)
+            ),
+            "by its likelihood": row["verdict"],
+        }
+        for row in table
+    )
+    return f"{said}\n\n{rows}"
+
+
+def choices() -> str:
+    """What each reading does to the headlines."""
+    table = pd.read_csv(PUBLISHED / "readings" / "tables" / "readings_found.csv")
+
+    def percent(rows: pd.DataFrame, case: str, name: str) -> str:
+        (value,) = rows[rows["case"] == case][name]
+        return f"{value:.2g} %"
+
+    rows = []
+    for reading, mine in table.groupby("reading", sort=False):
+        (cell,) = mine[mine["case"] == "endothelial_cell"].to_dict("records")
+        shares = (100 * cell[f"near_noise_{end}"] for end in ("share", "from", "to"))
+        rows.append(
+            {"reading": str(reading), "runs": str(cell["seeds"])}
+            | {"cell near the noise": "{:.0f} % ({:.0f} to {:.0f} %)".format(*shares)}
+            | {"error of k, cell": percent(mine, "endothelial_cell", "error_percent k")}
+            | {"of k, drop 2": percent(mine, "liquid_drop_2", "error_percent k")}
+            | {
+                f"of c + c_p, drop {n}": percent(mine, f"liquid_drop_{n}", "error_percent c + c_p")
+                for n in (1, 2)
+            }
+        )
+    return _table(iter(rows))
+
+
+def traces_told() -> str:
+    """What traces of the paper's protocol determine, of 500 each."""
+    coverage = read_table(PUBLISHED / "coverage" / "tables" / "coverage.csv")
+    return say_what_traces_tell(coverage, _CASES)
+
+
+def protocols_compared() -> str:
+    """What traces under the paper's protocol and others tell."""
+    table = pd.read_csv(PUBLISHED / "repaired" / "tables" / "protocols.csv")
+    rows = []
+    for row in table.to_dict("records"):
+        shares = (100 * row[f"enough_{end}"] for end in ("share", "from", "to"))
+        rows.append(
+            {"sample and protocol": row["case"], "quantity": row["quantity"]}
+            | {"lowest jaw force (µN)": f"{row['lowest_force_uN']:.2g}"}
+            | {"noise (µrad)": f"{row['noise_urad']:.3g}", "bound": f"{row['bound_percent']:.2g} %"}
+            | {f"within 10 % of {row['seeds']}": "{:.0f} % ({:.0f} to {:.0f} %)".format(*shares)}
+        )
+    return _table(iter(rows))
+
+
+# Tables that judge claims by 500 traces, or over levels of noise, and the published study of each.
+_JUDGING = {
+    "coverage": "coverage",
+    "robustness_noise": "robustness",
+    "robustness_gripper": "robustness",
+}
+_OF_THEM = {"slopes": "robustness"}
+"""Tables that are made of these."""
+
+
+def _claims() -> list[dict[str, str]]:
+    """Return the claims in their order, each row with the verdict that the most runs decide."""
+    tables = {
+        name: pd.read_csv(PUBLISHED / study / "tables" / f"{name}.csv")
+        for name, study in _JUDGING.items()
+    }
+    add_columns(tables)
+    numbers = {case.name: case.published.table for case in study_of().cases.values()}
+    for table in tables.values():
+        table["of_table"] = table["case"].map(numbers).astype("Int64")
+    every = yaml.safe_load((ROOT / "workflow" / "paper" / "claims.yaml").read_text("utf-8"))
+    told = [claim for claim in every if claim.get("rows", {}).get("table") in _JUDGING | _OF_THEM]
+    rows = [dict(row) for row in judge_all(told, Results(study_of(), tables), "").rows]
+    for name in ("readings", ""):
+        rows += read_table(PUBLISHED / name / "tables" / "claims.csv")
+    found: dict[str, dict[str, dict[str, str]]] = {claim["words"]: {} for claim in every}
+    for row in rows:
+        if row["verdict"] != "judged elsewhere" and not row["evidence"].startswith("Not here"):
+            before = found[row["claim"]].setdefault(row["of"], row)
+            if before["verdict"] == "too few runs to tell":
+                found[row["claim"]][row["of"]] = row
+    return [row for rows_of_claim in found.values() for row in rows_of_claim.values()]
+
+
+def claims_judged() -> str:
+    """The claims, each row with the verdict that the most runs decide."""
+    names = ("claim", "place", "of", "verdict", "evidence")
+    return _table({name: row[name].replace("|", r"\|") for name in names} for row in _claims())
+
+
+def claims_counted() -> str:
+    """How many claims have each verdict."""
+    return say_what_claims_are(_claims())
 
 
 def answer() -> str:
     """What the study found, in sentences as on its page."""
     tables = PUBLISHED / "tables"
-    methods, claimed = (read_table(tables / f"{name}.csv") for name in ("methods", "claims"))
+    methods = read_table(tables / "methods.csv")
     study = study_of()
     own = study.shown_method.title
     titles = {case.name: case.title for case in study.cases.values()}
     sentences = (
-        say_what_the_study_gives(methods, own, titles, "Run again, the paper's"),
+        say_what_the_study_gives(methods, own, titles, "Run again, the paper's", 1.0),
         say_which_method_finds_it(methods, own),
-        say_what_traces_tell(_verdicts()),
-        say_what_claims_are(claimed).replace(
-            "claims", "[claims](results/published/tables/claims.md)"
-        ),
+        traces_told(),
+        claims_counted().replace("claims", "[claims](docs/claims.md)", 1),
     )
     return "\n".join(f"- {sentence}" for sentence in sentences)
 
@@ -277,7 +387,15 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "docs" / "identifiability.md": {"slow": slow_branch, "methods": methods_compared},
     ROOT / "docs" / "measured.md": {"measured": measured},
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
-    ROOT / "docs" / "reproduction.md": {"results": paper_against_study},
+    ROOT / "docs" / "claims.md": {"claims": claims_judged},
+    ROOT / "docs" / "reproduction.md": {
+        "claims": claims_counted,
+        "results": paper_against_study,
+        "readings": readings_compared,
+        "choices": choices,
+        "told": traces_told,
+        "protocols": protocols_compared,
+    },
 }
 """Parts of documents that are written, by what."""
 

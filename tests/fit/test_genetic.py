@@ -157,6 +157,16 @@ def test_nearest_encodable_is_the_nearest_of_all(value: float, digits: int) -> N
     assert abs(nearest_encodable(value, genes) - value) == nearest
 
 
+def test_zeros_in_front_reach_below_the_smallest_number_without() -> None:
+    """Written out: 0.01 to 0.99, and 0.1 to 9.9 in steps of 0.1, each number once and ascending."""
+    genes = GeneRange((0, 1), (0, 9), first_digit=0)
+    hundredths = {*range(1, 100), *(10 * tenth for tenth in range(1, 100))}
+    np.testing.assert_allclose(genes.values, np.array(sorted(hundredths)) / 100, rtol=1e-15)
+    assert (genes.low, genes.high, nearest_encodable(0.056, genes)) == (0.01, 9.9, 0.06)
+    # Chromosomes of zeros alone are zero.
+    assert genes.least == (0, 0, 0)
+
+
 @pytest.mark.parametrize("digit", [0, 1])
 def test_no_encodable_point_is_lower_where_the_optimum_is_not_encodable(digit: int) -> None:
     """In a valley across both parameters, whose bottom no digits can hold; and at an end."""

@@ -41,6 +41,17 @@ def test_a_parameter_that_is_told_to_less_than_an_e_fold_counts() -> None:
     assert found == pytest.approx(np.array([[2.0, -1.0], [-1.0, 2.0]]) / 3)
 
 
+def test_parameters_that_stand_for_one_another_have_no_bounds() -> None:
+    """Of c and c_p a trace shows 9.9 c + 0.1 c_p, of k itself: the sum alone has a bound.
+
+    The third row moves along with the second, so that their logarithms trade: 9.9 to 0.1.
+    """
+    rows = np.array([[300.0, 0.0], [0.0, 9.9 * 500], [0.0, 0.1 * 500]])
+    shares = np.array([0.0, 0.99, 0.01])
+    found = np.diag(covariance(rows, 1.0, np.vstack([np.eye(3), shares])))
+    assert found == pytest.approx([1 / 300**2, np.inf, np.inf, 1 / 5000**2])
+
+
 def test_what_a_trace_without_noise_tells_may_outweigh_every_prior() -> None:
     """Two parameters of which it tells the sum, to 1e-12: their prior is lost in rounding."""
     rows = np.array([[[0.0], [1e12], [1e12]]])

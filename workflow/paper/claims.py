@@ -1,12 +1,12 @@
 """Judge the claims of the paper in claims.yaml, which says how, by the tables of a study.
 
-A claim names one of `JUDGES` with its numbers, or has parts that do. The rules of verdicts stand in
-`workflow/report/tables/claims.rst`, the caption of the table.
+A claim names one of `JUDGES` with its numbers; each quantity and sample that it is said of has a
+verdict of its own. The rules of verdicts stand in `workflow/report/tables/claims.rst`, the caption
+of the table. A second table has the paper's Tables 5 to 7 beside what the study finds.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from pathlib import Path
 from string import Formatter
 from typing import TYPE_CHECKING, Any
@@ -15,34 +15,37 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from biogrip.judging.quantities import PROVIDED
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.calibration import ARM_KEYS, FreeMotion, calibrate, free_motion
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import sample_times
-from biogrip.records.identifications import read_histories, read_identifications
+from biogrip.records.identifications import READINGS, read_histories, read_identifications
 from biogrip.records.rows import read_frame
-from biogrip.records.success import near_noise, share_with_limits
+from biogrip.records.success import median_with_limits, near_noise, share_with_limits
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, ShownTable, write
+from biogrip.tables.layout import Column, Row, ShownTable, write
+from biogrip.tables.printed import value_in_case
 
 if TYPE_CHECKING:
     snakemake: Any
 
 REPLICATED, IN_PART, NOT = "replicated", "in part", "not"
-OUTSIDE, UNDECIDED = "outside the printed encoding", "cannot be told"
+TOO_FEW, UNDECIDED = "too few runs to tell", "cannot be told"
+TOLD, ELSEWHERE = "not judged", "judged elsewhere"
 MOST, FEW = 0.9, 0.1
 """Shares from which, and up to which, something holds nearly always or hardly ever."""
 CLOSE, NEAR = 0.05, 0.1
 """Relative differences up to which a rounded number, and an identified value, is the paper's."""
-FEWEST_SEEDS = 20
-"""Seeds that shares and ranges take: with fewer, none is outside of the middle 90 %."""
-GENERATIONS = (20, 60)
-"""Generations at which tables of values are made, besides that of the last."""
+AROUND = 10
+"""Generations about the paper's that are still around it."""
+FASTER = 1.25
+"""Exponent of the noise up to which an error grows no faster than it."""
+OWN = "two digits from 1"
+"""Name of the encoding that the text describes, beside a reading that can print the tables."""
 
-Judged = tuple[str, str]
-"""A verdict, empty where something is only told, and the evidence."""
+Judged = tuple[str, str, str]
+"""What is judged, the verdict, and the evidence."""
 
 
 class LackingError(Exception):
@@ -57,44 +60,33 @@ class Results:
     tables: Mapping[str, pd.DataFrame]
     """Tables by name; `of_table` has the number of the paper's table that rows belong to."""
 
-    def table(self, name: str) -> pd.DataFrame:
-        """Return a table; raise `LackingError` if there is none, or too few seeds in it."""
-        if name not in self.tables:
-            raise LackingError(f"the study has no table {name}")
-        table = self.tables[name]
-        if "seed" in table and (seeds := table.groupby("case")["seed"].nunique().min()) < (
-            FEWEST_SEEDS
-        ):
-            raise LackingError(f"the study has {seeds} seeds, and it takes {FEWEST_SEEDS}")
-        return table
+    def rows(self, table: str, of: Sequence[int], where: str) -> pd.DataFrame:
+        """Return rows of a table; raise `LackingError` if there is none."""
+        if table not in self.tables:
+            raise LackingError(f"the study has no table {table}")
+        rows = self.tables[table]
+        rows = rows[rows["of_table"].isin(of)] if of else rows
+        if rows.empty:
+            raise LackingError(f"the study has no case of Table {' or '.join(map(str, of))}")
+        rows = rows.query(where, local_dict={"study": self.study}) if where else rows
+        if rows.empty:
+            raise LackingError(f"the study has no such rows in its table {table}")
+        return rows
 
 
-def by_share(those: Any) -> str:
-    """Judge something by the share of seeds or settings for which it holds."""
-    share = np.mean(those)
-    if share >= MOST:
+def by_interval(low: float, high: float, few: float = FEW, most: float = MOST) -> str:
+    """Judge something by the 95 % interval of the share of runs for which it holds."""
+    if low >= most:
         return REPLICATED
-    return IN_PART if share > FEW else NOT
+    if high <= few:
+        return NOT
+    return IN_PART if few < low and high < most else TOO_FEW
 
 
-def altogether(verdicts: Iterable[str]) -> str:
-    """Return the verdict on something that is said of several things."""
-    found = set(verdicts)
-    if found & {REPLICATED, IN_PART}:
-        return found.pop() if len(found) == 1 else IN_PART
-    return next((verdict for verdict in (NOT, OUTSIDE) if verdict in found), UNDECIDED)
-
-
-def is_encodable(printed: float, nearest: float) -> bool:
-    """Return whether the nearest value of the genes is the printed one, rounded to its digits."""
-    exponent = int(Decimal(f"{printed:.15g}").as_tuple().exponent)
-    return abs(nearest - printed) <= (0.5 + 1e-9) * 10.0**exponent
-
-
-def of_seeds(those: Any) -> str:
-    """Return a share of seeds, (n_seeds,), in words, with its 95 % limits."""
-    share, low, high = (100 * end for end in share_with_limits(int(np.sum(those)), len(those)))
-    return f"{share:.0f} % ({low:.0f} to {high:.0f})"
+def in_words(hits: int, runs: int) -> str:
+    """Return a share in words, with its 95 % limits."""
+    share, low, high = (100 * end for end in share_with_limits(hits, runs))
+    return f"{share:.0f} % ({low:.0f} to {high:.0f} %) of {runs}"
 
 
 class Evidence(Formatter):
@@ -116,60 +108,80 @@ def judge_rows(
     of: Sequence[int] = (),
     where: str = "",
     by: str | Sequence[str] = (),
+    name: str = "",
     holds: str = "",
-    unless: Mapping[str, str] | None = None,
     each: str = "",
+    count: Sequence[str] = (),
+    around: Sequence[Any] = (),
+    slope: Sequence[str] = (),
+    unless: str = "",
 ) -> list[Judged]:
-    """Judge by the share of a table's rows for which a condition holds; without one, only tell.
+    """Judge rows of a table, those of each value of the columns `by` apart.
 
-    Rows are those of tables of the paper (`of`) and of a condition (`where`), judged apart `by` the
-    values of a column. Verdicts that stand in `unless` take precedence where their condition holds.
-    With `each`, the condition has to hold in all rows that have the same value of this column.
-    Conditions are those of pandas' `eval`. Evidence may name, in braces, the `verdict`, the `share`
-    with limits, the number of `rows`, of `hits` and of `misses`, the quantities of hits (`those`),
-    the `study`, and statistics of columns, as in ``{median[misfit]:.2g}``.
+    Rows are those of tables of the paper (`of`) and of a condition (`where`). If they are runs,
+    with a column `seed`, the share counts for which `holds` is true, with `each` in all rows of the
+    same value. Else it has to be true of all rows. Instead of it, `count` names columns of hits and
+    of runs, `around` a column whose median is to be near a number, and `slope` a column with its
+    lowest and its highest value. Where `unless` is true nothing can be told. Runs of several
+    readings are judged by the one that can print the paper's values, with the text's beside it.
+
+    Conditions are those of pandas' `eval`. `name` and evidence may name, in braces, the `share`,
+    the number of `rows`, of `hits` and of `misses`, the `study`, and statistics of columns, as in
+    ``{median[misfit]:.2g}``.
     """
-    rows = results.table(table)
-    for number in of:
-        if not (rows["of_table"] == number).any():
-            raise LackingError(f"the study has no case of Table {number}")
-    rows = rows[rows["of_table"].isin(of)] if of else rows
-    rows = rows.query(where, local_dict={"study": results.study}) if where else rows
-    if rows.empty:
-        raise LackingError(f"the study has no such rows in its table {table}")
     judged = []
-    for _, group in rows.groupby(by, sort=False) if by else [("", rows)]:
-        numbers, verdict = group.select_dtypes("number"), ""
-        values = group.to_dict("list")
+    rows = results.rows(table, of, where)
+    for _, every in rows.groupby(by, sort=False) if by else [("", rows)]:
+        group = every[every["able"]] if "able" in every and every["able"].any() else every
+        numbers, verdict, values = group.select_dtypes("number"), "", group.to_dict("list")
         told: dict[str, Any] = {"study": results.study, "rows": len(group), "all": values}
-        told |= {"first": {name: column[0] for name, column in values.items()}}
+        told |= {"first": {label: column[0] for label, column in values.items()}}
         told |= {"least": numbers.min(), "median": numbers.median(), "most": numbers.max()}
         told |= {f"p{percent}": numbers.quantile(percent / 100) for percent in (5, 25, 75, 95)}
         if holds:
-            those = group.eval(holds)
-            those = those.groupby(group[each]).all() if each else those
-            verdict = by_share(those)
-            others = (name for name, text in (unless or {}).items() if group.eval(text).all())
-            verdict = next(others, verdict)
-            hits = int(those.sum())
-            told |= {"share": of_seeds(those), "hits": hits, "misses": len(those) - hits}
-            told["percent"] = 100 * hits / len(those)
-            if "quantity" in group and not each:
-                told["those"] = ", ".join(group["quantity"][those]) or "none"
-            of_sum = "sum" in group and group["sum"].all() and verdict != OUTSIDE
-            told["verdict"] = f"{verdict}, {PROVIDED}" if of_sum else verdict
-        judged.append((verdict, Evidence().format(evidence, **told)))
+            those = _those(results, group, holds, each)
+            hits, runs = int(those.sum()), len(those)
+            told |= {"hits": hits, "misses": runs - hits, "share": in_words(hits, runs)}
+            if "seed" in group:
+                verdict = by_interval(*share_with_limits(hits, runs)[1:])
+            else:
+                verdict = REPLICATED if hits == runs else NOT
+        elif count:
+            hits, runs = (int(group[column].sum()) for column in count)
+            told["share"] = in_words(hits, runs)
+            verdict = by_interval(*share_with_limits(hits, runs)[1:])
+        elif around:
+            told["middle"], low, high = median_with_limits(group[around[0]].to_numpy(float))
+            told |= {"low": low, "high": high}
+            inside = around[1] - AROUND <= low and high <= around[1] + AROUND
+            outside = high < around[1] - AROUND or low > around[1] + AROUND
+            verdict = REPLICATED if inside else NOT if outside else TOO_FEW
+        elif slope:
+            low, high = group[slope[1]].min(), group[slope[2]].max()
+            verdict = REPLICATED if high <= FASTER else NOT if low > FASTER else TOO_FEW
+        if unless and group.eval(unless).all():
+            verdict = UNDECIDED
+        said = Evidence().format(evidence, **told)
+        if len(group) < len(every) and holds:
+            beside = _those(results, every[~every["able"]], holds, each)
+            said = f"{said[:-1]}; with {OWN} {in_words(int(beside.sum()), len(beside))}."
+        judged.append((Evidence().format(name, **told), verdict, said))
     return judged
+
+
+def _those(results: Results, rows: pd.DataFrame, holds: str, each: str) -> Any:
+    those = rows.eval(holds, local_dict={"study": results.study})
+    return those.groupby(rows[each]).all() if each else those
 
 
 def judge_jaw_gap(results: Results, evidence: str) -> list[Judged]:
     """Judge by how much the angle at contact changes what is found, beside what noise allows."""
-    angles = np.radians(results.table("contact")["reference_angle_deg"].to_numpy(float))
+    angles = np.radians(results.rows("contact", (), "")["reference_angle_deg"].to_numpy(float))
     scale = np.sin(angles) ** 2
-    change = 100 * float(scale.max() / scale.min() - 1)
-    noise = float(results.table("coverage")["bound_percent"].min())
+    change = 100 * float(np.nanmax(scale) / np.nanmin(scale) - 1)
+    noise = float(results.rows("coverage", (), "")["bound_percent"].min())
     said = evidence.format(change=change, noise=noise)
-    return [(REPLICATED if change <= noise else IN_PART, said)]
+    return [("", REPLICATED if change <= noise else NOT, said)]
 
 
 def judge_free_arm(results: Results, evidence: str) -> list[Judged]:
@@ -184,66 +196,103 @@ def judge_free_arm(results: Results, evidence: str) -> list[Judged]:
     step, impulse = (add_noise(each, noise, rng) for each in (motion.step, motion.impulse))
     found = calibrate(FreeMotion(time_s, step, impulse), *causes).arm
     errors = [100 * abs(getattr(found, key) / getattr(arm, key) - 1) for key in ARM_KEYS]
-    verdict = altogether(REPLICATED if error <= 100 * CLOSE else NOT for error in errors)
-    return [(verdict, evidence.format(*errors, noise=100 * test.noise_level))]
-
-
-def judge_equations(results: Results, evidence: str, of: int) -> list[Judged]:
-    """Judge by whether the inner node runs away by eq. (6) as it is printed."""
-    cases = [case for case in results.study.cases.values() if case.published.table == of]
-    if not cases:
-        raise LackingError(f"the study has no case of Table {of}")
-    length_s = sum(phase.duration_s for phase in cases[0].phases)
-    decades = cases[0].parameters["k"] / cases[0].parameters["c"] * length_s / np.log(10)
-    said = evidence.format(decades=decades, length_s=length_s)
-    return [(NOT if decades > 0 else REPLICATED, said)]
+    verdict = REPLICATED if max(errors) <= 100 * CLOSE else NOT
+    return [("", verdict, evidence.format(*errors, noise=100 * test.noise_level))]
 
 
 JUDGES: Mapping[str, Any] = {
     "rows": judge_rows,
     "jaw_gap": judge_jaw_gap,
     "free_arm": judge_free_arm,
-    "equations": judge_equations,
 }
 
 
-def judge(claim: Mapping[str, Any], results: Results) -> Judged:
-    """Judge a claim, or a part of one."""
-    if "parts" in claim:
-        judged = [judge(part, results) for part in claim["parts"]]
-    else:
-        ((name, numbers),) = ((name, claim[name]) for name in JUDGES if name in claim)
-        try:
-            judged = JUDGES[name](results, claim["evidence"], **(numbers or {}))
-        except LackingError as lacking:
-            if "elsewhere" not in claim:
-                raise
-            return UNDECIDED, f"Not here: {lacking}; {claim['elsewhere']} makes it."
-    verdicts = [verdict for verdict, _ in judged if verdict and "tells_only" not in claim]
-    said = claim.get("between", ", ").join(evidence for _, evidence in judged)
-    around = claim.get("around", "{}").format(said, provided=PROVIDED)
-    return altogether(verdicts) if verdicts else "", around
+def judge(claim: Mapping[str, Any], results: Results) -> list[Judged]:
+    """Judge a claim; what nothing can contradict is only told."""
+    ((name, numbers),) = ((name, claim[name]) for name in JUDGES if name in claim)
+    try:
+        judged = JUDGES[name](results, claim["evidence"], **(numbers or {}))
+    except LackingError as lacking:
+        if "elsewhere" in claim:
+            return [("", ELSEWHERE, f"{claim['elsewhere']} has what it takes.")]
+        return [("", UNDECIDED, f"Not here: {lacking}.")]
+    return [(what, TOLD if claim.get("told") else verdict, said) for what, verdict, said in judged]
 
 
 def judge_all(claims: Sequence[Mapping[str, Any]], results: Results, caption: str) -> ShownTable:
     """Judge every claim by the study's results."""
-    rows = []
-    for claim in claims:
-        try:
-            verdict, evidence = judge(claim, results)
-        except LackingError as lacking:
-            verdict, evidence = UNDECIDED, f"Not here: {lacking}."
-        row = {"place": claim["place"], "claim": claim["words"], "verdict": verdict or UNDECIDED}
-        rows.append(row | {"evidence": evidence})
-    headings = ("Place", "Claim of the paper", "Verdict", "Evidence")
-    names = ("place", "claim", "verdict", "evidence")
+    rows: list[Row] = [
+        {"claim": claim["words"], "place": claim["place"], "of": what}
+        | {"verdict": verdict, "evidence": said}
+        for claim in claims
+        for what, verdict, said in judge(claim, results)
+    ]
+    headings = ("Claim of the paper", "Place", "Of", "Verdict", "Evidence")
+    names = ("claim", "place", "of", "verdict", "evidence")
     return ShownTable(caption, tuple(map(Column, names, headings)), rows)
 
 
+_COMPARED_COLUMNS = (
+    Column("case", "Sample"),
+    Column("quantity", "Quantity"),
+    Column("unit", "Unit"),
+    Column("target", "Target", 4),
+    Column("printed_from", "Paper from", 4),
+    Column("printed_to", "to", 4),
+    Column("error_from_percent", "Its error % from", 2),
+    Column("error_to_percent", "to", 2),
+    Column("reading", "Reading"),
+    Column("runs", "Runs"),
+    Column("median_error_percent", "Median error of a run %", 2),
+    Column("median_from_percent", "from", 2),
+    Column("median_to_percent", "to", 2),
+    Column("p25", "Quartiles from", 3),
+    Column("p75", "to", 3),
+    Column("near_share", "Share near the paper's value", 2),
+    Column("near_from", "from", 2),
+    Column("near_to", "to", 2),
+    Column("verdict", "Verdict"),
+)
+
+
+def compared(results: Results) -> ShownTable:
+    """Put the paper's Tables 5 to 7 beside what the runs of the study find."""
+    rows: list[Row] = []
+    values = results.tables.get("values", pd.DataFrame())
+    for (reading, case, quantity), runs in (
+        values.groupby(["reading", "case", "quantity"], sort=False) if len(values) else ()
+    ):
+        first, row = runs.iloc[0], {"case": case, "quantity": quantity, "reading": reading}
+        row |= {name: first[name] for name in ("unit", "target", "printed_from", "printed_to")}
+        row |= {f"error_{end}_percent": first[f"printed_error_{end}"] for end in ("from", "to")}
+        row |= {"runs": len(runs), **{f"p{p}": runs["value"].quantile(p / 100) for p in (25, 75)}}
+        medians = median_with_limits(runs["error"].to_numpy(float))
+        row |= zip((f"median_{n}_percent" for n in ("error", "from", "to")), medians, strict=True)
+        near = share_with_limits(int(runs["near"].sum()), len(runs))
+        row |= zip(("near_share", "near_from", "near_to"), near, strict=True)
+        verdict = by_interval(*near[1:]) if first["encodable"] else "its genes lack the value"
+        rows.append(row | {"verdict": verdict if first["determined"] else UNDECIDED})
+    caption = (
+        "The paper's Tables 5 to 7 beside the runs of this study, by readings of the paper. The "
+        "paper's value from and to: what is printed so with the printed error. Errors of a run are "
+        "absolute; their median has its 95 % interval. Near: within "
+        f"{NEAR:.0%} of the paper's value, with 95 % limits, by which the verdict is; it cannot be "
+        "told where no trace determines the quantity."
+    )
+    return ShownTable(caption, _COMPARED_COLUMNS, rows)
+
+
 def read_results(
-    study: Study, identifications: Sequence[Path], histories: Sequence[Path], files: Sequence[Path]
+    study: Study,
+    identifications: Sequence[Path],
+    histories: Sequence[Path],
+    files: Sequence[Path],
+    read: Sequence[Path] = (),
 ) -> Results:
-    """Read the tables of a study, and the runs on the paper's cases, of files in their order."""
+    """Read the tables of a study, and the runs on the paper's cases, of files in their order.
+
+    Runs under readings of the paper are in files named like their case.
+    """
     tables = {file.stem: read_frame(file, "a table", ()) for file in files}
     add_columns(tables)
     verdicts = [table for name, table in tables.items() if name.startswith("verdicts_")]
@@ -251,10 +300,14 @@ def read_results(
     runs: dict[str, list[pd.DataFrame]] = {}
     for case, found, best in zip(study.cases.values(), identifications, histories, strict=True):
         if study.shown == "genetic":
-            of_case = read_runs(case, found, best)
-            runs.setdefault("runs", []).append(of_case[""])
-            for at, values in of_case.items():
-                runs.setdefault(f"values{at}", []).append(values_of(case, values, tables))
+            for at, own in read_runs(case, found, best).items():
+                others = [file for file in read if file.stem == case.name and not at]
+                both = [own.assign(able=False)]
+                both += [read_reading(study, tables["readings"], file) for file in others]
+                every = pd.concat(both, ignore_index=True).assign(case=case.name)
+                if not at:
+                    runs.setdefault("runs", []).append(every)
+                runs.setdefault(f"values{at}", []).append(values_of(case, every, tables))
     tables |= {name: pd.concat(each, ignore_index=True) for name, each in runs.items()}
     cases = study.cases.values()
     numbers = {name: case.published.table for case in cases for name in (case.name, case.title)}
@@ -264,6 +317,21 @@ def read_results(
     return Results(study, tables)
 
 
+def read_reading(study: Study, readings: pd.DataFrame, file: Path) -> pd.DataFrame:
+    """Return the runs of a case under the reading that can print the most of the paper's values."""
+    best = readings["with_error"].idxmax()
+    name, block = list(study.config.readings.items())[best]
+    all_of = {"reading": study.config.readings, "seed": range(study.cases[file.stem].seeds)}
+    found = READINGS.read(file, case=[file.stem], **all_of)
+    found = found[found["reading"] == name].rename(columns=_NAMES)
+    found["near_noise"] = near_noise(found, study.near_noise_tolerance)
+    holds = readings.loc[best, "with_error"] == readings.loc[best, "values"]
+    return found.assign(able=True, reading=block.title, encodable=holds)
+
+
+_NAMES = {"k_N_per_m": "k", "k_p_N_per_m": "k_p", "c_Ns_per_m": "c", "c_p_Ns_per_m": "c_p"}
+
+
 def add_columns(tables: dict[str, pd.DataFrame]) -> None:
     """Add what claims need of several rows of a table, or cannot be said by pandas' `eval`."""
     if "evidence" in tables:
@@ -271,22 +339,25 @@ def add_columns(tables: dict[str, pd.DataFrame]) -> None:
         printed = pd.to_numeric(told["paper"].str.removeprefix("about "), errors="coerce")
         close = abs(told["this_study"] / printed - 1) <= CLOSE
         told["as_printed"] = close.where(told["quantity"].str.contains("voltage for .* N m"))
-    if "printed_values" in tables:
-        values = tables["printed_values"]
-        pairs = zip(values["printed"], values["nearest_encodable"], strict=True)
-        values["encodable"] = [is_encodable(*pair) for pair in pairs]
-        values["encodable"] &= values["within_range"] == "yes"
-    if "gene_ranges" in tables:
-        tables["gene_ranges"] = tables["gene_ranges"].sort_values("values")
     if "contact" in tables:
         tables["contact"]["closing_deg"] = np.degrees(1e-3 * tables["contact"]["closing_mrad"])
     if "methods" in tables:
-        shares = tables["methods"].groupby("case")["reached_share"]
-        tables["methods"]["reached_change"] = shares.transform("max") - shares.transform("min")
+        ends = tables["methods"].groupby("case")[["reached_low", "reached_high"]]
+        apart = ends.transform("max")["reached_low"] > ends.transform("min")["reached_high"]
+        # Where there is one method alone there is nothing to compare.
+        several = tables["methods"]["method"].nunique() > 1
+        tables["methods"]["apart"] = apart if several else np.nan
     if "robustness_gripper" in tables:
         sweep = tables["robustness_gripper"]
         bounds = sweep.groupby(["case", "quantity"])["bound_percent"]
         sweep["bound_change"] = bounds.transform("max") / bounds.transform("min")
+    if "robustness_noise" in tables:
+        sweep = tables["robustness_noise"]
+        noisy = sweep[sweep["row"] > 0]
+        tables["slopes"] = pd.DataFrame(
+            {"case": case, "quantity": quantity, **_slope(rows)}
+            for (case, quantity), rows in noisy.groupby(["case", "quantity"], sort=False)
+        )
     if "models" in tables:
         models = tables["models"]
         makers = models[models["model"].str.endswith("(made the traces)")].set_index("case")
@@ -294,8 +365,23 @@ def add_columns(tables: dict[str, pd.DataFrame]) -> None:
         models["for_maker"] = models["case"].map(makers["chosen_by_bic"])
 
 
+def _slope(rows: pd.DataFrame) -> Row:
+    """Return the exponent with which errors grow with the noise, and their size beside bounds."""
+    noise, error = np.log(rows[["row", "error_genetic"]].to_numpy(float).T)
+    (slope, _), spread = np.polyfit(noise, error, 1, cov=True)
+    wide = 1.96 * float(np.sqrt(spread[0, 0]))
+    # Rounded, for errors that do not change at all leave rounding.
+    ends = [round(end, 2) + 0.0 for end in (slope, slope - wide, slope + wide)]
+    # The median absolute error of an unbiased Gaussian estimate is 0.6745 standard deviations.
+    over = (rows["error_genetic"] / (0.6745 * rows["bound_percent"])).median()
+    at = rows.groupby("row")["error_genetic"].median()
+    sizes = {"over_bound": over, "first": at.iloc[0], "last": at.iloc[-1]}
+    sizes |= {"first_noise": at.index[0], "last_noise": at.index[-1]}
+    return dict(zip(("slope", "slope_from", "slope_to"), ends, strict=True)) | sizes
+
+
 def read_runs(case: Case, identifications: Path, histories: Path) -> dict[str, pd.DataFrame]:
-    """Return the genetic algorithm's runs on a case, a row a seed; in the end, and at generations.
+    """Return the genetic algorithm's runs on a case, a row a seed; at the end and generation 20.
 
     Parameters stand by name in the place of their columns.
     """
@@ -304,59 +390,59 @@ def read_runs(case: Case, identifications: Path, histories: Path) -> dict[str, p
     best = read_histories(histories, "genetic", ["best_misfit", *names]).rename(columns=names)
     change = best.groupby("seed")["best_misfit"].diff()
     falls = best["generation"].where(change < 0, 0).groupby(best["seed"]).max()
-    rises = (change > 0).groupby(best["seed"]).any()
     found["near_noise"] = near_noise(found, case.study.near_noise_tolerance)
-    found = found.assign(last_improvement=found["seed"].map(falls), rises=found["seed"].map(rises))
+    found = found.assign(last_improvement=found["seed"].map(falls))
     # Of a run that has stopped before, the last generation.
-    return {"": found} | {
-        f" at {at}": best[best["generation"] <= at].groupby("seed", as_index=False).last()
-        for at in GENERATIONS
-    }
+    at_20 = best[best["generation"] <= 20].groupby("seed", as_index=False).last()
+    return {"": found.assign(reading=OWN), " at 20": at_20.assign(reading=OWN)}
 
 
 def values_of(case: Case, runs: pd.DataFrame, tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Return a row for every quantity and run: its value beside the truth and the paper's value.
 
-    Errors are absolute, in percent; `least_error` is that of the genes' value nearest to the truth.
+    Errors are absolute, in percent.
     """
     printed = tables["printed_values"]
-    printed = printed[printed["case"] == case.name].set_index(["quantity", "parameter"])
-    nearest, expected = printed["nearest_encodable"], tables[f"verdicts_{case.name}"]
-    expected = expected.set_index("quantity")
-    truths, papers, rows = case.parameters, case.published.identified, []
+    printed = printed[(printed["case"] == case.name) & (printed["quantity"] == "identified")]
+    held = printed.set_index("parameter")["encodable"] == "yes"
+    expected = tables[f"verdicts_{case.name}"].set_index("quantity")
+    rows = []
     for quantity in case.sample.model.quantities:
         names = [parameter.name for parameter in quantity]
-        label = " + ".join(names)
-        truth, paper = (sum(of.get(name, np.nan) for name in names) for of in (truths, papers))
-        least = sum(nearest.get(("target", name), np.nan) for name in names)
+        label, truth = " + ".join(names), sum(case.parameters[name] for name in names)
+        paper, *ends = value_in_case(case, names) or 3 * (np.nan,)
+        sizes = [100 * abs(end / truth - 1) for end in ends]
+        # A target between the ends may have no error.
+        least = 0.0 if ends[0] <= truth <= ends[1] else min(sizes)
         values = runs[names].sum(axis=1)
+        # Sums have many ways to be made.
+        own = len(names) > 1 or bool(held.get(names[0], False))
         columns = {
             "value": values,
             "error": 100 * abs(values / truth - 1),
-            "decades": abs(np.log10(values / truth)),
+            "decades": abs(np.log10(values.clip(lower=1e-300) / truth)),
             "near": abs(values / paper - 1) <= NEAR,
-            "printed": paper,
-            "printed_error": 100 * abs(paper / truth - 1),
-            "least_error": 100 * abs(least / truth - 1),
-            "encodable": all(
-                ("identified", name) in nearest
-                and is_encodable(papers[name], nearest["identified", name])
-                for name in names
-            ),
-            "determined": expected["expected_verdict"][label] == DETERMINED,
-            "expected_high": expected["expected_high"][label],
-            "noise_percent": 100 * case.noise.level,
+            "encodable": runs["encodable"].where(runs["able"], own) if runs["able"].any() else own,
         }
-        head = {"case": case.name, "seed": runs["seed"], "quantity": label, "sum": len(names) > 1}
-        rows.append(pd.DataFrame(head | columns))
+        head = {"quantity": label, "unit": quantity[0].unit, "target": truth}
+        head |= {"printed_from": ends[0], "printed_to": ends[1], "printed_error_from": least}
+        head |= {"printed_error_to": max(sizes), "sum": len(names) > 1}
+        head |= {"determined": expected["expected_verdict"][label] == DETERMINED}
+        head |= {"expected_high": expected["expected_high"][label]}
+        head |= {"noise_percent": 100 * case.noise.level}
+        kept = runs[["case", "seed", "reading", "able"]]
+        rows.append(kept.assign(**head, **columns))
     return pd.concat(rows)
 
 
 if __name__ == "__main__":
     with logged(snakemake):
-        study, given = job_study(snakemake), snakemake.input
-        read = (paths(files) for files in (given.identifications, given.histories, given.tables))
-        results = read_results(study.of(study.published), *read)
+        given = snakemake.input
+        of_paper = job_study(snakemake)
+        of_paper = of_paper.of(of_paper.published)
+        files = (given.identifications, given.histories, given.tables, given.readings)
+        results = read_results(of_paper, *map(paths, files))
         claims = yaml.safe_load(Path(given.claims).read_text(encoding="utf-8"))
         caption = " ".join(Path(given.caption).read_text(encoding="utf-8").split())
         write(judge_all(claims, results, caption), Path(snakemake.output.table))
+        write(compared(results), Path(snakemake.output.compared))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from biogrip.digits import counted
 from biogrip.fit.genome import nearest_encodable
@@ -18,14 +19,12 @@ from biogrip.judging.likelihood import bounds_percent
 from biogrip.judging.quantities import Quantity
 from biogrip.physics import gripper as actuator
 from biogrip.physics.protocol import sample_times
-from biogrip.physics.sample_model import SINGLE_BRANCH
-from biogrip.physics.simulation import compute_grip
-from biogrip.records.identifications import read_identifications
 from biogrip.records.traces import read_measurements
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import error_percent
 from biogrip.tables.layout import Column, Row, ShownTable, write
+from biogrip.tables.printed import value_in_case
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -43,25 +42,17 @@ _PRINTED_VOLTAGES = (
     (0.32e-9, "about 7", "eq. (9) with Table 2"),
     (1.6e-6, "about 17", "section 3 prints 1.6 uN m without the factor 1e-3"),
 )
-_PRINTED_GENE_VALUES = "9 or 12"
 
 
 # Quantity, unit, what the paper has, what the study has, and a remark.
 _Told = tuple[str, str, str | None, float, str]
 
 
-def evidence(study: Study, identifications: list[Path], measurements: list[Path]) -> ShownTable:
+def evidence(study: Study, measurements: list[Path]) -> ShownTable:
     """Compare statements of the paper with results of the study."""
     told = _of_device(study)
     for name, case in study.cases.items():
-        told += [_grip(case)] if name in study.gripped else []
         told += _axis(case, [path for path in measurements if path.parent.name == name])
-        if case.published.generation and study.shown == "genetic":
-            for path in (path for path in identifications if path.stem == name):
-                median = read_identifications(path, case, "genetic")["generations"].median()
-                remark = "median generation at which ours stops"
-                quantity = f"{case.title}: generation of the fit"
-                told.append((quantity, "", str(case.published.generation), median, remark))
     names = [column.name for column in _COLUMNS]
     rows = [dict(zip(names, cells, strict=True)) for cells in told]
     return ShownTable("Statements of the paper beside what the study computes.", _COLUMNS, rows)
@@ -83,25 +74,11 @@ def _of_device(study: Study) -> list[_Told]:
         ("quality factor of the free arm", "", None, arm.quality_factor, config),
         ("voltage for the full stroke, no sample", "V", None, stroke, f"{config}'s k_2"),
     ]
-    remark = "from the config, made after Table 4"
-    for p in SINGLE_BRANCH:
-        low, high = study.ranges[p.name].exponent
-        quantity = f"values of the exponent gene of {p.name}"
-        told.append((quantity, "", _PRINTED_GENE_VALUES, high - low + 1, remark))
     return told
 
 
 def _volts(study: Study, torque_Nm: float) -> float:
     return float(actuator.voltage(study.actuator, torque_Nm))
-
-
-def _grip(case: Case) -> _Told:
-    """Return the lowest jaw force; the paper says that the lower torque maintains the grip."""
-    device = case.gripper, case.network, case.torque
-    grip = compute_grip(*device, nonlinear=case.nonlinear_target)
-    remark = f"at {grip.lowest_at_s:.4g} s, as in mechanics; negative: the jaws would have to pull"
-    quantity = f"{case.title}: lowest jaw force"
-    return quantity, "uN", "maintains the grip", 1e6 * grip.lowest_N, remark
 
 
 def _axis(case: Case, traces: list[Path]) -> list[_Told]:
@@ -133,6 +110,9 @@ _PRINTED_COLUMNS = (
     Column("nearest_encodable", "Nearest encodable", 2),
     Column("distance_percent", "Distance %", 2),
     Column("within_range", "Within range"),
+    Column("printed_from", "Printed from", 5),
+    Column("printed_to", "to", 5),
+    Column("encodable", "Two digits hold it"),
     Column("printed_error_percent", "Printed error %"),
     Column("recomputed_error_percent", "Recomputed error %", 3),
 )
@@ -158,6 +138,11 @@ def printed_values(study: Study) -> ShownTable:
                     "distance_percent": 100 * (value - nearest) / value,
                     "within_range": "yes" if genes.low <= value <= genes.high else "no",
                 }
+                if quantity == "identified":
+                    _, low, high = value_in_case(case, [name]) or (value, value, value)
+                    held = (genes.values >= low) & (genes.values <= high)
+                    row |= {"printed_from": low, "printed_to": high}
+                    row["encodable"] = "yes" if held.any() else "no"
                 if quantity == "identified" and target:
                     row["printed_error_percent"] = printed.error_percent.get(name)
                     error = error_percent(target, np.array([value]))[0]
@@ -165,7 +150,9 @@ def printed_values(study: Study) -> ShownTable:
                 rows.append(row)
     caption = (
         "Printed values of Tables 5 to 7 against the two-digit encoding of eq. (10), the ranges "
-        "of Table 4, and the printed errors against (target - identified) / target."
+        "of Table 4, and the printed errors against (target - identified) / target. From and to: "
+        "the numbers that are printed so with the printed error, each rounded or cut off; two "
+        "digits hold the value if they hold such a number."
     )
     return ShownTable(caption, _PRINTED_COLUMNS, rows)
 
@@ -173,10 +160,14 @@ def printed_values(study: Study) -> ShownTable:
 _RATES_HZ = (0.1, 1.0, 10.0, 100.0)
 # Factor of a parameter's bound over that of the sum above which the two count as exchangeable.
 _TRADING = 2.0
+# Rate (Hz) from which bounds are taken to others, and the share of chi-squared that counts.
+_NEAR, _MIDDLE = 10.0, 0.95
 _SAMPLING_COLUMNS = (
     Column("case", "Case"),
     Column("parameter", "Parameter"),
     Column("paper_error_percent", "Paper's error %", 2),
+    Column("paper_error_from_percent", "from", 2),
+    Column("paper_error_to_percent", "to", 2),
     *(Column(f"bound_percent_{rate:g}_Hz", f"Bound % at {rate:g} Hz", 2) for rate in _RATES_HZ),
 )
 
@@ -188,22 +179,33 @@ def sampling_evidence(study: Study) -> ShownTable:
     ]
     if found:
         table = np.array([cells[2:] for cells in found], dtype=float)
-        ratios = np.sqrt(np.mean((table[:, :1] / table[:, 1:]) ** 2, axis=0))
-        found.append(("all", "error / bound", None, *ratios))
+        errors, bounds = table[:, :1], table[:, 3:]
+        ratios = np.sqrt(np.mean((errors / bounds) ** 2, axis=0))
+        found.append(("all", "error / bound", None, None, None, *ratios))
+        near = bounds[:, _RATES_HZ.index(_NEAR)]
+        tails = chi2.ppf(((1 - _MIDDLE) / 2, (1 + _MIDDLE) / 2), len(errors))
+        rates = _NEAR * tails / np.sum((errors[:, 0] / near) ** 2)
+        found.append(("all", "rates (Hz)", None, *rates))
     caption = (
-        "The paper's errors beside the standard deviations that the study's noise leaves at least "
-        "(Cramer-Rao bounds at the true parameters), at several sampling rates. Of c and c_p the "
-        "sum stands where they trade against each other at the paper's answer. Last row: the "
-        "paper's error over the bound, root mean square over the rows above; about 1 is to be "
-        "expected of an identification that is as good as noise allows."
+        "The paper's errors, with what value and printed error leave of them, beside the standard "
+        "deviations that the study's noise leaves at least (Cramer-Rao bounds at the true "
+        "parameters), at several sampling rates. Of c and c_p the sum stands where they trade "
+        "against each other at the paper's answer. Last rows: the paper's error over the bound, "
+        "root mean square over the rows above, of which about 1 is to be expected of an "
+        "identification that is as good as noise allows; and the lowest and highest rate at which "
+        f"chi-squared of the errors is in the middle {_MIDDLE:.0%}, bounds taken from {_NEAR:g} Hz "
+        "with the root of the rate."
     )
     names = [column.name for column in _SAMPLING_COLUMNS]
-    rows = [dict(zip(names, cells, strict=True)) for cells in found]
+    rows = [dict(zip(names, cells, strict=False)) for cells in found]
     return ShownTable(caption, _SAMPLING_COLUMNS, rows)
 
 
 def _errors_and_bounds(case: Case) -> list[tuple[Any, ...]]:
-    """Return a row of each quantity that is determined at some rate and that the paper reports."""
+    """Return a row of each quantity that is determined at some rate and that the paper reports.
+
+    Errors are the paper's, and the lowest and the highest that it may have printed so.
+    """
     truth, identified = case.parameters, case.published.identified
     problem, noise = case.experiment, case.noise
     names = list(problem.searched.names)
@@ -216,11 +218,11 @@ def _errors_and_bounds(case: Case) -> list[tuple[Any, ...]]:
     for index, (quantity, _) in enumerate(at_truth[0]):
         bounds = [at_rate[index][1] for at_rate in at_truth]
         members = [names[member] for member in quantity.members]
-        known = all(member in identified for member in members)
-        if quantity in shown and known and min(bounds) < DETERMINED_PERCENT:
-            target, value = (sum(of[m] for m in members) for of in (truth, identified))
-            error = error_percent(target, np.array([value]))[0]
-            found.append((quantity.label, error, *bounds))
+        told = value_in_case(case, members)
+        if quantity in shown and told and min(bounds) < DETERMINED_PERCENT:
+            target = sum(truth[member] for member in members)
+            middle, high, low = error_percent(target, np.array(told))
+            found.append((quantity.label, middle, low, high, *bounds))
     return found
 
 
@@ -241,7 +243,7 @@ if __name__ == "__main__":
         of_paper = job_study(snakemake)
         of_paper = of_paper.of(of_paper.published)
         given, made = snakemake.input, snakemake.output
-        told = evidence(of_paper, paths(given.identifications), paths(given.measurements))
+        told = evidence(of_paper, paths(given.measurements))
         write(told, Path(made.evidence))
         write(printed_values(of_paper), Path(made.printed_values))
         write(sampling_evidence(of_paper), Path(made.sampling_evidence))

@@ -101,7 +101,8 @@ _MECHANICS_COLUMNS = (
     Column("stiffness_in_the_end_N_per_m", "in the end (N/m)"),
     Column("gripper_stiffness_N_per_m", "of the gripper (N/m)"),
     Column("stiffness_over_gripper", "Sample over gripper"),
-    Column("apparent_modulus_kPa", "Apparent modulus (kPa)"),
+    Column("apparent_modulus_kPa", "Modulus by Hertz (kPa)"),
+    Column("modulus_by_area_kPa", "by area (kPa)"),
 )
 
 
@@ -113,7 +114,8 @@ def mechanics(study: Study) -> ShownTable:
         "stiffness of the sample at once (all springs) and in the end (the parallel one), of the "
         "gripper (both hinges, at the jaws), and the first of these over the last. The modulus is "
         "that of an incompressible sphere between two flat jaws (Hertz) with force and shortening "
-        "of the end of the first phase; cells have about 1 kPa, give or take a factor of 30 by the "
+        "of the end of the first phase; by area it is force over the sphere's cross-section and "
+        "strain; cells have about 1 kPa, give or take a factor of 30 by the "
         "method of measurement. A case that gives no size has a row for the smallest and the "
         "largest sample that the gripper takes."
     )
@@ -152,7 +154,9 @@ def _mechanics_of(case: Case) -> list[Row]:
     for size in (SMALLEST_M, LARGEST_M) if size_m is None else (size_m,):
         modulus = 1e-3 * apparent_modulus(force, shortening, size) if shortening > 0 else None
         of_size = {"size_um": 1e6 * size, "strain_percent": 100 * shortening / size}
-        rows.append(of_all_sizes | of_size | {"apparent_modulus_kPa": modulus})
+        by_area = force / (np.pi / 4 * size**2) / (shortening / size)
+        moduli = {"apparent_modulus_kPa": modulus, "modulus_by_area_kPa": 1e-3 * by_area}
+        rows.append(of_all_sizes | of_size | moduli)
     return rows
 
 

@@ -123,9 +123,16 @@ INPUTS += ["gripper", "actuator"] if STUDY.has_gripper else []
 EVIDENCE = ["evidence", "printed_values", "sampling_evidence"]
 OTHER_TABLES = [*INPUTS, *(["contact", "left_out"] if STUDY.has_gripper else [])]
 OTHER_TABLES += ["linearisation", "mechanics", "contact_loss"] if STUDY.gripped else []
-OTHER_TABLES += ["claims", *EVIDENCE] if STUDY.published else []
-OTHER_TABLES += ["interpretations", "interpretations_jointly"] * bool(STUDY.config.interpretations)
+OTHER_TABLES += ["claims", "tables_5_to_7", *EVIDENCE] if STUDY.published else []
+OTHER_TABLES += ["readings", "readings_found"] * bool(STUDY.config.readings)
+# The paper's samples under other protocols, and these under its own.
+KNOWN = [STUDY.case(name).parameters for name in STUDY.published]
+OTHERS = [
+    n for n in STUDY.gripped if n not in STUDY.published and STUDY.case(n).parameters in KNOWN
+]
+OTHER_TABLES += ["protocols"] * bool(OTHERS)
 GRIPPER_FIGURES = ["comb", "linkage", "torque"] if STUDY.has_gripper else []
+PAPER_FIGURES = ["protocols"] * bool(OTHERS)
 FIGURES = ["answer"] if ANSWERED else []
 FIGURES += ["moduli", "overview"] if STUDY.simulated else []
 
@@ -145,7 +152,7 @@ SHOWN = {
         *(("robustness", sweep) for sweep in STUDY.config.sweeps),
     ],
     "figures": [
-        *((name, "") for name in [*GRIPPER_FIGURES, *FIGURES]),
+        *((name, "") for name in [*GRIPPER_FIGURES, *PAPER_FIGURES, *FIGURES]),
         *(("linearisation", "") for _ in STUDY.gripped[:1]),
         *(
             (name, case)

@@ -1,11 +1,11 @@
-"""What only the study of the paper has: its inputs, its gripper, evidence, interpretations, claims."""
+"""What only the study of the paper has: its inputs, its gripper, evidence, readings, claims."""
 
 from biogrip.physics.models import SINGLE_BRANCH
 
 # Simulated cases whose model has the paper's parameters, and what is read of each.
 OURS = {parameter.name for parameter in SINGLE_BRANCH}
 GRIPPED = STUDY.of(STUDY.gripped)
-INTERPRETED = [n for n in STUDY.simulated if set(STUDY.case(n).sample.model.names) <= OURS]
+READ = [n for n in STUDY.published if set(STUDY.case(n).sample.model.names) <= OURS]
 
 
 rule gripper_figures:
@@ -92,7 +92,6 @@ rule linearisation:
 # Of the cases whose axis the paper shows, the traces.
 rule evidence:
     input:
-        identifications=files("results/identifications/{case}.csv", STUDY.published),
         measurements=files(
             "results/measurements/{case}/{batch}.npz",
             [name for name in STUDY.published if STUDY.case(name).published.axis_rad],
@@ -117,67 +116,95 @@ rule evidence:
         "../paper/evidence.py"
 
 
-rule interpretations_of_case:
+rule readings_of_case:
     input:
         target="results/targets/{case}.csv",
     output:
-        rows="results/interpretations/{case}.csv",
+        rows="results/readings/{case}.csv",
     log:
-        "results/logs/interpretations_of_case/{case}.log",
+        "results/logs/readings_of_case/{case}.log",
     benchmark:
-        "results/benchmarks/interpretations_of_case/{case}.tsv"
+        "results/benchmarks/readings_of_case/{case}.tsv"
     resources:
         runtime=120,
     params:
         **settings_of(
-            # Of the case all, for an interpretation may change any.
-            *("study_seed", "seeds", "actuator", "interpretations", *CASE_KEYS),
+            # Of the case all, for a reading may change any.
+            *("study_seed", "seeds", "actuator", "readings", *CASE_KEYS),
         ),
     message:
-        "Identifying {wildcards.case} under every interpretation of the paper"
+        "Identifying {wildcards.case} under every reading of the paper"
     script:
-        "../scripts/interpretations_of_case.py"
+        "../scripts/readings_of_case.py"
 
 
-rule interpretations:
+rule readings:
     input:
-        found=files("results/interpretations/{case}.csv", INTERPRETED),
+        found=files("results/readings/{case}.csv", READ),
     output:
-        apart="results/tables/interpretations.csv",
-        apart_page=page_of_table("interpretations"),
-        jointly="results/tables/interpretations_jointly.csv",
-        jointly_page=page_of_table("interpretations_jointly"),
+        readings="results/tables/readings.csv",
+        found="results/tables/readings_found.csv",
+        pages=[page_of_table(name) for name in ("readings", "readings_found")],
     log:
-        "results/logs/interpretations.log",
+        "results/logs/readings.log",
     params:
         **settings_of(
-            *("interpretations", "seeds", "evaluation"),
-            *keys_of_cases(STUDY, "published", *SAMPLE),
+            *("readings", "seeds", "evaluation"),
+            *keys_of_cases(STUDY, *CASE_KEYS),
         ),
     message:
-        "Comparing the interpretations of the paper"
+        "Comparing the readings of the paper"
     script:
-        "../paper/interpretations.py"
+        "../paper/readings.py"
 
 
-# By what this study has: only some configs have sweeps and interpretations.
+rule protocols:
+    input:
+        identifications=files(
+            f"results/identifications/{{case}}/{STUDY.shown}/{{batch}}.csv",
+            [*STUDY.published, *OTHERS],
+        ),
+    output:
+        table="results/tables/protocols.csv",
+        page=page_of_table("protocols"),
+        figure=drawing("protocols"),
+    log:
+        "results/logs/protocols.log",
+    params:
+        **settings_of(
+            *"methods actuator".split(),
+            *keys_of_cases(STUDY, *FIT, "title", "published", "models", *SAMPLING, NOISE),
+        ),
+    message:
+        "Comparing the paper's protocol with others"
+    script:
+        "../paper/protocols.py"
+
+
+# By what this study has: only some configs have sweeps and readings.
 rule claims:
     input:
         claims=workflow.source_path("../paper/claims.yaml"),
         caption=workflow.source_path("../report/tables/claims.rst"),
         identifications=files("results/identifications/{case}.csv", STUDY.published),
         histories=files("results/histories/{case}.npz", STUDY.published),
-        tables=[file for file in made("tables", ".csv") if not file.endswith("/claims.csv")],
+        readings=files("results/readings/{case}.csv", READ if STUDY.config.readings else []),
+        tables=[
+            file
+            for file in made("tables", ".csv")
+            if not file.endswith(("/claims.csv", "/tables_5_to_7.csv"))
+        ],
     output:
         table="results/tables/claims.csv",
-        page=page_of_table("claims"),
+        compared="results/tables/tables_5_to_7.csv",
+        pages=[page_of_table(name) for name in ("claims", "tables_5_to_7")],
     log:
         "results/logs/claims.log",
     benchmark:
         "results/benchmarks/claims.tsv"
     params:
         **settings_of(
-            *"study_seed methods seeds evaluation actuator gripper".split(),
+            *"study_seed methods seeds evaluation actuator gripper readings".split(),
             *keys_of_cases(STUDY, "title", "published", "gripper", "calibration", *SAMPLE, NOISE),
         ),
     message:

@@ -29,10 +29,12 @@ class GeneRange(Block):
     digit: Annotated[
         tuple[Annotated[int, Field(ge=0, le=9)], ...], Field(min_length=2, max_length=2)
     ]
-    """Lowest and highest value of the digits g₂, g₃ and so on (eq. 10). The first is never below 1,
-    for numbers with leading zeros would be encoded twice."""
+    """Lowest and highest value of the digits g₂, g₃ and so on (eq. 10)."""
     digits: Annotated[int, Field(ge=1, le=6)] = 2
     """Number of digits; in eq. (10) two."""
+    first_digit: Annotated[int, Field(ge=0, le=1)] = 1
+    """Lowest value of the first digit g₂, if the others' is no higher. With 0 there are smaller
+    numbers, and several ways to encode one."""
 
     def complaints(self) -> Iterator[Complaint]:
         """Find bounds in the wrong order, and a range of a single value."""
@@ -49,7 +51,8 @@ class GeneRange(Block):
     @property
     def least(self) -> tuple[int, ...]:
         """Smallest value of each gene."""
-        return self.exponent[0], max(self.digit[0], 1), *[self.digit[0]] * (self.digits - 1)
+        first = max(self.digit[0], self.first_digit)
+        return self.exponent[0], first, *[self.digit[0]] * (self.digits - 1)
 
     @property
     def most(self) -> tuple[int, ...]:
@@ -58,8 +61,8 @@ class GeneRange(Block):
 
     @property
     def low(self) -> float:
-        """Smallest value that can be encoded (Table 4)."""
-        return _value(self.least)
+        """Smallest positive value that can be encoded (Table 4)."""
+        return _value(self.least) or _value((self.exponent[0], *[0] * (self.digits - 1), 1))
 
     @property
     def high(self) -> float:
@@ -68,12 +71,14 @@ class GeneRange(Block):
 
     @property
     def values(self) -> Array:
-        """All values that can be encoded, ascending, each the nearest double."""
+        """All positive values that can be encoded, ascending, each the nearest double."""
         mantissas = np.zeros(1)
         for least, most in zip(self.least[1:], self.most[1:], strict=True):
             mantissas = (10 * mantissas[:, None] + np.arange(least, most + 1)).ravel()
         powers = np.arange(self.exponent[0], self.exponent[1] + 1) - self.digits + _LARGEST_POWER
         values: Array = mantissas * _TIMES[powers, None] / _OVER[powers, None]
+        if self.least[1] == 0:
+            return np.unique(values[values > 0])
         return values.ravel()
 
 

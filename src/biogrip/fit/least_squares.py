@@ -119,7 +119,7 @@ def _best_of_alike(
     for own, first_row in enumerate(before):
         rows = _descents(rough[trace == own], first_row)
         # Newton's steps are not counted: the last bits of a processor decide their number.
-        finished = fine.evaluations[trace_of_fine == own].sum()
+        finished = _responses(fine)[trace_of_fine == own].sum()
         misfit, evaluations = float(best.misfit[own]), rows[-1][3] + int(finished)
         rows[-1] = np.exp(best.x[own]), misfit, misfit, evaluations
         progress(evaluations, misfit)
@@ -150,14 +150,19 @@ def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
 def _descents(found: Minima, before: Row) -> list[Row]:
     """Return the rows of a history: the given first one, and one for each fit."""
     rows, evaluations, best, ordered = [before], before[3], 0, list[float]()
-    ranks = found.misfit.astype(np.float32)
+    ranks, responses = found.misfit.astype(np.float32), _responses(found)
     for fit, misfit in enumerate(found.misfit.tolist()):
-        evaluations += int(found.evaluations[fit])
+        evaluations += int(responses[fit])
         best = fit if ranks[fit] < ranks[best] else best
         insort(ordered, misfit)
         median = 0.5 * (ordered[fit // 2] + ordered[(fit + 1) // 2])
         rows.append((np.exp(found.x[best]), float(found.misfit[best]), median, evaluations))
     return rows
+
+
+def _responses(found: Minima) -> IntArray:
+    """Return how many responses fits have computed: a linearisation is one and its derivatives."""
+    return found.evaluations * (1 + found.x.shape[1])
 
 
 def _answer_of(rows: list[Row], *, converged: bool) -> Fit:

@@ -171,12 +171,17 @@ def compute_fall(samples: int, before: float, after: float, noise_sd: float | No
     return 2 * samples * float(np.log(before / after))
 
 
-# Members with a smaller share in a sum are neglected, whatever their uncertainty.
+# Members with a smaller share in a sum are neglected, whatever their uncertainty; so is a smaller
+# part of a gradient, scaled by information, along what the response does not show.
 _NEGLIGIBLE = 1e-2
+# Share of the largest information that is rounding.
+_NO_INFORMATION = 1e-12
 
 
-def covariance(sensitivity: Array, noise_sd: float | Array) -> Array:
-    """Compute the first-order covariance of log-parameters estimated by least squares.
+def covariance(
+    sensitivity: Array, noise_sd: float | Array, gradients: Array | None = None
+) -> Array:
+    """Compute the first-order covariance of quantities estimated by least squares.
 
     With the same Gaussian noise everywhere, it is the inverse of the Fisher
     information J J^T / sigma^2: the Cramér-Rao bound, which no unbiased
@@ -189,39 +194,42 @@ def covariance(sensitivity: Array, noise_sd: float | Array) -> Array:
     logarithmic scale, the linear approximation of its effect fails.
 
     J is d response / d log parameter, (n_parameters, n_samples), sigma a number or
-    (n_samples,). The covariance, (n_parameters, n_parameters), is infinite on the diagonal for
-    parameters without information, and zero without noise.
+    (n_samples,). Gradients are d quantity / d log parameter, (n_quantities, n_parameters); without
+    them quantities are the log-parameters. The covariance, (n_quantities, n_quantities), is
+    infinite on the diagonal for what rests on a parameter without information or changes along a
+    direction in which the response does not. It is zero without noise.
     """
+    slopes = np.eye(len(sensitivity)) if gradients is None else gradients
     sigma = np.broadcast_to(noise_sd, sensitivity.shape[1])
     scale = float(np.sqrt(np.mean(sigma**2)))
     if not scale:
-        return np.zeros((len(sensitivity), len(sensitivity)))
+        return np.zeros((len(slopes), len(slopes)))
     relative = sensitivity / scale
-    informed = np.flatnonzero(np.sum(relative**2, axis=1) > 1)
-    found = np.diag(np.full(len(sensitivity), np.inf))
-    if len(informed) == 0:
-        return found
+    informed = np.sum(relative**2, axis=1) > 1
+    unknown = np.any(np.abs(slopes[:, ~informed]) > _NEGLIGIBLE, axis=1)
+    unknown |= ~np.any(np.abs(slopes) > _NEGLIGIBLE, axis=1)
     j = relative[informed]
     # Rows of length one, for parameters may differ by decades in their information.
     length = np.sqrt(np.sum(j**2, axis=1))
     j = j / length[:, None]
-    inverse = np.linalg.pinv(j @ j.T, hermitian=True, rcond=1e-12)
-    scattered = j * (sigma / scale)
-    within = inverse @ (scattered @ scattered.T) @ inverse / np.outer(length, length)
-    found[np.ix_(informed, informed)] = within
+    within = slopes[:, informed] / length
+    sizes, directions = np.linalg.eigh(j @ j.T)
+    none = sizes <= _NO_INFORMATION * sizes.max(initial=0.0)
+    parts = within @ directions
+    longest = np.sqrt(np.sum(parts**2, axis=1, keepdims=True))
+    unknown |= np.any(np.abs(parts[:, none]) > _NEGLIGIBLE * longest, axis=1)
+    inverse = parts[:, ~none] / sizes[~none] @ directions[:, ~none].T
+    scattered = inverse @ (j * (sigma / scale))
+    found: Array = scattered @ scattered.T
+    found[unknown] = found[:, unknown] = 0.0
+    found[unknown, unknown] = inf
     return found
 
 
 def bound(sensitivity: Array, noise_sd: float | Array, log_parameters: Array, q: Quantity) -> float:
     """Return the first-order standard deviation of a quantity's logarithm, by `covariance`."""
-    slope = q.gradient(log_parameters)
-    members = np.abs(slope) > _NEGLIGIBLE
-    if not np.any(members):
-        return float("inf")
-    found = covariance(sensitivity, noise_sd)[np.ix_(members, members)]
-    if np.any(np.isinf(found)):
-        return float("inf")
-    return float(np.sqrt(slope[members] @ found @ slope[members]))
+    gradient = q.gradient(log_parameters)
+    return float(np.sqrt(covariance(sensitivity, noise_sd, gradient[None])[0, 0]))
 
 
 def bounds_percent(

@@ -2,7 +2,6 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 
 from biogrip.digits import legible, plain, with_unit
 from biogrip.judging.quantities import PROVIDED
@@ -13,36 +12,52 @@ Row = Mapping[str, str]
 
 
 def say_what_the_study_gives(
-    methods: Iterable[Row], shown: str, titles: Mapping[str, str], who: str
+    methods: Iterable[Row], shown: str, titles: Mapping[str, str], who: str, tolerance: float
 ) -> str:
     """Say in which share of each case's traces the study's own method finds what genes can encode.
 
     Rows are those of the table of methods; `shown` is the title of that method, which `who` stands
-    before. It is "" if no case is simulated.
+    before; the tolerance is of chi-squared. It is "" if no case is simulated.
     """
     rows = [row for row in methods if row["method"] == shown]
     shares = [f"{share_of(row)} on “{titles[row['case']]}”" for row in rows]
     if not rows:
         return ""
     shares[0] = shares[0].replace("(", f"of {rows[0]['seeds']} runs (95 % interval: ", 1)
-    return f"{who} {shown} finds the best fit that its digits can express in {_listed(shares)}."
+    fit = f"the best fit known that its digits can express, or one within {tolerance:g} of its χ²,"
+    return f"{who} {shown} finds {fit} in {_listed(shares)}."
 
 
-def say_what_traces_tell(verdicts: Iterable[Row]) -> str:
-    """Say which quantities a trace determines always, never, or in some of the samples."""
-    decided: dict[str, list[bool]] = defaultdict(list)
-    for row in verdicts:
-        decided[row["quantity"]].append(row["verdict"] == DETERMINED)
-    always = [name for name, each in decided.items() if all(each)]
-    never = [name for name, each in decided.items() if not any(each)]
-    some = {name: each for name, each in decided.items() if any(each) and not all(each)}
-    provided = f", {PROVIDED}" * any(" + " in name for name in always)
-    parts = [f"It always determines {_listed(always)}{provided}"] if always else []
-    parts += [f"It never determines {_listed(never)}"] if never else []
-    if some:
-        counts = [f"{name} in {sum(each)}" for name, each in some.items()]
-        parts.append(f"It determines {_listed(counts)} of {max(map(len, some.values()))} samples")
-    return "".join(f"{part}. " for part in parts).strip().replace("It", "A trace", 1)
+def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> str:
+    """Say of which quantities all, none, or what share of the traces are determined.
+
+    Rows are those of the table of coverage; only verdicts from whole profiles count.
+    """
+    shares: dict[str, list[tuple[str, int, int]]] = defaultdict(list)
+    for row in coverage:
+        if runs := int(row["shown_seeds"] or 0):
+            found = titles[row["case"]], int(row["shown_determined"]), runs
+            shares[row["quantity"]].append(found)
+    if not shares:
+        return ""
+    ends = {q: [share_with_limits(*of) for _, *of in each] for q, each in shares.items()}
+    always = [q for q, each in ends.items() if all(low >= 0.9 or at == 1 for at, low, _ in each)]
+    never = [q for q, each in ends.items() if all(high <= 0.1 or at == 0 for at, _, high in each)]
+    parts = []
+    for names, words, worst in (
+        (always, "all or nearly all determine", min),
+        (never, "none or hardly any determines", max),
+    ):
+        if names:
+            provided = f", {PROVIDED}" * any(" + " in name for name in names)
+            share = _percent(*worst(of for name in names for of in ends[name]))
+            parts.append(f"{words} {_listed(names)}{provided}: {share}")
+    for name in (name for name in shares if name not in (*always, *never)):
+        each = zip(shares[name], ends[name], strict=True)
+        told = [f"{_percent(*share)} on “{title}”" for (title, *_), share in each]
+        parts.append(f"{name} is determined in {_listed(told)}")
+    runs = max(runs for each in shares.values() for *_, runs in each)
+    return f"Of {runs} traces of each sample {'; '.join(parts)}."
 
 
 def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
@@ -74,51 +89,93 @@ def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
 
 
 def say_what_claims_are(claims: Iterable[Row]) -> str:
-    """Say how many of the paper's claims have each verdict; "" if there are none."""
+    """Say how many of the paper's statements have each verdict; "" if there are none."""
     counts = Counter(row["verdict"] for row in claims)
-    if not counts:
+    judged = {verdict: count for verdict, count in counts.items() if verdict not in UNJUDGED}
+    if not judged:
         return ""
+    listed = [f"{counts[verdict]} {words}" for verdict, words in _CLAIMED.items()]
     return (
-        f"Of the paper's {counts.total()} claims {counts['replicated']} are replicated, "
-        f"{counts['in part']} in part, {counts['not']} not; "
-        f"{counts['outside the printed encoding']} are outside the printed encoding, and "
-        f"{counts['cannot be told']} cannot be told."
+        f"Of the paper's {sum(judged.values())} claims, one for each sample and quantity that a "
+        f"claim is said of, {_listed(listed)}."
     )
+
+
+UNJUDGED = "not judged", "judged elsewhere"
+"""Verdicts of claims that do not count: nothing can contradict them, or another config judges."""
+_CLAIMED = {
+    "replicated": "are replicated",
+    "in part": "are in part",
+    "not": "are not",
+    "too few runs to tell": "have too few runs to tell",
+    "cannot be told": "cannot be told",
+}
+
+
+def rows_beside_the_paper(
+    compared: Iterable[Row], titles: Mapping[str, str]
+) -> list[dict[str, str]]:
+    """Return the paper's Tables 5 to 7 beside the study's runs.
+
+    Quantities of which no sample's trace tells anything are left out. Rows are those of the table
+    of that name.
+    """
+    rows = list(compared)
+    told = {row["quantity"] for row in rows if row["verdict"] != "cannot be told"}
+    return [
+        {
+            "sample": titles[row["case"]],
+            "quantity": legible(with_unit(row["quantity"], row["unit"])),
+            "target": _number(row["target"]),
+            "paper": _ends(row, "printed_from", "printed_to")
+            + f" ({_ends(row, 'error_from_percent', 'error_to_percent', ' %', 3)})",
+            "runs": f"{row['runs']}, {row['reading']}",
+            "error of a run": legible(f"{_number(row['median_error_percent'], 2)} %")
+            + f" ({_ends(row, 'median_from_percent', 'median_to_percent', ' %', 2)})",
+            "runs near the paper's value": _percent(
+                *(float(row[f"near_{end}"]) for end in ("share", "from", "to"))
+            )
+            + f": {row['verdict']}",
+        }
+        for row in rows
+        if row["quantity"] in told
+    ]
 
 
 def compared_rows(
     errors: Iterable[Row], verdicts: Iterable[Row], titles: Mapping[str, str]
 ) -> list[dict[str, str]]:
-    """Return the paper's results beside the study's, of `basins` where there are two.
+    """Return targets beside the study's results, with the median error of a run in brackets.
 
-    Quantities that no case determines are left out. Rows are those of the tables of errors and
+    Quantities that no case determines are left out, and medians between quartiles a decade apart:
+    runs in two humps have none near their median. Rows are those of the tables of errors and
     verdicts, titles those of the cases.
     """
     decided = {row["quantity"] for row in verdicts if row["verdict"] == DETERMINED}
-    rows = list(errors)
-    split = {row["case"] for row in rows if row["basin"] != ALL}
-    seeds = {row["case"]: int(row["seeds"]) for row in rows if row["basin"] == ALL}
     return [
         {
             "sample": titles[row["case"]],
             "quantity": legible(with_unit(row["parameter"], row["unit"])),
             "target": _number(row["target"]),
-            "paper": _with_error(row["paper_identified"], row["paper_error_percent"]),
-            "runs": _runs(row, seeds[row["case"]]),
-            "this study: median": _with_error(row["median_identified"], _error(row)),
-            "quartiles": " to ".join(
-                _number(row[key]) for key in ("p25_identified", "p75_identified")
-            ),
+            "this study: median": _median(row),
+            "quartiles": _ends(row, "p25_identified", "p75_identified"),
         }
-        for row in rows
-        if row["parameter"] in decided and (row["basin"] == ALL) != (row["case"] in split)
+        for row in errors
+        if row["parameter"] in decided and row["basin"] == ALL
     ]
 
 
-def _runs(row: Row, runs: int) -> str:
-    if row["basin"] == ALL:
-        return ALL
-    return f"{_percent(*share_with_limits(int(row['seeds']), runs))} {row['basin']}"
+def _ends(row: Row, low: str, high: str, unit: str = "", digits: int = 4) -> str:
+    return legible(f"{_number(row[low], digits)} to {_number(row[high], digits)}{unit}")
+
+
+def _median(row: Row) -> str:
+    low, high = float(row["p25_identified"]), float(row["p75_identified"])
+    if high > 10 * low:
+        return "spread over decades"
+    error = row["median_absolute_error_percent"]
+    said = f" ({plain(float(f'{float(error):.2g}'))} %)" if error else ""
+    return _number(row["median_identified"]) + legible(said)
 
 
 def share_of(row: Row) -> str:
@@ -141,17 +198,5 @@ def _listed(names: Sequence[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def _number(text: str) -> str:
-    return legible(plain(float(text), 4)) if text else ""
-
-
-def _error(row: Row) -> str:
-    target, found = row["target"], row["median_identified"]
-    return str(100 * (1 - float(found) / float(target))) if target and float(target) else ""
-
-
-def _with_error(value: str, error: str) -> str:
-    """Return a value with its error in brackets, which the paper may give in words, as ">100"."""
-    with suppress(ValueError):
-        error = plain(float(f"{float(error):.2g}") + 0.0)
-    return _number(value) + (legible(f" ({error} %)") if value and error else "")
+def _number(text: str, digits: int = 4) -> str:
+    return legible(plain(float(f"{float(text):.{digits}g}"), digits)) if text else ""

@@ -27,6 +27,11 @@ from biogrip.tables.cases import target_of
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
 _LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
+# Tables, or beginnings of their names, that answers are written from.
+_ANSWERING = (
+    *("errors.csv", "verdicts_", "coverage.csv"),
+    *("methods.csv", "claims.csv", "tables_5_to_7.csv"),
+)
 # Tables under what is reconstructed; the others are under their heading.
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 # The paper's figure of its first fit, between those of its convergence and of its evolution.
@@ -84,9 +89,9 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
     for case, found, measured in zip(*of_cases, strict=True):
         calibrated = [path for path in files["calibrated"] if path.stem == case.name]
         traces.append((case.title, fits_of(case, methods, found, measured, calibrated)))
-    errors, judged, compared, claimed = (
+    errors, judged, covered, compared, claimed, beside = (
         [row for csv in files["downloads"] if csv.name.startswith(name) for row in read_table(csv)]
-        for name in ("errors.csv", "verdicts_", "methods.csv", "claims.csv")
+        for name in _ANSWERING
     )
     tables: list[Entry] = []
     for path, csv in zip(files["tables"], files["downloads"], strict=True):
@@ -112,12 +117,13 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
         _TEMPLATES.get_template("report.html.j2").render(
             explorer=explorer(traces),
             answers=[
-                answers.say_what_the_study_gives(*asked, titles, who),
+                answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
                 answers.say_which_method_finds_it(*asked),
-                answers.say_what_traces_tell(judged),
+                answers.say_what_traces_tell(covered, titles),
                 answers.say_what_claims_are(claimed),
             ],
-            compared=answers.compared_rows(errors, judged, titles),
+            compared=answers.rows_beside_the_paper(beside, titles)
+            or answers.compared_rows(errors, judged, titles),
             cases=list(zip(cases, map(read_verdicts, files["verdicts"]), strict=True)),
             target_of=target_of,
             hero=hero,

@@ -2,7 +2,7 @@
 
 Identifications by each method have a row per seed, with histories beside them. Further files of
 rows have the fits of every sample model, the intervals of coverage tests, and identifications under
-other interpretations of the paper.
+other readings of the paper.
 """
 
 from collections.abc import Mapping, Sequence
@@ -57,14 +57,14 @@ INTERVALS = RowFile(
 limits, and the estimate with uninformed parameters fixed at their true values. For some seeds, all
 quantities also have the verdict and limits that users are shown, from whole profiles."""
 
-INTERPRETATIONS = RowFile(
-    "interpretations",
+READINGS = RowFile(
+    "readings",
     (
-        *("case", "interpretation", "seed"),
+        *("case", "reading", "seed"),
         *(parameter.column for parameter in SINGLE_BRANCH),
-        *("misfit", "noise_rms", "last_improvement"),
+        *("misfit", "noise_rms", "generations", "last_improvement"),
     ),
-    words=("case", "interpretation"),
+    words=("case", "reading"),
 )
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pandas as pd
-from scipy.stats import binomtest
+from scipy.stats import binom, binomtest
 
 from biogrip.arrays import Array, BoolArray
 
@@ -52,6 +52,13 @@ def share_with_limits(count: int, runs: int) -> tuple[float, float, float]:
     """Return the share of runs that do something, and its 95 % interval by Wilson."""
     low, high = binomtest(count, runs).proportion_ci(0.95, method="wilson")
     return count / runs, float(low), float(high)
+
+
+def median_with_limits(values: Array) -> tuple[float, float, float]:
+    """Return the median of values, (n,), and its 95 % interval from their order."""
+    ordered, count = np.sort(values), len(values)
+    first = max(int(binom.ppf(0.025, count, 0.5)) - 1, 0)
+    return float(np.median(values)), float(ordered[first]), float(ordered[count - 1 - first])
 
 
 def share_in_words(count: int, runs: int) -> str:

@@ -1,8 +1,8 @@
-"""Studies around a study: points of a sweep, and other interpretations of the paper.
+"""Studies around a study: points of a sweep, and other readings of the paper.
 
 `judge` reads what is identified at every point of a sweep, and writes the errors and the share of
-seeds in the basin of the truth. `identify_interpreted` identifies the traces of a case by the
-genetic algorithm under every interpretation of the paper.
+seeds in the basin of the truth. `identify_readings` identifies the traces of a case by the
+genetic algorithm under every reading of the paper.
 """
 
 import math
@@ -22,11 +22,12 @@ from biogrip.keys import built
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import simulated_response
-from biogrip.records.identifications import INTERPRETATIONS, read_batch
+from biogrip.records.identifications import READINGS, read_batch
 from biogrip.records.rows import RowFile
 from biogrip.records.success import near_noise
 from biogrip.records.traces import read_target
 from biogrip.stages.identification import groups
+from biogrip.stages.targets import response
 from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.source import overlaid
 from biogrip.study.study import Case, Study
@@ -154,30 +155,32 @@ def _resolution(point: Case, true: Mapping[str, float]) -> float:
     return rms(both[1] - both[0])
 
 
-def identify_interpreted(case: Case, target: Path, rows: Path) -> None:
-    """Identify every noisy trace of a case under every interpretation by the genetic algorithm.
+def identify_readings(case: Case, target: Path, rows: Path) -> None:
+    """Identify every noisy trace of a case under every reading by the genetic algorithm.
 
-    Random streams are those of the study, so an interpretation that changes nothing reproduces the
+    Random streams are those of the study, so a reading that changes nothing reproduces the
     study's results.
     """
-    INTERPRETATIONS.write(rows, _interpretation_rows(case, target))
+    READINGS.write(rows, _reading_rows(case, target))
 
 
-def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
+def _reading_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
     time_s, _, rotation = read_target(target, case.times_s)
-    readings = case.study.config.interpretations
-    progress = Progress(f"{case.name}, interpretations", len(readings) * case.seeds)
+    readings = case.study.config.readings
+    progress = Progress(f"{case.name}, readings", len(readings) * case.seeds)
     for name, reading in readings.items():
         block = built(CaseBlock, overlaid(case.plain, reading.changes))
-        interpretation = replace(case, block=block)
-        experiment = interpretation.experiment
+        read = replace(case, block=block)
+        experiment, at, clean = read.experiment, time_s, rotation
+        if read.samples != len(time_s):
+            at, (clean, _) = read.times_s, response(read, read.times_s)
         for seeds in groups(range(case.seeds)):
             noises, searches = (
                 [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]
                 for purpose in ("noise", "genetic")
             )
-            traces = [add_noise(rotation, interpretation.noise, rng, time_s) for rng in noises]
-            problems = experiment.of_each(time_s, traces)
+            traces = [add_noise(clean, read.noise, rng, at) for rng in noises]
+            problems = experiment.of_each(at, traces)
             answers = identify_many(problems, block.genetic_algorithm, searches)
             for seed, trace, answer in zip(seeds, traces, answers, strict=True):
                 names = experiment.searched.names
@@ -186,8 +189,7 @@ def _interpretation_rows(case: Case, target: Path) -> Iterator[tuple[str | int, 
                 yield (
                     *(case.name, name, seed),
                     *(f"{values.get(p.name, 0.0):.6g}" for p in SINGLE_BRANCH),
-                    f"{answer.misfit:.6e}",
-                    f"{rms(trace - rotation):.6e}",
+                    *(f"{answer.misfit:.6e}", f"{rms(trace - clean):.6e}", answer.generations),
                     int(falls[-1]) + 1 if len(falls) else 0,
                 )
             progress.done(len(seeds))

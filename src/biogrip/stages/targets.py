@@ -46,7 +46,7 @@ def simulate(case: Case, target: Path) -> None:
         _check_finite(case, time_s, read)
         write_target(target, case.instrument, time_s, controlled, read)
         return
-    rotation, force = _response(case, time_s)
+    rotation, force = response(case, time_s)
     _check_finite(case, time_s, rotation)
     largest = float(np.max(np.abs(rotation)))
     if largest > case.stroke:
@@ -58,7 +58,7 @@ def simulate(case: Case, target: Path) -> None:
     write_target(target, case.instrument, time_s, controlled, rotation, force)
 
 
-def _response(case: Case, time_s: Array) -> tuple[Array, Array]:
+def response(case: Case, time_s: Array) -> tuple[Array, Array]:
     """Return the rotation of the left arm and the jaw force, (n_samples,) each."""
     device, nonlinear = (case.gripper, case.network, case.torque), case.nonlinear_target
     if case.unilateral:

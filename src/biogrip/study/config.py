@@ -59,8 +59,8 @@ class Evaluation(Block):
 
 
 @dataclass(frozen=True)
-class InterpretationBlock(Block):
-    """An alternative interpretation of the paper: changes to every simulated case."""
+class ReadingBlock(Block):
+    """A reading of what the paper leaves open: changes to every simulated case."""
 
     title: Printed
     """Name in print."""
@@ -148,10 +148,10 @@ class StudyConfig(Shared):
             "others, and shown in heat maps and their table only."
         ),
     ] = field(default_factory=dict)
-    interpretations: Annotated[Mapping[_Name, InterpretationBlock], Field(max_length=100)] = field(
+    readings: Annotated[Mapping[_Name, ReadingBlock], Field(max_length=100)] = field(
         default_factory=dict
     )
-    """Interpretations of the paper, by name, each tried with the genetic algorithm on the noisy
+    """Readings of the paper, by name, each tried with the genetic algorithm on the noisy
     traces of every simulated case, for a table."""
 
     def complaints(self) -> Iterator[Complaint]:

@@ -1,7 +1,7 @@
 """From config files to a checked study, or to messages that name file, line and key.
 
 The study's blocks are merged into every case before it is checked. Points of sweeps, and cases
-under other interpretations of the paper, are checked as if they were cases of the config.
+under other readings of the paper, are checked as if they were cases of the config.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -64,7 +64,7 @@ def load_study(
     _refuse(complaints, sources)
     assert study is not None
     study = replace(study, cases={it: study.cases[it] for it in study.only or study.cases})
-    _refuse([*_point_complaints(study), *_interpretation_complaints(study)], sources)
+    _refuse([*_point_complaints(study), *_reading_complaints(study)], sources)
     return Study(study)
 
 
@@ -102,13 +102,13 @@ def _point_complaints(study: StudyConfig) -> Iterator[Complaint]:
             yield from below(("sweeps", name), [study.sweeps[name].placed(point, complaint)])
 
 
-def _interpretation_complaints(study: StudyConfig) -> Iterator[Complaint]:
-    """Check every simulated case under every interpretation as if it were a case of the config."""
-    for name, block in study.interpretations.items():
+def _reading_complaints(study: StudyConfig) -> Iterator[Complaint]:
+    """Check every simulated case under every reading as if it were a case of the config."""
+    for name, block in study.readings.items():
         for case in study.cases.values():
             if not case.recorded:
                 complaints = checked(CaseBlock, overlaid(plain(case), block.changes))[1]
-                yield from below(("interpretations", name, "changes"), complaints)
+                yield from below(("readings", name, "changes"), complaints)
 
 
 def _fill_in(config: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -4,18 +4,17 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import counted
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.physics.models import Published
 from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.records.success import ALL, basins, near_noise, near_noise_words, share_with_limits
 from biogrip.study.study import Case, Study
 from biogrip.tables.layout import Column, Row, ShownTable
+from biogrip.tables.printed import value_in_case
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -72,7 +71,7 @@ def errors_of_case(case: Case, identifications: Path) -> ShownTable:
             }
             for name, percent in _PERCENTILES.items():
                 of_quantity[f"{name}_identified"] = np.percentile(values, percent)
-            rows.append(of_case | of_quantity | _of_paper(case.published, names, target))
+            rows.append(of_case | of_quantity | _of_paper(case, names, target))
     number = f"Table {case.published.table}. " if case.published.table is not None else ""
     caption = (
         f"{number}{case.title}: target and identified parameters over "
@@ -90,16 +89,17 @@ def error_percent(target: float | None, identified: Array) -> Array:
     return 100 * (target - identified) / target
 
 
-def _of_paper(published: Published, names: list[str], target: float | None) -> Row:
-    """Return the paper's value and error; the error of a sum is computed from its values."""
-    identified = published.identified
-    if not all(name in identified for name in names):
+def _of_paper(case: Case, names: list[str], target: float | None) -> Row:
+    """Return the paper's value and error; of a sum, what its members' printed errors make them."""
+    told = value_in_case(case, names)
+    if told is None:
         return {}
-    value = float(sum(identified[name] for name in names))
-    error: Any = published.error_percent.get(names[0])
     if len(names) > 1:
-        error = error_percent(target, np.array([value]))[0]
-    return {"paper_identified": value, "paper_error_percent": error}
+        error = error_percent(target, np.array(told[:1]))[0]
+        return {"paper_identified": told[0], "paper_error_percent": error}
+    (name,) = names
+    error = case.published.error_percent.get(name)
+    return {"paper_identified": case.published.identified[name], "paper_error_percent": error}
 
 
 def errors(study: Study, identifications: list[Path]) -> ShownTable:

@@ -1,11 +1,11 @@
-"""Identify a case by the genetic algorithm under every interpretation of the paper."""
+"""Identify a case by the genetic algorithm under every reading of the paper."""
 
 from pathlib import Path
 
 from biogrip.stages.job import job_case, logged
-from biogrip.stages.sweeps import identify_interpreted
+from biogrip.stages.sweeps import identify_readings
 
 with logged(snakemake):
-    identify_interpreted(
+    identify_readings(
         job_case(snakemake), Path(snakemake.input.target), Path(snakemake.output.rows)
     )

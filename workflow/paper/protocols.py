@@ -1,0 +1,164 @@
+"""The paper's samples under its protocol and under others: a table, and one figure of both.
+
+Another protocol is that of a case with the parameters of one of the paper's cases.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from biogrip.arrays import Array
+from biogrip.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, SHADE, figure, panel, save, styled
+from biogrip.judging.levels import DETERMINED_PERCENT
+from biogrip.judging.likelihood import bounds_percent
+from biogrip.physics.noise import standard_deviation
+from biogrip.physics.simulation import compute_grip, jaw_force, simulated_response
+from biogrip.records.identifications import read_batch
+from biogrip.records.success import share_with_limits
+from biogrip.stages.job import job_study, logged, paths
+from biogrip.study.study import Case, Study
+from biogrip.tables.layout import Column, Row, ShownTable, write
+
+if TYPE_CHECKING:
+    snakemake: Any
+
+_ENOUGH = 10.0
+"""Error in percent within which an estimate is good enough."""
+_MIDDLE = 1.96
+"""Standard deviations that hold 95 % of the estimates."""
+
+_COLUMNS = (
+    Column("case", "Case"),
+    Column("quantity", "Quantity"),
+    Column("unit", "Unit"),
+    Column("target", "Target", 4),
+    Column("lowest_force_uN", "Lowest jaw force (µN)", 2),
+    Column("readings", "Readings"),
+    Column("noise_urad", "Noise (µrad)"),
+    Column("bound_percent", "Bound %", 2),
+    Column("seeds", "Seeds"),
+    Column("median_error_percent", "Median abs. error %", 2),
+    Column("enough_share", f"Share within {_ENOUGH:g} %", 3),
+    Column("enough_from", "95 % from", 3),
+    Column("enough_to", "to", 3),
+    Column("noise_for_enough_urad", "Noise for 95 % (µrad)", 2),
+    Column("readings_for_enough", "Readings for 95 %, times", 2),
+)
+
+
+def protocols(study: Study, identifications: list[Path]) -> ShownTable:
+    """Compare what traces of every protocol tell, by bounds and by blind identifications."""
+    rows = [row for case, found in _pairs(study, identifications) for row in _rows(case, found)]
+    caption = (
+        "The paper's samples under its own protocol and under others: the lowest force of the "
+        "jaws, negative where they would have to pull; the Cramér-Rao bound at the case's noise; "
+        f"and blind identifications by {study.shown_method.title}, all parameters unknown. Noise "
+        f"and multiple of the readings at which, by the bound, 95 % of the estimates are within "
+        f"{_ENOUGH:g} %. Left out: quantities that have no bound under any protocol."
+    )
+    return ShownTable(caption, _COLUMNS, rows)
+
+
+def _pairs(study: Study, identifications: list[Path]) -> list[tuple[Case, pd.DataFrame]]:
+    """Return cases with their identifications, each of the paper's before those of its sample.
+
+    Files are batches in folders of the case and the method.
+    """
+    known = [case.parameters for case in study.cases.values() if case.published.table]
+    found: dict[str, list[pd.DataFrame]] = {}
+    for path in identifications:
+        name = path.parts[-3]
+        found.setdefault(name, []).append(read_batch(path, study.cases[name]))
+    both = [(study.cases[name], pd.concat(batches)) for name, batches in found.items()]
+    return sorted(both, key=lambda it: (known.index(it[0].parameters), not it[0].published.table))
+
+
+def _rows(case: Case, found: pd.DataFrame) -> Iterator[Row]:
+    """Yield a row of every quantity that traces may determine."""
+    given = case.gripper, case.network, case.torque
+    target = simulated_response(*given, case.times_s, nonlinear=False)[0]
+    noise = float(np.mean(standard_deviation(target, case.noise)))
+    grip = compute_grip(*given, nonlinear=False)
+    searched = case.experiment.searched.parameters
+    bounds = bounds_percent(case.experiment, case.noise, case.parameters, case.times_s)
+    for quantity, bound in bounds:
+        if not bound < DETERMINED_PERCENT:
+            continue
+        members = [searched[index] for index in quantity.members]
+        truth = sum(case.parameters[member.name] for member in members)
+        values = found[[member.column for member in members]].sum(axis=1).to_numpy(float)
+        errors = 100 * np.abs(values / truth - 1)
+        shares = share_with_limits(int(np.sum(errors <= _ENOUGH)), len(errors))
+        needed = _ENOUGH / (_MIDDLE * bound)
+        yield {
+            "case": case.title,
+            "quantity": quantity.label,
+            "unit": members[0].unit,
+            "target": truth,
+            "lowest_force_uN": 1e6 * grip.lowest_N,
+            "readings": case.samples,
+            "noise_urad": 1e6 * noise,
+            "bound_percent": bound,
+            "seeds": len(errors),
+            "median_error_percent": np.median(errors),
+            **dict(zip(("enough_share", "enough_from", "enough_to"), shares, strict=True)),
+            "noise_for_enough_urad": 1e6 * noise * needed,
+            "readings_for_enough": max(1.0, needed**-2),
+        }
+
+
+def draw_protocols(study: Study, identifications: list[Path]) -> Figure:
+    """Draw jaw forces, and how the identified k of all seeds lies about the truth."""
+    pairs = _pairs(study, identifications)
+    papers = [case for case, _ in pairs if case.published.table]
+    drawn = figure(PAGE_IN, 4.2)
+    panels = drawn.subplots(2, len(papers), squeeze=False, sharey="row")
+    for column, paper in enumerate(papers):
+        forces, estimates = panels[:, column]
+        forces.axhline(0, color=BLACK, linewidth=0.6)
+        estimates.axvspan(1 - _ENOUGH / 100, 1 + _ENOUGH / 100, color=SHADE)
+        mine = [(case, found) for case, found in pairs if case.parameters == paper.parameters]
+        for number, (case, found) in enumerate(mine):
+            color, dashes = (ORANGE, "-") if case is paper else (BLUE, ("-", "--")[number - 1])
+            label = "the paper's" if case is paper else ("jaws press", "less noise")[number - 1]
+            if number < 2:
+                forces.plot(*_force(case), color=color, label=label)
+            ratios = found["k_N_per_m"].to_numpy(float) / case.parameters["k"]
+            ratios = np.sort(np.clip(ratios, 0.3, 3))
+            shares = np.arange(1, len(ratios) + 1) / len(ratios)
+            estimates.step(ratios, shares, where="post", color=color, linestyle=dashes, label=label)
+        estimates.set_xscale("log")
+        estimates.set_xlim(0.29, 3.1)
+        estimates.set_xticks([0.3, 0.5, 1, 2, 3], ["0.3", "0.5", "1", "2", "3"])
+        estimates.minorticks_off()
+        estimates.set_xlabel("identified over true k")
+        forces.set_xlabel("time / duration")
+        panel(forces, "abc"[column % 3], paper.title)
+    panels[0, 0].set_ylabel("jaw force (µN)")
+    panels[1, 0].set_ylabel("share of seeds below")
+    panels[0, 0].legend(loc="lower left")
+    max(panels[1], key=lambda axes: len(axes.lines)).legend(loc="upper left")
+    return drawn
+
+
+def _force(case: Case) -> tuple[Array, Array]:
+    """Return times as shares of the duration, and the jaw force in µN without ringing."""
+    time_s = np.linspace(0, case.torque.end_s, 4001)
+    force = jaw_force(
+        case.gripper, case.network, case.torque, time_s, nonlinear=False, inertia=False
+    )
+    return time_s / case.torque.end_s, 1e6 * force[0]
+
+
+if __name__ == "__main__":
+    with logged(snakemake):
+        files = paths(snakemake.input.identifications)
+        compared = job_study(snakemake)
+        compared = compared.of(dict.fromkeys(file.parts[-3] for file in files))
+        write(protocols(compared, files), Path(snakemake.output.table))
+        with styled():
+            save(draw_protocols(compared, files), *paths(snakemake.output.figure))
