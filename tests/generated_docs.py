@@ -207,7 +207,6 @@ def answer() -> str:
     sentences = (
         say_what_the_study_gives(methods, own, titles, "Run again, the paper's", 1.0),
         say_which_method_finds_it(methods, own),
-        traces_told(),
         claims_counted().replace("claims", "[claims](docs/claims.md)", 1),
     )
     return "\n".join(f"- {sentence}" for sentence in sentences)
@@ -343,8 +342,10 @@ def identified_example() -> str:
         low, high = q["low"] or 0.0, q["high"] or np.inf
         if not low <= (true := truth.get(q["quantity"], low)) <= high:
             off = in_digits(100 * abs((high if true > high else low) / true - 1), 1)
-            missed.append(f"the limits of {q['quantity']} miss it by {off} %")
-    return f"{_quantities(text)}\n\nSimulated with {'; '.join([made, *missed])}."
+            missed.append(f"{q['quantity']}, missed by {off} %")
+    told = _quantities(text).partition("    Any linear sample")[0].rstrip()
+    held = f"all but {' and '.join(missed)}" if missed else "all"
+    return f"{told}\n\nSimulated with {made}: the limits hold {held}."
 
 
 def shorter_arms() -> str:

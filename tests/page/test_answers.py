@@ -108,7 +108,7 @@ def test_verdicts_on_claims_are_counted() -> None:
     told = ("in part", "not", "replicated", "in part", "cannot be told", "not judged")
     claims = [{"verdict": verdict} for verdict in (*told, "judged elsewhere")]
     assert say_what_claims_are(claims) == (
-        "Of the paper's 5 claims, one for each sample and quantity that a claim is said of, 1 are "
-        "replicated, 2 are in part, 1 are not, 0 have too few runs to tell and 1 cannot be told."
+        "Of the paper's 5 claims, each counted once for every sample and quantity: 1 replicated, 2 "
+        "in part, 1 not, 0 too few runs to tell, 1 cannot be told."
     )
     assert say_what_claims_are([]) == ""

@@ -94,22 +94,16 @@ def say_what_claims_are(claims: Iterable[Row]) -> str:
     judged = {verdict: count for verdict, count in counts.items() if verdict not in UNJUDGED}
     if not judged:
         return ""
-    listed = [f"{counts[verdict]} {words}" for verdict, words in _CLAIMED.items()]
+    listed = [f"{counts[verdict]} {verdict}" for verdict in _CLAIMED]
     return (
-        f"Of the paper's {sum(judged.values())} claims, one for each sample and quantity that a "
-        f"claim is said of, {_listed(listed)}."
+        f"Of the paper's {sum(judged.values())} claims, each counted once for every sample and "
+        f"quantity: {', '.join(listed)}."
     )
 
 
 UNJUDGED = "not judged", "judged elsewhere"
 """Verdicts of claims that do not count: nothing can contradict them, or another config judges."""
-_CLAIMED = {
-    "replicated": "are replicated",
-    "in part": "are in part",
-    "not": "are not",
-    "too few runs to tell": "have too few runs to tell",
-    "cannot be told": "cannot be told",
-}
+_CLAIMED = "replicated", "in part", "not", "too few runs to tell", "cannot be told"
 
 
 def rows_beside_the_paper(
