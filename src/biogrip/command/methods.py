@@ -40,8 +40,8 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     if "gripper" in assumed:
         own = assumed["gripper"]
         arms = (f"{own[arm]['stiffness_Nm_per_rad']:g}" for arm in ("left", "right"))
-        text = f"Its arms of {own['arm_length_m']:g} m have {' and '.join(arms)} N m/rad"
-        said.append(f"{text}, at {own['reference_angle_deg']:g} degrees.")
+        text = f"Its arms of {own['arm_length_m']:g} m have stiffnesses of {' and '.join(arms)}"
+        said.append(f"{text} N m/rad, at {own['reference_angle_deg']:g} degrees.")
     fixed = f" with {', '.join(found['fixed'])}" if "fixed" in found else ""
     along = [name for name in ("offset", "drift") if f"{name}_rad" in found]
     along += ["drift"] if "drift_rad_per_s" in found else []
