@@ -59,8 +59,9 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
                     share = ((3 * i + 2 * j + n) % 11) / 10
                     error = 0.004 * 7.0 ** (i + q)
                     bound = np.nan if row.shown == "0" else error * 2.0 ** (i - 3)
-                    values = (row.shown, column.shown, method, quantity, 20, share, error, bound)
-                    rows.append((f"{case}--level--{i}", *values))
+                    levels = (row.shown, column.shown, method, quantity)
+                    values = (20, share, share / 2, error, error / 2, bound)
+                    rows.append((f"{case}--level--{i}", *levels, *values))
     POINTS.write(folder / "level.csv", rows)
     return folder / "level.csv"
 

@@ -32,8 +32,8 @@ def test_what_traces_tell_is_told_by_shares_of_traces() -> None:
     assert say_what_traces_tell(rows, TITLES).replace("\xa0", " ") == (
         "Of 20 traces of each sample all or nearly all determine c + c_p, provided that the "
         "branch, k and c in series, relaxes within the experiment: 100 % (84 to 100 %); none or "
-        "hardly any determines c_p: 0 % (0 to 16 %); k is determined in 100 % (84 to 100 %) on “A "
-        "cell” and 15 % (5 to 36 %) on “A drop”."
+        "hardly any determines c_p: 0 % (0 to 16 %). On “A cell” 100 % (84 to 100 %) determine k. "
+        "On “A drop” 15 % (5 to 36 %) determine k."
     )
     one = say_what_traces_tell([covered("cell", "c_p", "1", "500")], TITLES)
     assert "hardly any determines c_p: 0" in one

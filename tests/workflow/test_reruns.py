@@ -61,7 +61,10 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     # Whose points have no figures of their own.
     "budget of a method, and a sweep": (
         {"genetic_algorithm": {"max_generations": 5}, "sweeps": {"levels": LEVELS}},
-        {"identification": 6, "target": 2, "measurement": 2, "sweep": 1} | RECORDED | STUDY,
+        # Evidence reads traces alone.
+        {"identification": 6, "target": 2, "measurement": 2, "sweep": 1}
+        | RECORDED
+        | {rule: 1 for rule in STUDY if rule != "evidence"},
     ),
 }
 

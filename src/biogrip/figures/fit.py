@@ -111,12 +111,12 @@ def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = 
     residual = fit.measured - fit.fitted
     residual = factor * residual if fit.sd is None else residual / fit.sd
     residuals.plot(fit.time_s, residual, color=MEASURED, **_readings(len(residual)))
-    _means(residuals, fit.time_s, residual)
     if fit.target is not None:
         residuals.plot(fit.time_s, factor * (fit.target - fit.fitted), color=TARGET)
     for other, color in zip(others, RUNS[1:], strict=False):
         left = factor * (np.asarray(other.target) - other.fitted)
         residuals.plot(other.time_s, left, color=color)
+    _means(residuals, fit.time_s, residual)
     residuals.axhline(0, color=FITTED, linewidth=0.8)
     bound = 1.15 * float(np.max(np.abs(residual)))
     residuals.set_ylim(-bound, bound)

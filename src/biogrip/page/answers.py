@@ -43,7 +43,8 @@ def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> 
     ends = {q: [share_with_limits(*of) for _, *of in each] for q, each in shares.items()}
     always = [q for q, each in ends.items() if all(low >= 0.9 or at == 1 for at, low, _ in each)]
     never = [q for q, each in ends.items() if all(high <= 0.1 or at == 0 for at, _, high in each)]
-    parts = []
+    runs = max(runs for each in shares.values() for *_, runs in each)
+    said, first = [], f"Of {runs} traces of each sample "
     for names, words, worst in (
         (always, "all or nearly all determine", min),
         (never, "none or hardly any determines", max),
@@ -51,13 +52,16 @@ def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> 
         if names:
             provided = f", {PROVIDED}" * any(" + " in name for name in names)
             share = _percent(*worst(of for name in names for of in ends[name]))
-            parts.append(f"{words} {_listed(names)}{provided}: {share}")
+            said.append(f"{words} {_listed(names)}{provided}: {share}")
+    told = f"{first}{'; '.join(said)}." if said else ""
+    of_title: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     for name in (name for name in shares if name not in (*always, *never)):
-        each = zip(shares[name], ends[name], strict=True)
-        told = [f"{_percent(*share)} on “{title}”" for (title, *_), share in each]
-        parts.append(f"{name} is determined in {_listed(told)}")
-    runs = max(runs for each in shares.values() for *_, runs in each)
-    return f"Of {runs} traces of each sample {'; '.join(parts)}."
+        for (title, *_), share in zip(shares[name], ends[name], strict=True):
+            of_title[title][_percent(*share)].append(name)
+    for title, by_share in of_title.items():
+        parts = [f"{share} determine {_listed(names)}" for share, names in by_share.items()]
+        told += f" {'On' if told else f'{first}on'} “{title}” {', '.join(parts)}."
+    return told
 
 
 def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:

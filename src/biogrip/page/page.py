@@ -117,9 +117,9 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
         _TEMPLATES.get_template("report.html.j2").render(
             explorer=explorer(traces),
             answers=[
+                answers.say_what_traces_tell(covered, titles),
                 answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
                 answers.say_which_method_finds_it(*asked),
-                answers.say_what_traces_tell(covered, titles),
                 answers.say_what_claims_are(claimed),
             ],
             compared=answers.rows_beside_the_paper(beside, titles)
