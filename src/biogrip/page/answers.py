@@ -56,8 +56,8 @@ def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> 
     told = f"{first}{'; '.join(said)}." if said else ""
     of_title: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     for name in (name for name in shares if name not in (*always, *never)):
-        for (title, *_), share in zip(shares[name], ends[name], strict=True):
-            of_title[title][_percent(*share)].append(name)
+        for (title, *_), limits in zip(shares[name], ends[name], strict=True):
+            of_title[title][_percent(*limits)].append(name)
     for title, by_share in of_title.items():
         parts = [f"{share} determine {_listed(names)}" for share, names in by_share.items()]
         told += f" {'On' if told else f'{first}on'} “{title}” {', '.join(parts)}."
