@@ -104,7 +104,7 @@ def _experiment(instrument: str, protocol: tuple[Phase, ...], model: str) -> Exp
     of = {"creep": INSTRUMENTS["strain"], "relaxation": INSTRUMENTS["modulus"]}
     its = of.get(instrument, GRIPPER)
     arms = _GRIPPER if its is GRIPPER else NO_ARMS
-    sample = Sample(model, per_area=its.per_area)
+    sample = Sample(model, stiffness=its.stiffness)
     return Experiment(arms, protocol, _RANGES, sample, {}, its)
 
 

@@ -37,9 +37,10 @@ CONTROLLED = {
     "force": 2e-6,
     "stress": 0.02,
     "modulus": 0.02,
+    "relative_modulus": 0.02,
 }
-# Modulus and compliance are over what is held.
-WHOLE = {"modulus": "stress", "compliance": "strain"}
+# Moduli and compliances are over what is held; a relative one is taken as over 1 Pa.
+WHOLE = {"modulus": "stress", "relative_modulus": "stress", "compliance": "strain"}
 
 
 def response(reading: str, held: float) -> Array:
@@ -76,8 +77,9 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
         assert item["verdict"] == "determined"
         # Twice the half width of 95 % limits: four standard deviations.
         assert abs(item["value"] - FOUND[name]) < item["high"] - item["low"]
-        unit = "Pa" if instrument.per_area else "N/m"
+        unit = instrument.stiffness
         assert item["unit"].startswith("s" if name == "tau" else unit[:2].strip("/"))
+        assert unit or item["unit"] in ("", "s")
     assert found["instrument"] == instrument.kind
     assert found["reads"] == {"quantity": reading, "unit": instrument.read.unit}
     share = found["noise" + instrument.read.suffix] / np.max(np.abs(clean))

@@ -44,8 +44,8 @@ def solid(seed: int = 1, **given: Any) -> Array:
 @pytest.mark.parametrize("name", MODELS)
 def test_every_model_has_the_moduli_of_its_impedance_and_their_slopes(name: str) -> None:
     """A springpot is a ladder to 1e-6 (`biogrip.physics.fractional`)."""
-    model, per_area = MODELS[name], True
-    experiment = set_up(INSTRUMENTS["storage"], (hold(1.0, 1.0),), Sample(name, per_area=per_area))
+    model = MODELS[name]
+    experiment = set_up(INSTRUMENTS["storage"], (hold(1.0, 1.0),), Sample(name, stiffness="Pa"))
     values = dict(zip(model.names, model.example, strict=True))
     places = np.append(-OMEGA[::-1], OMEGA)
     loss, storage = np.split(simulate(experiment, values, places), 2)

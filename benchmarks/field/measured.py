@@ -99,7 +99,7 @@ class Task:
             given.gripper,
             phases,
             given.ranges,
-            replace(self.sample, per_area=given.sample.per_area),
+            replace(self.sample, stiffness=given.sample.stiffness),
             self.fixed,
             given.instrument,
         ).weighted(self.deviations(measure))

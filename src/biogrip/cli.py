@@ -141,8 +141,8 @@ _SETTINGS: dict[str, list[tuple[str, str, str]]] = {
         (
             *("--reading", "[QUANTITY=]COLUMN"),
             "of readings [rotation=rotation_rad]; or displacement, strain, compliance (creep), "
-            "force, stress, modulus (relaxation); of a sweep storage, complex_modulus or "
-            "storage_stiffness, and loss, phase or loss_factor by a second --reading",
+            "force, stress, modulus, relative_modulus (relaxation); of a sweep storage, "
+            "complex_modulus or storage_stiffness, and loss, phase or loss_factor by a second one",
         ),
         ("--sd", "COLUMN", "of the readings' standard deviations"),
     ],

@@ -67,7 +67,7 @@ def set_up(
         NO_ARMS if isinstance(gripper, Instrument) else gripper,
         protocol,
         ranges or _RANGES,
-        replace(sample, per_area=instrument.per_area),
+        replace(sample, stiffness=instrument.stiffness),
         dict(fixed or {}),
         instrument,
     )

@@ -67,7 +67,11 @@ _LITTLE = 0.01
 # Ratio beyond which an upper limit hangs on the fastest lag that is tried.
 _MOST = 1e4
 # Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
-_UNITS = {False: ("N/m", "m/N", "m/(N s)", "N s/m"), True: ("Pa", "1/Pa", "1/(Pa s)", "Pa s")}
+_UNITS = {
+    "N/m": ("N/m", "m/N", "m/(N s)", "N s/m"),
+    "Pa": ("Pa", "1/Pa", "1/(Pa s)", "Pa s"),
+    "": ("", "", "1/s", "s"),
+}
 
 LEVEL, EXPONENT, LOSS, BEYOND, FLOW = "level", "exponent", "loss", "beyond", "flow"
 KINDS = (LEVEL, EXPONENT, LOSS, BEYOND, FLOW, "storage", "loss tangent", "increment", "slope")
@@ -351,7 +355,8 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
     inside = [time_s for time_s in times if first_s <= time_s <= last_s]
     # Slopes and moduli at an end of the trace are hardly known.
     inner = [time_s for time_s in inside if _INNER * first_s <= time_s <= last_s / _INNER]
-    letter, (unit, *of_creep) = "G" if instrument.per_area else "K", _UNITS[instrument.per_area]
+    stiffness = instrument.stiffness
+    letter, (unit, *of_creep) = "K" if stiffness == "N/m" else "G", _UNITS[stiffness]
     if not (deforms or jaws):
         letter, unit = "J", of_creep[0]
     # What falls is not smaller before the first reading, and not larger after the last one.

@@ -57,8 +57,8 @@ class Instrument:
     """What the protocol sets."""
     read: Channel
     """What a trace is of."""
-    per_area: bool = False
-    """True if stiffness is a modulus, in Pa."""
+    stiffness: str = "N/m"
+    """Unit of a sample's stiffnesses: Pa if they are moduli, none if these are shares."""
     relative: bool = False
     """True if what is read is divided by the largest controlled value."""
     partners: tuple[Channel, ...] = ()
@@ -111,6 +111,7 @@ COMPLIANCE = Channel(
 )
 
 MODULUS = Channel("modulus", "Pa", STRESS_UNITS)
+RELATIVE_MODULUS = Channel("relative_modulus", "", {"1": 1.0, "%": 1e-2}, "relative modulus")
 
 _STIFFNESSES = {"N/m": 1.0, "mN/m": 1e-3, "N/mm": 1e3, "nN/um": 1e-3, "pN/um": 1e-6, "pN/nm": 1e-3}
 PHASE = Channel("phase", "rad", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180})
@@ -125,13 +126,14 @@ INSTRUMENTS: dict[str, Instrument] = {
     for instrument in (
         GRIPPER,
         Instrument("creep", FORCE, DISPLACEMENT),
-        Instrument("creep", STRESS, STRAIN, per_area=True),
-        Instrument("creep", STRESS, COMPLIANCE, per_area=True, relative=True),
+        Instrument("creep", STRESS, STRAIN, stiffness="Pa"),
+        Instrument("creep", STRESS, COMPLIANCE, stiffness="Pa", relative=True),
         Instrument("relaxation", DISPLACEMENT, FORCE),
-        Instrument("relaxation", STRAIN, STRESS, per_area=True),
-        Instrument("relaxation", STRAIN, MODULUS, per_area=True, relative=True),
-        *(Instrument("oscillation", STRAIN, each, True, True, _LOSSES) for each in _MODULI),
-        Instrument("oscillation", DISPLACEMENT, _STIFF, False, True, _STIFF_LOSSES),
+        Instrument("relaxation", STRAIN, STRESS, stiffness="Pa"),
+        Instrument("relaxation", STRAIN, MODULUS, stiffness="Pa", relative=True),
+        Instrument("relaxation", STRAIN, RELATIVE_MODULUS, stiffness="", relative=True),
+        *(Instrument("oscillation", STRAIN, each, "Pa", True, _LOSSES) for each in _MODULI),
+        Instrument("oscillation", DISPLACEMENT, _STIFF, "N/m", True, _STIFF_LOSSES),
     )
 }
 """Instruments by the name of the quantity that they read."""

@@ -41,7 +41,7 @@ from biogrip.physics.sample_model import (
     Network,
     SampleModel,
     Turned,
-    in_pascals,
+    in_units,
     of_columns,
 )
 
@@ -330,8 +330,8 @@ class Sample:
     """Name of the model."""
     branches: int = 1
     """Number of Maxwell branches of a generalized one."""
-    per_area: bool = False
-    """True if its elements relate stress and strain, and have units of moduli."""
+    stiffness: str = "N/m"
+    """Unit of its stiffnesses: N/m, Pa, or none if they are shares of another."""
 
     @property
     def model(self) -> SampleModel:
@@ -341,7 +341,7 @@ class Sample:
             if model.branched is None:
                 raise ValueError(f"{self.name} has no number of branches")
             model = model.branched(self.branches)
-        return in_pascals(model) if self.per_area else model
+        return model if self.stiffness == "N/m" else in_units(model, self.stiffness)
 
     @property
     def candidate(self) -> str:

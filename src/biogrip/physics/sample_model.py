@@ -62,10 +62,17 @@ MOST_BRANCHES = 8
 """Most Maxwell branches of a generalized model."""
 
 
-# Units of kinds of parameters, and where a sample is under stress, and strained.
-_UNITS = {"stiffness": "N/m", "damping": "N s/m", "springpot": "N/m", "exponent": ""}
-_UNITS_PER_AREA = {"stiffness": "Pa", "damping": "Pa s", "springpot": "Pa", "exponent": ""}
-_SUFFIXES = {"N/m": "_N_per_m", "N s/m": "_Ns_per_m", "Pa": "_Pa", "Pa s": "_Pa_s", "": ""}
+# Units of dampings by those of stiffnesses: of a sample under a force, under a stress, and of one
+# whose moduli are shares of another.
+_DAMPINGS = {"N/m": "N s/m", "Pa": "Pa s", "": "s"}
+_SUFFIXES = {
+    "N/m": "_N_per_m",
+    "N s/m": "_Ns_per_m",
+    "Pa": "_Pa",
+    "Pa s": "_Pa_s",
+    "s": "_s",
+    "": "",
+}
 
 
 @dataclass(frozen=True)
@@ -85,13 +92,14 @@ class Parameter:
     """True if zero is a possible value: the element is then absent."""
     below: float = inf
     """Upper bound of all values, if there is one."""
-    per_area: bool = False
-    """True if it relates stress and strain."""
+    stiffness: str = "N/m"
+    """Unit of stiffnesses: N/m, Pa, or none if they are shares of another."""
 
     @property
     def unit(self) -> str:
         """SI unit; empty if it has none."""
-        return (_UNITS_PER_AREA if self.per_area else _UNITS)[self.kind]
+        dimensions = {"damping": _DAMPINGS[self.stiffness], "exponent": ""}
+        return dimensions.get(self.kind, self.stiffness)
 
     @property
     def column(self) -> str:
@@ -145,8 +153,7 @@ class SampleModel:
     @property
     def stiffness_unit(self) -> str:
         """Unit of the stiffnesses of its elements."""
-        per_area = any(parameter.per_area for parameter in self.parameters)
-        return (_UNITS_PER_AREA if per_area else _UNITS)["stiffness"]
+        return self.parameters[0].stiffness
 
     @property
     def power_law(self) -> bool:
@@ -243,9 +250,9 @@ def with_fixed(model: SampleModel, fixed: Mapping[str, float]) -> SampleModel:
 
 
 @cache
-def in_pascals(model: SampleModel) -> SampleModel:
-    """Return the model of a sample under stress, whose elements are moduli and viscosities."""
-    parameters = tuple(replace(parameter, per_area=True) for parameter in model.parameters)
+def in_units(model: SampleModel, stiffness: str) -> SampleModel:
+    """Return the model with stiffnesses in Pa, as of a sample under stress, or without a unit."""
+    parameters = tuple(replace(parameter, stiffness=stiffness) for parameter in model.parameters)
     return replace(model, parameters=parameters)
 
 

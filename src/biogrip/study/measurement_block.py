@@ -76,6 +76,9 @@ class MeasurementBlock(Block):
     modulus: _Name = None
     """Name of that of relaxation moduli: stresses over the largest strain that is held
     (relaxation)."""
+    relative_modulus: _Name = None
+    """Name of that of relaxation moduli over another one, as G/G0, which have no unit
+    (relaxation)."""
     storage: _Name = None
     """Name of that of storage moduli of a frequency sweep (`instrument: oscillation`)."""
     complex_modulus: _Name = None

@@ -135,7 +135,7 @@ class Case:
     @cached_property
     def sample(self) -> Sample:
         """Constitutive model."""
-        return replace(self.block.sample.sample, per_area=self.instrument.per_area)
+        return replace(self.block.sample.sample, stiffness=self.instrument.stiffness)
 
     @property
     def fixed(self) -> dict[str, float]:
@@ -227,8 +227,8 @@ class Case:
     def models(self) -> dict[str, Sample]:
         """Sample models to fit to the case's traces by name, see `CANDIDATES`."""
         names = (*self.study.config.model_selection.models, self.sample.candidate)
-        per_area = self.instrument.per_area
-        return {name: replace(CANDIDATES[name], per_area=per_area) for name in names}
+        unit = self.instrument.stiffness
+        return {name: replace(CANDIDATES[name], stiffness=unit) for name in names}
 
     @property
     def has_valley(self) -> bool:

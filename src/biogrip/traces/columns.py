@@ -12,7 +12,7 @@ from pathlib import Path
 from unicodedata import normalize
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS, PARTNERS, ROTATION, Channel
+from biogrip.physics.instruments import INSTRUMENTS, MODULUS, PARTNERS, ROTATION, Channel
 from biogrip.terminal import visible
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86_400.0}
@@ -49,10 +49,10 @@ _SURELY = (
 _PERHAPS = (r"[_\s]([^\s_]+)$", r"(?i)(%|‰|percent|pct|(?:micro|milli|[um])strain)$")
 # Pa^-1, Pa**-1, Pa-1, and with digits above the line, which `plain_name` brings down.
 _RECIPROCAL = re.compile(r"([A-Za-z]+)(?:\^|\*\*)?\(?[-\u2212]1\)?")
-# Names of pure numbers that have no unit: a word, more that end with one for a strain, and names
-# of tan(delta).
+# Names of pure numbers that have no unit: a word, more that end with one for a strain or a share of
+# a modulus, and names of tan(delta).
 _PURE = re.compile(
-    r"[^\W\d_]+|(?:[\w.,-]*[\w.,]?[ _-])*(?:strain|deformation|gamma|epsilon|eps|[γεϵ])"
+    r"[^\W\d_]+|(?:[\w.,-]*[\w.,]?[ _-])*(?:strain|modulus|deformation|gamma|epsilon|eps|[γεϵ])"
     r"|(?:loss|damping)[ _](?:factor|tangent)|(?:.* )?tan[ _]?\(?(?:delta|[dδ])\)?",
     re.I,
 )
@@ -202,7 +202,9 @@ def unit_of(
         how = f", or state one by {said_by}"
         if not end:
             row, how = f"{row}, neither stated (by {said_by}) nor at the end of the name", ""
-        raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.")
+        # As in G/G0.
+        share = " What is over another modulus is a relative_modulus." * (allowed == MODULUS.units)
+        raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.{share}")
     for other, said in ((at_end, "the name"), (in_row, "the row of units")):
         if other not in (None, unit):
             raise BiogripError(
