@@ -109,13 +109,13 @@ def test_a_rejected_fit_says_only_why(noise_model: str) -> None:
 
 
 def test_six_readings_determine_two_parameters() -> None:
-    """Of sixteen traces the limits hold the truth in at least thirteen: fewer have 1 in 100."""
+    """Of four traces the limits hold the truth in at least three: fewer have 1 in 70."""
     times, holds = np.arange(1.0, 7.0), 0
-    for seed in range(16):
+    for seed in range(4):
         noise = 8 * np.random.default_rng(seed).standard_normal(6)
         readings = 450 * np.exp(-times * 450 / 3800) + noise
         config: dict[str, Any] = {"model_selection": {"models": []}}
         found = identify_trace(times, readings, reads="modulus", model="maxwell", config=config)
         k = next(item for item in found.data["quantities"] if item["quantity"] == "k")
         holds += found.data["fit"] != "rejected" and k["low"] <= 450 <= k["high"]
-    assert holds >= 13
+    assert holds >= 3

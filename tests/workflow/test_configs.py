@@ -80,18 +80,16 @@ def test_another_clone_is_not_run_with_the_code_and_config_of_this_one(
     assert {*re.findall(r"measurements/\w+/(\w+-\d+)", planned.output)} == {"seeds_0-6"}
 
 
-@pytest.mark.parametrize("key", ["batch_size=9", "pdf=true"])
-def test_what_changes_no_result_is_no_other_study(tmp_path: Path, key: str) -> None:
+def test_what_changes_no_result_is_no_other_study(tmp_path: Path) -> None:
     """Batches as `profiles/slurm` has them, say: all that is published is made and compared."""
-    run = snakemake(tmp_path, "-n", "--quiet", "rules", "--config", key, "--", "check")
+    keys = "batch_size=9", "pdf=true"
+    run = snakemake(tmp_path, "-n", "--quiet", "rules", "--config", *keys, "--", "check")
     assert run.status == 0, run.output
     assert run.jobs["tables"] == run.jobs["claims"] == run.jobs["check"] == 1
 
 
 def test_figures_for_print_are_made_where_they_are_asked_for(tmp_path: Path) -> None:
     file = "results/figures/comb.pdf"
-    refused = snakemake(tmp_path, "-n", "--", file)
-    assert "MissingRuleException" in refused.output
     run = snakemake(tmp_path, "-n", "--config", "pdf=true", "--", file)
     assert run.jobs == {"gripper_figures": 1}
 
