@@ -21,6 +21,7 @@ _INSTRUMENTS = {
     "gripper": "The {} of an arm of a microgripper was recorded",
     "creep": "In creep the {} was recorded",
     "relaxation": "In relaxation the {} was recorded",
+    "oscillation": "In oscillation storage and loss moduli were recorded over frequency",
 }
 _MOST_PHASES, _MOST_NAMED = 4, 3
 _IN_LATEX = str.maketrans(
@@ -36,7 +37,9 @@ _POWER = re.compile(r"(\d[\d.]*)e([+-]\d+)\b")
 def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return sentences on instrument, protocol, model, noise, limits and conditions of a trace."""
     reads, assumed = found["reads"]["quantity"], found["assumed"]
-    said = [f"{_INSTRUMENTS[found['instrument']].format(reads)} under {_protocol(found)}."]
+    under = "" if INSTRUMENTS[reads].sweeps else f" under {_protocol(found)}"
+    what = _INSTRUMENTS[found["instrument"]].format(reads.replace("_", " "))
+    said = [f"{what}{under}."]
     if "gripper" in assumed:
         own = assumed["gripper"]
         arms = (f"{own[arm]['stiffness_Nm_per_rad']:g}" for arm in ("left", "right"))

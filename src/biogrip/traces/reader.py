@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -333,7 +334,7 @@ def _no_column(path: Path, line: int | None, column: str, names: list[str]) -> s
 def _as_in(names: Sequence[str]) -> str:
     """Return the option for a column that is named after what is read, or nothing."""
     found = ((name, own) for name in INSTRUMENTS for own in names if own.lower().startswith(name))
-    return next((f", as --reading {name}={own}" for name, own in found), "")
+    return next((f", as --reading {quote(f'{name}={own}')}" for name, own in found), "")
 
 
 def _both_moduli(
