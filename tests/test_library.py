@@ -107,6 +107,7 @@ def test_columns_of_pandas_are_identified_as_by_the_command(tmp_path: Path) -> N
     # One panel a quantity; and a table as the command writes it, but for its digits.
     assert len(result.plot("profiles").axes) >= len(frame)
     words = {"one": {"dish": "d1"}, "two": {"dish": "d2"}}
+    assert library.to_table([result])["trace"].tolist() == ["1"]
     table = library.to_table({"one": result, "two": result}, words)
     assert table[["trace", "dish"]].to_numpy().tolist() == [["one", "d1"], ["two", "d2"]]
     csv = pd.read_csv(tmp_path / "found.csv")

@@ -1,7 +1,7 @@
 """A trace in a notebook: identified and told as by the command, from arrays or pandas columns."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -227,16 +227,20 @@ def identify_trace(
 
 
 def to_table(
-    results: Mapping[str, TraceResult], words: Mapping[str, Mapping[str, str]] | None = None
+    results: Mapping[str, TraceResult] | Iterable[TraceResult],
+    words: Mapping[str, Mapping[str, str]] | None = None,
 ) -> "pd.DataFrame":
-    """Return results of several traces, by name, as the command's CSV: a row each.
+    """Return results of several traces, by name or numbered, as the command's CSV: a row each.
 
     Words are those of a table of traces, by name and column, as of the treatment and the dish.
     ``to_csv("found.csv", index=False)`` makes a file for ``biogrip groups``.
     """
     import pandas as pd
 
-    found = [{**own.data, "trace": name} for name, own in results.items()]
-    copied = {name: (words or {}).get(name, {}) for name in results}
+    named = results
+    if not isinstance(named, Mapping):
+        named = {str(number): own for number, own in enumerate(named, start=1)}
+    found = [{**own.data, "trace": name} for name, own in named.items()]
+    copied = {name: (words or {}).get(name, {}) for name in named}
     header, rows = table_of(Outcome(found, {}, copied=copied))
     return pd.DataFrame(rows, columns=header)
