@@ -27,7 +27,7 @@ from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.source import HOLD
 from biogrip.terminal import QUIET
-from tests.helpers.identified import FEW, identified, identify, told
+from tests.helpers.identified import FEW, by_quantity, identified, identify, told
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
 from tests.helpers.problems import clean
 
@@ -108,6 +108,12 @@ def test_options_are_keys_of_the_config_and_the_last_one_counts(
     by_options = case_of(Asked(EXAMPLE, None, tuple(settings)))
     assert by_options.block == case_of(Asked(EXAMPLE, tmp_path / "same.yaml", (model,))).block
     assert by_options.sample.candidate == "generalized_maxwell_2"
+
+
+def test_other_models_need_not_be_tried(tmp_path: Path) -> None:
+    found = identified(tmp_path, EXAMPLE, "--model", "liquid_drop", "--no-compare", config="")
+    assert not found["models"]
+    assert by_quantity(found)["k_p"]["verdict"] == "determined"
 
 
 def test_an_export_is_read_by_options_or_keys_and_what_is_recognised_is_said(

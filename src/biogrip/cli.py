@@ -196,7 +196,7 @@ class _Set(argparse.Action):
         if isinstance(values, tuple):
             path, value = values
         elif self.nargs == 0:
-            value = not str(option).startswith("--no-")
+            value = not str(option).startswith("--no-") if self.const is None else self.const
         namespace.settings = [*namespace.settings, (str(option), path, value)]
 
 
@@ -208,7 +208,7 @@ def _identify_parser(stages: Any) -> None:
     identify.examples = _examples(
         "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
         "identify cells.tsv --config my_gripper.yaml --csv found.csv",
-        cost="A trace takes seconds, most of them for comparing the sample models.",
+        cost="A trace takes seconds, most of them for comparing the sample models: --no-compare.",
     )
     identify.add_argument(
         "traces",
@@ -230,6 +230,10 @@ def _identify_parser(stages: Any) -> None:
         if title == "what was done":
             text = "YAML file with your gripper, protocol, search range, ..."
             group.add_argument("--config", type=Path, help=text)
+        if title == "the sample":
+            of_key = {"dest": "model_selection.models", "nargs": 0, "const": []}
+            text = "do not try other models, which takes most of the time"
+            group.add_argument("--no-compare", action=_Set, help=text, **of_key)
     output = identify.add_argument_group("output")
     output.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row per trace")
     output.add_argument("--report", type=Path, metavar="PAGE", help="HTML page with pictures")
