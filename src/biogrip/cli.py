@@ -26,7 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Matrices are small: BLAS threads, which NumPy starts when it is imported, cost more than they
     # bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    options = _parser().parse_args(arguments or sys.argv[1:] or ["--help"])
+    options = _parser().parse_args((sys.argv[1:] if arguments is None else arguments) or ["--help"])
     try:
         status: int = options.command(options)
         sys.stdout.flush()
@@ -107,7 +107,7 @@ def _within(text: str) -> tuple[str | None, float]:
     with suppress(ValueError):
         if 0 < float(percent) < math.inf:
             return name or None, float(percent)
-    raise argparse.ArgumentTypeError(f"found '{text}', allowed is a percentage, or as in k=10")
+    raise ValueError(f"found '{text}', allowed is a percentage, or as in k=10")
 
 
 def _any_key(text: str) -> tuple[tuple[str, ...], Any]:
@@ -272,7 +272,7 @@ def _design_parser(stages: Any) -> None:
     text = "config of the designed study, YAML [CONFIG_designed.yaml]"
     design.add_argument("--output", type=Path, help=text)
     text = "the shortest protocol that tells a parameter, or all, within PERCENT (95 %% limits)"
-    design.add_argument("--within", type=_within, metavar="[NAME=]PERCENT", help=text)
+    design.add_argument("--within", type=_read(_within), metavar="[NAME=]PERCENT", help=text)
 
 
 def _identify(options: argparse.Namespace) -> int:

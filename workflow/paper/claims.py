@@ -19,7 +19,7 @@ from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.calibration import ARM_KEYS, FreeMotion, calibrate, free_motion
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import sample_times
-from biogrip.records.identifications import READINGS, read_histories, read_identifications
+from biogrip.records.identifications import read_histories, read_identifications, read_readings
 from biogrip.records.rows import read_frame
 from biogrip.records.success import median_with_limits, near_noise, share_with_limits
 from biogrip.stages.job import job_study, logged, paths
@@ -321,15 +321,11 @@ def read_reading(study: Study, readings: pd.DataFrame, file: Path) -> pd.DataFra
     """Return the runs of a case under the reading that can print the most of the paper's values."""
     best = readings["with_error"].idxmax()
     name, block = list(study.config.readings.items())[best]
-    all_of = {"reading": study.config.readings, "seed": range(study.cases[file.stem].seeds)}
-    found = READINGS.read(file, case=[file.stem], **all_of)
-    found = found[found["reading"] == name].rename(columns=_NAMES)
+    found = read_readings(file, study.cases[file.stem])
+    found = found[found["reading"] == name].copy()
     found["near_noise"] = near_noise(found, study.near_noise_tolerance)
     holds = readings.loc[best, "with_error"] == readings.loc[best, "values"]
     return found.assign(able=True, reading=block.title, encodable=holds)
-
-
-_NAMES = {"k_N_per_m": "k", "k_p_N_per_m": "k_p", "c_Ns_per_m": "c", "c_p_Ns_per_m": "c_p"}
 
 
 def add_columns(tables: dict[str, pd.DataFrame]) -> None:

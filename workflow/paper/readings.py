@@ -13,8 +13,7 @@ import pandas as pd
 
 from biogrip.arrays import Array
 from biogrip.keys import built
-from biogrip.physics.sample_model import SINGLE_BRANCH
-from biogrip.records.identifications import READINGS
+from biogrip.records.identifications import read_readings
 from biogrip.records.success import near_noise, near_noise_words, share_with_limits
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.case_blocks import CaseBlock
@@ -48,18 +47,11 @@ Found = Mapping[str, pd.DataFrame]
 
 def read(study: Study, files: list[Path]) -> Found:
     """Read what all readings found of each case, CSV, with sums of dampers."""
-    names = {p.column: p.name for p in SINGLE_BRANCH}
     found = {}
-    for case, path in zip(study.cases, files, strict=True):
-        rows = read_rows(study, case, path).rename(columns=names)
-        found[case] = rows.assign(**{"c + c_p": rows["c"] + rows["c_p"]})
+    for case, path in zip(study.cases.values(), files, strict=True):
+        rows = read_readings(path, case)
+        found[case.name] = rows.assign(**{"c + c_p": rows["c"] + rows["c_p"]})
     return found
-
-
-def read_rows(study: Study, case: str, path: Path) -> pd.DataFrame:
-    """Read what every reading found of a case, in every seed."""
-    names, seeds = study.config.readings, range(study.cases[case].seeds)
-    return READINGS.read(path, case=[case], reading=names, seed=seeds)
 
 
 def printable(study: Study, reading: str) -> dict[str, int]:

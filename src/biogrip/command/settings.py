@@ -397,7 +397,8 @@ def read_table(
     problems = list(_name_problems(path, header, [file, *options_of]))
     problems += _unused(path, header, rows, {file, *options_of})
     found: list[Asked] = []
-    set_by: list[tuple[int, dict[str, str]]] = []
+    lines: list[int] = []
+    set_by: list[dict[str, str]] = []
     for line, row in rows:
         if not any(row):
             continue
@@ -418,29 +419,33 @@ def read_table(
         used = {"", *options_of, *(name for name in by_name if "." in name)}
         copied = {name: cell for name, cell in by_name.items() if name not in used}
         found.append(Asked(trace, config, tuple(settings), place(path, line), copied))
-        set_by.append((line, {name: cell for name, cell in by_name.items() if name in used}))
+        set_by.append({name: cell for name, cell in by_name.items() if name in used})
+        lines.append(line)
     if not found:
         problems.append(f"{place(path)}: found no traces, allowed is a row for each.")
-    of_file = defaultdict[str, list[int]](list)
-    for index, own in enumerate(found):
-        # Resolved, so that links to one file are found.
-        of_file[os.path.realpath(own.trace)].append(index)
-    for rows_of_file in of_file.values():
-        told = [
-            name
-            for name in set_by[rows_of_file[0]][1]
-            if len({set_by[index][1][name] for index in rows_of_file}) > 1
-        ]
-        parts = dict[str, int]()
-        for index in rows_of_file:
-            line, cells = set_by[index]
-            part = " ".join(cells[name] for name in told if cells[name])
-            if (before := parts.setdefault(part, line)) != line:
-                text = f"found '{visible(found[index].trace)}' again, as on line {before}; allowed"
-                problems.append(f"{place(path, line, file)}: {text} is each trace once.")
-            found[index] = replace(found[index], part=part)
+    parts, before = _parts([own.trace for own in found], set_by), dict[tuple[str, str], int]()
+    for index, (own, line, part) in enumerate(zip(found, lines, parts, strict=True)):
+        first = before.setdefault((os.path.realpath(own.trace), part), line)
+        if first != line and own.trace != path.parent:
+            text = f"found '{visible(own.trace)}' again, as on line {first}; allowed is each"
+            problems.append(f"{place(path, line, file)}: {text} trace once.")
+        found[index] = replace(own, part=part)
     _refuse(problems)
     return found
+
+
+def _parts(traces: Sequence[Path], set_by: Sequence[Mapping[str, str]]) -> list[str]:
+    """Return what tells each trace from others of its file: cells of its row that differ there."""
+    differ = defaultdict[str, dict[str, set[str]]](lambda: defaultdict(set))
+    # Resolved, so that links to one file are found.
+    files = [os.path.realpath(trace) for trace in traces]
+    for file, cells in zip(files, set_by, strict=True):
+        for name, cell in cells.items():
+            differ[file][name].add(cell)
+    return [
+        " ".join(cell for name, cell in cells.items() if cell and len(differ[file][name]) > 1)
+        for file, cells in zip(files, set_by, strict=True)
+    ]
 
 
 def _settings_of(cell: str, name: str, option: str | None, by: str) -> Iterator[Setting]:

@@ -108,7 +108,7 @@ def _scatter(
     ticks: list[str] = []
     # Sums are told so much better that on an axis of decades they are a line.
     sums = axes.twinx()
-    sums.set(ylim=(1 - _SUM, 1 + _SUM), yticks=[])
+    sums.set(ylim=(1 - _SUM, 1 + _SUM))
     for group in case.sample.model.quantities:
         names = [parameter.name for parameter in group]
         target = sum(case.parameters[name] for name in names)

@@ -157,7 +157,9 @@ def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
     time_s, best = fits.time_s, diagnosis.likelihood.best
     later_s, given = 2 * time_s[0] - time_s[1], fits.at(0.0, best)
     rejected = diagnosis.status == REJECTED
-    level, other = chdtri(1, _FALSE_ALARM), fits.at(later_s, best)
+    level, other = chdtri(1, _FALSE_ALARM), given
+    if not rejected:
+        other = fits.at(later_s, best)
     if rejected or compute_fall(len(time_s), given.misfit, other.misfit, None) > level:
         other = fits.best(later_s)
     alike = _as_good(fits, other)

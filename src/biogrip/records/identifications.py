@@ -68,6 +68,13 @@ READINGS = RowFile(
 )
 
 
+def read_readings(path: Path, case: Case) -> "pd.DataFrame":
+    """Read what every reading found of a case, in all seeds; parameters stand by name."""
+    names, seeds = case.study.config.readings, range(case.seeds)
+    found = READINGS.read(path, case=[case.name], reading=names, seed=seeds)
+    return found.rename(columns={p.column: p.name for p in SINGLE_BRANCH})
+
+
 def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
     """Return the parameters that have columns in a file of identifications.
 
