@@ -10,8 +10,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
-from biogrip.fit.least_squares import FINISHED
-from biogrip.fit.local_fits import FINE, PRIOR_WIDTH, ROUGH
+from biogrip.fit.least_squares import FINE, FINISHED, PRIOR_WIDTH, ROUGH
 from biogrip.fit.problem import TraceProblem
 
 

@@ -16,12 +16,11 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.misfit import Misfit, make_misfit
-from biogrip.physics.noise import add_noise, rms
+from biogrip.physics.noise import add_noise, nuisance_basis, rms
 from biogrip.physics.protocol import Course, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
-from biogrip.physics.whitening import nuisance_basis
 from biogrip.study.load import load_study
 from biogrip.study.study import Case
 

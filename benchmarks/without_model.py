@@ -27,9 +27,9 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import MODELS
+from biogrip.physics.noise import nuisance_basis
 from biogrip.physics.protocol import Phase, hold, join_phases, ramp
 from biogrip.physics.residuals import Residuals, Trace
-from biogrip.physics.whitening import nuisance_basis
 from biogrip.records.success import share_in_words
 from tests.helpers.laplace import IMPEDANCES
 

@@ -19,8 +19,7 @@ from scipy.stats import chi2
 from biogrip.cli import main
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
-from biogrip.fit.methods import identifier
-from biogrip.fit.problem import silent
+from biogrip.fit.problem import identifier, silent
 from biogrip.page.answers import (
     rows_beside_the_paper,
     say_what_claims_are,

@@ -9,10 +9,15 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.fit.fitted_onset import OnsetFits, begins_constant, estimate_onset
 from biogrip.judging.diagnosis import RING
 from biogrip.judging.doubts import DOUBT, Note
-from biogrip.judging.onset import is_cut_off, profile_over_onset
+from biogrip.judging.onset import (
+    OnsetFits,
+    begins_constant,
+    estimate_onset,
+    is_cut_off,
+    profile_over_onset,
+)
 from biogrip.library import Sample, TraceResult, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import Phase, hold, ramp

@@ -22,11 +22,10 @@ from biogrip.digits import with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs, write_text
 from biogrip.physics.modes import linear_responses
-from biogrip.physics.noise import standard_deviation
+from biogrip.physics.noise import standard_deviation, without
 from biogrip.physics.protocol import Phase, hold, join_phases, largest_load, sample_times
 from biogrip.physics.response import jaw_force_response, linear_jaw_force
 from biogrip.physics.simulation import compute_grip, simulated_response
-from biogrip.physics.whitening import without
 from biogrip.study.config import DesignBlock
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config, overlaid, read_config

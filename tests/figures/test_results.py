@@ -15,7 +15,7 @@ from biogrip.figures.likelihood import draw_profile, draw_valley
 from biogrip.figures.results import Fit
 from biogrip.figures.scatter import draw_scatter
 from biogrip.figures.style import ALL_SEEDS, RUNS, figure, styled
-from biogrip.fit.methods import METHODS
+from biogrip.fit.problem import METHODS
 from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.simulation import simulated_response

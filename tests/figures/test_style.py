@@ -16,7 +16,7 @@ from biogrip.figures.style import (
     save,
     styled,
 )
-from biogrip.fit.methods import METHODS
+from biogrip.fit.problem import METHODS
 from tests.helpers.default import STUDY
 from workflow.paper.gripper import draw_torque
 

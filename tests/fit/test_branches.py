@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.fit.local_fits import FINE
-from biogrip.fit.methods import METHODS, identifier
-from biogrip.fit.problem import Fit, TraceProblem, silent
+from biogrip.fit.least_squares import FINE
+from biogrip.fit.problem import METHODS, Fit, TraceProblem, identifier, silent
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.physics.models import Sample

@@ -7,9 +7,8 @@ import pytest
 
 from biogrip.arrays import Array, IntArray
 from biogrip.fit import least_squares
-from biogrip.fit.least_squares import _convex, _finished, fit_from, refine_optima
+from biogrip.fit.least_squares import ROUGH, LocalFits, _convex, _finished, fit_from, refine_optima
 from biogrip.fit.levenberg_marquardt import Minima, Normal
-from biogrip.fit.local_fits import ROUGH, LocalFits
 from tests.helpers.default import seen
 from tests.helpers.problems import problem
 

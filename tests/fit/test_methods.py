@@ -8,10 +8,16 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit import genetic, least_squares
-from biogrip.fit.least_squares import best_of_starts, fit_from, refine_optima
-from biogrip.fit.local_fits import PRIOR_WIDTH, ROUGH, LocalFits, alike
-from biogrip.fit.methods import METHODS, identifier
-from biogrip.fit.problem import TraceProblem, silent
+from biogrip.fit.least_squares import (
+    PRIOR_WIDTH,
+    ROUGH,
+    LocalFits,
+    alike,
+    best_of_starts,
+    fit_from,
+    refine_optima,
+)
+from biogrip.fit.problem import METHODS, TraceProblem, identifier, silent
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.noise import rms
 from biogrip.physics.residuals import Residuals

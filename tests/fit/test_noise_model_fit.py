@@ -13,8 +13,7 @@ from biogrip.fit.noise_model_fit import (
     outliers_of,
     significance_of_growth,
 )
-from biogrip.physics.noise import AR1, Noise, add_noise
-from biogrip.physics.whitening import NoiseModel
+from biogrip.physics.noise import AR1, Noise, NoiseModel, add_noise
 from tests.physics.test_noise import correlation
 
 SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))

@@ -17,9 +17,8 @@ from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit, fit_traces, gripper_functions
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.noise import AR1, Drift, Noise, Outliers, add_noise
+from biogrip.physics.noise import AR1, MOST_SAMPLES, Drift, Noise, Outliers, add_noise
 from biogrip.physics.simulation import simulated_response
-from biogrip.physics.whitening import MOST_SAMPLES
 from tests.helpers.default import STUDY
 
 CASE = STUDY.cases["liquid_drop_2"]

@@ -7,17 +7,15 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.fit.methods import identifier
-from biogrip.fit.problem import Fit, TraceProblem, silent
+from biogrip.fit.problem import Fit, TraceProblem, identifier, silent
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.models import MODELS
-from biogrip.physics.noise import Noise, add_noise
+from biogrip.physics.noise import Noise, add_noise, nuisance_basis
 from biogrip.physics.protocol import Course, sample_times
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
-from biogrip.physics.whitening import nuisance_basis
 from tests.helpers.default import STUDY
 
 MODEL = MODELS["generalized_maxwell"]

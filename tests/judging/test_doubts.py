@@ -20,8 +20,7 @@ from biogrip.judging.doubts import (
     has_fast_noise,
 )
 from biogrip.judging.likelihood import make_likelihood
-from biogrip.physics.noise import AR1, Noise, Outliers, add_noise
-from biogrip.physics.whitening import NoiseModel
+from biogrip.physics.noise import AR1, Noise, NoiseModel, Outliers, add_noise
 from tests.helpers.default import seen
 from tests.helpers.problems import MODEL, clean, likelihood_of, pose_noisy, posed_for
 

@@ -11,10 +11,9 @@ from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from, identify_from
 from biogrip.fit.noise_model_fit import absorbed
-from biogrip.judging.changes import compare_halves, find_step
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.levels import FALSE_ALARM
-from biogrip.judging.whiteness import wandering
+from biogrip.judging.whiteness import compare_halves, find_step, wandering
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import hold

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.fit.local_fits import FINE
+from biogrip.fit.least_squares import FINE
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.diagnosis import diagnose

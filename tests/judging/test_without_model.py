@@ -21,9 +21,9 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import MODELS
+from biogrip.physics.noise import WEIGHTED, Whitening, nuisance_basis
 from biogrip.physics.protocol import Phase, hold, join_phases, ramp
 from biogrip.physics.residuals import Residuals, Trace
-from biogrip.physics.whitening import WEIGHTED, Whitening, nuisance_basis
 from tests.helpers.problems import GRIPPER
 
 TIMES = np.geomspace(0.1, 100.0, 80)

@@ -11,7 +11,7 @@ import pytest
 
 from biogrip.digits import legible
 from biogrip.figures.results import Fit
-from biogrip.fit.methods import METHODS
+from biogrip.fit.problem import METHODS
 from biogrip.page.answers import (
     say_what_claims_are,
     say_what_the_study_gives,

@@ -11,25 +11,23 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.noise import (
     AR1,
     KINDS,
+    WEIGHTED,
     Drift,
     Flicker,
     Noise,
+    NoiseModel,
     Outliers,
+    Whitening,
     add_noise,
     draw_ornstein_uhlenbeck,
+    drift_is_flow,
+    estimate_noise,
     flicker_rates,
+    nuisance_basis,
     rms,
     stream,
 )
 from biogrip.physics.protocol import hold, join_phases, sample_times
-from biogrip.physics.whitening import (
-    WEIGHTED,
-    NoiseModel,
-    Whitening,
-    drift_is_flow,
-    estimate_noise,
-    nuisance_basis,
-)
 from tests.helpers.problems import EXPERIMENT, MODEL, SAMPLES, TORQUE
 from tests.physics.test_condensed import assert_alike
 

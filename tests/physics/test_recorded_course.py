@@ -12,11 +12,18 @@ from biogrip.physics.gripper import NO_ARMS
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS
 from biogrip.physics.modes import linear_responses, mode_responses
-from biogrip.physics.protocol import Course, evaluate, hold, join_phases, ramp
-from biogrip.physics.recorded_course import follow_rows, with_steps
+from biogrip.physics.noise import NoiseModel, Whitening, nuisance_basis
+from biogrip.physics.protocol import (
+    Course,
+    evaluate,
+    follow_rows,
+    hold,
+    join_phases,
+    ramp,
+    with_steps,
+)
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.simulation import simulated_response
-from biogrip.physics.whitening import NoiseModel, Whitening, nuisance_basis
 
 RNG = np.random.default_rng(4)
 EVEN: Array = np.arange(251) / 25

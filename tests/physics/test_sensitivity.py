@@ -10,11 +10,11 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.modes import linear_responses
+from biogrip.physics.noise import nuisance_basis, with_uncertain, within, without
 from biogrip.physics.protocol import Course, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.physics.whitening import nuisance_basis, with_uncertain, within, without
 from tests.helpers.responses import (
     MODEL_PARAMETERS,
     PROTOCOLS,

@@ -10,7 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from biogrip.errors import BiogripError
-from biogrip.fit.methods import METHODS
+from biogrip.fit.problem import METHODS
 from biogrip.physics.gripper import torque
 from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.load import load_given_study, load_study

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from biogrip.fit.methods import METHODS
+from biogrip.fit.problem import METHODS
 from biogrip.physics.models import MODELS, Published, Sample
 from biogrip.records.identifications import MODEL_FITS, columns
 from biogrip.records.rows import write_object

@@ -22,7 +22,7 @@ for package in (TOP / "src" / "biogrip", TOP.parent):
 
 from biogrip.errors import BiogripError
 from biogrip.files import digest_of, software
-from biogrip.fit.methods import METHODS
+from biogrip.fit.problem import METHODS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases
 from biogrip.stages.job import settings

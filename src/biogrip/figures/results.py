@@ -11,8 +11,8 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
 from biogrip.physics.instruments import ROTATION, Channel
+from biogrip.physics.noise import within
 from biogrip.physics.simulation import simulated_response
-from biogrip.physics.whitening import within
 from biogrip.records.identifications import read_histories, read_identifications
 from biogrip.records.rows import seeds_of
 from biogrip.records.success import ALL, basins

@@ -18,7 +18,7 @@ from matplotlib.ticker import LogFormatterSciNotation
 from biogrip.arrays import Array
 from biogrip.digits import SUPERSCRIPTS
 from biogrip.files import atomic_write
-from biogrip.fit.methods import Method
+from biogrip.fit.problem import Method
 
 COLUMN_IN, PAGE_IN = 3.5, 7.2
 
@@ -42,7 +42,7 @@ COLORS = {
     "purple": PURPLE,
     "amber": "#E69F00",
 }
-"""By the names that methods say them by (`biogrip.fit.methods`)."""
+"""By the names that methods say them by (`biogrip.fit.problem`)."""
 
 # Most panels that are legible in one row.
 _MOST_SIDE_BY_SIDE, _LEGEND_IN = 5, 0.4

@@ -15,17 +15,17 @@ from biogrip.physics.condensed import Condensed, SweptRows
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
-from biogrip.physics.noise import stream
-from biogrip.physics.protocol import SWEEP, Course, Phase, join_phases
-from biogrip.physics.residuals import Residuals, Trace
-from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.physics.whitening import (
+from biogrip.physics.noise import (
     WEIGHTED,
     NoiseModel,
     Whitening,
     nuisance_basis,
+    stream,
     with_uncertain,
 )
+from biogrip.physics.protocol import SWEEP, Course, Phase, join_phases
+from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.sample_model import SampleModel, with_fixed
 
 # Key of an arm that fits leave out, and its uncertainty with it.
 _NOT_FITTED = "inertia_kgm2"
@@ -66,10 +66,10 @@ class Experiment:
     ``gripper`` itself; ``share`` of the ``torque``; and of the ``steps`` of a record, by their
     number from 0, when each came."""
     fit_start: bool = False
-    """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
+    """True if the time at which the protocol started is fitted along (`judging.onset`)."""
     record: Array | None = field(default=None, compare=False)
     """Times from the start and what was controlled at them, (n, 2), where that was recorded, see
-    `biogrip.physics.recorded_course`; the phases are then a hold as long and as high."""
+    `biogrip.physics.protocol`; the phases are then a hold as long and as high."""
     undeclared: frozenset[str] = frozenset()
     """Which of ``offset`` and ``drift`` nothing is said of: a noise model brings them along."""
     given_ranges: frozenset[str] = frozenset()
@@ -101,7 +101,7 @@ class Experiment:
             return SWEEP
         if self.record is not None:
             # Imported here: few experiments have a record.
-            from biogrip.physics.recorded_course import follow_rows
+            from biogrip.physics.protocol import follow_rows
 
             return follow_rows(*self.record.T, deforms=self.instrument.deforms)
         return join_phases(self.phases, deforms=self.instrument.deforms)

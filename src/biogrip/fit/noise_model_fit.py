@@ -35,7 +35,7 @@ import numpy as np
 from scipy.special import betainc
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.physics.whitening import ROOT_12, NoiseModel, Whitening
+from biogrip.physics.noise import ROOT_12, NoiseModel, Whitening
 
 FAR = 4.5
 """Threshold in standard deviations of the noise, exceeded by one Gaussian reading in 150,000."""

@@ -18,8 +18,8 @@ from biogrip.fit.least_squares import fit_from, identify_many
 from biogrip.fit.nested_fits import deepen
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
+from biogrip.physics.noise import MOST_SAMPLES, NoiseModel, drift_is_flow
 from biogrip.physics.simulation import simulated_response
-from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, drift_is_flow
 
 # Square of three standard uncertainties.
 _SECOND_ORDER = 9.0

@@ -9,8 +9,8 @@ from biogrip.fit.experiment import Experiment
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import REJECTED, REJECTION, compute_status, find_reasons, order_notes
 from biogrip.judging.verdicts import FIT_REJECTED, Finding
+from biogrip.physics.noise import within
 from biogrip.physics.simulation import simulated_response
-from biogrip.physics.whitening import within
 from biogrip.traces.reader import Recording
 
 

@@ -26,7 +26,7 @@ from biogrip.arrays import Array
 from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.physics.modes import lag_course
-from biogrip.physics.whitening import without
+from biogrip.physics.noise import without
 
 # Weights that are tried; change of a row over the median's that is no scatter; fewest rows.
 _WEIGHTS = 10.0 ** np.arange(-2, 13)

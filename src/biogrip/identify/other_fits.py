@@ -18,7 +18,6 @@ from scipy.special import chdtrc
 
 from biogrip.digits import one_in, plain
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.fitted_onset import OnsetFits
 from biogrip.fit.nested_fits import (
     FittedModels,
     fit_models,
@@ -53,11 +52,12 @@ from biogrip.judging.levels import (
     SATURATED,
 )
 from biogrip.judging.likelihood import compute_fall, make_likelihood
+from biogrip.judging.onset import OnsetFits
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.models import CANDIDATES
+from biogrip.physics.noise import drift_is_flow, without
 from biogrip.physics.protocol import is_held
-from biogrip.physics.whitening import drift_is_flow, without
 from biogrip.traces.reader import Recording
 
 _MOST_SAMPLES = 50_000

@@ -25,8 +25,8 @@ from biogrip.judging.levels import (
 )
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lag_course
+from biogrip.physics.noise import nuisance_basis, without
 from biogrip.physics.protocol import Course, evaluate
-from biogrip.physics.whitening import nuisance_basis, without
 from biogrip.traces.columns import TIME_UNITS
 from biogrip.traces.reader import Recording
 

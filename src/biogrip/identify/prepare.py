@@ -21,12 +21,12 @@ from biogrip.digits import plain
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations, swept_deviations
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.fitted_onset import OnsetFits, estimate_onset
 from biogrip.fit.genome import GeneRange
 from biogrip.identify.plausibility import check_recording
+from biogrip.judging.onset import OnsetFits, estimate_onset
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
+from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise
 from biogrip.physics.protocol import Course, is_held, largest_load
-from biogrip.physics.whitening import MOST_SAMPLES, drift_is_flow, estimate_noise
 from biogrip.traces.columns import place
 from biogrip.traces.reader import Recording
 
@@ -55,7 +55,7 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
     """
     if experiment.record is not None:
         # Imported here, as below: few traces have a record.
-        from biogrip.physics.recorded_course import with_steps
+        from biogrip.physics.protocol import with_steps
 
         record, uncertain_s = with_steps(experiment.record)
         steps = {str(number): error for number, error in enumerate(uncertain_s.tolist())}

@@ -231,7 +231,7 @@ def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade
 def _with_valley(judged: Diagnosis, model: SampleModel) -> Diagnosis:
     """Return a diagnosis with its valley, whose lowest point counts if no profile is lower."""
     # Imported here: only a study has valleys.
-    from biogrip.judging.valley import compute_valley
+    from biogrip.judging.profiles import compute_valley
 
     valley, missed = compute_valley(judged.likelihood, model)
     return replace(judged, valley=valley, lowest=missed if judged.lowest is None else judged.lowest)

@@ -4,7 +4,7 @@ The heaviest note decides the status of a fit: ok, doubtful or rejected (`comput
 Residuals are tested for white noise (`biogrip.judging.whiteness`), each test at the level
 `FALSE_ALARM`: correlation of neighbours, the cumulative periodogram, means over stretches,
 outliers, a line in the spectrum, a step at any time, parts that differ
-(`biogrip.judging.changes`). A line or a step that explains the others is named in their place.
+(`biogrip.judging.whiteness`). A line or a step that explains the others is named in their place.
 Noise that grows with the rotation is told first, and the other tests are of what it leaves.
 
 What is correlated beyond chance (`CERTAIN_MISFIT`) and larger than the scatter of neighbouring
@@ -31,7 +31,6 @@ from biogrip.fit.noise_model_fit import (
     compute_growth,
     outliers_of,
 )
-from biogrip.judging.changes import Step, about_moduli, compare_halves, find_inertia, find_step
 from biogrip.judging.levels import (
     AS_THE_SCATTER,
     CERTAIN_MISFIT,
@@ -55,16 +54,21 @@ from biogrip.judging.levels import (
 )
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.whiteness import (
+    Step,
+    about_moduli,
     as_correlated,
     by_leverage,
+    compare_halves,
     correlated,
     far_out,
+    find_inertia,
     find_line,
+    find_step,
     uneven,
     wandering,
 )
+from biogrip.physics.noise import MOST_SAMPLES, NoiseModel, estimate_noise, without
 from biogrip.physics.residuals import Residuals
-from biogrip.physics.whitening import MOST_SAMPLES, NoiseModel, estimate_noise, without
 
 HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 """Weights of a note, in ascending order."""

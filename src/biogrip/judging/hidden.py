@@ -17,14 +17,13 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.noise_model_fit import absorbed
-from biogrip.judging.changes import Steps, parts_apart, steps_of
 from biogrip.judging.doubts import MANY, middle_of
 from biogrip.judging.levels import FALSE_ALARM
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.verdicts import Finding
-from biogrip.judging.whiteness import averaged
+from biogrip.judging.whiteness import Steps, averaged, parts_apart, steps_of
 from biogrip.physics.models import CANDIDATES, as_richer, contained
-from biogrip.physics.whitening import without
+from biogrip.physics.noise import without
 
 # Times of a jump and of a changed gain, in shares of the readings.
 _SHARES = np.linspace(0.1, 0.9, 9)

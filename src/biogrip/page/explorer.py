@@ -11,7 +11,7 @@ from biogrip.arrays import Array
 from biogrip.digits import significant, with_unit
 from biogrip.figures.results import Fit, fit_of, scale_of_fit
 from biogrip.figures.style import COLORS, MEASURED, TARGET, is_over_decades
-from biogrip.fit.methods import Method
+from biogrip.fit.problem import Method
 from biogrip.records.identifications import read_identifications
 from biogrip.records.traces import read_measurements
 from biogrip.stages.judgement import TRACE, experiment_for

@@ -30,9 +30,9 @@ from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array
 from biogrip.physics.modes import Modes, mode_responses, responses_in_turn, sum_of_modes
+from biogrip.physics.noise import Whitening, without
 from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import ModeRows, SpanningModes
-from biogrip.physics.whitening import Whitening, without
 
 _NODES = 20
 _DEGREE = _NODES - 1

@@ -1,4 +1,31 @@
-"""Noise that is added to simulated traces: white, autocorrelated, a drift, and outliers."""
+"""What an instrument adds to its readings, offset, drift and noise: simulated, or taken out.
+
+An offset and a linear drift are nuisance functions. Their amplitudes are linear parameters and are
+not searched: their span is projected out of trace and responses alike, which is the same as fitting
+them (variable projection) [1]_. Functions whose amplitude has a known standard deviation are
+projected out in part [2]_.
+
+The size of the noise is estimated without a model, and its colour is whitened. The autocorrelation
+is that of white noise plus exponentials of the time between two readings (Ornstein-Uhlenbeck
+processes): one of any relaxation time, and a geometric series of them for 1/f noise. A random walk
+begins with the first reading; the covariance of two of its readings is the time of the earlier one.
+White noise may have a part that grows with the reading. The Cholesky factor L of its matrix C is
+computed, and solved with, in linear time [3]_. Residuals r become L^-1 r, which are white and on
+average as large as r. Least squares of these are generalised least squares [4]_.
+
+References
+----------
+.. [1] G. H. Golub and V. Pereyra, The differentiation of pseudo-inverses and nonlinear least
+   squares problems whose variables separate, SIAM Journal on Numerical Analysis 10 (1973),
+   413-432.
+.. [2] A. M. Stuart, Inverse problems: a Bayesian perspective, Acta Numerica 19 (2010), 451-559:
+   a marginalised Gaussian uncertainty is a part of the noise.
+.. [3] D. Foreman-Mackey, E. Agol, S. Ambikasaran and R. Angus, Fast and scalable Gaussian
+   process modeling with applications to astronomical time series, The Astronomical Journal 154
+   (2017), 220: celerite.
+.. [4] A. C. Aitken, On least squares and linear combination of observations, Proceedings of the
+   Royal Society of Edinburgh 55 (1936), 42-48.
+"""
 
 import hashlib
 from collections.abc import Callable, Iterator
@@ -10,6 +37,8 @@ from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.keys import Block, Complaint, OneOf
+from biogrip.physics.modes import lag_course
+from biogrip.physics.protocol import Course
 
 # Relaxation times of flicker noise are so many e-folds apart, or less: its spectrum is 1/f to
 # within 2 exp(-pi^2 / 1.5) = 0.3 %, as Poisson's summation has it.
@@ -216,3 +245,237 @@ def stream(study_seed: int, case: str, seed: int, purpose: str) -> np.random.Gen
 def _words(name: str) -> tuple[int, ...]:
     digest = hashlib.sha256(name.encode()).digest()[:16]
     return tuple(int.from_bytes(digest[i : i + 4], "big") for i in range(0, 16, 4))
+
+
+# Least squared norm of a function that is projected out completely, up to rounding.
+_LEAST_NORM = 1 - 1e-9
+
+
+def nuisance_basis(time_s: Array, *, offset: bool, drift: bool) -> Array:
+    """Return orthonormal functions of time, (n_functions, n_times), that span offset and drift."""
+    functions = [np.ones_like(time_s)] * offset + [time_s] * drift
+    if not functions:
+        return np.zeros((0, len(time_s)))
+    return np.linalg.qr(np.stack(functions, axis=1))[0].T
+
+
+def without(basis: Array, rows: Array) -> Array:
+    """Project the span of a basis out of functions of time, shape (..., n_times)."""
+    return rows - (rows @ basis.T) @ basis if len(basis) else rows
+
+
+def within(basis: Array, rows: Array, sd: Array | None = None) -> Array:
+    """Project functions of time, shape (..., n_times), on the span of a basis.
+
+    With standard deviations of the values, (n_times,), by weighted least squares.
+    """
+    if sd is None or not len(basis):
+        return (rows @ basis.T) @ basis
+    weighted = np.linalg.qr((basis / sd).T)[0].T
+    return within(weighted, rows / sd) * sd
+
+
+def with_uncertain(basis: Array, functions: Array) -> Array:
+    """Add functions of random amplitude to a basis, so that `without` whitens noise with them.
+
+    Parameters
+    ----------
+    basis : (n_basis, n_times)
+        Orthonormal functions, of any amplitude.
+    functions : (n_functions, n_times)
+        Functions times the standard deviation of their amplitude, over that of white noise.
+
+    Returns
+    -------
+    (n_basis + n_functions, n_times)
+        Orthogonal functions of norm one and less. With singular values s of the functions,
+        `without` removes the part 1 - 1/sqrt(1 + s^2) of each direction, so that the sum of
+        noise and functions becomes white noise.
+    """
+    rest = without(basis, functions)
+    _, sizes, directions = np.linalg.svd(rest, full_matrices=False)
+    shares = 1 - 1 / np.sqrt(1 + sizes**2)
+    return np.vstack((basis, np.sqrt(shares)[:, None] * directions))
+
+
+def taken_out(basis: Array) -> int:
+    """Count the functions of a basis that are projected out completely."""
+    return int(np.count_nonzero(np.sum(np.square(basis), axis=1) > _LEAST_NORM))
+
+
+# A lag of so many protocols is an integral of the load.
+_LAG = 1e6
+# Share of a drift's variance that must be no flow: below it, lines differ by less than a tenth.
+_LEAST_SHARE_OF_DRIFT = 0.01
+
+
+def drift_is_flow(course: Course, time_s: Array) -> bool:
+    """Return True if a drift looks like the flow of a damper without a spring.
+
+    Under a constant load both are the same line. Under a deformation nothing flows on.
+
+    Parameters
+    ----------
+    course
+        The protocol.
+    time_s : (n_samples,)
+        Sampling times.
+    """
+    if course.deforms:
+        return False
+    constant = nuisance_basis(time_s, offset=True, drift=False)
+    flows = without(constant, _LAG * lag_course(course, (_LAG,))(time_s))
+    drift = without(constant, time_s / course.end_s)
+    basis = np.linalg.qr(flows.T)[0].T
+    return bool(np.sum(without(basis, drift) ** 2) < _LEAST_SHARE_OF_DRIFT * np.sum(drift**2))
+
+
+ROOT_12 = np.sqrt(12.0)
+"""Step of rounded readings over the standard deviation of the rounding errors."""
+
+# Shares of equal neighbours from which on readings are rounded, and of second differences that are
+# none of jumps; the error of the written digits, in steps.
+_LEAST_EQUAL, _ALL_BUT_JUMPS, _LARGEST_REST = 0.05, 0.98, 0.05
+
+
+def estimate_noise(readings: Array, rounding: float | None = None) -> float:
+    """Estimate the standard deviation of white noise on a smooth trace without a model.
+
+    The median of second differences is used, on which slopes and jumps of a protocol have
+    next to no effect. Where an instrument rounds so coarsely that neighbouring readings are often
+    the same, it is their mean square without the largest, and no less than the rounding errors'
+    [1]_. Of a trace without noise the estimate is tiny.
+
+    The trace is (n_samples,), or what a fit leaves of it; the step of its readings is by default
+    measured.
+
+    References
+    ----------
+    .. [1] B. Widrow, I. Kollar and M.-C. Liu, Statistical theory of quantization, IEEE Transactions
+       on Instrumentation and Measurement 45 (1996), 353-361: step over the root of 12.
+    """
+    second = np.abs(np.diff(readings, 2))
+    # Gaussian: the median is 0.6745 standard deviations, and those of second differences sqrt 6.
+    noise = float(np.median(second)) / (0.6745 * np.sqrt(6.0)) if len(second) else 0.0
+    step = measure_rounding(readings) if rounding is None else rounding
+    if len(second) and step:
+        most = second[second <= np.quantile(second, _ALL_BUT_JUMPS)]
+        noise = max(float(np.sqrt(np.mean(most**2) / 6)), step / ROOT_12)
+    return max(noise, 1e-9 * float(np.max(np.abs(readings))))
+
+
+def measure_rounding(readings: Array) -> float:
+    """Return the step in the unit of the readings that the readings of a trace are multiples of.
+
+    It is zero if neighbouring readings are seldom the same: rounding is then not seen beside the
+    noise.
+    """
+    same = np.count_nonzero(readings[1:] == readings[:-1])
+    if same < max(1.0, _LEAST_EQUAL * len(readings)):
+        return 0.0
+    apart = np.diff(np.unique(readings))
+    step = float(apart.min()) if len(apart) else 0.0
+    multiples = apart / step if step else apart
+    return step if np.all(np.abs(multiples - np.rint(multiples)) < _LARGEST_REST) else 0.0
+
+
+MOST_SAMPLES = 50_000
+"""Most readings with autocorrelated noise, which cannot be condensed to fewer nodes."""
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Autocorrelation model of noise, by the shares of its components in the variance."""
+
+    ar1: float
+    """Share of an Ornstein-Uhlenbeck process, AR(1) at uniform sampling."""
+    time_s: float
+    """Its relaxation time."""
+    flicker: float
+    """Share of noise with spectrum 1/f."""
+    proportional: float = 0.0
+    """Share of white noise whose standard deviation is proportional to the reading, on average
+    over the readings. The rest is white noise that is the same everywhere."""
+    walk: float = 0.0
+    """Share of a random walk that begins with the first reading, on average over the readings."""
+
+    @property
+    def white(self) -> float:
+        """Share of white noise that is the same everywhere."""
+        return 1 - self.ar1 - self.flicker - self.proportional - self.walk
+
+
+WEIGHTED = NoiseModel(ar1=0.0, time_s=1.0, flicker=0.0, proportional=1.0)
+"""Independent noise whose standard deviations are given."""
+
+
+class Whitening:
+    """Transforms autocorrelated into white noise of the same variance, and projects nuisance out.
+
+    Parameters
+    ----------
+    time_s : (n_samples,)
+        Ascending sampling times.
+    noise_model
+        Autocorrelation model of the noise.
+    nuisance : (n_functions, n_samples)
+        Functions that the instrument may have added, with any amplitude.
+    uncertain : (n_functions, n_samples), optional
+        Functions added with a random amplitude, see `with_uncertain`.
+    growing : (n_samples,), optional
+        Standard deviation of the proportional part up to a factor; required if there is one.
+    """
+
+    def __init__(
+        self,
+        time_s: Array,
+        noise_model: NoiseModel,
+        nuisance: Array,
+        uncertain: Array | None = None,
+        growing: Array | None = None,
+    ) -> None:
+        # Imported here, for loading celerite takes a tenth of a second.
+        from celerite2 import driver
+
+        flicker = flicker_rates(time_s)
+        rates = np.append(1 / noise_model.time_s, flicker)
+        shares = np.append(
+            noise_model.ar1, np.full(len(flicker), noise_model.flicker / len(flicker))
+        )
+        self._solve = driver.solve_lower
+        walked = (time_s - time_s[0]) / np.mean(time_s - time_s[0])
+        rates, shares = np.append(rates, 0.0), np.append(shares, noise_model.walk)
+        self._time_s, self._rates = np.ascontiguousarray(time_s, float), rates
+        self._left = np.tile(shares, (len(time_s), 1))
+        right = np.ones_like(self._left)
+        right[:, -1] = walked
+        # White noise keeps the matrix regular, however small its share.
+        diagonal = 1.0 + noise_model.walk * (walked - 1)
+        if growing is not None:
+            diagonal += noise_model.proportional * (growing**2 / np.mean(growing**2) - 1)
+        pivots, self._right = driver.factor(
+            self._time_s, rates, diagonal, self._left, right, np.empty_like(diagonal), right.copy()
+        )
+        self._deviations = np.sqrt(pivots)
+        self.log_determinant = float(np.sum(np.log(pivots)))
+        """Logarithm of the determinant of the covariance matrix, over the mean variance."""
+        self.nuisance = self._white(nuisance, uncertain)
+        """Whitened functions that are projected out, (n_functions, n_samples)."""
+
+    def __call__(self, rows: Array) -> Array:
+        """Whiten functions of time, shape (..., n_samples), and project the nuisance out."""
+        return without(self.nuisance, self._whitened(rows))
+
+    def _white(self, nuisance: Array, uncertain: Array | None) -> Array:
+        if not len(nuisance) and uncertain is None:
+            return nuisance
+        basis = np.linalg.qr(self._whitened(nuisance).T)[0].T
+        known = nuisance[:0] if uncertain is None else self._whitened(uncertain)
+        return with_uncertain(basis, known)
+
+    def _whitened(self, rows: Array) -> Array:
+        columns = np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]).T)
+        solved = self._solve(
+            self._time_s, self._rates, self._left, self._right, columns, np.empty_like(columns)
+        )
+        return (solved / self._deviations[:, None]).T.reshape(rows.shape)

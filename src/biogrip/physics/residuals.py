@@ -11,10 +11,10 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.modes import compute_modes, linear_responses
+from biogrip.physics.noise import estimate_noise, measure_rounding, taken_out
 from biogrip.physics.protocol import Course
 from biogrip.physics.sample_model import Network, SampleModel
 from biogrip.physics.simulation import Grip, Ring, compute_grip, find_ring
-from biogrip.physics.whitening import estimate_noise, measure_rounding, taken_out
 
 # Most numbers in the rows that are formed at once.
 _NUMBERS_AT_ONCE = 100_000

@@ -16,8 +16,8 @@ import numpy as np
 
 from biogrip.arrays import parts
 from biogrip.fit.genome import lowest_encodable
-from biogrip.fit.methods import identifier
 from biogrip.fit.nested_fits import fit_models
+from biogrip.fit.problem import identifier
 from biogrip.physics.noise import rms, stream
 from biogrip.records.identifications import (
     ENCODABLE,

@@ -19,15 +19,15 @@ from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genetic_refined import Polishing
 from biogrip.fit.genome import GeneRange, SearchRange
 from biogrip.fit.least_squares import LeastSquaresSettings
-from biogrip.fit.methods import METHODS
+from biogrip.fit.problem import METHODS
 from biogrip.keys import BY_KIND, Block, Complaint, OneOf, Printed, below, plain
 from biogrip.physics.calibration import CalibrationTest
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.gripper import CombDrive, Gripper
 from biogrip.physics.instruments import GRIPPER, KINDS, Instrument, of_kind
 from biogrip.physics.models import Published
+from biogrip.physics.noise import MOST_SAMPLES
 from biogrip.physics.sample_model import Parameter
-from biogrip.physics.whitening import MOST_SAMPLES
 from biogrip.study.experiment_blocks import (
     LARGEST_PARAMETER,
     GripperBlock,

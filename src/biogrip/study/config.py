@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from biogrip.errors import nearest
-from biogrip.fit.methods import METHODS
+from biogrip.fit.problem import METHODS
 from biogrip.keys import Block, Complaint, Distinct, OneOf, Printed, adapter, below
 from biogrip.physics.fractional import LONGEST_S
 from biogrip.physics.gripper import CombDrive

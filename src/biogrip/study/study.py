@@ -9,7 +9,7 @@ from typing import Any, cast
 from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange, SearchRange
-from biogrip.fit.methods import METHODS, Method
+from biogrip.fit.problem import METHODS, Method
 from biogrip.keys import built, plain
 from biogrip.physics.gripper import NO_ARMS, CombDrive, Contact, Gripper
 from biogrip.physics.instruments import GRIPPER, Instrument
