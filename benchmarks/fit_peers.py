@@ -40,7 +40,7 @@ class Objective:
         """All of it; the last is kept, for rows and Jacobian are asked for in turn."""
         if self._last is None or not np.array_equal(self._last[0], x):
             found = self._residuals.condensed_responses(x[None])[0]
-            found[0] -= self._residuals.condensed_trace
+            found[0] -= self._residuals.trace.rows
             misfit = float(np.linalg.norm(found[0])) / np.sqrt(self._residuals.samples)
             found /= self._residuals.noise_scale
             rows = np.append(found[0], (x - self._middle) / PRIOR_WIDTH)

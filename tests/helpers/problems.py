@@ -80,4 +80,4 @@ def condensed_of(
 def condensed_rows(residuals: Residuals, x: Array) -> tuple[Array, Array]:
     """Rows that stand for the residuals at log-parameters (n_parameters,), and their slopes."""
     rows = residuals.condensed_responses(x[None])[0]
-    return rows[0] - residuals.condensed_trace, rows[1:]
+    return rows[0] - residuals.trace.rows, rows[1:]

@@ -8,16 +8,18 @@ from biogrip.errors import BiogripError
 from biogrip.physics.gripper import (
     CombDrive,
     Gripper,
-    apparent_modulus,
     capacitance_slope,
     contact,
+    torque,
+    voltage,
+)
+from workflow.paper.mechanics import (
+    apparent_modulus,
     drag_of_arm,
     drag_of_sample,
     fringing_of_comb,
     mass_of_sample,
     rolling_of_contact,
-    torque,
-    voltage,
 )
 
 

@@ -115,7 +115,7 @@ def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
     expected = [np.sqrt(np.mean(residuals(at)[0] ** 2)) for at in logs]
     assert found == pytest.approx(expected, rel=1e-10)
     responses = residuals.condensed_responses(logs)
-    residual = responses[:, 0] - residuals.condensed_trace
+    residual = responses[:, 0] - residuals.trace.rows
     gradient = np.einsum("npr,nr->np", responses[:, 1:], residual)
     for at, own in zip(logs, gradient, strict=True):
         left, slopes = residuals(at)

@@ -20,7 +20,6 @@ from biogrip.physics.protocol import (
     join_phases,
 )
 from biogrip.physics.response import (
-    jaw_force_response,
     linear_jaw_force,
     step_response,
     superpose,
@@ -195,7 +194,7 @@ def test_the_arms_equation_closes_under_ramps_and_parabolas(
     response = step_response(gripper, network, inertia=False)
     rest = evaluate(TORQUE, time_s) - arm.stiffness_Nm_per_rad * superpose(response, TORQUE, time_s)
     rest -= arm.damping_Nms_per_rad * superpose(response, TORQUE, time_s, rate=True)
-    of_steps = jaw_force_response(gripper, network, inertia=inertia)
+    of_steps = step_response(gripper, network, inertia=inertia, force=True)
     force = linear_jaw_force(of_steps, TORQUE, time_s)
     largest = evaluate(TORQUE, time_s).max()
     np.testing.assert_allclose(
@@ -246,11 +245,11 @@ def test_nonlinear_force_follows_the_work_of_unequal_arms(unequal_gripper: Gripp
 def test_what_is_left_in_the_end(gripper: Gripper) -> None:
     """The springs' share of a held torque; nothing for a liquid, without a digit lost."""
     samples = random_samples(300, 12)
-    response = jaw_force_response(gripper, generalized_maxwell(samples))
+    response = step_response(gripper, generalized_maxwell(samples), force=True)
     b, k_p = gripper.lever_m, samples[:, 1]
     expected = 2 * b * k_p / (gripper.left.stiffness_Nm_per_rad + 2 * b**2 * k_p)
     np.testing.assert_allclose(response.static[:, 0], expected, rtol=1e-14)
-    liquid = jaw_force_response(gripper, maxwell([[1.0, 10.0]]))
+    liquid = step_response(gripper, maxwell([[1.0, 10.0]]), force=True)
     assert liquid.static[0, 0] == 0
     torque = join_phases((hold(5000.0, 1.6e-9),))
     late = linear_jaw_force(liquid, torque, np.array([1000.0, 2000.0]))[0]

@@ -215,7 +215,7 @@ def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
         residuals = Residuals(NO_ARMS, model, rows.course, given, instrument=GRIPPER)
         left, slopes = residuals(x)
         found = residuals.condensed_responses(x[None])[0]
-        found[0] -= residuals.condensed_trace
+        found[0] -= residuals.trace.rows
         scale = float(np.linalg.norm(left) + np.linalg.norm(slopes))
         every = np.vstack((left, slopes))
         assert np.max(np.abs(found @ found.T - every @ every.T)) < 1e-10 * scale**2

@@ -5,6 +5,7 @@ and apparent modulus of every sample; effects that the model leaves out, estimat
 identifications that wrongly assume bilateral contact.
 """
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,20 +19,19 @@ from biogrip.physics import gripper as actuator
 from biogrip.physics.gripper import (
     LARGEST_M,
     SMALLEST_M,
-    apparent_modulus,
-    drag_of_arm,
-    drag_of_sample,
-    fringing_of_comb,
-    mass_of_sample,
-    rolling_of_contact,
+    CombDrive,
+    Gripper,
+    displacement_of_tip,
 )
 from biogrip.physics.noise import add_noise, rms, stream
-from biogrip.physics.protocol import largest_load
+from biogrip.physics.nonlinear import nonlinear_rotation
+from biogrip.physics.protocol import Course, largest_load
+from biogrip.physics.response import LEFT, RIGHT, step_response, superpose
+from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import (
     compute_grip,
     jaw_force,
     simulated_response,
-    simulated_shortening,
 )
 from biogrip.physics.unilateral import unilateral_response
 from biogrip.records.traces import as_written
@@ -41,6 +41,81 @@ from biogrip.tables.layout import Column, Row, ShownTable, write
 
 if TYPE_CHECKING:
     snakemake: Any
+
+WATER_PA_S, WATER_KG_PER_M3 = 1.0e-3, 1.0e3
+
+
+def drag_of_sample(size_m: float) -> float:
+    """Return Stokes' drag 6 pi mu R of a sphere in water in N s/m, a bound for its shortening."""
+    return 3 * math.pi * WATER_PA_S * size_m
+
+
+def drag_of_arm(gripper: Gripper, width_m: float) -> float:
+    """Return the drag in N m s/rad of a fully immersed arm that turns in water.
+
+    The drag of a slender rod per length, moved sideways, is 4 pi mu/(ln(l/d) + 0.84)
+    (Tirado and Garcia de la Torre, J. Chem. Phys. 71, 2581, 1979). Its product with the
+    squared distance from the pivot is integrated along the arm.
+    """
+    length = gripper.arm_length_m
+    a_length = 4 * math.pi * WATER_PA_S / (math.log(length / width_m) + 0.84)
+    return a_length * length**3 / 3
+
+
+def rolling_of_contact(gripper: Gripper, size_m: float, rotation: float) -> float:
+    """Return the shift of the contact point along the jaw, as a share of the arm's length.
+
+    A round sample rolls on the turning jaw by its radius times the rotation. (The circle
+    on which the tip moves is part of the nonlinear model.)
+    """
+    return 0.5 * size_m * rotation / gripper.arm_length_m
+
+
+def fringing_of_comb(comb: CombDrive) -> float:
+    """Return the increase of capacitance by fringing fields, relative to eq. (7).
+
+    For two strips of width h at a distance g it is g/(pi h) [1 + ln(2 pi h/g)] (H. B.
+    Palmer, Trans. AIEE 56, 363, 1937). It is less in a comb, where neighbouring fingers
+    shield each other.
+    """
+    share = comb.finger_gap_m / (math.pi * comb.thickness_m)
+    return share * (1 + math.log(2 / share))
+
+
+def mass_of_sample(size_m: float) -> float:
+    """Return the mass of a sphere of water in kg."""
+    return WATER_KG_PER_M3 * math.pi * size_m**3 / 6
+
+
+def apparent_modulus(force_N: float, shortening_m: float, size_m: float) -> float:
+    """Return Young's modulus in Pa of a sphere from a force and the shortening it causes.
+
+    Hertz's model of an elastic sphere, incompressible and of a diameter, between flat rigid jaws
+    that do not stick, each of which indents it by half the shortening from first contact on:
+
+        F = 4/3 E/(1 - nu^2) R^(1/2) (delta/2)^(3/2)
+
+    (K. L. Johnson, Contact Mechanics, 1985, section 4.2). A cell in suspension is round, and the
+    jaws are flat and far stiffer; a cylinder's E = F L/(A delta) would need an area that is rarely
+    measured. The force grows faster than the shortening: the modulus, called apparent, is another
+    at every shortening. The theory is one of small strains.
+    """
+    indentation, radius = 0.5 * shortening_m, 0.5 * size_m
+    return 0.75 * (1 - 0.5**2) * force_N / math.sqrt(radius * indentation**3)
+
+
+def simulated_shortening(
+    gripper: Gripper, network: Network, course: Course, time_s: Array, *, nonlinear: bool
+) -> Array:
+    """Simulate the shortening of samples in m, (n, n_times); see `simulated_response`."""
+    if nonlinear:
+        turns = (nonlinear_rotation(gripper, network, course, time_s, a) for a in (LEFT, RIGHT))
+        left, right = (displacement_of_tip(gripper, turn) for turn in turns)
+        return left + right
+    response = step_response(gripper, network)
+    both = superpose(response, course, time_s, LEFT) + superpose(response, course, time_s, RIGHT)
+    return gripper.lever_m * both
+
 
 _CONTACT_COLUMNS = (
     Column("size_um", "Sample (um)"),

@@ -11,8 +11,7 @@ favour readings that are too low by chance.
 References
 ----------
 .. [1] S. Bernstein, Sur les fonctions absolument monotones, Acta Mathematica 52 (1929), 1-66.
-.. [2] C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, Prentice-Hall, 1974,
-   chapter 23.
+.. [2] C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, Prentice-Hall, 1974, ch. 23.
 """
 
 from dataclasses import dataclass
@@ -168,7 +167,7 @@ def fit_any_sample(residuals: Residuals) -> AnySampleFit:
     The grid of rates is divided next to those that are needed until that changes the fit no more.
     """
     covered_s = residuals.course.covered_s(residuals.trace.time_s)
-    measured = residuals.condensed_trace / residuals.noise_scale
+    measured = residuals.trace.rows / residuals.noise_scale
     lags, least = show_lags(residuals, covered_s, np.zeros(0)), np.inf
     for _ in range(_MOST_DIVISIONS):
         amplitudes, norm = nnls(lags.rows.T, measured, maxiter=100 * len(lags.rates))
@@ -223,15 +222,8 @@ def proportional_deviations(problem: Experiment, time_s: Array, readings: Array)
     """Compute standard deviations of readings in proportion to the smooth rotation, (n_samples,).
 
     The problem has that share, and the standard deviation of further noise. If it is not known, no
-    deviation is less than that of the median of the smallest readings, nor than they scatter: of
-    a rotation of zero, no instrument is certain.
-
-    Parameters
-    ----------
-    problem
-        What the trace was recorded with, and what is known of its noise.
-    time_s, readings : (n_samples,)
-        A recorded trace, times ascending.
+    deviation is less than that of the median of the smallest readings, nor than they scatter: of a
+    rotation of zero, no instrument is certain. Times ascend, (n_samples,).
     """
     share, noise_sd = problem.noise_share or 0.0, problem.noise_sd
     nuisance = problem.nuisance(time_s)

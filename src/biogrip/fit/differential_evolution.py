@@ -2,9 +2,7 @@
 
 References
 ----------
-.. [1] R. Storn and K. Price, Differential evolution: a simple and efficient heuristic for
-   global optimization over continuous spaces, Journal of Global Optimization 11 (1997),
-   341-359.
+.. [1] R. Storn and K. Price, Journal of Global Optimization 11 (1997), 341-359.
 """
 
 from collections.abc import Sequence

@@ -224,7 +224,7 @@ class Experiment:
 
     def for_model(self, problem: TraceProblem, model: SampleModel) -> TraceProblem:
         """Return one of its problems posed for another model; both share rows of the trace."""
-        return make_problem(problem.residuals.of_model(model), self.ranges)
+        return make_problem(replace(problem.residuals, model=model), self.ranges)
 
     def nuisance(self, time_s: Array) -> Array:
         """Return the nuisance functions, offset and drift, (n_functions, n_samples)."""

@@ -7,10 +7,8 @@ to its last digits (`refine_optima`). No result depends, to the last bit, on the
 
 References
 ----------
-.. [1] A. Raue et al., Lessons learned from quantitative dynamical modeling in systems biology,
-   PLoS ONE 8 (2013), e74335: local fits from many starts.
-.. [2] J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., Springer, 2006, section
-   3.4: Newton's method with the moduli of the curvatures.
+.. [1] A. Raue et al., PLoS ONE 8 (2013), e74335: local fits from many starts.
+.. [2] J. Nocedal and S. J. Wright, Numerical Optimization, Springer, 2006, section 3.4.
 """
 
 from bisect import insort
@@ -73,9 +71,9 @@ class LocalFits:
         self.low = np.stack([problem.low for problem in problems])
         self.high = np.stack([problem.high for problem in problems])
         self._residuals = problems[0].residuals
-        self._traces = np.stack([problem.residuals.condensed_trace for problem in problems])
+        self._traces = np.stack([problem.residuals.trace.rows for problem in problems])
         # Not the noise that is stated: the optimum must not depend on what is believed of it.
-        self._noise_sd = np.array([problem.residuals.scatter for problem in problems])
+        self._noise_sd = np.array([problem.residuals.trace.scatter for problem in problems])
         self._middle = 0.5 * (self.low + self.high)
 
     def normal(self, x: Array, trace: IntArray) -> Normal:
@@ -265,7 +263,11 @@ def _best_of_alike(
     progress: Progress,
 ) -> list[Fit]:
     fits, traces = LocalFits(problems), np.arange(len(problems))
-    rough, trace, fine, trace_of_fine = _finished(fits, starts)
+    trace = np.repeat(traces, [len(own_starts) for own_starts in starts])
+    rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
+    # Rough fits show which basins are deepest; only the best are continued to the optimum.
+    finalists = np.concatenate([_best(rough, trace == own, FINISHED) for own in traces])
+    fine, trace_of_fine = fits.fitted(rough.x[finalists], trace[finalists]), trace[finalists]
     winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
     best = refine_optima(fits, fine[winners], traces)
     answers = []
@@ -276,20 +278,10 @@ def _best_of_alike(
         misfit, evaluations = float(best.misfit[own]), rows[-1][3] + int(finished)
         rows[-1] = np.exp(best.x[own]), misfit, misfit, evaluations
         progress(evaluations, misfit)
-        answers.append(_answer_of(rows, converged=bool(best.converged[own])))
+        steps, why, converged = len(rows) - 1, "all starts fitted", bool(best.converged[own])
+        given = rows[-1][0], misfit, steps, evaluations, why, History.of(rows), converged
+        answers.append(Fit(*given))
     return answers
-
-
-def _finished(
-    fits: LocalFits, starts: Sequence[Array]
-) -> tuple[Minima, IntArray, Minima, IntArray]:
-    """Fit roughly from all starts, then finely from the best; return both with their traces."""
-    trace = np.repeat(np.arange(len(starts)), [len(own_starts) for own_starts in starts])
-    rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
-    # Rough fits show which basins are deepest; only the best are continued to the optimum.
-    best = [_best(rough, trace == own, FINISHED) for own in range(len(starts))]
-    finalists = np.concatenate(best)
-    return rough, trace, fits.fitted(rough.x[finalists], trace[finalists]), trace[finalists]
 
 
 def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
@@ -316,13 +308,6 @@ def _descents(found: Minima, before: Row) -> list[Row]:
 def _responses(found: Minima) -> IntArray:
     """Return how many responses fits have computed: a linearisation is one and its derivatives."""
     return found.evaluations * (1 + found.x.shape[1])
-
-
-def _answer_of(rows: list[Row], *, converged: bool) -> Fit:
-    """Return an identification with a history, whose last row is its result."""
-    parameters, misfit, _, evaluations = rows[-1]
-    steps, why = len(rows) - 1, "all starts fitted"
-    return Fit(parameters, misfit, steps, evaluations, why, History.of(rows), converged)
 
 
 def identify_from(problem: TraceProblem, start: Array) -> Fit:
@@ -391,8 +376,13 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     closer = minimize(convex, found.x, low, high, _CLOSE, None, _DAMPING, _MOST_STEPS)
     evaluations = closer.evaluations * (1 + 2 * found.x.shape[1])
     here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
-    scatter = np.array([fits.problems[own].residuals.scatter for own in trace.tolist()])
-    left_of_one, rounding = (here.misfit / scatter) ** 2, _rounding(fits, here.misfit, trace)
+    residuals = [fits.problems[own].residuals for own in trace.tolist()]
+    sizes = [(each.trace.scatter, each.peak, each.samples) for each in residuals]
+    scatter, peak, samples = np.array(sizes).T
+    left_of_one = (here.misfit / scatter) ** 2
+    # Rounding errors of sums of squares.
+    error = _ROUNDING * peak
+    rounding = samples * error * (2 * here.misfit + error) / scatter**2
     state = _State(fits, trace, rounding, found.x.copy(), here)
     state.move(moving, closer.x)
     left, damping = np.full(len(moving), np.inf), np.zeros(len(moving))
@@ -451,16 +441,6 @@ class _State:
         for part, new in zip(self.here.parts, there.parts, strict=True):
             part[moved] = new[kept]
         return kept
-
-
-def _rounding(fits: LocalFits, misfit: Array, trace: IntArray) -> Array:
-    """Estimate the rounding errors of sums of squares, (n,)."""
-    residuals = [fits.problems[own].residuals for own in trace.tolist()]
-    samples = np.array([each.samples for each in residuals])
-    noise_sd = np.array([each.scatter for each in residuals])
-    more = _ROUNDING * np.array([each.peak for each in residuals])
-    found: Array = samples * more * (2 * misfit + more) / noise_sd**2
-    return found
 
 
 def _newton_step(low: Array, high: Array, normal: Normal, x: Array, damping: Array) -> Array:

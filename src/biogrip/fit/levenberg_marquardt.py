@@ -12,14 +12,10 @@ differ. On the grid, every step begins with the same bits on all processors.
 
 References
 ----------
-.. [1] K. Levenberg, A method for the solution of certain non-linear problems in least squares,
-   Quarterly of Applied Mathematics 2 (1944), 164-168.
-.. [2] D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters,
-   Journal of the Society for Industrial and Applied Mathematics 11 (1963), 431-441.
-.. [3] J. J. Moré, The Levenberg-Marquardt algorithm: implementation and theory, in G. A. Watson
-   (ed.), Numerical Analysis, Lecture Notes in Mathematics 630, Springer, 1978, 105-116.
-.. [4] H. B. Nielsen, Damping parameter in Marquardt's method, report IMM-REP-1999-05, Technical
-   University of Denmark, 1999.
+.. [1] K. Levenberg, Quarterly of Applied Mathematics 2 (1944), 164-168.
+.. [2] D. W. Marquardt, SIAM Journal on Applied Mathematics 11 (1963), 431-441.
+.. [3] J. J. Moré, in G. A. Watson (ed.), Numerical Analysis, Springer, 1978, 105-116.
+.. [4] H. B. Nielsen, Damping parameter in Marquardt's method, report IMM-REP-1999-05, 1999.
 """
 
 from collections.abc import Callable, Sequence

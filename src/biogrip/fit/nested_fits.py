@@ -10,11 +10,9 @@ Models are compared by the information criteria AIC [1]_ and BIC [2]_; differenc
 
 References
 ----------
-.. [1] H. Akaike, A new look at the statistical model identification, IEEE Transactions on
-   Automatic Control 19 (1974), 716-723.
-.. [2] G. Schwarz, Estimating the dimension of a model, Annals of Statistics 6 (1978), 461-464.
-.. [3] R. E. Kass and A. E. Raftery, Bayes factors, Journal of the American Statistical
-   Association 90 (1995), 773-795: which differences are worth a mention.
+.. [1] H. Akaike, IEEE Transactions on Automatic Control 19 (1974), 716-723.
+.. [2] G. Schwarz, Annals of Statistics 6 (1978), 461-464.
+.. [3] R. E. Kass and A. E. Raftery, Journal of the American Statistical Association 90 (1995), 773.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -107,21 +105,15 @@ def fit_models(
             points = [within_range(start, problem) for start in of_contained]
             points += [near[name][trace]] if near and name in near else []
             further.append(np.reshape(points, (-1, len(problem.low))))
-        own = _fewer(settings) if CANDIDATES[name].model.power_law else settings
+        own, (points, starts) = settings, _FEWER
+        if CANDIDATES[name].model.power_law:
+            own = LeastSquaresSettings(-(-own.candidates // points), -(-own.starts // starts))
         found[name] = identify_many(problems[name], own, rngs[name], silent, further)
         found[name] = deepen(problems[name], found[name])
         done()
     _fit_again(problems, found)
     _take_simpler(problems, found)
     return {name: found[name] for name in problems}
-
-
-def _fewer(settings: LeastSquaresSettings) -> LeastSquaresSettings:
-    """Return the budget of power laws: fewer points and starts, beside those of nested models."""
-    points, starts = _FEWER
-    return LeastSquaresSettings(
-        candidates=-(-settings.candidates // points), starts=-(-settings.starts // starts)
-    )
 
 
 def _of_contained(

@@ -16,19 +16,12 @@ from vanishing, as it often would by chance alone [4]_.
 
 References
 ----------
-.. [1] C. Spearman, The proof and measurement of association between two things, American Journal
-   of Psychology 15 (1904), 72-101.
-.. [2] K. L. Lange, R. J. A. Little and J. M. G. Taylor, Robust statistical modeling using the t
-   distribution, Journal of the American Statistical Association 84 (1989), 881-896.
-.. [3] H. D. Patterson and R. Thompson, Recovery of inter-block information when block sizes are
-   unequal, Biometrika 58 (1971), 545-554.
-.. [4] Y. Chung, S. Rabe-Hesketh, V. Dorie, A. Gelman and J. Liu, A nondegenerate penalized
-   likelihood estimator for variance parameters in multilevel models, Psychometrika 78 (2013),
-   685-709: a gamma prior of shape 2 on a standard deviation.
-.. [5] F. R. Hampel, The influence curve and its role in robust estimation, Journal of the
-   American Statistical Association 69 (1974), 383-393.
-.. [6] F. E. Satterthwaite, An approximate distribution of estimates of variance components,
-   Biometrics Bulletin 2 (1946), 110-114.
+.. [1] C. Spearman, American Journal of Psychology 15 (1904), 72-101: rank correlation.
+.. [2] K. L. Lange et al., Journal of the American Statistical Association 84 (1989), 881-896.
+.. [3] H. D. Patterson and R. Thompson, Biometrika 58 (1971), 545-554: restricted likelihood.
+.. [4] Y. Chung et al., Psychometrika 78 (2013), 685-709: a gamma prior on a standard deviation.
+.. [5] F. R. Hampel, Journal of the American Statistical Association 69 (1974), 383-393.
+.. [6] F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114.
 """
 
 import numpy as np
@@ -201,7 +194,7 @@ class NoiseModelLikelihood:
             white = self._whitening(x, nuisance)(sensitivity)
             # Every parameter has a prior standard deviation of 1, as in `Likelihood.deviation`.
             inverse = np.linalg.inv(white @ white.T + np.eye(len(white)))
-            return np.log(np.diagonal(inverse)) + 2 * self._log_scale(x)
+            return np.log(np.diagonal(inverse)) + float(np.log(self._parts(x)[0] / self._free))
 
         x = _logarithms(noise_model)
         steps = _APART * np.eye(len(x))
@@ -235,10 +228,6 @@ class NoiseModelLikelihood:
         free, (left, of_reached, determinant) = self._free, self._parts(x)
         prior = float(np.logaddexp(x[2], x[3] - _BESIDE_ITS_MEAN))
         return free * float(np.log(left)) + determinant + of_reached - prior
-
-    def _log_scale(self, x: Array) -> float:
-        """Return the logarithm of the noise's standard deviation under a noise model."""
-        return 0.5 * float(np.log(self._parts(x)[0] / self._free))
 
     @property
     def _free(self) -> int:

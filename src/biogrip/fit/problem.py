@@ -114,10 +114,6 @@ class TraceProblem:
     high: Array
     """Those of the upper ends."""
 
-    def later(self, change_s: float) -> "TraceProblem":
-        """Return the problem of the same trace for a protocol that starts later by some s."""
-        return replace(self, residuals=self.residuals.later(change_s))
-
 
 def make_problem(residuals: Residuals, ranges: Mapping[str, GeneRange]) -> TraceProblem:
     """Set up a problem from its residuals, and gene ranges by `Parameter.range_name`."""

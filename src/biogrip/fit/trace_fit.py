@@ -29,18 +29,13 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
     """Compute the changes of a reading by the uncertainties of the gripper and of the protocol.
 
     To the first order it is half the difference between responses with the property a standard
-    uncertainty above and below its value, as is recommended for nonlinear models [1]_. The mean
-    of both, less the rotation itself, is its second order: it grows with the square of the error,
-    and has the amplitude of an error of three standard uncertainties. Without it limits would be
-    too narrow where the noise is far below the square.
+    uncertainty above and below its value, as is recommended for nonlinear models (JCGM 100:2008,
+    section 5.1.3, note 2). The mean of both, less the rotation itself, is its second order: it
+    grows with the square of the error, and has the amplitude of an error of three standard
+    uncertainties. Without it limits would be too narrow where the noise is far below the square.
 
-    Rows are changes at ascending times, (2 n_properties, n_times), those of first order of
-    each uncertain property, then those of second.
-
-    References
-    ----------
-    .. [1] JCGM 100:2008, Evaluation of measurement data: guide to the expression of uncertainty
-       in measurement, section 5.1.3, note 2.
+    Rows are changes at ascending times, (2 n_properties, n_times), those of first order of each
+    uncertain property, then those of second.
     """
     network = experiment.searched.network(parameters)
 
@@ -226,7 +221,7 @@ def _without_outliers(
         plain = experiment.of(time_s[kept], readings[kept])
         found = find(plain)
         residual = plain.residuals.left(logs := np.log(found.parameters))
-        step = plain.residuals.rounding
+        step = plain.residuals.trace.rounding
         growth = compute_growth(residual, plain.residuals.response(logs), step)
         struck = outliers_of(residual / growth, step)
         if not struck.any():
@@ -246,7 +241,9 @@ def _in_turn(
     problem, noise_model = plain, None
     logs = np.log(found.parameters)
     residuals = plain.residuals
-    growth = compute_growth(residuals.left(logs), residuals.response(logs), residuals.rounding)
+    growth = compute_growth(
+        residuals.left(logs), residuals.response(logs), residuals.trace.rounding
+    )
     grows = experiment.coloured and np.ptp(growth) > 0
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
@@ -272,7 +269,7 @@ def _in_turn(
     if noise_model is not None:
         errors = likelihood.errors(noise_model)
         freedom = likelihood.freedom(noise_model, sensitivity / noise_sd, nuisance)
-        problem = replace(problem, residuals=problem.residuals.with_freedom(freedom))
+        problem = replace(problem, residuals=replace(problem.residuals, freedom=freedom))
     return problem, found, noise_model, errors
 
 

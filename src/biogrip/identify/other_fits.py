@@ -180,7 +180,9 @@ def _misfits(
     residuals, best = diagnosis.likelihood.problem.residuals, diagnosis.likelihood.best
     if diagnosis.status == REJECTED:
         return misfits
-    growth = compute_growth(residuals.left(best), residuals.response(best), residuals.rounding)
+    growth = compute_growth(
+        residuals.left(best), residuals.response(best), residuals.trace.rounding
+    )
     if compare_extremes(growth) <= CLEARLY:
         return misfits
     for place, (name, problem) in enumerate(problems.items()):

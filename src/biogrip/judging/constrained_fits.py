@@ -7,9 +7,7 @@ residual instead would be violated, the more the better the trace determines the
 
 References
 ----------
-.. [1] J. Abadie and J. Carpentier, Generalization of the Wolfe reduced gradient method to the
-   case of nonlinear constraints, in R. Fletcher (ed.), Optimization, Academic Press, 1969,
-   37-47.
+.. [1] J. Abadie and J. Carpentier, in R. Fletcher (ed.), Optimization, Academic Press, 1969, 37-47.
 """
 
 from collections.abc import Sequence
@@ -219,7 +217,7 @@ class ConstrainedFits:
         self.missed: dict[int, tuple[float, Array]] = {}
         self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
-        scale = np.array([problem.residuals.scatter for problem in problems])
+        scale = np.array([problem.residuals.trace.scatter for problem in problems])
         self._unit = np.array([problem.residuals.noise_scale for problem in problems]) / scale
         # Ratio of chi^2 to the fits' sums of squares.
         self._ratio = (scale / self._noise_sd) ** 2
@@ -276,13 +274,6 @@ class ConstrainedFits:
                 self.missed[of_trace] = float(increases[index]), found.x[index].copy()
         return increases
 
-    def ranges(self) -> Array:
-        """Return the lowest and highest logarithm of each profile's quantity, (2, n_profiles)."""
-        bounds = zip(self._fits.low, self._fits.high, strict=True)
-        return np.array(
-            [quantity.range(*ends) for ends in bounds for quantity in self.quantities]
-        ).T
-
     def slowest(self, profile: int) -> float | None:
         """Return the relaxation time in s of a branch, if it is too slow for a profile's quantity.
 
@@ -297,12 +288,3 @@ class ConstrainedFits:
         ]
         slowest = max(times, default=0.0)
         return slowest if slowest > last_s else None
-
-    def deviations(self) -> Array:
-        """Return the logarithms' first-order standard deviations, at most 1, (n_profiles,)."""
-        information = self._fits.normal(self._optima, np.arange(len(self._optima))).information
-        information = information * self._ratio[:, None, None]
-        slopes = np.array([[q.gradient(x) for q in self.quantities] for x in self._optima])
-        # The prior keeps the matrix regular.
-        spread = np.linalg.solve(information, slopes.swapaxes(1, 2)).swapaxes(1, 2)
-        return np.sqrt(np.clip(np.sum(spread * slopes, axis=2), 0.0, 1.0)).ravel()

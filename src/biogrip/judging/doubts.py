@@ -31,27 +31,7 @@ from biogrip.fit.noise_model_fit import (
     compute_growth,
     outliers_of,
 )
-from biogrip.judging.levels import (
-    AS_THE_SCATTER,
-    CERTAIN_MISFIT,
-    CLEARLY,
-    FALSE_ALARM,
-    FAR_OFF,
-    LONG,
-    MOSTLY,
-    NO_SCATTER,
-    NOISE_FREE,
-    NOISE_FREE_OF_PEAK,
-    NOTICEABLE,
-    REPEATED,
-    SLOW,
-    SMOOTH,
-    SURE,
-    TOO_LITTLE,
-    TOO_MUCH,
-    UNEVEN,
-    UNRESOLVED,
-)
+from biogrip.judging import levels
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.whiteness import (
     Step,
@@ -127,12 +107,12 @@ class Remainder:
 def examine_residuals(likelihood: Likelihood) -> Remainder:
     """Test what the best fit of a trace leaves for noise, and for misfit."""
     residuals, misfit = likelihood.problem.residuals, likelihood.misfit
-    if misfit < UNRESOLVED * residuals.peak:
+    if misfit < levels.UNRESOLVED * residuals.peak:
         return Remainder([])
     residual, slopes = _left(residuals, likelihood.best)
-    rounding = residuals.rounding
-    least = min(NOISE_FREE * likelihood.noise_sd, NOISE_FREE_OF_PEAK * residuals.peak)
-    if misfit < least and estimate_noise(residual, rounding) < NO_SCATTER * misfit:
+    rounding = residuals.trace.rounding
+    least = min(levels.NOISE_FREE * likelihood.noise_sd, levels.NOISE_FREE_OF_PEAK * residuals.peak)
+    if misfit < least and estimate_noise(residual, rounding) < levels.NO_SCATTER * misfit:
         return Remainder([])
     growth = compute_growth(residual, residuals.response(likelihood.best), rounding)
     directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
@@ -142,7 +122,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
         # What a fit with these weights would leave, to first order.
         standard = without(basis, standard)
     struck = outliers_of(by_leverage(standard, basis), rounding)
-    if far_out(standard, struck, basis) >= FALSE_ALARM:
+    if far_out(standard, struck, basis) >= levels.FALSE_ALARM:
         struck[:] = False
     whole = not struck.any()
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
@@ -157,7 +137,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     found = None
     in_time = not residuals.course.sweeps
     lines = list(_lines(bulk, basis, residuals, scale)) if whole and in_time else []
-    if chance < CERTAIN_MISFIT and times > TOO_MUCH and not lines:
+    if chance < levels.CERTAIN_MISFIT and times > levels.TOO_MUCH and not lines:
         found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
         notes.clear()
         notes += found.notes
@@ -176,7 +156,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
         colour = list(_about_colour(bulk, basis, correlation, chance, suspects))
         if not in_time:
             # Nothing has a spectrum, or wanders, over places of two moduli.
-            colour = colour[: chance < FALSE_ALARM]
+            colour = colour[: chance < levels.FALSE_ALARM]
         changes = _about_changes(residuals, bulk, basis, growth, coloured=bool(colour))
         doubts += lines or changes or (colour if not found else [])
     notes += (Note(DOUBT, doubt) for doubt in doubts)
@@ -209,7 +189,7 @@ def _misfit(
 
     Given are residuals with slopes, and those that are no outliers with what the fit absorbs.
     """
-    if has_uneven_noise(left[0], residuals.rounding):
+    if has_uneven_noise(left[0], residuals.trace.rounding):
         text = (
             "The noise differs from one part of the trace to another, and the intervals do not "
             "allow for that: leave out the readings that scatter most (--from, --until), or give "
@@ -221,7 +201,7 @@ def _misfit(
     relative = residuals.course.sweeps and residuals.coloured
     of_peak = f"{plain(100 * share, 2)} % of the {'moduli' if relative else 'peak'}"
     suspects = name_suspects(residuals, times, scale)
-    if not residuals.rounding and np.mean(read[1:] == read[:-1]) > REPEATED:
+    if not residuals.trace.rounding and np.mean(read[1:] == read[:-1]) > levels.REPEATED:
         text = (
             "Most readings repeat the one before, as of a sensor that is read less often than it "
             "is logged: keep one of each."
@@ -231,7 +211,7 @@ def _misfit(
             f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
             "correlated for a short time."
         )
-    elif share < FAR_OFF:
+    elif share < levels.FAR_OFF:
         text = (
             f"The fit is good to {of_peak}; the rest, {more} times the noise of the trace, is not "
             f"noise: {suspects}."
@@ -262,9 +242,9 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     if residuals.course.sweeps:
         gives, culprits = "has both moduli (Kramers-Kronig)", find_inertia(residuals, *left)
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
-    if correlated(*left)[1] >= FALSE_ALARM:
+    if correlated(*left)[1] >= levels.FALSE_ALARM:
         return inadequate
-    if other * TOO_MUCH < times:
+    if other * levels.TOO_MUCH < times:
         return f"{inadequate}; what that leaves is of {culprits}"
     return f"no linear sample {gives}, but leaves at least {noises}: {culprits}"
 
@@ -274,7 +254,7 @@ def _about_growth(
 ) -> Iterator[str]:
     """Yield a sentence on noise that grows with what is read, (n_samples,) in units of a scale."""
     times = compare_extremes(growth)
-    if not np.ptp(growth) or times < TOO_MUCH:
+    if not np.ptp(growth) or times < levels.TOO_MUCH:
         return
     instrument = residuals.instrument
     read = instrument.read.name
@@ -285,7 +265,7 @@ def _about_growth(
         "nor the intervals allow for that."
     )
     # Of noise that grows little the share is hardly known.
-    if not residuals.coloured and times > CLEARLY:
+    if not residuals.coloured and times > levels.CLEARLY:
         share = scale * growth / np.abs(residuals.response(log_parameters))
         text += f" Readings are weighted by --noise-share {plain(np.median(share), 2)}."
     yield text
@@ -302,18 +282,18 @@ def _about_colour(
 
     The correlation of neighbours and its chance are given.
     """
-    if chance < FALSE_ALARM:
+    if chance < levels.FALSE_ALARM:
         yield (
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
             f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {suspects()}."
         )
-    elif (chance := uneven(residual, basis)) < FALSE_ALARM:
+    elif (chance := uneven(residual, basis)) < levels.FALSE_ALARM:
         yield (
             "The residual has more of some frequencies than of others, as white noise has only "
             f"{one_in(chance)} traces: the intervals are wrong, or {suspects()}."
         )
     chance = wandering(residual, basis)
-    if chance < FALSE_ALARM:
+    if chance < levels.FALSE_ALARM:
         yield (
             "The residual wanders: its means over stretches of the trace scatter as much as those "
             f"of white noise do only {one_in(chance)} traces. It contains something slow that the "
@@ -327,7 +307,7 @@ def _lines(residual: Array, basis: Array, residuals: Residuals, scale: float) ->
     unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf
     while len(named) < _MOST_LINES:
         frequency, chance, line = find_line(rest, residuals.trace.time_s)
-        if chance >= FALSE_ALARM:
+        if chance >= levels.FALSE_ALARM:
             break
         amplitude = float(np.linalg.norm(line @ rest)) * np.sqrt(2 / len(rest))
         named.append(f"{plain(frequency, 3)} Hz ({plain(amplitude, 2)}{unit})")
@@ -335,7 +315,7 @@ def _lines(residual: Array, basis: Array, residuals: Residuals, scale: float) ->
         taken = absorbed(np.vstack((taken, line)))
         rest = without(taken, residual)
     size = float(np.sqrt(np.mean(rest**2)))
-    misfit = correlated(rest, taken)[1] < CERTAIN_MISFIT and size > TOO_MUCH * scale
+    misfit = correlated(rest, taken)[1] < levels.CERTAIN_MISFIT and size > levels.TOO_MUCH * scale
     if named and not misfit:
         yield (
             f"The residual has a line in its spectrum, at {' and '.join(named)}, as of hum or a "
@@ -354,7 +334,7 @@ def _about_changes(
     if residuals.course.sweeps:
         return [] if coloured else list(about_moduli(residuals, residual, basis, growth))
     step = find_step(residual, basis, lambda rows: trace.condensed.cleared(rows) / growth)
-    if step and step.chance < FALSE_ALARM and not (coloured and _is_coloured(step)):
+    if step and step.chance < levels.FALSE_ALARM and not (coloured and _is_coloured(step)):
         before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
         size = plain(-step.size, 2)
         unit = f" {residuals.instrument.read.unit}".rstrip()
@@ -365,7 +345,7 @@ def _about_changes(
         ]
     split = middle_of(residuals)
     chance = 1.0 if coloured else compare_halves(residual, basis, split)
-    if chance >= FALSE_ALARM:
+    if chance >= levels.FALSE_ALARM:
         return []
     return [
         f"The readings up to {plain(trace.time_s[split - 1])} s and those after it, each fitted "
@@ -378,7 +358,7 @@ def _is_coloured(step: Step) -> bool:
     """Return True if what a fit leaves with a step is not white noise, either."""
     given = step.left, step.basis
     chances = correlated(*given)[1], uneven(*given), wandering(*given)
-    return min(chances) < FALSE_ALARM
+    return min(chances) < levels.FALSE_ALARM
 
 
 def middle_of(residuals: Residuals) -> int:
@@ -418,14 +398,14 @@ def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
     left = max(len(residual) - lost, 1)
     chi_squared = float(residual @ residual) / likelihood.noise_sd**2
     share = float(np.sqrt(chi_squared / left))
-    if share < TOO_LITTLE and float(chdtr(left, chi_squared)) < FALSE_ALARM:
+    if share < levels.TOO_LITTLE and float(chdtr(left, chi_squared)) < levels.FALSE_ALARM:
         yield Note(
             DOUBT,
             f"The noise that was given is {plain(1 / share, 2)} times what the fit leaves: its "
             "value, or its unit, is not the right one.",
         )
-    if share > 1 and float(chdtrc(left, chi_squared)) < FALSE_ALARM:
-        much, so = share > TOO_MUCH, "limits are too narrow by that"
+    if share > 1 and float(chdtrc(left, chi_squared)) < levels.FALSE_ALARM:
+        much, so = share > levels.TOO_MUCH, "limits are too narrow by that"
         if much:
             suspects = name_suspects(residuals, share, likelihood.noise_sd)
             so = f"its value or unit is not the right one, or {suspects}"
@@ -456,14 +436,14 @@ def find_slow_misfit(
     largest response; `suspects` says what is wrong if they are misfit.
     """
     share, time_s = noise_model.ar1, noise_model.time_s
-    certain = np.exp(-SURE * np.array(errors))
+    certain = np.exp(-levels.SURE * np.array(errors))
     least_s = time_s * float(certain[0])
-    slow = share > MOSTLY and least_s > SLOW * duration_s
-    slow |= share > NOTICEABLE and least_s > LONG * duration_s
+    slow = share > levels.MOSTLY and least_s > levels.SLOW * duration_s
+    slow |= share > levels.NOTICEABLE and least_s > levels.LONG * duration_s
     what = f"is correlated over {plain(time_s, 2)} s of a trace of {plain(duration_s)} s"
     walk = noise_model.walk
     certain_walk = certain[1] * walk / (1 - walk + certain[1] * walk)
-    if certain_walk > NOTICEABLE and walk > share:
+    if certain_walk > levels.NOTICEABLE and walk > share:
         slow, share, what = True, walk, "walks at random"
     if not slow:
         return None
@@ -488,11 +468,11 @@ def has_fast_noise(residuals: Residuals, residual: Array, slopes: Array) -> bool
     if max(float(np.sum(each)) for each in stretches) > _IN_ONE * float(residual @ residual):
         return False
     noise_model = NoiseModelLikelihood(time_s, residual, slopes).best()
-    fast = noise_model.time_s <= SLOW * residuals.duration_s
+    fast = noise_model.time_s <= levels.SLOW * residuals.duration_s
     # Neighbours of such noise differ by a root of its readings less than all of it scatters.
     scatter = np.sqrt(np.mean(residual**2)) / max(residuals.noise_scale, 1e-300)
-    rough = scatter < SMOOTH * np.sqrt(max(SLOW * len(time_s), 1.0))
-    return fast and bool(rough) and noise_model.ar1 > NOTICEABLE
+    rough = scatter < levels.SMOOTH * np.sqrt(max(levels.SLOW * len(time_s), 1.0))
+    return fast and bool(rough) and noise_model.ar1 > levels.NOTICEABLE
 
 
 def has_uneven_noise(residual: Array, rounding: float) -> bool:
@@ -506,7 +486,7 @@ def has_uneven_noise(residual: Array, rounding: float) -> bool:
         return False
     stretches = np.array_split(residual, count)
     scales = [estimate_noise(each, rounding) for each in stretches]
-    if max(scales) < UNEVEN * min(scales):
+    if max(scales) < levels.UNEVEN * min(scales):
         return False
     own = np.concatenate([each / scale for each, scale in zip(stretches, scales, strict=True)])
-    return bool(np.mean(own**2) < AS_THE_SCATTER)
+    return bool(np.mean(own**2) < levels.AS_THE_SCATTER)

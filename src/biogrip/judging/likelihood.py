@@ -9,13 +9,10 @@ Fisher information gives the Cramér-Rao bounds of the parameters of a trace [2]
 
 References
 ----------
-.. [1] D. M. Bates and D. G. Watts, Nonlinear Regression Analysis and Its Applications, Wiley,
-   1988: profiles and the F threshold where the noise is estimated.
+.. [1] D. M. Bates and D. G. Watts, Nonlinear Regression Analysis, Wiley, 1988: profiles.
 .. [2] H. Cramér, Mathematical Methods of Statistics, Princeton University Press, 1946.
-.. [3] C. R. Rao, Information and the accuracy attainable in the estimation of statistical
-   parameters, Bulletin of the Calcutta Mathematical Society 37 (1945).
-.. [4] H. White, A heteroskedasticity-consistent covariance matrix estimator and a direct test
-   for heteroskedasticity, Econometrica 48 (1980), 817-838: noise that changes along the trace.
+.. [3] C. R. Rao, Bulletin of the Calcutta Mathematical Society 37 (1945).
+.. [4] H. White, Econometrica 48 (1980), 817-838: noise that changes along the trace.
 """
 
 import math

@@ -140,10 +140,6 @@ def spacing_at(time_s: Array, at_s: float) -> float:
     return float(time_s[after] - time_s[after - 1])
 
 
-def _misfit(fit: OnsetFit) -> float:
-    return fit.misfit
-
-
 @dataclass(frozen=True)
 class OnsetFits:
     """Fits of a trace for given onsets, linear and in white noise."""
@@ -193,7 +189,7 @@ class OnsetFits:
                 for low_s, high_s in self._smooth_intervals(best.onset_s)
                 if low_s < self._latest_s
             ]
-            found = min((self._within(best, *own) for own in ends), key=_misfit)
+            found = min((self._within(best, *own) for own in ends), key=lambda fit: fit.misfit)
             if found.misfit >= best.misfit * (1 - _STILL):
                 return best
             own, best = next(pair for pair in ends if best.onset_s <= pair[1]), found
@@ -279,14 +275,7 @@ def notes_on_start(
     likelihood ratio. One that begins long after its first step, as if cut off there, may have been
     recorded on another clock: then it is fitted with that step just before it.
 
-    Parameters
-    ----------
-    experiment
-        Assumptions of the identification, with a protocol that starts at 0.
-    time_s, readings : (n_samples,)
-        The trace, times ascending.
-    diagnosis
-        That of the best fit with that protocol.
+    The protocol starts at 0, times ascend, (n_samples,), and the diagnosis is that of the best fit.
     """
     may_be_late = not experiment.start_given
     fits, ramped = OnsetFits(experiment, time_s, readings), _with_ramp(experiment, time_s)
@@ -484,14 +473,9 @@ def onset_limits(best: Likelihood, time_s: Array) -> tuple[float, float]:
 def profile_over_onset(
     diagnosis: Diagnosis, time_s: Array
 ) -> tuple[Diagnosis, tuple[float, float]]:
-    """Return a diagnosis whose limits allow for the uncertainty of a fitted onset, and its limits.
+    """Return a diagnosis whose limits allow for a fitted onset, and the limits of that.
 
-    Parameters
-    ----------
-    diagnosis
-        Diagnosis for the best onset.
-    time_s : (n_samples,)
-        Times from that onset, ascending.
+    The diagnosis is for the best onset; ascending times, (n_samples,), are from it.
     """
     best = diagnosis.likelihood
     ends = onset_limits(best, time_s)
@@ -516,7 +500,7 @@ def profile_over_onset(
 
 def _at(best: Likelihood, change_s: float) -> Likelihood:
     """Return the likelihood of an onset that is later by some s, relative to that of the best."""
-    problem = best.problem.later(change_s)
+    problem = replace(best.problem, residuals=best.problem.residuals.later(change_s))
     fit = fit_from([problem], best.best)
     misfit = float(fit.misfit[0])
     cost = best.increase(misfit)

@@ -13,12 +13,9 @@ which is nearly linear in the quantity's logarithm: a few fits suffice.
 
 References
 ----------
-.. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based
-   confidence intervals, Applied Statistics 37 (1988), 87-94.
-.. [2] A. Raue et al., Structural and practical identifiability analysis of partially observed
-   dynamical models by exploiting the profile likelihood, Bioinformatics 25 (2009), 1923-1929.
-.. [3] M. Dowell and P. Jarratt, A modified regula falsi method for computing the root of an
-   equation, BIT 11 (1971), 168-174.
+.. [1] D. J. Venzon and S. H. Moolgavkar, Applied Statistics 37 (1988), 87-94.
+.. [2] A. Raue et al., Bioinformatics 25 (2009), 1923-1929.
+.. [3] M. Dowell and P. Jarratt, BIT 11 (1971), 168-174.
 """
 
 from collections.abc import Callable, Sequence

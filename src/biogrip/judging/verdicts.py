@@ -29,6 +29,13 @@ FIT_REJECTED = "fit rejected"
 """Verdict on every quantity of a fit that is rejected."""
 
 
+def verdict_of(low: float | None, high: float | None) -> str:
+    """Return the verdict on a quantity with these limits."""
+    if low is None:
+        return NOT_DETERMINED if high is None else BOUNDED_ABOVE
+    return BOUNDED_BELOW if high is None else DETERMINED
+
+
 @dataclass(frozen=True)
 class Finding:
     """A quantity, its profile, and the verdict on it."""
@@ -42,12 +49,7 @@ class Finding:
     @property
     def verdict(self) -> str:
         """Verdict: determined, bounded below or above, or not determined."""
-        below, above = self.profile.low is not None, self.profile.high is not None
-        if below and above:
-            return DETERMINED
-        if below:
-            return BOUNDED_BELOW
-        return BOUNDED_ABOVE if above else NOT_DETERMINED
+        return verdict_of(self.profile.low, self.profile.high)
 
     @property
     def value(self) -> float:

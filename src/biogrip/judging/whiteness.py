@@ -20,24 +20,15 @@ basis of what the fit absorbs has orthonormal rows, (n_directions, n_samples), a
 
 References
 ----------
-.. [1] J. Durbin and G. S. Watson, Testing for serial correlation in least squares regression II,
-   Biometrika 38 (1951), 159-177: section 4.
-.. [2] J. Durbin, Tests for serial correlation in regression analysis based on the periodogram of
-   least-squares residuals, Biometrika 56 (1969), 1-15.
-.. [3] R. D. Cook and S. Weisberg, Residuals and Influence in Regression, Chapman and Hall, 1982:
-   section 2.2.2, the test for an outlier.
-.. [4] H. D. Patterson and R. Thompson, Recovery of inter-block information when block sizes are
-   unequal, Biometrika 58 (1971), 545-554.
-.. [5] F. E. Satterthwaite, An approximate distribution of estimates of variance components,
-   Biometrics Bulletin 2 (1946), 110-114.
-.. [6] H. Akaike, A new look at the statistical model identification, IEEE Transactions on Automatic
-   Control 19 (1974), 716-723.
-.. [7] R. A. Fisher, Tests of significance in harmonic analysis, Proceedings of the Royal Society
-   of London A 125 (1929), 54-59.
-.. [8] G. C. Chow, Tests of equality between sets of coefficients in two linear regressions,
-   Econometrica 28 (1960), 591-605.
-.. [9] D. Siegmund and B. Yakir, The Statistics of Gene Mapping, Springer, 2007: section 5.2, the
-   maximum of a process on a grid.
+.. [1] J. Durbin and G. S. Watson, Biometrika 38 (1951), 159-177: section 4.
+.. [2] J. Durbin, Biometrika 56 (1969), 1-15: the cumulative periodogram.
+.. [3] R. D. Cook and S. Weisberg, Residuals and Influence in Regression, 1982: section 2.2.2.
+.. [4] H. D. Patterson and R. Thompson, Biometrika 58 (1971), 545-554: restricted likelihood.
+.. [5] F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114.
+.. [6] H. Akaike, IEEE Transactions on Automatic Control 19 (1974), 716-723.
+.. [7] R. A. Fisher, Proceedings of the Royal Society of London A 125 (1929), 54-59.
+.. [8] G. C. Chow, Econometrica 28 (1960), 591-605: equality of two regressions.
+.. [9] D. Siegmund and B. Yakir, The Statistics of Gene Mapping, Springer, 2007: section 5.2.
 """
 
 from collections.abc import Callable, Iterator

@@ -21,8 +21,7 @@ References
 ----------
 .. [1] B. W. Rust and W. R. Burrus, Mathematical Programming and the Numerical Solution of Linear
    Equations, Elsevier, 1972: limits of linear functionals of what is not negative.
-.. [2] P. B. Stark, Inference in infinite-dimensional inverse problems: discretization and duality,
-   Journal of Geophysical Research 97 (1992), 14055-14082.
+.. [2] P. B. Stark, Journal of Geophysical Research 97 (1992), 14055-14082: duality.
 """
 
 import math
@@ -41,7 +40,7 @@ from biogrip.digits import plain, with_limits
 from biogrip.fit.any_sample import AnySampleFit, Lags, fit_any_sample
 from biogrip.judging.levels import CERTAIN_MISFIT, TOO_MUCH
 from biogrip.judging.likelihood import find_thresholds
-from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.judging.verdicts import verdict_of
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
 
@@ -117,9 +116,7 @@ class Told:
     @property
     def verdict(self) -> str:
         """Verdict as on a model's quantities: determined, bounded below or above, or not."""
-        if self.low is not None:
-            return BOUNDED_BELOW if self.high is None else DETERMINED
-        return NOT_DETERMINED if self.high is None else BOUNDED_ABOVE
+        return verdict_of(self.low, self.high)
 
     def words(self) -> str:
         """Return value and limits, or the only limit, in words."""
@@ -170,19 +167,10 @@ def tell_without_model(
 ) -> WithoutModel:
     """Tell what a trace says of any linear sample, whatever its model.
 
-    Parameters
-    ----------
-    residuals
-        Protocol, trace with what is projected out and whitened, and instrument; their model is not
-        used.
-    confidence
-        Of two limits, such as 0.95; a single limit is one of such a pair.
-    noise_sd
-        Standard deviation of the noise, if it is known.
-    at_s
-        Times in s after a step, whose inverses are angular frequencies; by default one a decade.
-    kinds
-        What is to be told.
+    The model of the residuals is not used. The confidence, such as 0.95, is of two limits; a single
+    limit is one of such a pair. The standard deviation of the noise is given if it is known. Times
+    in s after a step, whose inverses are angular frequencies, are by default one a decade. Of
+    `KINDS`, some are told.
     """
     fit = fit_any_sample(residuals)
     free, sd, left = fit.free, fit.sd, fit.left_of_readings()

@@ -1,12 +1,6 @@
 """No-load calibration: an arm's inertia, damping and stiffness from its free motion (section 2).
 
 A calibrated gripper is written as a config block that can be laid over a study.
-
-References
-----------
-.. [1] J. J. Moré, The Levenberg-Marquardt algorithm: implementation and theory, in G. A. Watson
-   (ed.), Numerical Analysis, Lecture Notes in Mathematics 630, Springer, 1978, 105-116:
-   `scipy.optimize.least_squares`.
 """
 
 from collections.abc import Iterable, Iterator
@@ -52,17 +46,8 @@ def read_calibrated_arms(
 ) -> tuple[Gripper, dict[str, dict[str, float]]]:
     """Return a gripper with the arms of a calibration in place of its own.
 
-    Returns
-    -------
-    gripper
-        Gripper with the calibrated arms.
-    uncertainty
-        Standard uncertainties by arm and key.
-
-    Raises
-    ------
-    BiogripError
-        If the file is missing or is no calibration.
+    With it come their standard uncertainties, by arm and key. A file that is missing or is no
+    calibration is a `BiogripError`.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -148,17 +133,8 @@ def free_motion(arm: Arm, time_s: Array, step_Nm: float, impulse_Nms: float) -> 
 def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> CalibratedArm:
     """Identify an arm by least squares on both records, in the logarithms of I, c and k.
 
-    Parameters
-    ----------
-    record
-        The measured motion.
-    step_Nm, impulse_Nms
-        Torque step and impulse that caused it.
-
-    Raises
-    ------
-    BiogripError
-        If the arm does not ring within the record, or no arm fits.
+    The torque step and impulse caused the motion that was measured. If the arm does not ring within
+    the record, or no arm fits, it is a `BiogripError`.
     """
     # Imported here, for settings of calibrations do not need SciPy.
     from scipy.optimize import least_squares

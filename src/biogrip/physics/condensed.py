@@ -16,8 +16,7 @@ the same orthonormal functions, and the norm of what they do not reach.
 
 References
 ----------
-.. [1] L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapter 8:
-   how fast Chebyshev's coefficients of analytic functions fall.
+.. [1] L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapter 8.
 """
 
 from collections.abc import Iterator
@@ -94,12 +93,8 @@ class DenseSamples:
     def rows_of_samples(self, samples: Array) -> tuple[Array, float]:
         """Project readings, (n_samples,), smooth or not, on smooth functions.
 
-        Returns
-        -------
-        rows : (n_nodes,)
-            Rows with the same products with smooth functions.
-        rest
-            Norm of the part orthogonal to all smooth functions.
+        Returns rows with the same products with these, (n_nodes,), and the norm of what is
+        orthogonal to all of them.
         """
         parts: list[Array] = []
         rest = 0.0

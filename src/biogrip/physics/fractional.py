@@ -52,13 +52,9 @@ names in other programs, is in `docs/model.md`.
 
 References
 ----------
-.. [1] A. Bonfanti, J. L. Kaplan, G. Charras and A. Kabla, Fractional viscoelastic models for
-   power-law materials, Soft Matter 16 (2020), 6002-6020: springpots, and what they describe.
-.. [2] L. N. Trefethen and J. A. C. Weideman, The exponentially convergent trapezoidal rule,
-   SIAM Review 56 (2014), 385-458.
-.. [3] A. Bonfanti, J. Fouchard, N. Khalilgharibi, G. Charras and A. Kabla, A unified rheological
-   model for cells and cellularised materials, Royal Society Open Science 7 (2020), 190920: a
-   springpot and a damper in series, with a spring beside both.
+.. [1] A. Bonfanti et al., Soft Matter 16 (2020), 6002-6020: springpots, and what they describe.
+.. [2] L. N. Trefethen and J. A. C. Weideman, SIAM Review 56 (2014), 385-458: trapezoidal rule.
+.. [3] A. Bonfanti et al., Royal Society Open Science 7 (2020), 190920: models for cells.
 """
 
 from dataclasses import dataclass, replace
@@ -222,19 +218,9 @@ def _gel(k: Array, k_alpha: Array, alpha: Array) -> Network:
     return series(spring(k), ladder(k_alpha, alpha))
 
 
-def _zener(k: Array, k_p: Array, k_alpha: Array, alpha: Array) -> Network:
-    gel = _gel(k, k_alpha, alpha)
-    return replace(gel, k_p=gel.k_p + k_p)
-
-
-def _solid(k_p: Array, k_alpha: Array, alpha: Array, c: Array) -> Network:
-    liquid = _liquid(k_alpha, alpha, c)
-    return replace(liquid, k_p=liquid.k_p + k_p)
-
-
-def _jeffreys(k_alpha: Array, alpha: Array, c: Array, c_p: Array) -> Network:
-    liquid = _liquid(k_alpha, alpha, c)
-    return replace(liquid, c_p=liquid.c_p + c_p)
+def _beside(network: Network, k_p: Array | float = 0.0, c_p: Array | float = 0.0) -> Network:
+    """Return a network with a spring or a damper beside it."""
+    return replace(network, k_p=network.k_p + k_p, c_p=network.c_p + c_p)
 
 
 _K_ALPHA = Parameter("k_alpha", "springpot", "springpot, modulus at 1 rad/s", "k")
@@ -330,7 +316,7 @@ FRACTIONAL_MODELS = (
         "fractional_zener",
         "fractional Zener solid",
         (replace(K, meaning="series spring"), _K_BESIDE, *_ONE),
-        of_columns(_zener),
+        of_columns(lambda k, k_p, *pot: _beside(_gel(k, *pot), k_p=k_p)),
         example=(8.0, 1.0, 20.0, 0.4),
         contains={
             "zener_maxwell": lambda k, k_p, c: (k, k_p, c, 1.0),
@@ -342,7 +328,7 @@ FRACTIONAL_MODELS = (
         "fractional_solid",
         "fractional Maxwell liquid and spring in parallel",
         (_K_BESIDE, *_ONE, _C_BEHIND),
-        of_columns(_solid),
+        of_columns(lambda k_p, *liquid: _beside(_liquid(*liquid), k_p=k_p)),
         example=(1.0, 10.0, 0.3, 300.0),
         contains={
             "zener_maxwell": lambda k, k_p, c: (k_p, k, 0.0, c),
@@ -354,7 +340,7 @@ FRACTIONAL_MODELS = (
         "fractional_jeffreys",
         "fractional Jeffreys liquid",
         (*_ONE, _C_BEHIND, C_P),
-        of_columns(_jeffreys),
+        of_columns(lambda *both: _beside(_liquid(*both[:3]), c_p=both[3])),
         example=(10.0, 0.3, 300.0, 20.0),
         contains={
             "fractional_maxwell": lambda k_alpha, alpha, c: (k_alpha, alpha, c, 0.0),

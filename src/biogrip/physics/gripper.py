@@ -1,19 +1,7 @@
 """The gripper: two arms, a lever that squeezes the sample (Table 1), the comb drive, and contact.
 
 The rotary comb drive turns a voltage into a torque (eqs. 7-9), which closes the arms onto the
-sample (section 2). Effects that the model neglects are estimated here, too.
-
-Biologists compare moduli, in Pa; springs and dampers, in N/m and N s/m, belong to one sample and
-its size. Hertz's contact model relates them: a sphere of an incompressible elastic material between
-two flat rigid jaws that do not stick, each of which indents it by half the shortening,
-
-    F = 4/3 E/(1 - nu^2) R^(1/2) (delta/2)^(3/2)
-
-(K. L. Johnson, Contact Mechanics, 1985, section 4.2). A cell in suspension and a drop are round,
-and the jaws are flat and far stiffer; a cylinder's E = F L/(A delta) would need an area that is
-rarely measured. The force grows faster than the shortening, so a spring has another modulus at
-every shortening: the modulus is called apparent, and is given with its shortening. Hertz's theory
-is one of small strains.
+sample (section 2).
 """
 
 import math
@@ -193,10 +181,7 @@ def torque(comb: CombDrive, voltage_V: ArrayLike) -> Array:
 def voltage(comb: CombDrive, torque_Nm: ArrayLike) -> Array:
     """Return the voltage in V that exerts a torque in N m (eq. 9 solved for V).
 
-    Raises
-    ------
-    ValueError
-        If a torque is negative: a comb drive only pulls.
+    A negative torque is a `ValueError`: a comb drive only pulls.
     """
     torques = np.asarray(torque_Nm, dtype=float)
     if np.any(torques < 0):
@@ -224,24 +209,11 @@ class Contact:
 
 
 def contact(neutral: Gripper, jaw_gap_m: float, comb: CombDrive, size_m: float) -> Contact:
-    """Compute the configuration of arms closed symmetrically onto a sample.
+    """Compute the configuration of arms closed symmetrically onto a sample of a diameter.
 
-    Parameters
-    ----------
-    neutral
-        The gripper with its neutral angle as the reference angle.
-    jaw_gap_m
-        Distance between the jaws there.
-    comb
-        The comb drive of each arm.
-    size_m
-        Diameter of the sample.
-
-    Raises
-    ------
-    BiogripError
-        If the sample is out of range, does not fit, or the comb's stroke does
-        not reach it.
+    Given are the gripper with its neutral angle as the reference angle, the distance between the
+    jaws there, and the comb drive of each arm. A sample that is out of range, does not fit, or that
+    the comb's stroke does not reach, is a `BiogripError`.
     """
     if not SMALLEST_M * (1 - 1e-9) <= size_m <= LARGEST_M * (1 + 1e-9):
         allowed = f"{1e6 * SMALLEST_M:g} to {1e6 * LARGEST_M:g} um"
@@ -272,58 +244,3 @@ def contact(neutral: Gripper, jaw_gap_m: float, comb: CombDrive, size_m: float) 
         held_Nm,
         float(voltage(comb, held_Nm)),
     )
-
-
-WATER_PA_S, WATER_KG_PER_M3 = 1.0e-3, 1.0e3
-
-
-def drag_of_sample(size_m: float) -> float:
-    """Return Stokes' drag 6 pi mu R of a sphere in water in N s/m, a bound for its shortening."""
-    return 3 * math.pi * WATER_PA_S * size_m
-
-
-def drag_of_arm(gripper: Gripper, width_m: float) -> float:
-    """Return the drag in N m s/rad of a fully immersed arm that turns in water.
-
-    The drag of a slender rod per length, moved sideways, is 4 pi mu/(ln(l/d) + 0.84)
-    (Tirado and Garcia de la Torre, J. Chem. Phys. 71, 2581, 1979). Its product with the
-    squared distance from the pivot is integrated along the arm.
-    """
-    length = gripper.arm_length_m
-    a_length = 4 * math.pi * WATER_PA_S / (math.log(length / width_m) + 0.84)
-    return a_length * length**3 / 3
-
-
-def rolling_of_contact(gripper: Gripper, size_m: float, rotation: float) -> float:
-    """Return the shift of the contact point along the jaw, as a share of the arm's length.
-
-    A round sample rolls on the turning jaw by its radius times the rotation. (The circle
-    on which the tip moves is part of the nonlinear model.)
-    """
-    return 0.5 * size_m * rotation / gripper.arm_length_m
-
-
-def fringing_of_comb(comb: CombDrive) -> float:
-    """Return the increase of capacitance by fringing fields, relative to eq. (7).
-
-    For two strips of width h at a distance g it is g/(pi h) [1 + ln(2 pi h/g)] (H. B.
-    Palmer, Trans. AIEE 56, 363, 1937). It is less in a comb, where neighbouring fingers
-    shield each other.
-    """
-    share = comb.finger_gap_m / (math.pi * comb.thickness_m)
-    return share * (1 + math.log(2 / share))
-
-
-def mass_of_sample(size_m: float) -> float:
-    """Return the mass of a sphere of water in kg."""
-    return WATER_KG_PER_M3 * math.pi * size_m**3 / 6
-
-
-def apparent_modulus(force_N: float, shortening_m: float, size_m: float) -> float:
-    """Return Young's modulus in Pa of a sphere from a force and the shortening it causes.
-
-    The shortening is counted from first contact, the size is the sphere's diameter. Poisson's ratio
-    is that of an incompressible material, 1/2.
-    """
-    indentation, radius = 0.5 * shortening_m, 0.5 * size_m
-    return 0.75 * (1 - 0.5**2) * force_N / math.sqrt(radius * indentation**3)

@@ -41,11 +41,6 @@ class Channel:
         """Usual name of a column or key: the name with the unit."""
         return self.name + self.suffix
 
-    @property
-    def si(self) -> str:
-        """The SI unit as a key of the units."""
-        return self.unit or "1"
-
 
 @dataclass(frozen=True)
 class Instrument:

@@ -76,10 +76,10 @@ def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:
 
 
 class SeriesMisfit:
-    """RMS difference between the model's response and uniformly sampled traces.
+    """RMS difference between the model's response to steps and uniformly sampled traces.
 
-    For steps, by the linear model without inertia; the first sample is at t = 0, and one is
-    at every step. Traces are (n_samples,) or (n_traces, n_samples).
+    The first sample is at t = 0, and one is at every step. Traces are (n_samples,) or (n_traces,
+    n_samples).
     """
 
     def __init__(
@@ -212,16 +212,8 @@ def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array,
 
     A sample with one Maxwell branch has two modes without inertia. This special case of
     `biogrip.physics.response` is written out for speed: populations are small, and most time goes
-    into calls.
-
-    Returns
-    -------
-    static : (n,)
-        Final rotation in rad per N m.
-    rates : (2, n)
-        Exponents in 1/s.
-    weights : (2, n)
-        Weights of the exponentials, in rad per N m.
+    into calls. Returns the final rotation in rad per N m, (n,), the exponents in 1/s and their
+    weights in rad per N m, (2, n).
     """
     squared_lever = lever_m**2
     rate = network.k[:, 0] / network.c[:, 0]

@@ -51,21 +51,9 @@ _SPRING_OF_NO_BRANCH = 1e-18
 
 @of_columns
 def generalized_maxwell(*columns: Array) -> Network:
-    r"""Generalized Maxwell-Wiechert model, Figure 5 (2).
+    """Generalized Maxwell-Wiechert model, Figure 5 (2): branches beside a spring and a damper.
 
-    With one branch the columns are k, k_p, c, c_p; with more they are
-    k_1 ... k_n, k_p, c_1 ... c_n, c_p.
-
-    ::
-
-              +---/\/\/---[==]---+
-              |    k_1    c_1    |
-              +---/\/\/---[==]---+      (any number of branches)
-              |    k_2    c_2    |
-        B o---+------/\/\/-------+---o C
-              |       k_p        |
-              +-------[==]-------+
-                      c_p
+    With one branch the columns are k, k_p, c, c_p; with more k_1 ... k_n, k_p, c_1 ... c_n, c_p.
     """
     n = len(columns) // 2 - 1
     k, c = (np.array(columns)[some] for some in (slice(n), slice(n + 1, 2 * n + 1)))
@@ -78,72 +66,37 @@ def generalized_maxwell(*columns: Array) -> Network:
 
 @of_columns
 def liquid_drop(k: Array, k_p: Array, c: Array) -> Network:
-    r"""Maxwell liquid drop with membrane stiffness, Figure 5 (1); columns k, k_p, c.
-
-    ::
-
-              +---/\/\/---[==]---+
-              |     k       c    |
-        B o---+------/\/\/-------+---o C
-                      k_p
-    """
+    """Maxwell liquid drop with membrane stiffness, Figure 5 (1); columns k, k_p, c."""
     return Network(k_p=k_p, c_p=np.zeros_like(k_p), k=k[:, None], c=c[:, None])
 
 
 @of_columns
 def kelvin_voigt(k_p: Array, c_p: Array) -> Network:
-    r"""Kelvin-Voigt solid; columns k_p, c_p.
-
-    ::
-
-              +------/\/\/-------+
-        B o---+       k_p        +---o C
-              +-------[==]-------+
-                      c_p
-    """
+    """Kelvin-Voigt solid, a spring beside a damper; columns k_p, c_p."""
     none = np.zeros((len(k_p), 0))
     return Network(k_p=k_p, c_p=c_p, k=none, c=none)
 
 
 @of_columns
 def damper(c_p: Array) -> Network:
-    r"""Bare damper, a Newtonian liquid; column c_p.
-
-    ::
-
-        B o---[==]---o C
-               c_p
-    """
+    """Bare damper, a Newtonian liquid; column c_p."""
     none = np.zeros((len(c_p), 0))
     return Network(k_p=np.zeros_like(c_p), c_p=c_p, k=none, c=none)
 
 
 @of_columns
 def maxwell(k: Array, c: Array) -> Network:
-    r"""Maxwell liquid; columns k, c.
-
-    ::
-
-        B o---/\/\/---[==]---o C
-                k       c
-    """
+    """Maxwell liquid, a spring and a damper in series; columns k, c."""
     none = np.zeros_like(k)
     return Network(k_p=none, c_p=none, k=k[:, None], c=c[:, None])
 
 
 @of_columns
 def zener_kelvin(k_s: Array, k_v: Array, c_v: Array) -> Network:
-    r"""Zener solid (standard linear solid) in Kelvin's form; columns k_s, k_v, c_v.
+    """Zener solid (standard linear solid) in Kelvin's form; columns k_s, k_v, c_v.
 
-    Its Maxwell form has k_p = k_s k_v/(k_s + k_v), k = k_s^2/(k_s + k_v) and
-    c = c_v [k_s/(k_s + k_v)]^2.
-
-    ::
-
-                         +---/\/\/---+
-        B o---/\/\/------+    k_v    +---o C
-               k_s       +---[==]----+
-                              c_v
+    In series with k_s are k_v and c_v, side by side. Its Maxwell form has k_p = k_s k_v/(k_s +
+    k_v), k = k_s^2/(k_s + k_v) and c = c_v [k_s/(k_s + k_v)]^2.
     """
     k, k_p, c = _to_maxwell(k_s, k_v, c_v)
     return Network(k_p=k_p, c_p=np.zeros_like(k_s), k=k[:, None], c=c[:, None])
@@ -151,19 +104,12 @@ def zener_kelvin(k_s: Array, k_v: Array, c_v: Array) -> Network:
 
 @of_columns
 def burgers(k_s: Array, c_s: Array, k_v: Array, c_v: Array) -> Network:
-    r"""Burgers fluid; columns k_s, c_s, k_v, c_v.
+    """Burgers fluid; columns k_s, c_s, k_v, c_v.
 
-    A Maxwell liquid and a Kelvin-Voigt element in series have the compliance
-    1/k_s + 1/(c_s s) + 1/(k_v + c_v s). Its inverse is two Maxwell branches, their
-    rates the roots of a r^2 - b r + k_v with a = c_s c_v/k_s, e = c_s k_v/k_s and
-    b = c_s + c_v + e; their springs share k_s. Written without differences.
-
-    ::
-
-                                +---/\/\/---+
-        B o---/\/\/---[==]------+    k_v    +---o C
-               k_s    c_s       +---[==]----+
-                                     c_v
+    A Maxwell liquid and a Kelvin-Voigt element in series have the compliance 1/k_s + 1/(c_s s) +
+    1/(k_v + c_v s). Its inverse is two Maxwell branches, their rates the roots of a r^2 - b r + k_v
+    with a = c_s c_v/k_s, e = c_s k_v/k_s and b = c_s + c_v + e; their springs share k_s. Written
+    without differences.
     """
     e = c_s * k_v / k_s
     d = c_s + c_v - e

@@ -22,10 +22,8 @@ for z phi_n'(z) = phi_(n-1)(z) - n phi_n(z), and a deformation t^n/n! gives g = 
 
 References
 ----------
-.. [1] W. Squire and G. Trapp, Using complex variables to estimate derivatives of real
-   functions, SIAM Review 40 (1998), 110-112.
-.. [2] J. R. R. A. Martins, P. Sturdza and J. J. Alonso, The complex-step derivative
-   approximation, ACM Transactions on Mathematical Software 29 (2003), 245-262.
+.. [1] W. Squire and G. Trapp, SIAM Review 40 (1998), 110-112: derivatives by complex variables.
+.. [2] J. R. R. A. Martins et al., ACM Transactions on Mathematical Software 29 (2003), 245-262.
 .. [3] J. D. Ferry, Viscoelastic Properties of Polymers, Wiley, 1980, chapter 3.
 """
 
@@ -74,21 +72,8 @@ def linear_responses(
 ) -> Array:
     """Compute what is read in the linear model, corrected eqs. (4)-(6), and d/d log p of it.
 
-    Parameters
-    ----------
-    gripper, model, course
-        Arms, sample model and protocol of the simulation.
-    time_s : (n_times,)
-        Ascending.
-    parameters : (n, n_parameters)
-        All positive.
-    slopes
-        True to compute derivatives.
-
-    Returns
-    -------
-    (n, 1 + n_parameters, n_times)
-        Readings, and their derivatives; without `slopes`, (n, 1, n_times).
+    Times, (n_times,), ascend; parameters, (n, n_parameters), are positive. Returns readings and
+    their derivatives, (n, 1 + n_parameters, n_times); without `slopes`, (n, 1, n_times).
     """
     modes = compute_modes(gripper, model, course, parameters, slopes=slopes)
     return sum_of_modes(modes, course, time_s)
@@ -122,36 +107,29 @@ def compute_modes(
 
     All parameters are positive. Without `slopes` there are no derivatives: n_parameters is zero.
     """
-    network, count = _complex_step_network(model, parameters, slopes=slopes)
-    if course.deforms:
-        (rates, rate_slopes), (weights, weight_slopes) = (
-            _split_complex_step(of, count) for of in _branches(network)
-        )
-        return Modes(
-            np.ascontiguousarray(rates),
-            np.ascontiguousarray(weights),
-            rate_slopes.swapaxes(0, 1),
-            weight_slopes.swapaxes(0, 1),
-        )
-    found = _between_arms(gripper, network, count)
-    return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in found))
+    count = parameters.shape[1] if slopes else 0
+    if slopes:
+        # After the samples, copies with each of their parameters tilted into the complex plane.
+        factors = np.ones((count + 1, 1, count), dtype=np.complex128)
+        factors[1:, 0].imag = _COMPLEX_STEP * np.eye(count)
+        parameters = (parameters * factors).reshape(-1, count)
+    network = model.network(parameters)
+    if not course.deforms:
+        found = _between_arms(gripper, network, count)
+        return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in found))
+    both = [of.reshape(count + 1, -1, of.shape[1]) for of in _branches(network)]
+    rates, weights = (np.ascontiguousarray(of[0].real) for of in both)
+    return Modes(rates, weights, *((of[1:].imag / _COMPLEX_STEP).swapaxes(0, 1) for of in both))
 
 
 def _between_arms(
     gripper: Gripper, network: Network, count: int
 ) -> tuple[Array, Array, Array, Array]:
-    """Compute rates and weights of the left arm, with derivatives by the log-parameters.
+    """Compute rates and weights of the left arm, (n_modes, n), and derivatives of both.
 
-    With H(x; p) = 0 at a rate, dx = (sum_j dK_j/(x - r_j) + ...) / (S/x^2); S and N follow. The
-    network has n samples, and after them the same with each of `count` parameters tilted into the
-    complex plane by the complex step.
-
-    Returns
-    -------
-    rates : (n_modes, n)
-    weights : (n_modes, n)
-    rate_slopes : (n_parameters, n_modes, n)
-    weight_slopes : (n_parameters, n_modes, n)
+    These are by the log-parameters, (n_parameters, n_modes, n). With H(x; p) = 0 at a rate, dx =
+    (sum_j dK_j/(x - r_j) + ...) / (S/x^2); S and N follow. The network has n samples, and after
+    them the same with each of `count` parameters tilted by the complex step.
     """
     arms = Arms(gripper)
     given = arms.with_sample(network)
@@ -188,25 +166,6 @@ def _between_arms(
     return -x, weights, -moved, weight_slopes
 
 
-def _complex_step_network(
-    model: SampleModel, parameters: Array, *, slopes: bool
-) -> tuple[Network, int]:
-    """Return networks of samples and, for slopes, of copies with complex-step parameters."""
-    if not slopes:
-        return model.network(parameters), 0
-    count = parameters.shape[1]
-    factors = np.ones((count + 1, 1, count), dtype=np.complex128)
-    factors[1:, 0].imag = _COMPLEX_STEP * np.eye(count)
-    return model.network((parameters * factors).reshape(-1, count)), count
-
-
-def _split_complex_step(values: NDArray[Any], count: int) -> tuple[Array, Array]:
-    """Return values, (..., n, terms), and derivatives, (n_parameters, ..., n, terms)."""
-    *others, _, terms = values.shape
-    of_tilts = values.reshape(*others, count + 1, -1, terms).swapaxes(0, -3)
-    return of_tilts[0].real, of_tilts[1:].imag / _COMPLEX_STEP
-
-
 def relaxation(network: Network, course: Course, time_s: Array) -> Array:
     """Compute the load on samples that a protocol deforms, (n, n_times)."""
     rates, weights = _branches(network)
@@ -232,14 +191,8 @@ def _branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
 def lag_course(course: Course, shares: Sequence[float]) -> Callable[[Array], Array]:
     """Return a function of ascending times for loads that lag behind, (n_lags, n_times).
 
-    Of a deformation, they are the forces of springs that forget it with these relaxation times.
-
-    Parameters
-    ----------
-    course
-        The protocol.
-    shares
-        Relaxation times of the lags over the protocol's duration.
+    Of a deformation, they are the forces of springs that forget it with these relaxation times,
+    given as shares of the protocol's duration.
     """
     rates, sign = -1 / (course.end_s * np.array(shares)), 1.0 if course.deforms else -1.0
 
@@ -255,22 +208,10 @@ def mode_responses(
 ) -> tuple[Array, Array]:
     """Compute responses of modes of unit weight, or of branches of unit stiffness, and dg/dr.
 
-    Parameters
-    ----------
-    rates : (n, n_modes)
-        In 1/s, real, negative or zero.
-    course
-        The protocol, of a load or a deformation.
-    time_s : (n_times,)
-        Ascending; at the very instant of a step, what precedes it. Before the protocol nothing
-        responds.
-    slopes
-        True to compute derivatives; else the responses are returned in their place.
-
-    Returns
-    -------
-    responses, slopes : (n, n_modes, n_times)
-        In units of what is controlled, and those times s.
+    Rates in 1/s, (n, n_modes), are real, negative or zero. Times, (n_times,), ascend; at the very
+    instant of a step is what precedes it, and before the protocol nothing responds. Both results
+    are (n, n_modes, n_times), in units of what is controlled, and those times s. Without `slopes`
+    the responses are returned in their place.
     """
     both = np.zeros((1 + slopes, *rates.shape, len(time_s)))
     for here, found in responses_in_turn(rates, course, time_s, slopes=slopes):
@@ -332,8 +273,7 @@ def moduli_of_modes(rates: Array, places: Array) -> Array:
 class _Motion:
     """How modes go on in neighbouring phases, with the derivatives by their rates.
 
-    Rates are (n, n_modes, 1), and all orders of what is controlled, at the starts of the phases,
-    (n_phases, n_orders).
+    Rates are (n, n_modes, 1), all orders of what is controlled at the starts (n_phases, n_orders).
     """
 
     def __init__(self, rates: Array, powers: Array, *, deforms: bool, slopes: bool) -> None:

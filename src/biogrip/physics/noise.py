@@ -15,16 +15,10 @@ average as large as r. Least squares of these are generalised least squares [4]_
 
 References
 ----------
-.. [1] G. H. Golub and V. Pereyra, The differentiation of pseudo-inverses and nonlinear least
-   squares problems whose variables separate, SIAM Journal on Numerical Analysis 10 (1973),
-   413-432.
-.. [2] A. M. Stuart, Inverse problems: a Bayesian perspective, Acta Numerica 19 (2010), 451-559:
-   a marginalised Gaussian uncertainty is a part of the noise.
-.. [3] D. Foreman-Mackey, E. Agol, S. Ambikasaran and R. Angus, Fast and scalable Gaussian
-   process modeling with applications to astronomical time series, The Astronomical Journal 154
-   (2017), 220: celerite.
-.. [4] A. C. Aitken, On least squares and linear combination of observations, Proceedings of the
-   Royal Society of Edinburgh 55 (1936), 42-48.
+.. [1] G. H. Golub and V. Pereyra, SIAM Journal on Numerical Analysis 10 (1973), 413-432.
+.. [2] A. M. Stuart, Acta Numerica 19 (2010), 451-559: a Gaussian uncertainty is noise.
+.. [3] D. Foreman-Mackey et al., The Astronomical Journal 154 (2017), 220: celerite.
+.. [4] A. C. Aitken, Proceedings of the Royal Society of Edinburgh 55 (1936), 42-48.
 """
 
 import hashlib
@@ -138,12 +132,7 @@ def add_noise(
 ) -> Array:
     """Return a noisy copy of a trace, (n_samples,).
 
-    Ascending sampling times, (n_samples,), are required unless the noise is white.
-
-    Raises
-    ------
-    ValueError
-        If the times are required and missing.
+    Without ascending sampling times, (n_samples,), noise that is not white is a `ValueError`.
     """
     unit = KINDS[noise.kind](rng, len(readings))
     if not noise.white:
@@ -197,13 +186,9 @@ def draw_ornstein_uhlenbeck(
 ) -> Array:
     """Draw a sum of independent Ornstein-Uhlenbeck processes, exactly, at any times, (n_times,).
 
-    From reading to reading, each is an AR(1) process [1]_. Weights are the variance of each, rates
-    the inverse of its relaxation time, (n_processes,).
-
-    References
-    ----------
-    .. [1] D. T. Gillespie, Exact numerical simulation of the Ornstein-Uhlenbeck process and its
-       integral, Physical Review E 54 (1996), 2084-2091.
+    From reading to reading, each is an AR(1) process (D. T. Gillespie, Physical Review E 54 (1996),
+    2084-2091). Weights are the variance of each, rates the inverse of its relaxation time,
+    (n_processes,).
     """
     states = rng.standard_normal((len(time_s), len(weights)))
     elapsed = np.outer(np.diff(time_s), rates_per_s)
@@ -216,15 +201,10 @@ def draw_ornstein_uhlenbeck(
 
 
 def flicker_rates(time_s: Array) -> Array:
-    """Return rates in 1/s of processes whose sum has the spectrum 1/f [1]_, (n_processes,).
+    """Return rates in 1/s of processes whose sum has the spectrum 1/f, (n_processes,).
 
-    A geometric series for Ornstein-Uhlenbeck processes of the same variance, which cover all
-    frequencies of ascending times.
-
-    References
-    ----------
-    .. [1] E. Milotti, 1/f noise: a pedagogical review, arXiv:physics/0204033, 2002, section 3:
-       a superposition of relaxation processes.
+    They are a geometric series, for Ornstein-Uhlenbeck processes of the same variance, which cover
+    all frequencies of ascending times (E. Milotti, arXiv:physics/0204033, 2002, section 3).
     """
     slowest = 1 / (_LONGEST_TIME * (time_s[-1] - time_s[0]))
     fastest = 1 / float(np.diff(time_s).min())
@@ -235,8 +215,8 @@ def flicker_rates(time_s: Array) -> Array:
 def stream(study_seed: int, case: str, seed: int, purpose: str) -> np.random.Generator:
     """Return the generator of one purpose, e.g. ``"noise"``, of one seed of one case.
 
-    Its seed sequence is a child of the study's seed, with a spawn key made of the names
-    and numbers alone: no other case or seed, and no order of jobs, can change it.
+    Its seed sequence is a child of the study's seed, with a spawn key made of the names and numbers
+    alone: no other case or seed, and no order of jobs, can change it.
     """
     key = (*_words(case), seed, *_words(purpose))
     return np.random.default_rng(np.random.SeedSequence(study_seed, spawn_key=key))
@@ -278,19 +258,11 @@ def within(basis: Array, rows: Array, sd: Array | None = None) -> Array:
 def with_uncertain(basis: Array, functions: Array) -> Array:
     """Add functions of random amplitude to a basis, so that `without` whitens noise with them.
 
-    Parameters
-    ----------
-    basis : (n_basis, n_times)
-        Orthonormal functions, of any amplitude.
-    functions : (n_functions, n_times)
-        Functions times the standard deviation of their amplitude, over that of white noise.
-
-    Returns
-    -------
-    (n_basis + n_functions, n_times)
-        Orthogonal functions of norm one and less. With singular values s of the functions,
-        `without` removes the part 1 - 1/sqrt(1 + s^2) of each direction, so that the sum of
-        noise and functions becomes white noise.
+    The basis, (n_basis, n_times), is orthonormal; functions, (n_functions, n_times), are times the
+    standard deviation of their amplitude, over that of white noise. Returns orthogonal functions of
+    norm one and less, (n_basis + n_functions, n_times): with singular values s of the functions,
+    `without` removes the part 1 - 1/sqrt(1 + s^2) of each direction, so that the sum of noise and
+    functions becomes white noise.
     """
     rest = without(basis, functions)
     _, sizes, directions = np.linalg.svd(rest, full_matrices=False)
@@ -312,14 +284,8 @@ _LEAST_SHARE_OF_DRIFT = 0.01
 def drift_is_flow(course: Course, time_s: Array) -> bool:
     """Return True if a drift looks like the flow of a damper without a spring.
 
-    Under a constant load both are the same line. Under a deformation nothing flows on.
-
-    Parameters
-    ----------
-    course
-        The protocol.
-    time_s : (n_samples,)
-        Sampling times.
+    Under a constant load both are the same line. Under a deformation nothing flows on. Sampling
+    times are (n_samples,).
     """
     if course.deforms:
         return False
@@ -341,18 +307,14 @@ _LEAST_EQUAL, _ALL_BUT_JUMPS, _LARGEST_REST = 0.05, 0.98, 0.05
 def estimate_noise(readings: Array, rounding: float | None = None) -> float:
     """Estimate the standard deviation of white noise on a smooth trace without a model.
 
-    The median of second differences is used, on which slopes and jumps of a protocol have
-    next to no effect. Where an instrument rounds so coarsely that neighbouring readings are often
-    the same, it is their mean square without the largest, and no less than the rounding errors'
-    [1]_. Of a trace without noise the estimate is tiny.
+    The median of second differences is used, on which slopes and jumps of a protocol have next to
+    no effect. Where an instrument rounds so coarsely that neighbouring readings are often the same,
+    it is their mean square without the largest, and no less than the rounding errors' (B. Widrow,
+    I. Kollar and M.-C. Liu, IEEE Transactions on Instrumentation and Measurement 45 (1996),
+    353-361: step over the root of 12). Of a trace without noise the estimate is tiny.
 
     The trace is (n_samples,), or what a fit leaves of it; the step of its readings is by default
     measured.
-
-    References
-    ----------
-    .. [1] B. Widrow, I. Kollar and M.-C. Liu, Statistical theory of quantization, IEEE Transactions
-       on Instrumentation and Measurement 45 (1996), 353-361: step over the root of 12.
     """
     second = np.abs(np.diff(readings, 2))
     # Gaussian: the median is 0.6745 standard deviations, and those of second differences sqrt 6.
@@ -365,10 +327,9 @@ def estimate_noise(readings: Array, rounding: float | None = None) -> float:
 
 
 def measure_rounding(readings: Array) -> float:
-    """Return the step in the unit of the readings that the readings of a trace are multiples of.
+    """Return the step that readings, (n_samples,), are multiples of, in their unit.
 
-    It is zero if neighbouring readings are seldom the same: rounding is then not seen beside the
-    noise.
+    It is zero if neighbours are seldom the same: rounding is then not seen beside the noise.
     """
     same = np.count_nonzero(readings[1:] == readings[:-1])
     if same < max(1.0, _LEAST_EQUAL * len(readings)):
@@ -412,18 +373,10 @@ WEIGHTED = NoiseModel(ar1=0.0, time_s=1.0, flicker=0.0, proportional=1.0)
 class Whitening:
     """Transforms autocorrelated into white noise of the same variance, and projects nuisance out.
 
-    Parameters
-    ----------
-    time_s : (n_samples,)
-        Ascending sampling times.
-    noise_model
-        Autocorrelation model of the noise.
-    nuisance : (n_functions, n_samples)
-        Functions that the instrument may have added, with any amplitude.
-    uncertain : (n_functions, n_samples), optional
-        Functions added with a random amplitude, see `with_uncertain`.
-    growing : (n_samples,), optional
-        Standard deviation of the proportional part up to a factor; required if there is one.
+    Sampling times, (n_samples,), ascend. Nuisance are functions that the instrument may have added
+    with any amplitude, uncertain ones those with a random amplitude (`with_uncertain`),
+    (n_functions, n_samples); growing is the standard deviation of the proportional part up to a
+    factor, (n_samples,), required if there is one.
     """
 
     def __init__(

@@ -18,8 +18,7 @@ samples at once. Inertia acts on the linear part alone.
 
 References
 ----------
-.. [1] E. Hairer and G. Wanner, Solving Ordinary Differential Equations II: Stiff and
-   Differential-Algebraic Problems, 2nd ed., Springer, 1996, section IV.5: Radau IIA methods.
+.. [1] E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, Springer, 1996, IV.5.
 """
 
 from dataclasses import dataclass
@@ -98,10 +97,7 @@ def nonlinear_rotation(
 ) -> Array:
     """Compute the closing rotation of an arm in rad, (n, n_times), by the nonlinear model.
 
-    Raises
-    ------
-    BiogripError
-        If the torque closes the arms beyond what the model describes.
+    A torque that closes the arms beyond what the model describes is a `BiogripError`.
     """
     found = correction(gripper, network, torque).checked()
     linear = step_response(gripper, network)
@@ -111,14 +107,9 @@ def nonlinear_rotation(
 def correction(
     gripper: Gripper, network: Network, torque: Course, factors: Array | None = None
 ) -> Correction:
-    """Compute nonlinear minus linear rotation, without inertia.
+    """Compute nonlinear minus linear rotation of n samples, without inertia.
 
-    Parameters
-    ----------
-    gripper, network, torque
-        The arms, n samples, the protocol.
-    factors : (n,)
-        Factors on the torque of each sample, if any.
+    Factors on the torque of each sample, if any, are (n,).
     """
     arms = [gripper.left] if gripper.left == gripper.right else [gripper.left, gripper.right]
     response = step_response(gripper, network, inertia=False)

@@ -182,8 +182,8 @@ def joined(omega: Array, storage: Array, loss: Array) -> tuple[Array, Array]:
 def hold(duration_s: float, level: float) -> Phase:
     """Return a phase that holds what the instrument controls at a level, in SI units.
 
-    A gripper's level is the torque of both arms; in creep it is a stress or force, in relaxation a
-    strain or displacement.
+    Of a gripper it is the torque of both arms; in creep a stress or force, in relaxation a strain
+    or displacement.
     """
     return Phase(duration_s, level)
 
@@ -280,15 +280,9 @@ def with_steps(record: Array) -> tuple[Array, Array]:
 def follow_rows(time_s: Array, values: Array, *, deforms: bool) -> Course:
     """Return the protocol that goes through all rows of a record, from the first on.
 
-    Parameters
-    ----------
-    time_s : (n,)
-        Times from the start of the protocol, ascending, at least two; two rows of one time are a
-        step. Where nothing changes, rows make no phases of their own.
-    values : (n,)
-        What was controlled; at the first row it jumps there from zero.
-    deforms
-        True if that is a deformation.
+    Times from its start, (n,), ascend, at least two; two rows of one time are a step. What was
+    controlled, (n,), jumps there from zero at the first row; it may be what `deforms`. Where
+    nothing changes, rows make no phases of their own.
     """
     # Without its steps the course goes on from row to row.
     at_once = np.diff(time_s, append=np.inf) == 0
@@ -343,9 +337,9 @@ def _rates(time_s: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _quartics(time_s: Array, values: Array, bends: Array) -> tuple[Array, BoolArray]:
-    """Return the rates at rows, (n,), of quartics through five rows, and whether these are smooth.
+    """Return the rates at rows, (n,), of quartics through the nearest five, and which are smooth.
 
-    Rows are the nearest five; second derivatives at rows are (n,), those of the ends repeated.
+    Second derivatives at rows are (n,), those of the ends repeated.
     """
     count = len(values)
     rows = np.clip(np.arange(count) - _ASIDE, 0, count - _ROWS)[:, None] + np.arange(_ROWS)

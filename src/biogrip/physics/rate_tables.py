@@ -17,10 +17,8 @@ of responses, 3e-15.
 
 References
 ----------
-.. [1] L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapter 8:
-   convergence of Chebyshev interpolants within a Bernstein ellipse.
-.. [2] H. Cheng, Z. Gimbutas, P. G. Martinsson and V. Rokhlin, On the compression of low rank
-   matrices, SIAM Journal on Scientific Computing 26 (2005), 1389-1404: by QR with column pivoting.
+.. [1] L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapter 8.
+.. [2] H. Cheng et al., SIAM Journal on Scientific Computing 26 (2005), 1389-1404: pivoted QR.
 """
 
 from collections.abc import Callable
@@ -99,7 +97,7 @@ class DecayTable:
     def of(self, which: IntArray, rates: Array) -> Array:
         """Return selected sums, each of which depends on its own rate alone.
 
-        `which` holds indices of the sums, in a shape that broadcasts with that of the rates.
+        Indices of the sums broadcast with the rates.
         """
         place = np.fmin(np.log(1 - self._longest * rates) / (_WIDTH / _SHORTER), self._end)
         piece = place.astype(np.intp)
@@ -170,20 +168,9 @@ class ModeRows:
 class SpanningModes:
     """Modes whose responses to any course span those of all modes, slow and fast.
 
-    A course is a sum of jumps of its level, its rate, and so on. So columns are taken that stand
-    for all [2]_ from a matrix with a column a rate, of responses to any such jump after any time
-    from the shortest to T.
-
-    Parameters
-    ----------
-    end_s
-        T.
-    shortest_s
-        Shortest time of a reading after a change of what is controlled.
-    orders
-        Number of orders of the course.
-    deforms
-        True if a deformation is controlled.
+    A course is a sum of jumps of its level, its rate, and so on: of some orders. So columns are
+    taken that stand for all [2]_ from a matrix with a column a rate, of responses to any such jump
+    after any time from the shortest of a reading to the last, T.
     """
 
     def __init__(self, end_s: float, shortest_s: float, orders: int, *, deforms: bool) -> None:
@@ -201,7 +188,7 @@ class SpanningModes:
 def _spanning(halvings: int, orders: int, deforms: bool) -> tuple[Array, float, Array]:
     """Return rates of spanning modes over T, a rate beyond which nothing lasts, and a table.
 
-    It has coefficients of the share of each mode in that of any rate, piece by piece, (n_modes,
+    That has coefficients of the share of each mode in that of any rate, piece by piece, (n_modes,
     n_pieces + 1, degree + 1), see `ModeRows`.
     """
     # Imported here: the genetic algorithm does not need it, and loading takes long.

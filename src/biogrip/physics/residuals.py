@@ -102,16 +102,6 @@ class Residuals:
         """Standard deviation of the noise."""
         return self.trace.noise_sd
 
-    @property
-    def scatter(self) -> float:
-        """Standard deviation of the noise by neighbouring readings, which scales fits."""
-        return self.trace.scatter
-
-    @property
-    def rounding(self) -> float:
-        """Step that the readings are multiples of, or zero."""
-        return self.trace.rounding
-
     @cached_property
     def peak(self) -> float:
         """Largest reading without nuisance, in magnitude."""
@@ -126,19 +116,6 @@ class Residuals:
     def plain(self) -> bool:
         """True without nuisance functions and whitening."""
         return not (self.coloured or len(self.trace.condensed.nuisance))
-
-    @property
-    def condensed_trace(self) -> Array:
-        """Condensed rows of the trace, (n_rows,) in the unit of the readings."""
-        return self.trace.rows
-
-    def of_model(self, model: SampleModel) -> "Residuals":
-        """Return the residuals of another model against the same trace."""
-        return replace(self, model=model)
-
-    def with_freedom(self, freedom: float) -> "Residuals":
-        """Return a copy whose noise model is known with so many degrees of freedom."""
-        return replace(self, freedom=freedom)
 
     def later(self, change_s: float) -> "Residuals":
         """Return the residuals of the same trace for a protocol that starts later by some s."""
@@ -155,13 +132,7 @@ class Residuals:
         return same_rows and (self.gripper, self.model) == (other.gripper, other.model)
 
     def __call__(self, log_parameters: Array) -> tuple[Array, Array]:
-        """Return residuals, (n_samples,), and derivatives, (n_parameters, n_samples),.
-
-        Parameters
-        ----------
-        log_parameters : (n_parameters,)
-            Natural logarithms of the parameters in SI units.
-        """
+        """Return residuals, (n_samples,), and derivatives, (n_parameters, n_samples)."""
         rows = self._simulated(log_parameters[None], self.trace.time_s)[0]
         cleared = self.trace.condensed.cleared
         return cleared(rows[0]) - self.trace.cleared, cleared(rows[1:])
@@ -180,19 +151,8 @@ class Residuals:
     ) -> tuple[Array, Array]:
         """Compute gradients of half the sums of squares, and misfits, to all digits.
 
-        Parameters
-        ----------
-        log_parameters : (n, n_parameters)
-            Natural logarithms of the parameters in SI units.
-        others
-            For each of these, residuals that share the responses, of the trace to compare with.
-
-        Returns
-        -------
-        gradients : (n, n_parameters)
-            Of half the sums of squares, in the square of that unit.
-        misfits : (n,)
-            Root mean squares.
+        Log-parameters are (n, n_parameters); for each there are residuals that share the responses,
+        of the trace to compare with. Gradients are (n, n_parameters), root mean squares (n,).
         """
         n, parameters = log_parameters.shape
         sums = np.empty((n, 1 + parameters))
@@ -206,31 +166,15 @@ class Residuals:
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Compute condensed rows of the responses of many samples.
 
-        Parameters
-        ----------
-        log_parameters : (n, n_parameters)
-            Natural logarithms of the parameters in SI units.
-        slopes
-            True to compute derivatives.
-
-        Returns
-        -------
-        (n, 1 + n_parameters, n_rows)
-            First the response, then its derivatives by the log-parameters. Without
-            `slopes`, (n, 1, n_rows).
+        Of log-parameters, (n, n_parameters), they are (n, 1 + n_parameters, n_rows): first the
+        response, then its derivatives by these. Without `slopes`, (n, 1, n_rows).
         """
         given = self.gripper, self.model, self.course
         parameters, condensed = np.exp(log_parameters), self.trace.condensed
         return condensed.of_modes(compute_modes(*given, parameters, slopes=slopes))
 
     def misfit(self, parameters: Array) -> Array:
-        """Compute RMS misfits of a population, (n,), each independent of the others.
-
-        Parameters
-        ----------
-        parameters : (n, n_parameters)
-            Sample parameters in the model's order, SI units.
-        """
+        """Compute RMS misfits, (n,), of parameters, (n, n_parameters), each by itself."""
         misfit = np.empty(len(parameters))
         for some in parts(len(parameters), max(1, _NUMBERS_AT_ONCE // len(self.trace.rows))):
             responses = self.condensed_responses(np.log(parameters[some]), slopes=False)[:, 0]

@@ -67,24 +67,15 @@ class StepResponse:
     """In rad per N m, (n, n_arms, n_modes)."""
 
 
-def step_response(gripper: Gripper, network: Network, *, inertia: bool = True) -> StepResponse:
+def step_response(
+    gripper: Gripper, network: Network, *, inertia: bool = True, force: bool = False
+) -> StepResponse:
     """Solve the linear model for n samples at once (corrected eqs. 4-6).
 
-    With `inertia`, arms ring for milliseconds. Without, all rates are real and negative.
+    With `inertia`, arms ring for milliseconds. Without, all rates are real and negative, and a
+    parallel damper makes the force jump with the torque. The jaw `force`, in N per N m, takes the
+    place of an arm.
     """
-    return _solve(gripper, network, inertia=inertia, force=False)
-
-
-def jaw_force_response(gripper: Gripper, network: Network, *, inertia: bool = True) -> StepResponse:
-    """Compute the jaw force of n samples after unit torque steps, in N per N m.
-
-    The force takes the place of an arm. Without inertia a parallel damper makes the force jump with
-    the torque.
-    """
-    return _solve(gripper, network, inertia=inertia, force=True)
-
-
-def _solve(gripper: Gripper, network: Network, *, inertia: bool, force: bool) -> StepResponse:
     arms = Arms(gripper)
     impedance = arms.with_sample(network)
     zeros = impedance.zeros()
@@ -106,12 +97,9 @@ def _solve(gripper: Gripper, network: Network, *, inertia: bool, force: bool) ->
 def weights_of_loads(gripper: Gripper, network: Network) -> Array:
     """Compute weights of the modes without inertia under steps of either arm's load.
 
-    Returns
-    -------
-    (n, n_arms, n_loads, n_modes)
-        In rad per N m; loads are that of both arms and, where these differ, what that of the left
-        arm exceeds that of the right one by. Of equal arms, only that of both, and one stands for
-        both.
+    In rad per N m, (n, n_arms, n_loads, n_modes); loads are that of both arms and, where these
+    differ, what that of the left arm exceeds that of the right one by. Of equal arms, only that of
+    both, and one stands for both.
     """
     arms = Arms(gripper)
     impedance = arms.with_sample(network)
@@ -150,7 +138,7 @@ def superpose(
 def linear_jaw_force(response: StepResponse, course: Course, time_s: Array) -> Array:
     """Compute the jaw force of the linear model in N, (n, n_times), at any times.
 
-    The response is that of `jaw_force_response`; at the instant of a step: what follows it.
+    The response is that of the jaw force; at the instant of a step: what follows it.
     """
     force = np.zeros((len(response.rates), len(time_s)))
     rates = response.rates[:, :, None]
@@ -178,12 +166,8 @@ def _growth(order: int, rates: NDArray[Any], elapsed: Array) -> NDArray[Any]:
 def phi_functions(most: int, z: NDArray[Any]) -> list[NDArray[Any]]:
     """Compute phi_n(z) = (e^z - sum_{k<n} z^k/k!) / z^n for n = 0 ... most, at least 1.
 
-    Near zero, where that would cancel, the last is a series, and the others follow from it.
-
-    References
-    ----------
-    .. [1] M. Hochbruck and A. Ostermann, Exponential integrators, Acta Numerica 19 (2010),
-       209-286.
+    Near zero, where that would cancel, the last is a series, and the others follow from it (M.
+    Hochbruck and A. Ostermann, Acta Numerica 19 (2010), 209-286).
     """
     small = np.abs(z) < 1.0
     near, far = np.where(small, z, 0), np.where(small, 1, z)
@@ -269,8 +253,8 @@ class Arms:
     def rotations_apart(self, zeros: Zeros) -> Array:
         """Return N of the rotations under what the left load exceeds the right one by.
 
-        With these loads phi_2 = [Z_4/(Z_2 + Z_4) tau_2 + b^2 G/(Z_2 + Z_4) (tau_2 - tau_4)] / H.
-        The result is (n_arms, n_modes, n).
+        With these phi_2 = [Z_4/(Z_2 + Z_4) tau_2 + b^2 G/(Z_2 + Z_4) (tau_2 - tau_4)] / H. Returns
+        (n_arms, n_modes, n).
         """
         of_right, of_left = self.rotations(zeros)[0]
         through = -of_left * of_right

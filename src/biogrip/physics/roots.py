@@ -15,18 +15,12 @@ its digits, and no polynomial is needed, whose coefficients would span hundreds 
 
 References
 ----------
-.. [1] L. W. Ehrlich, A modified Newton method for polynomials, Communications of the ACM 10
-   (1967), 107-108.
-.. [2] O. Aberth, Iteration methods for finding all zeros of a polynomial simultaneously,
-   Mathematics of Computation 27 (1973), 339-344.
-.. [3] D. A. Bini, Numerical computation of polynomial zeros by means of Aberth's method,
-   Numerical Algorithms 13 (1996), 179-200: starting radii from the Newton polygon.
-.. [4] R.-C. Li, Solving secular equations stably and efficiently, LAPACK Working Note 89
-   (1994): both neighbouring poles matched in value and slope, the middle way.
-.. [5] J. R. Bunch, C. P. Nielsen and D. C. Sorensen, Rank-one modification of the symmetric
-   eigenproblem, Numerische Mathematik 31 (1978), 31-48.
-.. [6] N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM, 2002, section
-   1.8: the quadratic formula without cancellation.
+.. [1] L. W. Ehrlich, Communications of the ACM 10 (1967), 107-108.
+.. [2] O. Aberth, Mathematics of Computation 27 (1973), 339-344: all zeros simultaneously.
+.. [3] D. A. Bini, Numerical Algorithms 13 (1996), 179-200: starts from the Newton polygon.
+.. [4] R.-C. Li, LAPACK Working Note 89 (1994): the middle way, matched in value and slopes.
+.. [5] J. R. Bunch, C. P. Nielsen and D. C. Sorensen, Numerische Mathematik 31 (1978), 31-48.
+.. [6] N. J. Higham, Accuracy and Stability of Numerical Algorithms, SIAM, 2002, section 1.8.
 """
 
 from collections.abc import Callable, Sequence

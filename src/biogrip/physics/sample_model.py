@@ -184,9 +184,9 @@ class SampleModel:
     def in_order(self, parameters: Array) -> IntArray:
         """Order in which branches of samples, (n, n_parameters), relax, the fastest first.
 
-        A trace is the same whichever branch is called which; so that samples and fits
-        can be compared, branches are counted by their relaxation times c/k, and springpots by their
-        exponents. For every column it is the one that belongs there, (n, n_parameters), as of
+        A trace is the same whichever branch is called which; so that samples and fits can be
+        compared, branches are counted by their relaxation times c/k, and springpots by their
+        exponents. Returned is for every column the one that belongs there, as of
         `numpy.take_along_axis`.
         """
         order = np.tile(np.arange(len(self.names)), (len(parameters), 1))

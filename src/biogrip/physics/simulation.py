@@ -15,13 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.physics.gripper import Gripper, displacement_of_tip
+from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import mode_responses, relaxation
 from biogrip.physics.protocol import Course
 from biogrip.physics.response import (
     LEFT,
-    RIGHT,
-    jaw_force_response,
     linear_jaw_force,
     step_response,
     superpose,
@@ -43,7 +41,7 @@ def jaw_force(
     By either model, as in `simulated_response`; at the instant of a step: what follows it. Without
     inertia, the force may jump.
     """
-    response = jaw_force_response(gripper, network, inertia=inertia)
+    response = step_response(gripper, network, inertia=inertia, force=True)
     force = linear_jaw_force(response, course, time_s)
     if nonlinear:
         from biogrip.physics.nonlinear import correction
@@ -136,21 +134,6 @@ def simulated_response(
     return rotation
 
 
-def simulated_shortening(
-    gripper: Gripper, network: Network, course: Course, time_s: Array, *, nonlinear: bool
-) -> Array:
-    """Simulate the shortening of samples in m, (n, n_times); see `simulated_response`."""
-    if nonlinear:
-        from biogrip.physics.nonlinear import nonlinear_rotation
-
-        turns = (nonlinear_rotation(gripper, network, course, time_s, a) for a in (LEFT, RIGHT))
-        left, right = (displacement_of_tip(gripper, turn) for turn in turns)
-        return left + right
-    response = step_response(gripper, network)
-    both = superpose(response, course, time_s, LEFT) + superpose(response, course, time_s, RIGHT)
-    return gripper.lever_m * both
-
-
 # A ring of exp(-36) is lost in rounding.
 _EFOLDS_OF_RING = 36.0
 
@@ -182,16 +165,8 @@ def find_ring(
     """Return what shows of the ringing of arms on the first sample, or None.
 
     A parallel damper ends a ring. It only counts if it is seen when the ring is over, too: what
-    readings of a ring tell of it, without inertia, is the ring's.
-
-    Parameters
-    ----------
-    gripper, network, course
-        Arms, sample and protocol.
-    time_s : (n_samples,)
-        Sampling times.
-    in_noise
-        Turns a change of the readings, (n_samples,), into standard deviations of white noise.
+    readings of a ring tell of it, without inertia, is the ring's. `in_noise` turns a change of the
+    readings, (n_samples,), into standard deviations of white noise.
     """
     if not gripper.has_inertia:
         return None

@@ -62,12 +62,8 @@ def unilateral_response(
 ) -> UnilateralResponse:
     """Simulate the first sample in unilateral contact with the jaws, without inertia.
 
-    Times ascend; at the instant of a step: what follows it.
-
-    Raises
-    ------
-    BiogripError
-        If contact is lost too often.
+    Times ascend; at the instant of a step: what follows it. If contact is lost too often, it is a
+    `BiogripError`.
     """
     system, pieces = _System(gripper, network), list(_pieces(torque))
     most_torque = max(
@@ -146,8 +142,8 @@ def _pieces(torque: Course) -> Iterator[tuple[float, float, _Forcing]]:
 class _Modes:
     """Modes of a system of springs and dampers.
 
-    Of the springs G is given, (n_springs, n_states): the extension of each, times the root of its
-    stiffness, by the states; of the dampers L, (n_states, n_states), lower triangular.
+    G, (n_springs, n_states), has the extension of each spring, times the root of its stiffness; L,
+    (n_states, n_states), of the dampers is lower triangular.
     """
 
     def __init__(self, springs: Array, dampers: Array) -> None:
@@ -205,8 +201,8 @@ class _Motion:
 class _Stretch:
     """Solution from an instant on, with or without contact, as functions of the time since then.
 
-    The state, (n, n_times), is phi_2, phi_4, delta and the branches' dampers. The margin, which
-    may not become negative, is the contact force or the gap.
+    The state, (n, n_times), is phi_2, phi_4, delta and the branches' dampers. The margin, which may
+    not become negative, is the contact force or the gap.
     """
 
     state: Callable[[Array], Array]
@@ -290,10 +286,7 @@ class _System:
 
 
 def _coupled(arms: Array, shared: float, diagonal: Array) -> Array:
-    """Return the Cholesky factor of diag(c_2, c_4) + w (1, 1)(1, 1)^T, and roots beside it.
-
-    Written without cancellation.
-    """
+    """Return the Cholesky factor of diag(c_2, c_4) + w (1, 1)(1, 1)^T, and roots beside it."""
     c_2, c_4 = arms
     first = np.sqrt(c_2 + shared)
     second = np.sqrt(c_4 + shared * c_2 / (c_2 + shared))

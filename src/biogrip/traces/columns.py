@@ -261,7 +261,7 @@ def held_unit(value: float | str, controlled: Channel) -> tuple[float, str]:
         number, written = number_and_unit(str(value))
     except ValueError as error:
         raise BiogripError(f"--hold: {error}.") from error
-    unit = known_unit(written, controlled.units) if written else controlled.si
+    unit = known_unit(written, controlled.units) if written else controlled.unit or "1"
     if unit is None:
         allowed = ", ".join(controlled.units)
         found = f"found the unit '{shortened(written)}' of a {controlled.name}"
