@@ -80,10 +80,7 @@ class Lags:
         return np.log1p(self.covered_s[1] * self.rates), chosen[1:] | chosen[:-1]
 
     def are_close(self, chosen: BoolArray) -> bool:
-        """Return True if lags next to those that are chosen, (n_rates,), hardly differ from them.
-
-        Between the fastest two there is nothing to be told apart.
-        """
+        """Return True if lags next to chosen ones, (n_rates,), are close, but the fastest two."""
         places, beside = self._beside(chosen)
         return bool(np.max(np.diff(places)[:-1], where=beside[:-1], initial=0.0) < _CLOSE)
 
@@ -195,10 +192,7 @@ def spread_rates(
 
 
 def spread_lags(course: Course, time_s: Array, a_decade: int) -> list[float]:
-    """Return lags over a protocol's duration, see `lag_course`, so many a decade.
-
-    They are for readings at ascending times, (n_samples,).
-    """
+    """Return lags over a protocol, see `lag_course`, so many a decade, for ascending times."""
     shortest = _SHORTEST * float(np.diff(time_s).min()) / course.end_s
     count = 2 + int(a_decade * np.log10(_LONGEST / shortest))
     lags: list[float] = np.geomspace(shortest, _LONGEST, count).tolist()
@@ -206,10 +200,7 @@ def spread_lags(course: Course, time_s: Array, a_decade: int) -> list[float]:
 
 
 def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:
-    """Fit non-negative amplitudes of responses, (n, n_rows), to a trace, (n_rows,).
-
-    Returns the amplitudes, (n,), and the residual sum of squares.
-    """
+    """Fit amplitudes >= 0 of responses, (n, n_rows), to a trace; return the square sum, too."""
     # As many rows as functions have the same inner products.
     rows = np.asarray(np.linalg.qr(np.vstack((responses, trace)).T, mode="r"))
     sizes = np.linalg.norm(responses, axis=1)

@@ -77,8 +77,7 @@ class Experiment:
     start_given: bool = True
     """False if nothing says when the protocol of a recorded trace starts."""
     simulated: bool = False
-    """True if traces follow this experiment, so that neither start, offset, drift nor model are
-    doubted."""
+    """True if traces follow this experiment: neither start, offset, drift nor model are doubted."""
     models: tuple[str, ...] = ()
     """Sample models to compare, as in `CANDIDATES`."""
     cheap_models: bool = True
@@ -170,10 +169,7 @@ class Experiment:
         return not (self.coloured or self.uncertain)
 
     def calibrated(self, files: Sequence[Path]) -> "Experiment":
-        """Take the arms of the first calibration file (YAML), if there is one.
-
-        If it cannot be read, it is a `BiogripError`.
-        """
+        """Take the arms of the first calibration file; a bad one is a `BiogripError`."""
         if not files:
             return self
         # Imported here: a recorded trace has no such file.

@@ -87,24 +87,8 @@ def identify_many(
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Fit]:
-    """Identify samples of one model by the paper's genetic algorithm.
-
-    `progress` is called after every generation, for all problems together.
-    """
-    return [each.identification for each in evolve(problems, settings, rngs, progress)]
-
-
-@dataclass(frozen=True)
-class Evolution:
-    """The result of one run of the genetic algorithm, with its first and last survivors."""
-
-    identification: Fit
-    """Best individual and history."""
-    first_survivors: Array
-    """Parameters of the survivors of the initial population, best first, (n_survivors,
-    n_parameters)."""
-    last_survivors: Array
-    """Those of the last population."""
+    """Identify samples of one model by the paper's genetic algorithm, all at once."""
+    return [found for found, _, _ in evolve(problems, settings, rngs, progress)]
 
 
 def evolve(
@@ -112,8 +96,11 @@ def evolve(
     settings: GeneticSettings,
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
-) -> list[Evolution]:
-    """Identify samples as `identify_many` does, and return the survivors as well."""
+) -> list[tuple[Fit, Array, Array]]:
+    """Identify samples as `identify_many` does; return the first and last survivors as well.
+
+    They are parameters, best first, (n_survivors, n_parameters).
+    """
     misfits = combine_misfits([make_misfit(problem.residuals) for problem in problems])
     genome = problems[0].genome
 
@@ -166,16 +153,13 @@ def evolve(
         record()
         progress(evaluations_of_all, float(ranking[:, 0].min()))
     last[running] = survivors
-    survived = genome.decode(first), genome.decode(last)
-    found = [_identification(*each) for each in zip(courses, stalled.tolist(), strict=True)]
-    return [Evolution(*each) for each in zip(found, *survived, strict=True)]
-
-
-def _identification(course: list[Row], has_stalled: bool) -> Fit:
-    parameters, misfit, _, evaluations = course[-1]
-    why = "stalled" if has_stalled else "generation limit"
-    history = History.of(course)
-    return Fit(parameters, misfit, len(course) - 1, evaluations, why, history)
+    found = []
+    for course, has_stalled in zip(courses, stalled.tolist(), strict=True):
+        parameters, misfit, _, evaluations = course[-1]
+        why = "stalled" if has_stalled else "generation limit"
+        steps, history = len(course) - 1, History.of(course)
+        found.append(Fit(parameters, misfit, steps, evaluations, why, history))
+    return list(zip(found, genome.decode(first), genome.decode(last), strict=True))
 
 
 def select(
@@ -205,10 +189,7 @@ def _taken(individuals: NDArray[Any], which: IntArray) -> NDArray[Any]:
 def cross(
     parents: Chromosomes, settings: GeneticSettings, rngs: Sequence[np.random.Generator]
 ) -> Chromosomes:
-    """Produce children by single-point crossover; both children of a pair are kept.
-
-    Parents and children are (n_populations, n, n_genes), parents best first.
-    """
+    """Produce both children of pairs of parents, (n_populations, n, n_genes), best first."""
     populations, count, genes = parents.shape
     n_children = settings.population - settings.survivors
     pairs = -(-n_children // 2)

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from biogrip.arrays import Array
-from biogrip.fit.genetic import Evolution, GeneticSettings, evolve
+from biogrip.fit.genetic import GeneticSettings, evolve
 from biogrip.fit.least_squares import best_of_starts
 from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block
@@ -34,22 +34,16 @@ def identify_many(
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Fit]:
-    """Identify samples of one model by the genetic algorithm and local fits from its survivors.
-
-    `progress` is called after every generation, for all problems together, and finally for each.
-    """
+    """Identify samples of one model by the genetic algorithm and local fits from its survivors."""
     genetic, polishing = settings
     evolutions = evolve(problems, genetic, rngs, progress)
-    starts, before = zip(*(_survivors(each, polishing) for each in evolutions), strict=True)
+    starts, before = zip(*(_survivors(*each, polishing) for each in evolutions), strict=True)
     fine = best_of_starts(problems, starts, before, progress)
-    coarse = [evolution.identification for evolution in evolutions]
-    return [_polished(*both) for both in zip(coarse, fine, strict=True)]
+    return [_polished(coarse, own) for (coarse, _, _), own in zip(evolutions, fine, strict=True)]
 
 
-def _survivors(evolution: Evolution, chosen: Polishing) -> tuple[Array, Row]:
+def _survivors(coarse: Fit, first: Array, last: Array, chosen: Polishing) -> tuple[Array, Row]:
     """Return the starts of the fits, log-parameters, and the first row of their history."""
-    coarse = evolution.identification
-    last, first = evolution.last_survivors, evolution.first_survivors
     starts = np.concatenate((last[: chosen.last], first[: chosen.first]))
     median = float(coarse.history.median_misfit[-1])
     before = coarse.parameters, coarse.misfit, median, coarse.evaluations

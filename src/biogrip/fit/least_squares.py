@@ -26,19 +26,13 @@ from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silen
 from biogrip.keys import Block
 
 PRIOR_WIDTH = 100.0
-"""Standard deviation, in e-folds, of the Gaussian prior about the middle of each range.
-
-The prior changes an estimate only by the square of (standard deviation / 100 e-folds).
-A parameter that the trace does not inform ends in the middle of the range left to it.
-Without the prior, rounding errors would place it, and these differ between processors.
-"""
+"""Standard deviation, in e-folds, of the Gaussian prior about the middle of each range. It changes
+estimates by the square of (standard deviation / 100 e-folds), and places a parameter that the
+trace does not inform, which rounding would place."""
 
 ROUGH, FAIR, FINE = 1e-5, 1e-6, 1e-8
-"""Relative decrease of the sum of squares below which a fit has converged.
-
-`ROUGH` distinguishes basins, `FAIR` gives chi^2 of some thousand readings to 0.01, `FINE` gives
-the optimum. All are far above rounding errors, so that every machine stops at the same step.
-"""
+"""Relative decrease of the sum of squares below which a fit has converged, to tell basins, to give
+chi^2 of some thousand readings to 0.01, and the optimum: far above rounding errors."""
 
 # Step of the differences of exact first derivatives that give second derivatives of residuals.
 _APART = 1e-4
@@ -77,10 +71,7 @@ class LocalFits:
         self._middle = 0.5 * (self.low + self.high)
 
     def normal(self, x: Array, trace: IntArray) -> Normal:
-        """Return the normal equations of the residuals, in units of the noise, and the prior.
-
-        They are at log-parameters, (n, n_parameters), each compared with a trace by index, (n,).
-        """
+        """Return normal equations, in the noise and with the prior, at points, each for a trace."""
         size = max(1, _AT_ONCE // (self._traces.shape[1] * (1 + x.shape[1])))
         normals = []
         for some in parts(max(len(x), 1), size):
@@ -89,11 +80,7 @@ class LocalFits:
         return Normal.joined(normals) if len(normals) > 1 else normals[0]
 
     def curved(self, x: Array, trace: IntArray) -> Normal:
-        """Return normal equations with the full Hessian in place of its Gauss-Newton part.
-
-        The Gauss-Newton part lacks residuals times their second derivatives. Only these
-        derivatives are finite differences, so that their error vanishes with the residuals.
-        """
+        """Return normal equations with all of the Hessian, in part from differences of slopes."""
         normals = []
         numbers = 2 * x.shape[1] * (1 + x.shape[1]) * self._traces.shape[1]
         for some in parts(len(x), max(1, _AT_ONCE // numbers)):
@@ -263,11 +250,7 @@ def _best_of_alike(
     progress: Progress,
 ) -> list[Fit]:
     fits, traces = LocalFits(problems), np.arange(len(problems))
-    trace = np.repeat(traces, [len(own_starts) for own_starts in starts])
-    rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
-    # Rough fits show which basins are deepest; only the best are continued to the optimum.
-    finalists = np.concatenate([_best(rough, trace == own, FINISHED) for own in traces])
-    fine, trace_of_fine = fits.fitted(rough.x[finalists], trace[finalists]), trace[finalists]
+    rough, trace, fine, trace_of_fine = _finished(fits, starts)
     winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
     best = refine_optima(fits, fine[winners], traces)
     answers = []
@@ -282,6 +265,18 @@ def _best_of_alike(
         given = rows[-1][0], misfit, steps, evaluations, why, History.of(rows), converged
         answers.append(Fit(*given))
     return answers
+
+
+def _finished(
+    fits: LocalFits, starts: Sequence[Array]
+) -> tuple[Minima, IntArray, Minima, IntArray]:
+    """Fit roughly from all starts, then finely from the best; return both with their traces."""
+    trace = np.repeat(np.arange(len(starts)), [len(own_starts) for own_starts in starts])
+    rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
+    # Rough fits show which basins are deepest; only the best are continued to the optimum.
+    best = [_best(rough, trace == own, FINISHED) for own in range(len(starts))]
+    finalists = np.concatenate(best)
+    return rough, trace, fits.fitted(rough.x[finalists], trace[finalists]), trace[finalists]
 
 
 def _best(found: Minima, which: BoolArray, count: int) -> IntArray:

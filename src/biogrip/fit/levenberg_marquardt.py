@@ -65,8 +65,7 @@ class Normal(Rows):
     gradient: Array
     """Half its gradient, (n, n_parameters)."""
     information: Array
-    """Half its Hessian, in the Gauss-Newton approximation unless noted otherwise, (n, n_parameters,
-    n_parameters)."""
+    """Half its Hessian, (n, n_parameters, n_parameters), by Gauss-Newton unless noted otherwise."""
     misfit: Array
     """RMS misfit to the trace, (n,)."""
 
@@ -230,11 +229,7 @@ def _free_step(gradient: Array, information: Array, damping: Array, fixed: BoolA
 
 
 def _solved(matrix: Array, vector: Array) -> Array:
-    """Solve positive definite systems, (n, size, size) and (n, size), by elimination.
-
-    For such small matrices, taking each elimination step for all systems is several times as
-    fast as solving one system after the other, as a library does.
-    """
+    """Solve small positive definite systems, each step of elimination for all: for speed."""
     a, b = matrix.transpose(1, 2, 0).copy(), vector.T.copy()
     size = len(b)
     for row in range(size - 1):

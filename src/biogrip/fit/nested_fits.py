@@ -105,9 +105,9 @@ def fit_models(
             points = [within_range(start, problem) for start in of_contained]
             points += [near[name][trace]] if near and name in near else []
             further.append(np.reshape(points, (-1, len(problem.low))))
-        own, (points, starts) = settings, _FEWER
+        own, (fewer, few) = settings, _FEWER
         if CANDIDATES[name].model.power_law:
-            own = LeastSquaresSettings(-(-own.candidates // points), -(-own.starts // starts))
+            own = LeastSquaresSettings(-(-own.candidates // fewer), -(-own.starts // few))
         found[name] = identify_many(problems[name], own, rngs[name], silent, further)
         found[name] = deepen(problems[name], found[name])
         done()
@@ -119,10 +119,7 @@ def fit_models(
 def _of_contained(
     name: str, found: Mapping[str, Answers], trace: int, longest_s: float
 ) -> Iterator[Array]:
-    """Yield the optima of nested models as starts, in the richer model's own parameters.
-
-    Elements that have vanished start at two finite sizes: noticeable, and hardly noticeable.
-    """
+    """Yield nested optima as starts; what has vanished is noticeable, or hardly noticeable."""
     kinds = np.array([parameter.kind for parameter in CANDIDATES[name].model.parameters])
     for inner in different_in(name, found):
         parameters = as_richer(name, inner, found[inner][trace].parameters)
@@ -297,10 +294,7 @@ def one_branch_more(tried: Sequence[FittedModel]) -> str | None:
 
 
 def advice(tried: Sequence[FittedModel], chosen: str, *, adequate: bool = True) -> str:
-    """State in a sentence whether BIC prefers another of the models tried to the chosen one.
-
-    If what is preferred is not `adequate`, none of them is.
-    """
+    """State in a sentence whether BIC prefers another of the models tried, if adequate, to one."""
     own, best = _own_and_best(tried, chosen)
     title = own.model.title[0].upper() + own.model.title[1:]
     if best is own:

@@ -64,8 +64,7 @@ class Fit:
     generations: int
     """Number of steps: generations, or local fits."""
     evaluations: int
-    """Number of simulated responses; a response with its derivatives counts as one. Those of the
-    final Newton refinement are not counted."""
+    """Number of simulated responses, with derivatives or not, but for the last Newton steps."""
     stop_reason: str
     """Reason why the method stopped."""
     history: History = field(repr=False)
@@ -139,8 +138,7 @@ class Method:
     step: str
     """Name of a step of the method, after each of which its history has a row."""
     color: str
-    """Colour of its lines in figures, as no other method's: a name in
-    `biogrip.figures.style.COLORS`."""
+    """Colour of its lines in figures, its own, of `biogrip.figures.style.COLORS`."""
     dashes: str
     """Their dashes, as Matplotlib has them."""
     exact: bool = False
@@ -152,17 +150,10 @@ class Method:
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
+        Method("genetic", "genetic algorithm", ("genetic_algorithm",), "generation", "grey", "-"),
         Method(
-            name="genetic",
-            title="genetic algorithm",
-            blocks=("genetic_algorithm",),
-            step="generation",
-            color="grey",
-            dashes="-",
-        ),
-        Method(
-            name="genetic_refined",
-            title="genetic, polished",
+            "genetic_refined",
+            "genetic, polished",
             blocks=("genetic_algorithm", "genetic_refined"),
             step="generation, then local fit",
             color="vermilion",
@@ -171,8 +162,8 @@ METHODS: dict[str, Method] = {
             sure=True,
         ),
         Method(
-            name="least_squares",
-            title="multi-start least squares",
+            "least_squares",
+            "multi-start least squares",
             blocks=("least_squares",),
             step="local fit",
             color="blue",
@@ -181,8 +172,8 @@ METHODS: dict[str, Method] = {
             sure=True,
         ),
         Method(
-            name="differential_evolution",
-            title="differential evolution",
+            "differential_evolution",
+            "differential evolution",
             blocks=("differential_evolution",),
             step="generation",
             color="purple",
@@ -191,7 +182,6 @@ METHODS: dict[str, Method] = {
         ),
     )
 }
-
 
 Identify = Callable[[Sequence[TraceProblem], Sequence[np.random.Generator], Progress], list[Fit]]
 """Identifies traces as the ``identify_many`` of a method does, with its settings."""

@@ -166,10 +166,7 @@ def fit_least_squares(
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[TraceFit]:
-    """Fit traces by least squares from many starts, each with random numbers of its own.
-
-    See `fit_traces`; all experiments have the same budget.
-    """
+    """Fit traces as `fit_traces` does, by least squares from many starts, with random numbers."""
 
     def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
         of_traces = [rngs[trace] for trace in which]

@@ -5,11 +5,9 @@ with the standard error s_i, from its limits. A mean of cells weighs each by 1/(
 tau^2 after DerSimonian and Laird (Controlled Clinical Trials 7 (1986), 177-188).
 
 Where dishes, animals or days were repeated, these are the units: a group is the mean of the means
-of its units, with the limits of Student's t (Lord, Velle, Mullins and Fritz-Laylin, Journal of Cell
-Biology 219 (2020), e202001064). Without units cells are taken for independent, with limits after
-Hartung and Knapp, never closer than the weights say (Roever, Knapp and Friede, BMC Medical Research
-Methodology 15 (2015), 99).
-
+of its units, with the limits of Student's t (Lord et al., Journal of Cell Biology 219 (2020),
+e202001064). Without units cells are taken for independent, with limits after Hartung and Knapp,
+never closer than the weights say (Roever et al., BMC Medical Research Methodology 15 (2015), 99).
 Two groups are compared by Welch's t, several with the first after Holm (Scandinavian Journal of
 Statistics 6 (1979), 65-70).
 """
@@ -140,10 +138,7 @@ def adjusted(p_values: Sequence[float]) -> list[float]:
 
 
 def unit_means(cells: Sequence[Cell], quantity: str) -> dict[str, float]:
-    """Return means of logarithms of units of one group.
-
-    A unit counts if no fewer of its cells determine the quantity than do not.
-    """
+    """Return means of logarithms of units, of which no more cells are unknown than known."""
     of: dict[str, list[tuple[float, float] | None]] = defaultdict(list)
     for cell in cells:
         of[cell.unit].append(cell.known.get(quantity))

@@ -186,10 +186,7 @@ class QuantityConstraint:
 
 
 CLOSE = 1e-7
-"""Tolerance of fits that give chi^2 of some thousand readings to 0.001.
-
-Along a valley, a fit to the last digit takes three times as many steps.
-"""
+"""Tolerance of fits that give chi^2 to 0.001; to the last digit takes three times as many steps."""
 
 
 class ConstrainedFits:
@@ -275,10 +272,7 @@ class ConstrainedFits:
         return increases
 
     def slowest(self, profile: int) -> float | None:
-        """Return the relaxation time in s of a branch, if it is too slow for a profile's quantity.
-
-        It is that of the trace's optimum.
-        """
+        """Return the relaxation time in s of a branch of an optimum that is too slow, if any."""
         quantity = self.quantities[profile % len(self.quantities)]
         best, last_s = self.best[profile], self._residuals.duration_s
         times = [

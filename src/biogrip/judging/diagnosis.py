@@ -284,11 +284,7 @@ def _too_slow(judged: Diagnosis) -> Iterator[Note]:
 
 
 def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
-    """Yield a note for each parameter that the data push beyond an end of its search range.
-
-    The fit is repeated from beyond the end, with a wider range for this parameter. If the element
-    may as well vanish, chi^2 does not fall, and no note is due.
-    """
+    """Yield a note for each parameter that a wider range takes clearly beyond an end of its."""
     problem, x = likelihood.problem, likelihood.best
     for index, parameter in enumerate(model.parameters):
         for end, outward, word in ((problem.low, -1.0, "lower"), (problem.high, 1.0, "upper")):
@@ -312,11 +308,7 @@ def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
 
 
 def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
-    """Yield a note if the trace shows the arms ringing, which fits leave out.
-
-    The parallel damper has the least value that the trace allows. Ringing may be why a fit is
-    rejected, and only what rejects it is said of such a fit; its misfit is no noise.
-    """
+    """Yield a note if the arms, with the least parallel damper, ring in the trace."""
     likelihood = judged.likelihood
     residuals = likelihood.problem.residuals
     network = residuals.model.network(np.exp(likelihood.best))
@@ -341,10 +333,7 @@ def _rounded_up(value: float) -> str:
 
 
 def _pulling(grip: Grip | None, last_s: float) -> Iterator[Note]:
-    """Yield a note if, with the best fit, the jaws would have to pull at the sample.
-
-    A loss of contact would show in the misfit: with a good fit the sample stuck.
-    """
+    """Yield a note if, with the best fit, the jaws would have to pull at the sample."""
     if grip is not None and grip.pulls_from_s is not None and grip.pulls_from_s <= last_s:
         yield Note(
             HARMLESS,

@@ -100,8 +100,7 @@ class Remainder:
     notes: list[Note]
     """Doubts about it and about the noise that was given."""
     misfit: tuple[float, float] | None = None
-    """If limits allow for a misfit, how many independent residuals it is worth, and its freedom:
-    see `biogrip.judging.whiteness.as_correlated`."""
+    """If limits allow for a misfit, its worth in independent residuals and its freedom."""
 
 
 def examine_residuals(likelihood: Likelihood) -> Remainder:
@@ -185,10 +184,7 @@ def _misfit(
     times: float,
     scale: float,
 ) -> Remainder:
-    """Return the note on a misfit that is some times the noise, and whether it widens limits.
-
-    Given are residuals with slopes, and those that are no outliers with what the fit absorbs.
-    """
+    """Return the note on a misfit that is some times the noise, and whether it widens limits."""
     if has_uneven_noise(left[0], residuals.trace.rounding):
         text = (
             "The noise differs from one part of the trace to another, and the intervals do not "
@@ -230,10 +226,7 @@ def _misfit(
 
 
 def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
-    """Return what is wrong where a model's misfit is some times the scale of the noise.
-
-    What any linear sample leaves is noise, or no model's fault.
-    """
+    """Return what is wrong where a misfit is some times the noise, by what any sample leaves."""
     fit = fit_any_sample(residuals)
     other = fit.sd / scale
     noises = counted(plain(other, 2), "noise")
@@ -278,10 +271,7 @@ def _about_colour(
     chance: float,
     suspects: Callable[[], str],
 ) -> Iterator[str]:
-    """Yield a sentence for each test of white noise that residuals, (n_samples,), fail.
-
-    The correlation of neighbours and its chance are given.
-    """
+    """Yield a sentence for each test of white noise that residuals, (n_samples,), fail."""
     if chance < levels.FALSE_ALARM:
         yield (
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
@@ -326,10 +316,7 @@ def _lines(residual: Array, basis: Array, residuals: Residuals, scale: float) ->
 def _about_changes(
     residuals: Residuals, residual: Array, basis: Array, growth: Array, *, coloured: bool
 ) -> list[str]:
-    """Return a sentence on a change within the trace, if it explains what its fit leaves.
-
-    Residuals, (n_samples,), are over the growth of the noise; they may seem to be coloured.
-    """
+    """Return a sentence on a change within the trace, if it explains what its fit leaves."""
     trace = residuals.trace
     if residuals.course.sweeps:
         return [] if coloured else list(about_moduli(residuals, residual, basis, growth))

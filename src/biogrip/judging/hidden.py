@@ -17,8 +17,8 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.noise_model_fit import absorbed
+from biogrip.judging import levels
 from biogrip.judging.doubts import MANY, middle_of
-from biogrip.judging.levels import FALSE_ALARM
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.verdicts import Finding
 from biogrip.judging.whiteness import Steps, averaged, parts_apart, steps_of
@@ -27,9 +27,6 @@ from biogrip.physics.noise import without
 
 # Times of a jump and of a changed gain, in shares of the readings.
 _SHARES = np.linspace(0.1, 0.9, 9)
-# Largest errors that may well be: a fifth of the peak, or of the readings; as late as readings are
-# apart at first; half of the first branch.
-_JUMP, _GAIN, _BRANCH = 0.2, 0.2, 0.5
 # Onsets and strengths of finite differences, as shares of the first interval and of the branch; and
 # relaxation times of a second branch over that of the first.
 _LATE, _WEAK, _TIMES = 1e-3, 1e-3, (0.1, 10.0)
@@ -58,10 +55,7 @@ class Hidden:
 
 
 def find_hidden(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Hidden]:
-    """Return the worst error of each kind, of those that move a quantity with two limits.
-
-    Of more readings than slopes are computed of, none are looked for.
-    """
+    """Return the worst error of each kind that moves a quantity with two limits, none of `MANY`."""
     residuals, best = likelihood.problem.residuals, likelihood.best
     limited = [each for each in findings if each.low is not None and each.high is not None]
     if residuals.samples > MANY or not limited:
@@ -97,41 +91,35 @@ def _beyond(finding: Finding, moves: dict[str, float]) -> float:
 
 
 def _told(left: Array, basis: Array, steps: Steps, split: int) -> float:
-    """Return an error over the size that the most sensitive test just misses.
-
-    What a fit leaves of it is in standard deviations of the noise, (n_samples,).
-    """
+    """Return an error, (n_samples,) in noise, over the size that the most sensitive test misses."""
     from scipy.special import chdtri
 
     scanned = np.abs(steps.shapes @ left) / steps.norms
-    found = [float(np.max(scanned, initial=0.0)) / steps.critical(FALSE_ALARM)]
+    found = [float(np.max(scanned, initial=0.0)) / steps.critical(levels.FALSE_ALARM)]
     for rows in (parts_apart(basis, split), averaged(basis)):
         if len(rows):
             # Of a sum of squares with as many degrees of freedom the mean is that of noise.
-            more = chdtri(len(rows), FALSE_ALARM) - len(rows)
+            more = chdtri(len(rows), levels.FALSE_ALARM) - len(rows)
             found.append(float(np.linalg.norm(rows @ left) / np.sqrt(more)))
     return max(found)
 
 
 def _planted(likelihood: Likelihood) -> Iterator[tuple[str, str, float, float, Array]]:
-    """Yield kind, words, factor of the size in words, most, and shape of each error, (n_samples,).
-
-    A shape is for an error of size one.
-    """
+    """Yield kind, words, factor of the size in words, most, and shape of each error of size one."""
     residuals, best = likelihood.problem.residuals, likelihood.best
     time_s, response, peak = residuals.trace.time_s, residuals.response(best), residuals.peak
     count = len(time_s)
     for before in np.unique((_SHARES * count).astype(np.int64)).tolist():
         after, at = (np.arange(count) >= before).astype(float), plain(time_s[before], 2)
-        yield "jump", f"a jump of {{}} % of the peak at {at} s", 100, _JUMP, peak * after
-        yield "gain", f"a gain that changes by {{}} % at {at} s", 100, _GAIN, after * response
+        yield "jump", f"a jump of {{}} % of the peak at {at} s", 100, levels.JUMP, peak * after
+        yield "gain", f"a gain that changes by {{}} % at {at} s", 100, levels.GAIN, after * response
     late_s = _LATE * float(np.min(np.diff(time_s)))
     later = residuals.later(late_s).response(best)
     apart_s = float(time_s[1] - time_s[0])
     yield "start", "a start that is late by {} s", 1, apart_s, (later - response) / late_s
     for tau, shape in _second_branch(likelihood, response):
         words = f"a second branch of {plain(tau, 2)} s with {{}} % of its stiffness"
-        yield "branch", words, 100, _BRANCH, shape
+        yield "branch", words, 100, levels.BRANCH, shape
 
 
 def _second_branch(likelihood: Likelihood, response: Array) -> Iterator[tuple[float, Array]]:

@@ -56,6 +56,56 @@ UNEVEN = 3.0
 AS_THE_SCATTER = 1.44
 """Mean square over that of the scatter up to which noise may be white: 1.05 to 1.4 if it is."""
 
+TOLD = 0.03
+"""Least share of a reading's variance, or of a step's squares, that a fit leaves where it is told:
+a fit that absorbs more follows the reading. Chosen."""
+
+TWO_MORE = 4.0
+"""Decrease of the deviance by which a misfit is no white noise: AIC's price of its two numbers."""
+
+FEWEST_INDEPENDENT, LEAST_FREEDOM = 0.3, 3.0
+"""A misfit that is smooth over half a trace would seem worth next to nothing: so few hardly lower
+the share of limits that hold (`tests/judging/test_whiteness.py`)."""
+
+PERIODS, EVEN = 10, 0.01
+"""Fewest periods of a line, as what is slower may be misfit, and the largest difference of
+intervals, as a share, with which it has a spectrum. Chosen."""
+
+JUMP, GAIN, BRANCH = 0.2, 0.2, 0.5
+"""Largest errors that a trace may well hide: a fifth of the peak, or of the readings; half of the
+stiffness of the first branch. Chosen."""
+
+# The start of a protocol.
+
+SURELY, AS_GOOD = 1e-9, 1e-3
+"""Levels of the tests for a late start or another clock, so that correlated noise does not look
+like one, and for a tare or a clock that fits as well, one trace in a thousand."""
+
+UNLIKE = 0.05
+"""Level at which another start fits worse than the best: 5 %, as that of limits."""
+
+CONSTANT, CONSTANT_OF_PEAK, FEWEST_BEFORE = 2.0, 1e-3, 3
+"""Standard deviation of constant readings, in noise and in peaks of noise-free traces, and fewest
+of which it is known. Chosen."""
+
+OFFSET = 40.0
+"""Fall of chi^2 by which an offset is better than a late start: by chance once in a billion."""
+
+DELAYED, FEWEST_APART, PLANNED = 10.0, 3, (0.5, 1.5)
+"""First intervals from a change to the first reading of a trace that is cut off, fewest readings by
+which their growth is known, and its powers of the time if someone spaced them. Chosen."""
+
+HELD = 0.1
+"""Change of a recorded load, as a share of it, that is held. Chosen."""
+
+WHITE = 1.5
+"""Misfit over the scatter of neighbours that a right fit does not exceed. Chosen, above `TOO_MUCH`:
+it accuses a clock."""
+
+KNOWN_START = 0.1
+"""Share of the time between readings to which a fitted start must be known to tell a ring. Chosen:
+a ring lasts for less than an interval."""
+
 # Limits and verdicts.
 
 CERTAIN = 0.999
@@ -64,10 +114,7 @@ the range ends there is chosen, and must not decide."""
 
 MISSED = 0.05
 """Increase of chi^2, from the weak prior of local fits, beyond which a fit is not the optimum: an
-eightieth of what moves a 95 % limit.
-
-A fit that is deeper than an optimum by more shows that the optimum is not the global one.
-"""
+eightieth of what moves a 95 % limit."""
 
 WIDE = 3.0
 """Limits further than this factor from their middle tell little more than an order of magnitude:
@@ -96,10 +143,9 @@ often as each of the next values, and fewest values."""
 # Impossible traces, which are refused.
 
 SMALLEST_SHARE, LARGEST_SHARE = 2e-3, 1.5
-"""Plausible rotations over that of the free arm. No sample makes the arm turn further than without
-it: the excess allows for errors of the fit and of the gripper's stiffness. The paper's stiffest
-sample turns it by 8e-3. The ratio, 750, is below 1000, so that no trace passes both in its unit
-and in one a thousand times larger or smaller."""
+"""Plausible rotations over that of the free arm, which no sample exceeds but for errors of fit and
+stiffness; the paper's stiffest sample turns it by 8e-3. The ratio is below 1000, so that no
+trace passes both in its unit and in one a thousand times larger or smaller."""
 
 SHORTEST_SHARE = 0.02
 """Share of the protocol that a trace must cover: more than min/h = s/min = 1/60."""

@@ -48,11 +48,9 @@ class Likelihood:
     noise_sd: float
     """Standard deviation of the noise, known or estimated from the residual."""
     threshold: float
-    """Increase of chi^2 at the confidence limits. It is that of an interval with two ends: a single
-    limit is one of these ends, and holds with more than the confidence."""
+    """Increase of chi^2 at the limits of an interval: a single limit holds with more confidence."""
     certainty: float
-    """Increase that a profile must reach at an end of the range to have a limit on that side. A
-    profile that levels off between `threshold` and this would have a limit by chance alone."""
+    """Increase that a profile must reach at an end of the range to have a limit on that side."""
     freedom: float = inf
     """Degrees of freedom of the noise's estimated variance; infinite if the noise is known."""
     confidence: float = 0.95
@@ -111,10 +109,7 @@ def make_likelihood(
     confidence: float,
     noise_sd: float | None = None,
 ) -> Likelihood:
-    """Compute the noise and the thresholds for the profile likelihoods of a trace.
-
-    Without the standard deviation of the noise, it is estimated from the misfit.
-    """
+    """Compute noise, by default from the misfit, and thresholds for the profiles of a trace."""
     freedom = inf
     if noise_sd is None:
         left = problem.residuals.free - len(best)
@@ -125,10 +120,7 @@ def make_likelihood(
 
 
 def check_rows(likelihood: Likelihood) -> None:
-    """Raise an `ArithmeticError` if the condensed rows have another misfit than the readings.
-
-    Profiles, which see the rows alone, would then have limits around another optimum.
-    """
+    """Raise an `ArithmeticError` if rows, as profiles see them, have not the readings' misfit."""
     residuals, best = likelihood.problem.residuals, likelihood.best
     of_rows = float(residuals.misfit(np.exp(best)[None])[0])
     of_readings = float(np.sqrt(np.mean(residuals.left(best) ** 2)))
@@ -143,10 +135,7 @@ def check_rows(likelihood: Likelihood) -> None:
 
 
 def find_thresholds(confidence: float, freedom: float) -> tuple[float, float]:
-    """Return the increases of chi^2 at limits and at `CERTAIN`, by the freedom of the noise.
-
-    If the noise is known, chi-squared of one degree of freedom, 3.84 at 95 %; else F(1, freedom).
-    """
+    """Return increases of chi^2 at limits and at `CERTAIN`: chi-squared(1), or F(1, freedom)."""
     from scipy.special import fdtri
 
     levels = confidence, CERTAIN

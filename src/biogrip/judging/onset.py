@@ -1,21 +1,17 @@
 """When the protocol of a recorded trace starts: found, doubted, and allowed for in limits.
 
-`estimate_onset` needs no sample model: the trace is fitted by any sample's possible responses to
-the delayed torque, and the delay with the least residual sum of squares is found on ever finer
-grids. `OnsetFits` fits the onset along with a sample. Where a rotation jumps between two readings,
-the misfit as a function of the onset has a step at every one: it is smooth only between
-neighbouring ones, and is minimised there, from one interval to the next.
+`estimate_onset` needs no sample model: of delays on ever finer grids it takes the one with which
+any sample's possible responses leave least. `OnsetFits` fits the onset along with a sample. Where a
+rotation jumps between two readings, the misfit as a function of the onset has a step at every one:
+it is minimised between neighbouring ones, from one interval to the next.
 
-`notes_on_start` tests a trace of which nothing says when its protocol starts: if it begins before
-that, or so long after it that the clock may be another's. It says what a tare would change, and a
-ramp that ends before the first reading.
+`notes_on_start` tests if a trace begins before its protocol, or so long after it that the clock may
+be another's; it says what a tare would change, and a ramp before the first reading.
 
-`profile_over_onset` widens limits for an onset that is fitted along. A quantity's profile is the
-lowest of those for single onsets, each in its increase over the best fit with the best onset. So a
-limit is the outermost of the limits for single onsets, with the threshold less the increase that
-the onset itself costs. Onsets are taken all over their own confidence interval, closer at its ends,
-as on a circle: with nine the limits of an elliptic region are short by at most five per cent.
-Linear approximations fail at the kinks.
+`profile_over_onset` takes the lowest of the profiles for single onsets, each in its increase over
+the best fit with the best onset. Onsets are taken all over their own confidence interval, closer at
+its ends, as on a circle: with nine the limits of an elliptic region are short by at most five per
+cent. Linear approximations fail at the kinks.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,6 +29,7 @@ from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import TraceProblem, silent
+from biogrip.judging import levels
 from biogrip.judging.diagnosis import RING, Diagnosis
 from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
@@ -51,12 +48,6 @@ _MOST_READINGS = 2000
 _LEAST_AFTER = 0.02
 # Readings after the latest onset, beside one for each parameter.
 _MORE_AFTER = 2
-# Fewest readings before an onset by which a late one is recognised.
-_FEWEST_BEFORE = 3
-# Standard deviation of readings that are constant, in noise, and in peaks of noise-free traces.
-_CONSTANT, _CONSTANT_OF_PEAK = 2.0, 1e-3
-# Fall of χ² by which an offset is better than a late onset: by chance once in a billion.
-_CLEARLY = 40.0
 _BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
 # Most steps of a fit, and intervals that it goes through; smooth intervals around an onset.
 _MOST_STEPS, _NEAR = 200, 2
@@ -76,8 +67,8 @@ def estimate_onset(problem: Experiment, time_s: Array, readings: Array) -> float
         return onset_s
     # Constant is an instrument with an offset, or a sample that has yielded at once.
     other_s, other = _estimate(problem, time_s, readings, offset=True)
-    noise = max(other, (_CONSTANT_OF_PEAK * float(np.ptp(readings))) ** 2)
-    return other_s if len(time_s) * (rest - other) > _CLEARLY * noise else onset_s
+    noise = max(other, (levels.CONSTANT_OF_PEAK * float(np.ptp(readings))) ** 2)
+    return other_s if len(time_s) * (rest - other) > levels.OFFSET * noise else onset_s
 
 
 def _estimate(
@@ -114,12 +105,12 @@ def begins_constant(time_s: Array, readings: Array, onset_s: float | None = None
 
     Without an onset, the first few readings are looked at. The last one before it may be on a ramp.
     """
-    before = readings[:_FEWEST_BEFORE]
+    before = readings[: levels.FEWEST_BEFORE]
     if onset_s is not None:
         before = readings[time_s < onset_s][:-1]
     noise_sd, peak = estimate_noise(readings), float(np.ptp(readings))
-    size = max(_CONSTANT * noise_sd, _CONSTANT_OF_PEAK * peak)
-    return len(before) >= _FEWEST_BEFORE and bool(np.std(before) < size)
+    size = max(levels.CONSTANT * noise_sd, levels.CONSTANT_OF_PEAK * peak)
+    return len(before) >= levels.FEWEST_BEFORE and bool(np.std(before) < size)
 
 
 @dataclass(frozen=True)
@@ -224,11 +215,7 @@ class OnsetFits:
         return OnsetFit(float(fit.x[-1]), fit.x[:-1], misfit)
 
     def _smooth_intervals(self, onset_s: float) -> Iterator[tuple[float, float]]:
-        """Yield intervals of onsets around one, within which no reading passes a change of torque.
-
-        An onset before the first reading passes none, however early: the first interval then
-        begins some times as far before it.
-        """
+        """Yield intervals of onsets around one, in which no reading passes a change of torque."""
         changes_s = self._identified.torque.changes_s
         edges = np.unique(np.subtract.outer(self.time_s, changes_s))
         equal_s = _ROUNDING * max(np.abs(self.time_s).max(), np.abs(changes_s).max())
@@ -240,24 +227,12 @@ class OnsetFits:
         yield from pairwise(edges[max(after - _NEAR, 0) : after + _NEAR].tolist())
 
 
-# So that correlated noise does not look like a late onset; and level of other tests.
-_FALSE_ALARM, _AS_GOOD = 1e-9, 1e-3
-# Intervals from a change to the first reading of a trace that is cut off, fewest readings by which
-# their growth is known, and its powers of the time if readings were spaced from the change on.
-_DELAYED, _FEWEST_APART, _PLANNED = 10.0, 3, (0.5, 1.5)
-# Starts that are compared, the last so much of an interval before the first reading; and how
-# unlikely is what fits worse.
-_STARTS, _NEAREST, _UNLIKE = 40, 0.01, 0.05
-# Change of a recorded load that is held, as a share of it.
-_HELD = 0.1
-# Misfit over the scatter of neighbours that a right fit does not exceed.
-_WHITE = 1.5
+# Starts that are compared, the last so much of an interval before the first reading.
+_STARTS, _NEAREST = 40, 0.01
 _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
 # First change of the onset over how far readings are apart there, and most of it as a share of the
 # trace.
 _FIRST_STEP, _MOST = 1 / 64, 0.25
-# Share of that to which an onset has to be known for readings to be of a ring after it.
-_TOLD = 0.1
 # Accuracy of an end of the onset's interval, as a share of its distance.
 _ACCURACY = 0.01
 
@@ -302,7 +277,7 @@ def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> 
     trace, noise_sd = (fits.time_s, fits.readings), fits.experiment.noise_sd
     found, given = fits.best(guess_s), fits.at(0.0, diagnosis.likelihood.best)
     fall = compute_fall(len(trace[0]), given.misfit, found.misfit, noise_sd)
-    if fall < chdtri(1, _FALSE_ALARM) or not begins_constant(*trace, found.onset_s):
+    if fall < chdtri(1, levels.SURELY) or not begins_constant(*trace, found.onset_s):
         return
     fit = fits.posed(found.onset_s), found.log_parameters, found.misfit
     likelihood = make_likelihood(*fit, confidence=diagnosis.likelihood.confidence)
@@ -321,7 +296,7 @@ def _about_tare(fits: OnsetFits, diagnosis: Diagnosis, onset_s: float) -> Iterat
     """Yield a note if the readings before an onset are not zero, by a t test."""
     before = fits.readings[fits.time_s < onset_s][:-1]
     mean, error = float(np.mean(before)), float(np.std(before, ddof=1)) / np.sqrt(len(before))
-    if abs(mean) > error * stdtrit(len(before) - 1, 1 - _AS_GOOD / 2):
+    if abs(mean) > error * stdtrit(len(before) - 1, 1 - levels.AS_GOOD / 2):
         unit = f" {fits.experiment.instrument.read.unit}".rstrip()
         yield Note(
             REJECTION if diagnosis.status == REJECTED else DOUBT,
@@ -336,14 +311,14 @@ def is_cut_off(time_s: Array) -> bool:
     They begin more than ten of their first intervals after it, and these do not grow in proportion
     to the time, as of readings that someone spaced from 0 on.
     """
-    few = max(_FEWEST_APART, len(time_s) // 10)
+    few = max(levels.FEWEST_APART, len(time_s) // 10)
     first_s, last_s = (
         float(np.ptp(ends)) / few for ends in (time_s[: few + 1], time_s[-few - 1 :])
     )
-    if time_s[0] <= _DELAYED * first_s:
+    if time_s[0] <= levels.DELAYED * first_s:
         return False
     growth = np.log(last_s / first_s) / np.log(time_s[-1 - few] / time_s[0])
-    return not _PLANNED[0] < growth < _PLANNED[1]
+    return not levels.PLANNED[0] < growth < levels.PLANNED[1]
 
 
 def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
@@ -351,22 +326,22 @@ def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
     time_s, best = fits.time_s, diagnosis.likelihood.best
     later_s, given = 2 * time_s[0] - time_s[1], fits.at(0.0, best)
     rejected = diagnosis.status == REJECTED
-    level, other = chdtri(1, _FALSE_ALARM), given
+    level, other = chdtri(1, levels.SURELY), given
     if not rejected:
         other = fits.at(later_s, best)
-    if rejected or compute_fall(len(time_s), given.misfit, other.misfit, None) > level:
+    if rejected or compute_fall(len(time_s), given.misfit, other.misfit) > level:
         other = fits.best(later_s)
     alike = _as_good(fits, other)
     starts_s = [min(fit.onset_s for fit in alike), max(fit.onset_s for fit in alike)]
     told = starts_s[1] - starts_s[0] < time_s[1] - time_s[0]
     when = f"at {other.onset_s:.4g} s" if told else "at any time from {:.4g} to {:.4g} s"
-    fall = compute_fall(len(time_s), given.misfit, other.misfit, None)
+    fall = compute_fall(len(time_s), given.misfit, other.misfit)
     found = ""
-    white = other.misfit < _WHITE * estimate_noise(fits.readings)
+    white = other.misfit < levels.WHITE * estimate_noise(fits.readings)
     if fall > level and 0 < other.onset_s < time_s[0] and white:
         found = f"the fit is far better (χ² falls by {plain(fall)})"
         found += "" if told else f", and values hang on it: {_moved(diagnosis, None, alike)}"
-    elif not rejected and fall > -chdtri(1, _AS_GOOD):
+    elif not rejected and fall > -chdtri(1, levels.AS_GOOD):
         moved = _moved(diagnosis, given, alike, 0.5)
         found = f"the trace fits as well: {moved}" if moved else ""
     if found:
@@ -379,10 +354,7 @@ def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
 
 
 def _as_good(fits: OnsetFits, best: OnsetFit) -> list[OnsetFit]:
-    """Return the best fit and others, of onsets from 0 to the first reading, that are as good.
-
-    Each begins with the values of its neighbour.
-    """
+    """Return fits of onsets from 0 to the first reading that are as good as the best, and that."""
     first_s, interval_s = fits.time_s[0], fits.time_s[1] - fits.time_s[0]
     onsets_s = first_s - np.geomspace(_NEAREST * interval_s, first_s, _STARTS)
     found = [best]
@@ -390,7 +362,7 @@ def _as_good(fits: OnsetFits, best: OnsetFit) -> list[OnsetFit]:
         near = best
         for onset_s in side.tolist():
             near = fits.at(onset_s, near.log_parameters)
-            if compute_fall(len(fits.time_s), near.misfit, best.misfit, None) > chdtri(1, _UNLIKE):
+            if compute_fall(len(fits.time_s), near.misfit, best.misfit) > chdtri(1, levels.UNLIKE):
                 break
             found.append(near)
     return found
@@ -399,10 +371,7 @@ def _as_good(fits: OnsetFits, best: OnsetFit) -> list[OnsetFit]:
 def _moved(
     diagnosis: Diagnosis, given: OnsetFit | None, others: Sequence[OnsetFit], widths: float = 0.0
 ) -> str:
-    """Name what other fits move beyond its limits, by more than so many of their widths.
-
-    Without a given fit to compare with, for one that is rejected has no limits, all is named.
-    """
+    """Name what other fits move by some widths of its limits; all if none is compared with."""
     x, said = diagnosis.likelihood.best, []
     for each in diagnosis.findings:
         shift = x - given.log_parameters if given else 0.0
@@ -421,10 +390,7 @@ def _moved(
 
 
 def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> Iterator[Note]:
-    """Yield a note if a ramp up to the first reading, or one as long before, moves a value.
-
-    That is by the width of its limits or more.
-    """
+    """Yield a note if a ramp up to the first reading, or one as long before, moves a value out."""
     best, delay_s = diagnosis.likelihood.best, float(fits.time_s[0])
     given, others = fits.at(0.0, best), replace(fits, experiment=ramped)
     ends = {f"with the first reading, at {plain(delay_s)} s": 0.0}
@@ -450,7 +416,7 @@ def _with_ramp(experiment: Experiment, time_s: Array) -> Experiment | None:
     if record is not None:
         later = record[record[:, 0] > delay_s]
         level, before = record[0, 1], record[: len(record) - len(later), 1]
-        if delay_s <= 0 or not level or np.ptp(before) > _HELD * abs(level):
+        if delay_s <= 0 or not level or np.ptp(before) > levels.HELD * abs(level):
             return None
         return replace(experiment, record=np.vstack(([0.0, 0.0], [delay_s, level], later)))
     first, *rest = experiment.phases
@@ -473,13 +439,10 @@ def onset_limits(best: Likelihood, time_s: Array) -> tuple[float, float]:
 def profile_over_onset(
     diagnosis: Diagnosis, time_s: Array
 ) -> tuple[Diagnosis, tuple[float, float]]:
-    """Return a diagnosis whose limits allow for a fitted onset, and the limits of that.
-
-    The diagnosis is for the best onset; ascending times, (n_samples,), are from it.
-    """
+    """Return a diagnosis whose limits allow for the onset, with times from it; and its limits."""
     best = diagnosis.likelihood
     ends = onset_limits(best, time_s)
-    if ends[1] - ends[0] > _TOLD * spacing_at(time_s, 0.0):
+    if ends[1] - ends[0] > levels.KNOWN_START * spacing_at(time_s, 0.0):
         # Nothing tells how soon after a change of the torque a reading came.
         notes = [note for note in diagnosis.notes if not note.text.startswith(RING)]
         diagnosis = replace(diagnosis, notes=notes)
@@ -527,10 +490,7 @@ def _end(best: Likelihood, step_s: float) -> float:
 
 
 def _merged(finding: Finding, profiles: Sequence[Profile], costs: list[float]) -> Finding:
-    """Return a finding with the lowest of its profile and of those of other onsets.
-
-    It has no gaps: between two of the onsets nothing is known to be excluded.
-    """
+    """Return a finding with the lowest profile of its own and those of other onsets; no gaps."""
     own = finding.profile
     values: Array = np.unique(np.concatenate([p.log_values for p in (own, *profiles)]))
     rows = [

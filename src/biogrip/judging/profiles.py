@@ -88,19 +88,13 @@ class Points:
         return np.stack((np.searchsorted(self.profile, every), last))
 
     def extremes(self) -> Array:
-        """Return the fits at both ends of profiles, (2 n_quantities, n_traces, n_parameters).
-
-        A basin at the end of one profile may be the deepest at the limit of another.
-        """
+        """Return the fits at both ends of profiles, (2 n_quantities, n_traces, n_parameters)."""
         ends = self.x[self.ends()].reshape(2, len(self.fits.likelihoods), -1, self.x.shape[1])
         extremes: Array = np.concatenate(ends.swapaxes(1, 2))
         return extremes
 
     def smooth(self, limits: Array) -> None:
-        """Add points for drawing: the limits, then midpoints of neighbours that are far apart.
-
-        Limits are (n_profiles, 2), logarithms within the profiles; NaN where there is none.
-        """
+        """Add limits, (n_profiles, 2) or NaN, and midpoints of neighbours far apart in drawings."""
         profile, side = np.nonzero(np.isfinite(limits))
         values = limits[profile, side]
         below = (self.profile == profile[:, None]) & (self.values < values[:, None])
@@ -114,10 +108,7 @@ class Points:
             self._add(left, 0.5 * (self.values[left] + self.values[left + 1]))
 
     def _deepen(self, limits: IntArray) -> None:
-        """Fit limits above the threshold from the ends of all profiles, and so their neighbours.
-
-        The limit was found in a deeper basin than those of the points around it.
-        """
+        """Fit limits above the threshold from the ends of all profiles, and their neighbours."""
         profile = self.profile[limits]
         missed = self.increases[limits] > _CLEARLY * self.fits.threshold[profile]
         limits, profile = limits[missed], profile[missed]
@@ -144,10 +135,7 @@ class Points:
 def keep_lower(
     increases: Array, x: Array, point: IntArray, found: Array, fitted: Array
 ) -> BoolArray:
-    """Keep, in place, fits of points that are lower; return a mask of points that improved much.
-
-    Several fits may be of one point.
-    """
+    """Keep lower fits of points, one or more each, in place; return which improved much."""
     news = np.zeros(len(increases), dtype=bool)
     for at, increase, parameters in zip(point.tolist(), found.tolist(), fitted, strict=True):
         before = increases[at]
@@ -182,25 +170,21 @@ class Profile:
     high: float | None
     """Upper confidence limit, likewise."""
     lowest: Array
-    """Log-parameters of the lowest increase, which is negative if the optimum was missed,
-    (n_parameters,)."""
+    """Log-parameters of the lowest increase, negative if the optimum was missed."""
     gaps: tuple[tuple[float, float], ...] = ()
     """Stretches between the limits in which the profile is above the threshold."""
     certainty: float | None = None
     """Increase that a limit takes at an end of the range, if an end is above the threshold and yet
     has no limit for want of it; else None."""
     slowest_s: float | None = None
-    """Relaxation time of a branch of the best fit, if the quantity requires one within the trace,
-    and no fit with such a one is nearly as good: then there are no limits."""
+    """Relaxation time of a branch of the best fit that denies limits, as it should be within the
+    trace."""
 
 
 def compute_profiles(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Profile]]:
-    """Compute profile likelihoods and confidence limits of quantities, by trace and quantity.
-
-    If `smooth` is true, profiles have as many points as a drawing needs.
-    """
+    """Compute profiles and limits by trace and quantity, with points for a drawing if `smooth`."""
     found: dict[int, list[Profile]] = {}
     count = len(quantities)
     for group in alike([likelihood.problem for likelihood in likelihoods]):
@@ -265,7 +249,7 @@ def _limits(points: Points) -> Array:
         values, increases, x = points.values[both], points.increases[both], points.x[both]
         elsewhere = points.extremes()[:, fits.trace[profile]]
         brackets = Brackets(profile, values, increases, x, elsewhere)
-        found = crossings(fits, brackets, FINE, _ACCURACY)
+        found = crossings(fits, brackets)
         crossed[end, profile] = found
         points.increases[both], points.x[both] = brackets.increases, brackets.x
         # Where the outer point has come below the threshold, the next bracket is further out.
@@ -285,20 +269,16 @@ class Brackets:
     profile: IntArray
     """Index of the profile in `ConstrainedFits`, (n,)."""
     values: Array
-    """Logarithms of the quantity at the inner end, below the threshold, and the outer, above, (2,
-    n)."""
+    """Logarithms at the inner end, below the threshold, and the outer, above it, (2, n)."""
     increases: Array
     """Increases of chi^2 there, (2, n)."""
     x: Array
     """Log-parameters fitted there, (2, n, n_parameters)."""
     elsewhere: Array
-    """Log-parameters of additional starts that may lead to deeper basins, (n_starts, n,
-    n_parameters)."""
+    """Starts that may lead to deeper basins, (n_starts, n, n_parameters)."""
 
 
-def crossings(
-    fits: ConstrainedFits, brackets: Brackets, tolerance: float, accuracy: float
-) -> Array:
+def crossings(fits: ConstrainedFits, brackets: Brackets) -> Array:
     """Find the logarithms of quantities at which the increase of chi^2 equals the threshold, (n,).
 
     The accuracy is that of the square root of the increase. Lower fits that are found at outer ends
@@ -324,11 +304,11 @@ def crossings(
         if not tries:
             _, deepest = fits.from_each(profile, tried, brackets.elsewhere, FAIR)
             starts = np.concatenate((starts, deepest[None]))
-        increases, fitted = fits.from_each(profile[left], tried, starts, tolerance)
+        increases, fitted = fits.from_each(profile[left], tried, starts, FINE)
         over = np.sqrt(np.maximum(np.min(increases, axis=0), 0.0)) - root_threshold[left]
         # A basin deeper than that of the outer end may be deeper at the outer end, too.
-        missed = np.sqrt(np.maximum(increases[2], 0.0)) - root_threshold[left] > over + accuracy
-        _lower(fits, brackets, left[missed], fitted[missed], tolerance)
+        missed = np.sqrt(np.maximum(increases[2], 0.0)) - root_threshold[left] > over + _ACCURACY
+        _lower(fits, brackets, left[missed], fitted[missed])
         void = brackets.increases[1, left] < threshold[left]
         found[left] = np.where(void, np.nan, tried)
         side = (over > 0).astype(np.int64)
@@ -339,17 +319,15 @@ def crossings(
         moved[left] = side
         # Where a deeper basin begins, the increase may jump past the threshold.
         apart = np.abs(ends[1, left] - ends[0, left]) > _CLOSEST
-        left = left[(np.abs(over) > accuracy) & apart & ~void]
+        left = left[(np.abs(over) > _ACCURACY) & apart & ~void]
     return found
 
 
-def _lower(
-    fits: ConstrainedFits, brackets: Brackets, which: IntArray, starts: Array, tolerance: float
-) -> None:
+def _lower(fits: ConstrainedFits, brackets: Brackets, which: IntArray, starts: Array) -> None:
     """Fit the outer ends of brackets from other starts and keep, in place, the lower fits."""
     if not len(which):
         return
-    increases, x = fits.at(brackets.profile[which], brackets.values[1, which], starts, tolerance)
+    increases, x = fits.at(brackets.profile[which], brackets.values[1, which], starts, FINE)
     lower = increases < brackets.increases[1, which]
     brackets.increases[1, which[lower]], brackets.x[1, which[lower]] = increases[lower], x[lower]
 
@@ -357,10 +335,7 @@ def _lower(
 def find_gaps(
     log_values: Array, increases: Array, threshold: float
 ) -> tuple[tuple[float, float], ...]:
-    """Find the stretches of a profile above the threshold, between points below it.
-
-    Their ends are interpolated linearly in the square root of the increase.
-    """
+    """Find stretches above the threshold, with ends interpolated in the root of the increase."""
     inside = np.flatnonzero(increases < threshold).tolist()
     found = []
     for start, end in pairwise(inside):
@@ -426,10 +401,7 @@ def _listed(values: Array, rounding: Callable[[float], float | None]) -> list[li
 def _increases(
     likelihood: Likelihood, pair: list[int], x_values: Array, y_values: Array
 ) -> tuple[Array, Array | None]:
-    """Compute the increase of chi^2 at every point of a grid, and find a missed optimum.
-
-    All points are fitted from the optimum, then from neighbours as long as these improve.
-    """
+    """Compute the increase of chi^2 at every point of a grid, and find a missed optimum."""
     fits = ConstrainedFits([likelihood], [])
     rows, columns = x_values.shape
     x = np.tile(likelihood.best, (rows * columns, 1))

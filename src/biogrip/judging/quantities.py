@@ -27,11 +27,9 @@ class BranchPenalty:
     branch: tuple[int, int]
     """Indices of its spring and damper."""
     before: tuple[int, int] | None = None
-    """Those of the branch that must relax later; None if the branch must relax within the
-    experiment."""
+    """Those of the branch that must relax later; None: this relaxes within the experiment."""
     power: int = 1
-    """`SampleModel.branch_power`: 0 for springpots, of which the one of `before` must have the
-    larger exponent."""
+    """`SampleModel.branch_power`: 0 for springpots, in the order of their exponents."""
 
     @property
     def stiffness(self) -> float:
@@ -65,14 +63,12 @@ class Quantity:
     members: tuple[int, ...]
     """Indices of the parameters in it."""
     sense: int = 0
-    """Power of the members in a sum: 1; -1 in series, one over the sum of reciprocals. 0 in a
-    product of powers."""
+    """Power of the members in a sum: 1; -1 in series; 0 in a product of powers."""
     sign: tuple[int, ...] = (1,)
     """Powers in a product (relaxation times are quotients), (n_members,)."""
     penalties: tuple[BranchPenalty, ...] = ()
-    """Conditions for the quantity to be meaningful. A sum requires that branches relax within the
-    experiment: the damper of a branch too weak and slow to be seen could have any size. Parameters
-    of several branches require that these relax in order: branches could exchange their names."""
+    """Conditions. In a sum the damper of a branch too weak and slow to be seen could have any size;
+    of several branches, names could be exchanged."""
 
     @property
     def provided(self) -> str | None:

@@ -153,10 +153,7 @@ class Trade:
 def compute_findings(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Finding]]:
-    """Profile quantities in each of several traces, and reach a verdict on each of them.
-
-    If `smooth` is true, profiles have as many points as a drawing needs.
-    """
+    """Profile quantities in each of several traces, and reach a verdict on each of them."""
     found = []
     every = compute_profiles(likelihoods, quantities, smooth=smooth)
     for likelihood, profiles in zip(likelihoods, every, strict=True):

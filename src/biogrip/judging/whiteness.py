@@ -40,25 +40,17 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import one_in, plain
 from biogrip.fit.noise_model_fit import absorbed
-from biogrip.judging.levels import FALSE_ALARM
+from biogrip.judging import levels
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import is_storage
 from biogrip.physics.residuals import Residuals
 
 # Stretches over which residuals are averaged, and readings in the shortest.
 _STRETCHES, _SHORTEST = 20, 5
-# Sums of residuals that a misfit is estimated from; correlation lengths and shares of white noise
-# that are tried, and by how much they have to lower the deviance [6]_.
+# Sums that a misfit is estimated from; correlation lengths and shares of white noise to try.
 _SUMS, _LENGTHS, _WHITE = 200, 10, (0.001, 0.03, 0.2, 0.6)
-_TWO_MORE = 4.0
-# A misfit that is smooth over half a trace would seem worth next to nothing: so few hardly lower
-# the share of limits that hold.
-_FEWEST, _LEAST_FREEDOM = 0.3, 3.0
-# Least share of a reading's variance, or of a step's squares, that a fit leaves where it is told.
-_TOLD = 0.03
-# Fewest periods of a line, since what is slower may be a misfit; its frequencies are so much finer
-# than the periodogram's; and the largest difference of intervals, as a share, that is none.
-_PERIODS, _FINER, _EVEN = 10, 16, 0.01
+# Frequencies of a line are so much finer than the periodogram's.
+_FINER = 16
 
 
 def correlated(residual: Array, basis: Array) -> tuple[float, float]:
@@ -125,15 +117,12 @@ def averaged(basis: Array) -> Array:
         row[part] = len(part) ** -0.5
     rest = without(basis, rows)
     _, shares, found = np.linalg.svd(rest, full_matrices=False)
-    kept: Array = found[shares > _TOLD]
+    kept: Array = found[shares > levels.TOLD]
     return kept
 
 
 def _chance_of_less(observed: float, first: float, second: float, free: int, most: float) -> float:
-    """Return the chance of a smaller ratio r^T A r / r^T r of what a fit leaves of white noise.
-
-    The traces of M A and of its square are given, and the largest that the ratio can be.
-    """
+    """Return the chance of a smaller ratio, by the traces of M A and its square, and the most."""
     from scipy.special import betainc
 
     mean = first / free
@@ -175,12 +164,12 @@ def find_line(residual: Array, time_s: Array) -> tuple[float, float, Array]:
     evenly spaced; directions are cosine and sine as orthonormal rows, (2, n_samples).
     """
     n, apart = len(residual), np.diff(time_s)
-    if n < 4 * _PERIODS or np.ptp(apart) > _EVEN * np.median(apart):
+    if n < 4 * levels.PERIODS or np.ptp(apart) > levels.EVEN * np.median(apart):
         return 0.0, 1.0, np.zeros((0, n))
     fine = np.abs(np.fft.rfft(residual, _FINER * n)[: _FINER * ((n + 1) // 2)]) ** 2
     power = fine[_FINER::_FINER]
-    share = np.max(power[_PERIODS - 1 :]) / np.sum(power)
-    slowest = _FINER * _PERIODS
+    share = np.max(power[levels.PERIODS - 1 :]) / np.sum(power)
+    slowest = _FINER * levels.PERIODS
     frequency = (slowest + np.argmax(fine[slowest:])) / (_FINER * n * np.mean(apart))
     angle = 2 * np.pi * frequency * time_s
     basis = np.linalg.qr(np.column_stack((np.cos(angle), np.sin(angle))))[0].T
@@ -189,8 +178,8 @@ def find_line(residual: Array, time_s: Array) -> tuple[float, float, Array]:
 
 def by_leverage(residual: Array, basis: Array) -> Array:
     """Return residuals in their own standard deviations; those that a fit follows as they are."""
-    share = 1 - np.sum(basis**2, axis=0)
-    return np.where(share > _TOLD, residual / np.sqrt(np.maximum(share, _TOLD)), residual)
+    share, least = 1 - np.sum(basis**2, axis=0), levels.TOLD
+    return np.where(share > least, residual / np.sqrt(np.maximum(share, least)), residual)
 
 
 def far_out(residual: Array, struck: BoolArray, basis: Array) -> float:
@@ -208,7 +197,7 @@ def far_out(residual: Array, struck: BoolArray, basis: Array) -> float:
         return 1.0
     own = basis[:, struck]
     left = np.eye(len(basis)) - own @ own.T
-    if len(basis) and np.linalg.eigvalsh(left)[0] < _TOLD:
+    if len(basis) and np.linalg.eigvalsh(left)[0] < levels.TOLD:
         return 1.0
     through = np.linalg.solve(left, own)
     residual = without(basis, residual)
@@ -247,7 +236,7 @@ def as_correlated(residual: Array, basis: Array) -> tuple[float, float]:
     apart = np.abs(np.subtract.outer(np.arange(sums), np.arange(sums)))
     found = np.eye(sums)
     lowest, size = _restricted(found, left, taken)
-    lowest, found = lowest - _TWO_MORE, size * found
+    lowest, found = lowest - levels.TWO_MORE, size * found
     for length in np.geomspace(1, max(sums / 2, 2), _LENGTHS):
         for kernel in (np.exp(-apart / length), np.exp(-0.5 * (apart / length) ** 2)):
             for white in _WHITE:
@@ -259,7 +248,7 @@ def as_correlated(residual: Array, basis: Array) -> tuple[float, float]:
     remaining = found - taken @ (taken.T @ found)
     freedom = float(np.trace(remaining) ** 2 / np.sum(remaining * remaining.T))
     independent = min(n * float(np.mean(residual**2)) / largest, float(n - len(basis)))
-    return max(independent, _FEWEST), max(freedom, _LEAST_FREEDOM)
+    return max(independent, levels.FEWEST_INDEPENDENT), max(freedom, levels.LEAST_FREEDOM)
 
 
 def _restricted(covariance: Array, left: Array, taken: Array) -> tuple[float, float]:
@@ -357,7 +346,7 @@ def steps_of(basis: Array, cleared: Callable[[Array], Array]) -> Steps:
     square, of_whole = (np.einsum("ij,ij->i", rows, rows) for rows in (shapes, whole))
     # The step back is the same step if a constant is absorbed.
     back = np.einsum("ij,ij->i", *[cleared(np.ones((1, samples))) - whole] * 2)
-    told = square > _TOLD * np.minimum(of_whole, back)
+    told = square > levels.TOLD * np.minimum(of_whole, back)
     return Steps(before[told], shapes[told], np.sqrt(square[told]), samples - len(basis))
 
 
@@ -401,10 +390,7 @@ def compare_halves(residual: Array, basis: Array, split: int) -> float:
 def find_inertia(
     residuals: Residuals, residual: Array, basis: Array, growth: Array | float = 1.0
 ) -> str:
-    """Return in words what may make moduli wrong: inertia, if an F test tells it, or what else.
-
-    Inertia adds a part to the storage modulus that goes with the frequency squared.
-    """
+    """Return in words what may make moduli wrong: inertia, if an F test tells it, or what else."""
     from scipy.special import fdtrc
 
     places, free = residuals.trace.time_s, len(residual) - len(basis)
@@ -413,7 +399,7 @@ def find_inertia(
     total, square = float(residual @ residual), float(shape @ shape)
     size = float(shape @ residual) / square
     explained = size**2 * square
-    if fdtrc(1, free - 1, explained * (free - 1) / (total - explained)) >= FALSE_ALARM:
+    if fdtrc(1, free - 1, explained * (free - 1) / (total - explained)) >= levels.FALSE_ALARM:
         return "a column of something else, slip, too large a strain, or a sample that changed"
     part = plain(100 * abs(size) * float(places[-1]) ** 2 / float(residuals.trace.readings[-1]), 2)
     return (
@@ -437,7 +423,7 @@ def about_moduli(
     cause = find_inertia(residuals, residual, basis, growth)
     if cause.startswith("inertia"):
         yield f"The fit leaves what is of {cause}."
-    elif (chance := compare_halves(residual, basis, int(np.sum(~storage)))) < FALSE_ALARM:
+    elif (chance := compare_halves(residual, basis, int(np.sum(~storage)))) < levels.FALSE_ALARM:
         yield (
             "The storage and the loss modulus, each fitted by itself, differ as those with white "
             f"noise do only {one_in(chance)} sweeps: {cause}."
@@ -450,7 +436,7 @@ def about_moduli(
     means = [float(np.sum(residual[of] ** 2)) / n for of, n in zip(columns, free, strict=True)]
     larger = int(means[1] > means[0])
     ratio = means[larger] / means[1 - larger]
-    if 2 * fdtrc(free[larger], free[1 - larger], ratio) < FALSE_ALARM:
+    if 2 * fdtrc(free[larger], free[1 - larger], ratio) < levels.FALSE_ALARM:
         yield (
             f"For its weights the {('storage', 'loss')[larger]} modulus scatters "
             f"{plain(np.sqrt(ratio), 2)} times as much as the other: give standard deviations of "

@@ -2,20 +2,16 @@
 
 A linear passive sample has a spectrum of relaxation times that is nowhere negative. Its relaxation
 modulus G, its compliance J and what they are at a frequency are linear functionals of it, or ratios
-of two. The limits of a quantity are the ends of what it is over all spectra whose sum of squares
-exceeds the least by no more than a quantile of F, or of chi-squared if the noise is known [1]_,
-[2]_. In each fit for a limit one more row, of great weight, holds the quantity at a value v: f at
-v, or the ratio f/g by f - v g at zero. The root of the excess is nearly linear in v, and Newton's
-method takes two or three fits.
-
-What the best fit leaves tells the noise, as the sum of squares over the degrees of freedom that the
-relaxation times of the best fit and their amplitudes leave.
+of two. Their limits are the ends over all spectra whose sum of squares exceeds the least by no more
+than a quantile of F, or of chi-squared if the noise is known [1]_, [2]_. In each fit for a limit
+one more row, of great weight, holds the quantity at a value v: f at v, or the ratio f/g by f - v g
+at zero. The root of the excess is nearly linear in v: Newton's method takes two or three fits. What
+the best fit leaves tells the noise.
 
 In relaxation nothing is told of what relaxes before the first reading after a step. G' and G'' are
-then those of what relaxes later, to which the rest would add.
-
-Between arms that yield, a load is shared by arms and sample. Of a gripper, K is the force over the
-shortening at a time after a step of the torque: at once and at rest it is the sample's stiffness.
+then those of what relaxes later, to which the rest would add. Between arms that yield, a load is
+shared by arms and sample. Of a gripper, K is the force over the shortening at a time after a step
+of the torque: at once and at rest it is the sample's stiffness.
 
 References
 ----------
@@ -279,10 +275,7 @@ class _Profile:
         self._open = [it for it in (-1, 1) if np.any(it * row[faint] > _HANGS * clearly)]
 
     def limit(self, side: int) -> float | None:
-        """Find the lower or upper limit, side -1 or 1, if there is one.
-
-        It is found roughly, and then with closer lags on either side of those that it needs.
-        """
+        """Find the limit on a side, -1 or 1, if there is one: roughly, then with closer lags."""
         if not 0 < self._stride < math.inf or side in self._open:
             return None
         lags, value, accuracy = self._fit.lags, self.best + side * self._stride, _ROUGH
@@ -297,10 +290,7 @@ class _Profile:
     def _crossing(
         self, lags: Lags, side: int, value: float, accuracy: float
     ) -> tuple[float | None, BoolArray]:
-        """Return the limit with certain lags, and which it needs, beginning with a value.
-
-        The root of the excess there is accurate to a share.
-        """
+        """Return the limit with certain lags, and which it needs, beginning with a value."""
         above, below = self._quantity.added(lags)
         seen: BoolArray = np.any(lags.rows, axis=1)
         ratio = self._quantity.below is not None

@@ -91,11 +91,7 @@ class DenseSamples:
         return rows
 
     def rows_of_samples(self, samples: Array) -> tuple[Array, float]:
-        """Project readings, (n_samples,), smooth or not, on smooth functions.
-
-        Returns rows with the same products with these, (n_nodes,), and the norm of what is
-        orthogonal to all of them.
-        """
+        """Project readings, (n_samples,), on the nodes' rows; return the norm of the rest, too."""
         parts: list[Array] = []
         rest = 0.0
         for piece in self._pieces:
@@ -159,8 +155,7 @@ class Condensed:
     all_s: Array
     """Ascending sampling times, (n_samples,)."""
     functions: Array
-    """Functions projected out of trace and responses, (n_functions, n_samples), if noise is white;
-    see `nuisance_basis`, `with_uncertain`."""
+    """Functions projected out, (n_functions, n_samples), if noise is white (`with_uncertain`)."""
     whitening: Whitening | None = None
     """Transformation that whitens noise and projects nuisance out; None for white noise."""
 
@@ -178,11 +173,6 @@ class Condensed:
         if self.whitening is not None:
             return self.whitening(rows)
         return without(self.nuisance, rows)
-
-    @property
-    def coloured(self) -> bool:
-        """True if the noise is whitened."""
-        return self.whitening is not None
 
     def of_trace(self, readings: Array) -> Array:
         """Return rows of a trace without nuisance, (n_rows,); no response reaches the last."""

@@ -6,25 +6,20 @@ In
 
     s^alpha = sin(pi alpha)/pi int_-inf^inf e^(alpha u) s / (s + e^u) du
 
-the trapezoidal rule of step h [2] gives springs h sin(pi alpha)/pi e^(alpha u_j), each with a
-damper in series. They relax at the rates e^(u_j), whatever alpha is. For the poles of
-the integrand, at a distance of pi from the real axis if s is real and of pi/2 if it is
-imaginary, the relative error is about e^(-2 pi^2/h) or 2 e^(-pi^2/h). Of the infinite
-sum a band of rates is kept. All slower branches together are replaced by a spring and a
-few branches, all faster ones by a damper and a few branches, which have the same first
-moments: a quadrature on Chebyshev's nodes, one of them at zero. All springs come out
-positive and smooth in alpha, and the limits, spring and damper, are exact.
+the trapezoidal rule of step h [2]_ gives springs h sin(pi alpha)/pi e^(alpha u_j), each with a
+damper in series. They relax at the rates e^(u_j), whatever alpha is. By the poles of the integrand
+the relative error is about e^(-2 pi^2/h) where s is real, and 2 e^(-pi^2/h) where it is imaginary.
+Of the infinite sum a band of rates is kept. All slower branches are replaced by a spring and a few
+branches, all faster ones by a damper and a few, which have the same first moments: a quadrature on
+Chebyshev's nodes, one of them at zero. All springs come out positive and smooth in alpha, and the
+limits, spring and damper, are exact.
 
-Ladders have the same rates, so in parallel they add up. In series their impedance is
-L_1 L_2/H with H = L_1 + L_2. It has branches at the zeros -x of H, with the springs
-L_1(-x)^2/(x H'(-x)), and, if both ladders have branches, at the shared rates p_j, with the
-springs W_1j W_2j/(W_1j + W_2j).
+Ladders have the same rates, so in parallel they add up. In series their impedance is L_1 L_2/H with
+H = L_1 + L_2. It has branches at the zeros -x of H, with the springs L_1(-x)^2/(x H'(-x)), and, if
+both ladders have branches, at the shared rates p_j, with the springs W_1j W_2j/(W_1j + W_2j).
 
-A springpot has a modulus k_alpha (N/m, at 1 rad/s) and an exponent
-alpha; with a second one, k_beta and beta < alpha. All models are represented by Maxwell branches,
-as a `Network` like all other models. J is the creep compliance, G the relaxation modulus (N/m), t
-in seconds, E_(a,b) the Mittag-Leffler function, a = alpha - beta [1]_. What they are for, and their
-names in other programs, is in `docs/model.md`.
+J is the creep compliance, G the relaxation modulus (N/m), t in seconds, E_(a,b) the Mittag-Leffler
+function, a = alpha - beta [1]_; `docs/model.md` has what the models are for.
 
 `springpot`, the power law of creeping cells: --<>--
     J = t^alpha/(k_alpha Gamma(1+alpha)), G = k_alpha t^-alpha/Gamma(1-alpha)
@@ -114,8 +109,7 @@ class Ladder:
     damper: NDArray[Any]
     """Parallel damper in N s/m, (n,)."""
     springs: NDArray[Any]
-    """Springs of the Maxwell branches in N/m, (n_branches, n), whose rates are
-    `BRANCH_RATES_PER_S`; without branches zeros, (1, n)."""
+    """Springs in N/m of branches with `BRANCH_RATES_PER_S`, (n_branches, n), or zeros, (1, n)."""
 
     def __add__(self, other: "Ladder") -> "Ladder":
         """Return both ladders in parallel."""

@@ -94,10 +94,7 @@ class Gripper(Block):
 _NOTHING = 1e-40
 
 NO_ARMS = Gripper(math.sqrt(0.5), 90.0, Arm(0.0, _NOTHING, _NOTHING), Arm(0.0, _NOTHING, _NOTHING))
-"""Arms that do nothing: they turn by what a sample yields to a load, its creep.
-
-With twice their squared lever one, a torque of theirs is the load on the sample.
-"""
+"""Arms that do nothing: with a squared lever of 1/2 they turn by what a sample creeps."""
 
 
 def rotation_of_tip(gripper: Gripper, displacement_m: Array) -> Array:
@@ -179,10 +176,7 @@ def torque(comb: CombDrive, voltage_V: ArrayLike) -> Array:
 
 
 def voltage(comb: CombDrive, torque_Nm: ArrayLike) -> Array:
-    """Return the voltage in V that exerts a torque in N m (eq. 9 solved for V).
-
-    A negative torque is a `ValueError`: a comb drive only pulls.
-    """
+    """Return the voltage in V of a torque in N m (eq. 9); a negative one is a `ValueError`."""
     torques = np.asarray(torque_Nm, dtype=float)
     if np.any(torques < 0):
         raise ValueError(f"a comb drive only pulls: torque {torques.min()} N m is negative")

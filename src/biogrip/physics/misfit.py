@@ -49,7 +49,8 @@ def make_misfit(residuals: Residuals) -> Misfit:
     even = np.allclose(trace.time_s * intervals / end_s, np.arange(residuals.samples), rtol=1e-9)
     if (
         (even and np.allclose(steps, np.rint(steps), rtol=0, atol=1e-9))
-        and (course.only_steps and not course.deforms and residuals.plain)
+        and not (np.any(course.changes[:, 1:]) or course.deforms)
+        and not (residuals.coloured or len(trace.condensed.nuisance))
         and residuals.gripper.left == residuals.gripper.right
         and residuals.model.network([residuals.model.example]).k.shape[1] == 1
     ):
@@ -59,10 +60,7 @@ def make_misfit(residuals: Residuals) -> Misfit:
 
 
 def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:
-    """Combine the misfit functions of several traces into one of a population for each trace.
-
-    Its results equal those of the single functions to the last bit.
-    """
+    """Combine misfit functions of traces into one of a population for each, to the last bit."""
     series = [misfit for misfit in misfits if isinstance(misfit, SeriesMisfit)]
     if len(series) == len(misfits) and all(map(series[0].joins, series)):
         return SeriesMisfit.joined(series).of_each
@@ -159,11 +157,7 @@ class SeriesMisfit:
         return self.projections(np.zeros(1))[:, 0]
 
     def _model_square_sums(self, static: Array, rates: Array, weights: Array) -> Array:
-        """Sum squared responses over all readings, shape (n,).
-
-        A phase of N readings has ((z_1 z_2)^N - 1) / (z_1 z_2 - 1) for both modes together, which
-        follows from z^N - 1 and z - 1 of each without cancellation.
-        """
+        """Sum squared responses over readings, (n,), as geometric series without cancellation."""
         decayed = np.expm1(self._lengths * rates)
         amplitudes = self._amplitudes(weights, 1 + decayed[1:])
         constants = self._levels * static
@@ -186,21 +180,14 @@ class SeriesMisfit:
         return _sum(_sum(terms)) + _sum(constants)[0]
 
     def _amplitudes(self, weights: Array, decays: Array) -> Array:
-        """Compute amplitudes of modes at the first reading of each phase, (n_phases, n_modes, n).
-
-        Weights, (n_modes, n), are those of unit steps; decays, (n_phases, n_modes, n), the shares
-        that remain of modes at the end of each phase.
-        """
+        """Compute amplitudes of modes at the start of each phase, (n_phases, n_modes, n)."""
         amplitudes = self._heights * weights
         for phase in range(1, len(amplitudes)):
             amplitudes[phase] += decays[phase - 1] * amplitudes[phase - 1]
         return amplitudes
 
     def exact_projections(self, rates: Array) -> Array:
-        """Project each trace on the response of a mode of unit weight, by direct summation.
-
-        For rates in units of the sampling rate, (n,), the result is (n_traces, n).
-        """
+        """Project traces, by summation, on modes of rates over the sampling rate, (n_traces, n)."""
         sums = _power_sums(self._traces, self._first_samples, rates)
         decays = np.exp(self._lengths[1:] * rates)
         amplitudes = self._amplitudes(np.ones((1, len(rates))), decays)
@@ -235,12 +222,7 @@ def _sum(terms: Array) -> Array:
 
 
 def _power_sums(traces: Array, first_samples: IntArray, rates: Array) -> Array:
-    """Compute sum_n exp(rate n) y_n of phases, shape (n_traces, n_phases, n_rates).
-
-    With n = B a + b, it is one matrix product with the phases folded to (B, N/B), and
-    one weighted sum over rows. Traces are treated one by one, so that none depends on
-    the others.
-    """
+    """Compute sum_n exp(rate n) y_n of phases, with n = B a + b, (n_traces, n_phases, n_rates)."""
     longest = int(np.diff(first_samples, append=traces.shape[1]).max())
     block = max(1, int(np.sqrt(longest)))
     within = np.exp(rates[:, None] * np.arange(block))

@@ -29,21 +29,23 @@ from biogrip.keys import Block, OneOf
 from biogrip.physics.fractional import FRACTIONAL_MODELS
 from biogrip.physics.sample_model import (
     C_P,
-    C_S,
-    C_V,
     K_P,
-    K_S,
-    K_V,
     MOST_BRANCHES,
     SINGLE_BRANCH,
     C,
     K,
     Network,
+    Parameter,
     SampleModel,
     Turned,
     in_units,
     of_columns,
 )
+
+K_S = Parameter("k_s", "stiffness", "series spring", "k")
+C_S = Parameter("c_s", "damping", "series damper", "c")
+K_V = Parameter("k_v", "stiffness", "spring of the Kelvin-Voigt element", "k")
+C_V = Parameter("c_v", "damping", "damper of the Kelvin-Voigt element", "c")
 
 # A spring or damper of a branch that is gone, in N/m or N s/m: no response shows it.
 _SPRING_OF_NO_BRANCH = 1e-18

@@ -103,10 +103,7 @@ def compute_modes(
     *,
     slopes: bool = True,
 ) -> Modes:
-    """Compute the modes of samples, (n, n_parameters), without inertia, all of them real.
-
-    All parameters are positive. Without `slopes` there are no derivatives: n_parameters is zero.
-    """
+    """Compute the modes of samples, all positive, (n, n_parameters), and their derivatives."""
     count = parameters.shape[1] if slopes else 0
     if slopes:
         # After the samples, copies with each of their parameters tilted into the complex plane.
@@ -175,10 +172,7 @@ def relaxation(network: Network, course: Course, time_s: Array) -> Array:
 
 
 def _branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return rates and stiffnesses of all elements beside one another, (n, n_modes).
-
-    A branch forgets at the rate -k/c, a bare spring never, and a bare damper at once.
-    """
+    """Return rates and stiffnesses of elements side by side, (n, n_modes); of bare ones last."""
     bare = np.stack((network.k_p, _RATE_OF_A_DAMPER * network.c_p), axis=1)
     fixed = np.broadcast_to([0.0, -_RATE_OF_A_DAMPER], bare.shape)
     # A branch so weak that its numbers underflow is none.
@@ -222,10 +216,7 @@ def mode_responses(
 def responses_in_turn(
     rates: Array, course: Course, time_s: Array, *, slopes: bool = True
 ) -> Iterator[tuple[slice, Array]]:
-    """Yield parts of the times after the start, and what `mode_responses` finds there, stacked.
-
-    The end of a phase is the initial state of the next, so that phases cost no more than readings.
-    """
+    """Yield parts of the times after the start, and what `mode_responses` finds there, stacked."""
     if course.sweeps:
         yield slice(None), moduli_of_modes(rates, time_s)[: 1 + slopes]
         return
@@ -271,20 +262,14 @@ def moduli_of_modes(rates: Array, places: Array) -> Array:
 
 
 class _Motion:
-    """How modes go on in neighbouring phases, with the derivatives by their rates.
-
-    Rates are (n, n_modes, 1), all orders of what is controlled at the starts (n_phases, n_orders).
-    """
+    """How modes, (n, n_modes, 1), go on in phases whose orders are (n_phases, n_orders)."""
 
     def __init__(self, rates: Array, powers: Array, *, deforms: bool, slopes: bool) -> None:
         self._rates, self._powers = rates, powers
         self._deforms, self._slopes = deforms, slopes
 
     def carried(self, state: Array, lengths_s: Array, steps: Array) -> Array:
-        """Return modes at the starts of the phases and at their end, (..., n_phases + 1).
-
-        Given are how long they last and what a branch is stretched by after each, (n_phases,).
-        """
+        """Return modes at the starts of phases, stretched by steps after each, and at their end."""
         remains, gained = self._terms(np.arange(len(lengths_s)), lengths_s)
         reached = _recursion(state[0], remains, gained[0] + steps)
         if not self._slopes:
@@ -319,11 +304,7 @@ class _Motion:
 
 
 def _recursion(first: Array, factors: Array, terms: Array) -> Array:
-    """Return x_0 ... x_n, along the last axis, with x_(k+1) = factors_k x_k + terms_k.
-
-    Many steps are taken in blocks: those of all blocks from zero on at once, then from block to
-    block.
-    """
+    """Return x_0 ... x_n, x_(k+1) = factors_k x_k + terms_k; many steps are taken in blocks."""
     count = terms.shape[-1]
     block = int(np.sqrt(count)) if count > _FEW else 1
     blocks = -(-count // block)

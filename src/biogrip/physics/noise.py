@@ -130,10 +130,7 @@ class Noise(Block):
 def add_noise(
     readings: Array, noise: Noise, rng: np.random.Generator, time_s: Array | None = None
 ) -> Array:
-    """Return a noisy copy of a trace, (n_samples,).
-
-    Without ascending sampling times, (n_samples,), noise that is not white is a `ValueError`.
-    """
+    """Return a noisy copy of a trace, (n_samples,); times are needed unless the noise is white."""
     unit = KINDS[noise.kind](rng, len(readings))
     if not noise.white:
         if time_s is None:
@@ -165,10 +162,7 @@ def _with_parts(unit: Array, time_s: Array, noise: Noise, rng: np.random.Generat
 
 
 def standard_deviation(readings: Array, noise: Noise) -> Array:
-    """Return the noise's standard deviation at every reading of a noise-free trace.
-
-    Drift and outliers are not included.
-    """
+    """Return the standard deviation of noise, but drift and outliers, at noise-free readings."""
     magnitude = np.abs(readings)
     if noise.level_rad is not None:
         return np.full_like(magnitude, noise.level_rad)
@@ -245,10 +239,7 @@ def without(basis: Array, rows: Array) -> Array:
 
 
 def within(basis: Array, rows: Array, sd: Array | None = None) -> Array:
-    """Project functions of time, shape (..., n_times), on the span of a basis.
-
-    With standard deviations of the values, (n_times,), by weighted least squares.
-    """
+    """Project functions, (..., n_times), on the span of a basis, weighted by 1/sd^2, (n_times,)."""
     if sd is None or not len(basis):
         return (rows @ basis.T) @ basis
     weighted = np.linalg.qr((basis / sd).T)[0].T
@@ -327,10 +318,7 @@ def estimate_noise(readings: Array, rounding: float | None = None) -> float:
 
 
 def measure_rounding(readings: Array) -> float:
-    """Return the step that readings, (n_samples,), are multiples of, in their unit.
-
-    It is zero if neighbours are seldom the same: rounding is then not seen beside the noise.
-    """
+    """Return the step of which readings, (n_samples,), are multiples, 0 if not seen in noise."""
     same = np.count_nonzero(readings[1:] == readings[:-1])
     if same < max(1.0, _LEAST_EQUAL * len(readings)):
         return 0.0
@@ -412,19 +400,16 @@ class Whitening:
         self._deviations = np.sqrt(pivots)
         self.log_determinant = float(np.sum(np.log(pivots)))
         """Logarithm of the determinant of the covariance matrix, over the mean variance."""
-        self.nuisance = self._white(nuisance, uncertain)
+        if len(nuisance) or uncertain is not None:
+            basis = np.linalg.qr(self._whitened(nuisance).T)[0].T
+            known = nuisance[:0] if uncertain is None else self._whitened(uncertain)
+            nuisance = with_uncertain(basis, known)
+        self.nuisance = nuisance
         """Whitened functions that are projected out, (n_functions, n_samples)."""
 
     def __call__(self, rows: Array) -> Array:
         """Whiten functions of time, shape (..., n_samples), and project the nuisance out."""
         return without(self.nuisance, self._whitened(rows))
-
-    def _white(self, nuisance: Array, uncertain: Array | None) -> Array:
-        if not len(nuisance) and uncertain is None:
-            return nuisance
-        basis = np.linalg.qr(self._whitened(nuisance).T)[0].T
-        known = nuisance[:0] if uncertain is None else self._whitened(uncertain)
-        return with_uncertain(basis, known)
 
     def _whitened(self, rows: Array) -> Array:
         columns = np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]).T)

@@ -51,11 +51,9 @@ class Correction:
     edges_s: Array
     """The mesh, (n_elements + 1,)."""
     values: Array
-    """Rotation at the start of each element and at its nodes, (n, n_arms, n_elements, _STAGES +
-    1)."""
+    """Rotation at starts of elements and at nodes, (n, n_arms, n_elements, _STAGES + 1)."""
     force_N: Array
-    """Nonlinear minus linear jaw force there, (n, n_elements, _STAGES + 1); after a jump of the
-    torque, at the start."""
+    """Jaw force there, likewise, (n, n_elements, _STAGES + 1); after a jump, at the start."""
     converged: np.ndarray
     """True if the sweeps converged, (n,)."""
 
@@ -107,15 +105,14 @@ def nonlinear_rotation(
 def correction(
     gripper: Gripper, network: Network, torque: Course, factors: Array | None = None
 ) -> Correction:
-    """Compute nonlinear minus linear rotation of n samples, without inertia.
-
-    Factors on the torque of each sample, if any, are (n,).
-    """
+    """Compute nonlinear minus linear rotation of samples, with factors on their torques, (n,)."""
     arms = [gripper.left] if gripper.left == gripper.right else [gripper.left, gripper.right]
     response = step_response(gripper, network, inertia=False)
     edges = _mesh(torque)
     modes = _Modes(response.rates, weights_of_loads(gripper, network), np.diff(edges))
-    nodes = _nodes(edges)
+    # Collocation nodes, (n_elements, _STAGES).
+    nodes = edges[:-1, None] + np.diff(edges)[:, None] * _radau()[0]
+    nodes[:, -1] = edges[1:]
     before_jumps = np.minimum(nodes, np.nextafter(edges[1:, None], 0)).ravel()
     shape = (len(network.k_p), len(arms), *nodes.shape)
     b_0 = gripper.lever_m
@@ -157,11 +154,7 @@ def correction(
 
 
 def _from_starts(force: Array, edges_s: Array, torque: Course) -> Array:
-    """Complete values at the nodes by those at the starts of the elements.
-
-    The force is continuous, but for jumps of the torque. The element that follows a jump
-    is short, and its polynomial is extrapolated to its start.
-    """
+    """Complete values at nodes by those at starts, which after a jump are extrapolated."""
     starts = np.concatenate((force[:, :1, 0], force[:, :-1, -1]), axis=1)
     sets_in = np.isin(edges_s[:-1], torque.time_s)
     starts[:, sets_in] = force[:, sets_in] @ _polynomials(_radau()[0], np.zeros(1))[:, 0]
@@ -213,10 +206,7 @@ class _Modes:
         self._residues = weights * rates[:, None, None, :]
 
     def respond(self, load: Array, which: IntArray) -> tuple[Array, Array]:
-        """Compute rotations and rates of arms at nodes, (n, n_arms, n_elements, _STAGES) each.
-
-        The loads there are (n, n_loads, n_elements, _STAGES), on samples with indices `which`.
-        """
+        """Compute rotations and rates, (n, n_arms, n_elements, _STAGES), under loads."""
         forced = np.einsum("nmeij,ndej->ndmei", self._gain[which], load)
         start = np.zeros(forced.shape[:4])
         carry = self._carry[which]
@@ -243,13 +233,6 @@ def _radau() -> tuple[Array, Array]:
     vandermonde = c[:, None] ** powers
     integrals = c[:, None] ** (powers + 1) / (powers + 1)
     return c, integrals @ np.linalg.inv(vandermonde)
-
-
-def _nodes(edges: Array) -> Array:
-    """Return collocation nodes, shape (n_elements, _STAGES)."""
-    nodes = edges[:-1, None] + np.diff(edges)[:, None] * _radau()[0]
-    nodes[:, -1] = edges[1:]
-    return nodes
 
 
 def _polynomials(points: Array, x: Array) -> Array:

@@ -138,11 +138,6 @@ class Course:
         nearest = np.where(np.abs(near[0] - time_s) <= np.abs(near[1] - time_s), *near)
         return np.where(np.abs(nearest - time_s) <= _ROUNDING * apart, nearest, time_s)
 
-    @cached_property
-    def only_steps(self) -> bool:
-        """True if what is controlled is piecewise constant."""
-        return not np.any(self.changes[:, 1:])
-
 
 class Sweep(Course):
     """A frequency sweep, in which a sample is strained by sines, and moduli are over the strain.
@@ -194,10 +189,7 @@ def ramp(duration_s: float, level: float, to_level: float) -> Phase:
 
 
 def join_phases(phases: tuple[Phase, ...], *, deforms: bool = False) -> Course:
-    """Convert phases that follow one another from t = 0 into a list of changes.
-
-    They are of a torque or load or, if the protocol `deforms`, of a deformation.
-    """
+    """Convert phases of a load or deformation, one after the other from 0, to changes."""
     durations = np.array([phase.duration_s for phase in phases])
     ends = np.cumsum(durations)
     starts = np.concatenate(([0.0], ends[:-1]))
@@ -237,10 +229,7 @@ def is_held(course: Course, time_s: ArrayLike) -> bool:
 
 
 def largest_load(phases: Iterable[Phase]) -> float:
-    """Return what phases control of the largest magnitude.
-
-    Within a phase nothing turns round.
-    """
+    """Return what phases, in which nothing turns round, control of the largest magnitude."""
     ends = (level for phase in phases for level in phase.at([0.0, phase.duration_s]).tolist())
     return max(ends, key=abs)
 
@@ -337,10 +326,7 @@ def _rates(time_s: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _quartics(time_s: Array, values: Array, bends: Array) -> tuple[Array, BoolArray]:
-    """Return the rates at rows, (n,), of quartics through the nearest five, and which are smooth.
-
-    Second derivatives at rows are (n,), those of the ends repeated.
-    """
+    """Return rates at rows, (n,), of quartics through the nearest five; and which are smooth."""
     count = len(values)
     rows = np.clip(np.arange(count) - _ASIDE, 0, count - _ROWS)[:, None] + np.arange(_ROWS)
     inner = bends[rows[:, 1:-1]].T

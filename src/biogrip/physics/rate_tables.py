@@ -2,18 +2,14 @@
 
 However many terms it has, f(r) = sum_i a_i exp(r t_i) is a smooth function of the rate r alone. So
 it is computed once at some hundred rates, and from then on interpolated piece by piece, by
-polynomials through Chebyshev nodes in
-
-    u = log(1 - T r),
-
-T the largest t_i: linear where nothing has decayed yet, logarithmic beyond.
+polynomials through Chebyshev nodes in u = log(1 - T r), T the largest t_i: linear where nothing has
+decayed yet, logarithmic beyond.
 
 In the strip |Im u| <= pi/2 no exp(r t_i) exceeds e, for there Re(T r) <= 1. It holds the Bernstein
-ellipse of a piece of width w with rho - 1/rho = 2 pi/w, so degree d leaves an error of at most
-4 e rho^-d / (rho - 1) sum |a_i| [1]_. That is 1.7e-16 sum |a_i|, no more than rounding, for the
-wide pieces of high degree that need the fewest rates. Looking up is faster in short pieces of low
-degree, into which they are divided; these add 4e-17 sum |a_i| for 32 of them, and for 16, in rows
-of responses, 3e-15.
+ellipse of a piece of width w with rho - 1/rho = 2 pi/w, so degree d leaves an error of at most 4 e
+rho^-d / (rho - 1) sum |a_i| [1]_: 1.7e-16 sum |a_i| for the wide pieces of high degree that need
+the fewest rates. Looking up is faster in short pieces of low degree, into which they are divided;
+these add 4e-17 sum |a_i| for 32 of them, and for 16, in rows of responses, 3e-15.
 
 References
 ----------
@@ -95,10 +91,7 @@ class DecayTable:
         return self.of(every, rates)
 
     def of(self, which: IntArray, rates: Array) -> Array:
-        """Return selected sums, each of which depends on its own rate alone.
-
-        Indices of the sums broadcast with the rates.
-        """
+        """Return sums of some indices, each at rates of its own; both broadcast."""
         place = np.fmin(np.log(1 - self._longest * rates) / (_WIDTH / _SHORTER), self._end)
         piece = place.astype(np.intp)
         place -= piece
@@ -186,11 +179,7 @@ class SpanningModes:
 
 @lru_cache(maxsize=16)
 def _spanning(halvings: int, orders: int, deforms: bool) -> tuple[Array, float, Array]:
-    """Return rates of spanning modes over T, a rate beyond which nothing lasts, and a table.
-
-    That has coefficients of the share of each mode in that of any rate, piece by piece, (n_modes,
-    n_pieces + 1, degree + 1), see `ModeRows`.
-    """
+    """Return rates over T, one beyond which nothing lasts, and the table of `ModeRows`."""
     # Imported here: the genetic algorithm does not need it, and loading takes long.
     from scipy.linalg import qr
 

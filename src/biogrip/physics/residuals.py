@@ -110,12 +110,7 @@ class Residuals:
     @property
     def coloured(self) -> bool:
         """True if residuals are whitened, as the noise is autocorrelated."""
-        return self.trace.condensed.coloured
-
-    @property
-    def plain(self) -> bool:
-        """True without nuisance functions and whitening."""
-        return not (self.coloured or len(self.trace.condensed.nuisance))
+        return self.trace.condensed.whitening is not None
 
     def later(self, change_s: float) -> "Residuals":
         """Return the residuals of the same trace for a protocol that starts later by some s."""
@@ -164,11 +159,7 @@ class Residuals:
         return sums[:, 1:], np.sqrt(sums[:, 0] / self.samples)
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
-        """Compute condensed rows of the responses of many samples.
-
-        Of log-parameters, (n, n_parameters), they are (n, 1 + n_parameters, n_rows): first the
-        response, then its derivatives by these. Without `slopes`, (n, 1, n_rows).
-        """
+        """Compute rows of responses and, if wanted, their slopes, (n, 1 + n_parameters, n_rows)."""
         given = self.gripper, self.model, self.course
         parameters, condensed = np.exp(log_parameters), self.trace.condensed
         return condensed.of_modes(compute_modes(*given, parameters, slopes=slopes))

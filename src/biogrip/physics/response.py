@@ -83,7 +83,7 @@ def step_response(
     if inertia:
         ringing = Ringing(gripper, network, zeros)
         rates: NDArray[Any] = ringing.rates
-        weights: NDArray[Any] = ringing.force() if force else ringing.rotations()
+        weights: NDArray[Any] = ringing.weights(force=force)
     else:
         rates = -zeros.values.T
         numerators = arms.force(zeros) if force else arms.rotations(zeros)[0]
@@ -136,10 +136,7 @@ def superpose(
 
 
 def linear_jaw_force(response: StepResponse, course: Course, time_s: Array) -> Array:
-    """Compute the jaw force of the linear model in N, (n, n_times), at any times.
-
-    The response is that of the jaw force; at the instant of a step: what follows it.
-    """
+    """Compute the jaw force in N, (n, n_times), from its step response; at a step, after it."""
     force = np.zeros((len(response.rates), len(time_s)))
     rates = response.rates[:, :, None]
     static, weights = response.static[:, 0], response.weights[:, 0]
@@ -343,23 +340,13 @@ class Ringing:
         factors[..., : inverse.shape[2]] *= inverse
         self._slope = self._highest * factors.prod(axis=2)
 
-    def rotations(self) -> ComplexArray:
-        """Return weights of the rotations in rad per N m, (n_arms, n_modes, n)."""
-        if self._alike:
-            return self._weights([np.ones_like(self.rates)] * 2)
-        left, right = (_value(arm, self.rates) for arm in self._arms)
-        return self._weights([right, left])
-
-    def force(self) -> ComplexArray:
-        """Return weights of the jaw force in N per N m, (1, n_modes, n)."""
-        force = self._lever_m * self._sample
-        if self._alike:
-            return self._weights([2 * force])
-        left, right = (_value(arm, self.rates) for arm in self._arms)
-        return self._weights([force * (left + right)])
-
-    def _weights(self, numerators: list[ComplexArray]) -> ComplexArray:
-        weights: ComplexArray = np.array(numerators) / (self.rates * self._slope)
+    def weights(self, *, force: bool) -> ComplexArray:
+        """Return weights, (n_arms, n_modes, n), of rotations or the force in N, per N m."""
+        left, right = [np.ones_like(self.rates)] * 2
+        if not self._alike:
+            left, right = (_value(arm, self.rates) for arm in self._arms)
+        pressing = [self._lever_m * self._sample * (left + right)] if force else [right, left]
+        weights: ComplexArray = np.array(pressing) / (self.rates * self._slope)
         return weights.swapaxes(1, 2)
 
     def _begin(self, zeros: Zeros) -> tuple[Array, ComplexArray]:

@@ -25,7 +25,7 @@ References
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,12 +33,8 @@ from numpy.typing import NDArray
 from biogrip.arrays import Array, ComplexArray, IntArray
 
 SMALLEST_GAP = 1e-6
-"""Relative distance below which two roots are moved apart.
-
-The partial fractions of two roots a relative gap g apart lose eps/g; moving a
-double root symmetrically apart by g changes the response by g^2. Both stay
-below 1e-9 here.
-"""
+"""Relative distance below which two roots are moved apart: partial fractions of two roots a gap g
+apart lose eps/g, and moving them apart changes the response by g^2, both below 1e-9."""
 
 # Most sweeps over roots that iterations find together, and over zeros of sums of poles.
 _MOST_SWEEPS_OF_ROOTS, _MOST_SWEEPS_OF_ZEROS = 80, 60
@@ -123,8 +119,7 @@ class Zeros:
     pole: Array
     """Pole that each zero is counted from, (n_zeros, n)."""
     beyond: NDArray[Any]
-    """Distance of the zero from that pole; for complex weights its derivative is the imaginary
-    part."""
+    """Distance of the zero from it; with complex weights the imaginary part is its derivative."""
 
     @property
     def values(self) -> NDArray[Any]:
@@ -165,8 +160,7 @@ def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -
 _FEW_POINTS = 1000
 
 
-@dataclass(frozen=True)
-class _Sides:
+class _Sides(NamedTuple):
     """Sums over the poles below given points and over those above, and derivatives of the sums."""
 
     below: Array
@@ -232,10 +226,7 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
     # The sign at the middle of a gap tells which pole the zero is nearer to.
     zero, which = np.divmod(np.arange(gaps.size), len(level))
     middle = _sides(weights, poles, zero, which, Zeros(poles[:-1].ravel(), 0.5 * gaps.ravel()))
-    below, above, below_slope, above_slope = (
-        of.reshape(gaps.shape)
-        for of in (middle.below, middle.above, middle.below_slope, middle.above_slope)
-    )
+    below, below_slope, above, above_slope = (of.reshape(gaps.shape) for of in middle)
     value = below + above - level
     pole = np.concatenate((np.where(value > 0, poles[1:], poles[:-1]), poles[-1:]))
     side, gap, start = np.ones_like(pole), np.full_like(pole, np.inf), np.empty_like(pole)
@@ -248,11 +239,7 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
 
 
 def _sides(weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros) -> _Sides:
-    """Return the sums at points, in the order of the poles: no point depends on the others.
-
-    Points are given by the index of the last pole below, `zero`, in ascending order, and by that of
-    their function.
-    """
+    """Return the sums at points, of last poles below, `zero`, and functions, pole by pole."""
     # A lone column would be summed by halves.
     if 1 < len(zero) <= _FEW_POINTS:
         terms = weights[:, which] / (slopes := (at.pole - poles[:, which]) + at.beyond)
@@ -295,10 +282,7 @@ def _nearer(
 def _between(
     value: Array, below_slope: Array, above_slope: Array, side: Array, gap: Array, at: Array
 ) -> Array:
-    """Return the zero of c + p/d - q/(gap - d), matched in value and slopes, one pole per side [4].
-
-    Distances are from the nearer pole, so that d keeps all its digits.
-    """
+    """Return the zero of c + p/d - q/(gap - d), matched in value and slopes [4]."""
     rest = gap - at
     p = -np.where(side > 0, below_slope, above_slope) * at * at
     q = -np.where(side > 0, above_slope, below_slope) * rest * rest

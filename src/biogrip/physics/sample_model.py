@@ -32,10 +32,7 @@ _RIGID = 1e18
 
 
 def of_columns(network: Callable[..., Network]) -> Callable[[ArrayLike], Network]:
-    """Return a function of parameters, (n, n_parameters), from a function of their columns, (n,).
-
-    Infinite parameters are replaced by rigid ones.
-    """
+    """Turn a function of columns, (n,), into one of (n, n_parameters), with inf made rigid."""
 
     @wraps(network)
     def of_parameters(parameters: ArrayLike) -> Network:
@@ -47,10 +44,7 @@ def of_columns(network: Callable[..., Network]) -> Callable[[ArrayLike], Network
 
 
 def complex_modulus(network: Network, omega: Array) -> tuple[Array, Array]:
-    """Return storage and loss moduli of n samples, in N/m or Pa, each (n, n_omega).
-
-    Angular frequencies are in rad/s, (n_omega,).
-    """
+    """Return storage and loss moduli, each (n, n_omega) in N/m or Pa, at frequencies in rad/s."""
     rates = (network.k / network.c)[:, :, None]
     share = network.k[:, :, None] / (omega**2 + rates**2)
     storage = network.k_p[:, None] + np.sum(share * omega**2, axis=1)
@@ -82,8 +76,7 @@ class Parameter:
     name: str
     """Identifier in config, columns and code."""
     kind: str
-    """``"stiffness"``, ``"damping"``, ``"springpot"`` (a modulus at 1 rad/s) or ``"exponent"``;
-    decides the unit."""
+    """``"stiffness"``, ``"damping"``, ``"springpot"`` (modulus at 1 rad/s) or ``"exponent"``."""
     meaning: str
     """A few words for tables."""
     range_name: str
@@ -132,14 +125,12 @@ class SampleModel:
     example: tuple[float, ...]
     """Parameters of some sample, which tests are about."""
     exchangeable: tuple[str, ...] = ()
-    """Parameters whose sum deserves a row of its own in tables, because stiff branches make them
-    trade against each other."""
+    """Parameters that stiff branches make trade against each other: tables have their sum."""
     branches: tuple[tuple[str, str], ...] = ()
     """Spring and damper of each Maxwell branch, or modulus and exponent of each springpot, by
     name, where a trace is the same whichever is called which; in ascending order (`in_order`)."""
     contains: Mapping[str, Turned] = field(default_factory=dict, hash=False)
-    """Models that it becomes where elements vanish, by candidate, and how their parameters are
-    turned into its own (`biogrip.physics.models`)."""
+    """Models that it becomes where elements vanish, and how their parameters become its own."""
     within: Mapping[str, Turned] = field(default_factory=dict, hash=False)
     """Likewise, candidates that become it, and how its parameters are turned into theirs."""
     branched: "Callable[[int], SampleModel] | None" = None
@@ -204,10 +195,7 @@ class SampleModel:
         return {**parameters, **dict(zip(self.names, values[0, order].tolist(), strict=True))}
 
     def moduli(self, parameters: Mapping[str, float], omega: Array) -> dict[str, Array]:
-        """Return storage and loss moduli over angular frequencies in rad/s, in named columns.
-
-        Parameters are by name; all columns are (n_omega,).
-        """
+        """Return storage and loss moduli at frequencies in rad/s, (n_omega,), in named columns."""
         storage, loss = complex_modulus(self.sample(parameters), omega)
         suffix = _SUFFIXES[self.stiffness_unit]
         return {"omega_per_s": omega, f"storage{suffix}": storage[0], f"loss{suffix}": loss[0]}
@@ -263,8 +251,3 @@ C_P = Parameter("c_p", "damping", "parallel damper", "c_p", may_vanish=True)
 
 SINGLE_BRANCH: tuple[Parameter, ...] = (K, K_P, C, C_P)
 """The paper's parameters, which every file of identifications has columns for."""
-
-K_S = Parameter("k_s", "stiffness", "series spring", "k")
-C_S = Parameter("c_s", "damping", "series damper", "c")
-K_V = Parameter("k_v", "stiffness", "spring of the Kelvin-Voigt element", "k")
-C_V = Parameter("c_v", "damping", "damper of the Kelvin-Voigt element", "c")

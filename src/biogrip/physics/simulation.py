@@ -83,10 +83,7 @@ class Grip:
 
 
 def compute_grip(gripper: Gripper, network: Network, course: Course, *, nonlinear: bool) -> Grip:
-    """Compute the extreme forces of the jaws on the first sample, without inertia.
-
-    By either model, as in `simulated_response`.
-    """
+    """Compute the extreme forces of the jaws on the first sample, without inertia."""
     time_s = _instants(course)
     force = jaw_force(gripper, network, course, time_s, nonlinear=nonlinear, inertia=False)[0]
     least_shown = _LEAST_FORCE * float(np.abs(force).max()) or 1.0
@@ -138,11 +135,8 @@ def simulated_response(
 _EFOLDS_OF_RING = 36.0
 
 VISIBLE = 0.2
-"""Norm of a ring in standard deviations of the noise from which it counts as visible.
-
-No estimate is off by more of its standard deviations: a 95 % interval then holds the truth in 94.5
-% or more of traces.
-"""
+"""Norm of a ring in standard deviations of the noise from which it counts as visible: no estimate
+is off by more of its own, and a 95 % interval holds the truth in 94.5 % of traces."""
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,18 @@
 """The linear model with unilateral contact: jaws press but do not pull, and may lose contact.
 
 While the jaws touch, arms and sample are one system without inertia. When the contact force reaches
-zero, contact is lost: each arm turns against its own hinge, and the unloaded sample recovers. When
-the gap closes, jaws and sample touch again. Every stretch is solved exactly; only the instants at
-which it ends are found numerically.
+zero, each arm turns against its own hinge, and the unloaded sample recovers, until the gap closes.
+Every stretch is solved exactly; only the instants at which it ends are found numerically. States
+are continuous. Loss and contact do not alternate at once: the force that contact would give and the
+rate at which the gap would open are proportional, with opposite signs. The sample may shift between
+the jaws freely, so that only the sum of both tips' displacements counts.
 
-All states are continuous when contact changes. Loss and contact do not alternate at once, for the
-force that contact would give and the rate at which the gap would open without contact are
-proportional, with opposite signs. The sample may shift between the jaws freely, so that only the
-sum of both tips' displacements counts.
-
-A system of springs and dampers M z' + K z = f with M = L L^T and K = G^T G, one row of G a spring,
-has the modes q = V^T L^T z of the singular value decomposition G L^-T = U S V^T, and the rates S^2.
-Taking the decomposition of the factor rather than the eigenvalues of its square keeps twice as many
-digits of the slow rates.
+Springs and dampers M z' + K z = f with M = L L^T and K = G^T G, one row of G a spring, have the
+modes q = V^T L^T z of the singular value decomposition G L^-T = U S V^T, and the rates S^2: twice
+as many digits of the slow rates as by the eigenvalues of its square.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,7 +61,10 @@ def unilateral_response(
     Times ascend; at the instant of a step: what follows it. If contact is lost too often, it is a
     `BiogripError`.
     """
-    system, pieces = _System(gripper, network), list(_pieces(torque))
+    system, lengths = _System(gripper, network), np.diff(torque.time_s, append=torque.end_s)
+    # Start and length of each phase, and the torques of both arms in it.
+    loads_of = (_Forcing(np.stack((powers, powers))) for powers in torque.within_phases)
+    pieces = list(zip(torque.time_s.tolist(), lengths.tolist(), loads_of, strict=True))
     most_torque = max(
         float(np.max(np.abs(loads.at(np.array([0.0, length]))))) for _, length, loads in pieces
     )
@@ -132,19 +131,8 @@ class _Forcing:
         return _Forcing(self.powers @ shift)
 
 
-def _pieces(torque: Course) -> Iterator[tuple[float, float, _Forcing]]:
-    """Yield start and length of each phase, and the torques of both arms in it."""
-    lengths = np.diff(torque.time_s, append=torque.end_s)
-    for start, length, powers in zip(torque.time_s, lengths, torque.within_phases, strict=True):
-        yield float(start), float(length), _Forcing(np.stack((powers, powers)))
-
-
 class _Modes:
-    """Modes of a system of springs and dampers.
-
-    G, (n_springs, n_states), has the extension of each spring, times the root of its stiffness; L,
-    (n_states, n_states), of the dampers is lower triangular.
-    """
+    """Modes of springs G, (n_springs, n_states), and dampers L, (n_states, n_states), lower."""
 
     def __init__(self, springs: Array, dampers: Array) -> None:
         inverse = np.linalg.inv(dampers)
