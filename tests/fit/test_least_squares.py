@@ -37,7 +37,7 @@ def test_a_fit_that_stops_short_has_converged_if_no_data_tell(
     posed, one = problem("endothelial_cell", 0), np.zeros(1, dtype=np.int64)
     best = fit_from([posed], np.log([35.0, 12.3, 299.9, 1e-3])).x
     fits = LocalFits([posed])
-    curvature = fits.curved(best, one).information[0, 0, 0]
+    curvature = fits.normal(best, one, curved=True).information[0, 0, 0]
     start = best + np.sqrt(rise / curvature) * np.eye(4)[:1]
     short = Minima(start, np.full(1, np.inf), one, np.ones(1, dtype=bool))
     monkeypatch.setattr(least_squares, "minimize", lambda *_: short)

@@ -232,7 +232,7 @@ def test_curvatures_are_those_of_what_is_minimized(name: str) -> None:
     """All second derivatives, against differences of gradients on all samples; away from optima."""
     for posed, sample in noisy(MODELS_SETTLED[name], 6):
         fits, trace, x = LocalFits([posed]), np.zeros(1, dtype=np.int64), sample + 0.3
-        found = fits.curved(x[None], trace)
+        found = fits.normal(x[None], trace, curved=True)
         unit = np.eye(len(x))
 
         np.testing.assert_allclose(

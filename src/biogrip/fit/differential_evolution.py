@@ -7,7 +7,7 @@ References
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -15,9 +15,6 @@ from pydantic import Field
 from biogrip.arrays import Array
 from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block
-
-if TYPE_CHECKING:
-    from scipy.optimize import OptimizeResult
 
 
 @dataclass(frozen=True)
@@ -63,11 +60,11 @@ def _identified(
         evaluations += columns.shape[1]
         return problem.residuals.misfit(np.exp(columns.T)).astype(np.float32).astype(float)
 
-    def row_of(result: "OptimizeResult") -> Row:
+    def row_of(result: Any) -> Row:
         median = float(np.median(result.population_energies))
         return np.exp(result.x), float(result.fun), median, evaluations
 
-    def record(intermediate_result: "OptimizeResult") -> None:
+    def record(intermediate_result: Any) -> None:
         rows.append(row_of(intermediate_result))
         progress(evaluations, rows[-1][1])
 

@@ -2,11 +2,10 @@
 
 Each generation, the best individuals survive unchanged. They are the parents of the others by
 single-point crossover, after which a share of the children has a gene redrawn. The search stops
-when the best misfit has stalled.
-
-Individuals are ranked by their misfit in single precision; the chromosome breaks ties. Its 24 bits
-are far finer than noise can resolve, and far coarser than the differences between processors and
-BLAS libraries: the last bits of a misfit cannot change the course of the search.
+when the best misfit has stalled. Individuals are ranked by their misfit in single precision; the
+chromosome breaks ties. Its 24 bits are far finer than noise can resolve, and far coarser than the
+differences between processors and BLAS libraries: the last bits of a misfit cannot change the
+search.
 
 The populations of several traces evolve side by side as arrays, (n_populations, n, n_genes). Each
 has a random generator of its own, so that none depends on the others.

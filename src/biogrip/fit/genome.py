@@ -1,10 +1,10 @@
 """The chromosome: exponent and digits of each parameter are genes (eq. 10, Tables 3, 4)."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,6 @@ from pydantic import Field
 from biogrip.arrays import Array, IntArray
 from biogrip.keys import Block, Complaint
 from biogrip.physics.sample_model import SampleModel
-
-if TYPE_CHECKING:
-    from biogrip.physics.misfit import Misfit
 
 
 @dataclass(frozen=True)
@@ -206,14 +203,14 @@ _LEAST = 1e-7
 _AT_ONCE = 3
 
 
-def lowest_encodable(misfit: "Misfit", ranges: Sequence[GeneRange], starts: Array) -> float:
-    """Return the lowest misfit of all encodable points around some starts.
+def lowest_encodable(
+    misfit: Callable[[Array], Array], ranges: Sequence[GeneRange], starts: Array
+) -> float:
+    """Return the lowest misfit of all encodable points around some starts, (n, n_parameters).
 
     Around each start's nearest encodable point all neighbours are computed, the last digit or the
     one before it up or down by one in up to three parameters, and then around the best of them,
-    until none is better than the point that they surround. A lower point elsewhere is not excluded.
-    Starts, (n, n_parameters), are the ends of runs, among which should be the continuous optimum;
-    of each parameter a gene range is given.
+    until none is better. A lower point elsewhere is not excluded.
     """
     values = [genes.values for genes in ranges]
     tens = [genes.most[-1] - genes.least[-1] + 1 for genes in ranges]

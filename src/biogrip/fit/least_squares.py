@@ -70,25 +70,21 @@ class LocalFits:
         self._noise_sd = np.array([problem.residuals.trace.scatter for problem in problems])
         self._middle = 0.5 * (self.low + self.high)
 
-    def normal(self, x: Array, trace: IntArray) -> Normal:
-        """Return normal equations, in the noise and with the prior, at points, each for a trace."""
-        size = max(1, _AT_ONCE // (self._traces.shape[1] * (1 + x.shape[1])))
+    def normal(self, x: Array, trace: IntArray, *, curved: bool = False) -> Normal:
+        """Return the normal equations of the residuals, in units of the noise, and the prior.
+
+        Log-parameters are (n, n_parameters), each for a trace. If `curved`, the full Hessian stands
+        in place of its Gauss-Newton part: second derivatives are differences of exact slopes, whose
+        error vanishes with the residuals.
+        """
+        numbers = self._traces.shape[1] * (1 + x.shape[1]) * (2 * x.shape[1] if curved else 1)
         normals = []
-        for some in parts(max(len(x), 1), size):
+        for some in parts(max(len(x), 1), max(1, _AT_ONCE // numbers)):
             rows = self._residuals.condensed_responses(x[some])
             normals.append(self._normal_of(rows, x[some], trace[some]))
+            if curved:
+                normals[-1].information += self._second(rows[:, 0], x[some], trace[some])
         return Normal.joined(normals) if len(normals) > 1 else normals[0]
-
-    def curved(self, x: Array, trace: IntArray) -> Normal:
-        """Return normal equations with all of the Hessian, in part from differences of slopes."""
-        normals = []
-        numbers = 2 * x.shape[1] * (1 + x.shape[1]) * self._traces.shape[1]
-        for some in parts(len(x), max(1, _AT_ONCE // numbers)):
-            here, own = x[some], trace[some]
-            rows = self._residuals.condensed_responses(here)
-            normals.append(self._normal_of(rows, here, own))
-            normals[-1].information += self._second(rows[:, 0], here, own)
-        return Normal.joined(normals)
 
     def _second(self, residual: Array, x: Array, trace: IntArray) -> Array:
         """Return residuals times their second derivatives, in units of the noise."""
@@ -351,17 +347,17 @@ _ROUNDING = 1e-15
 def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     """Refine optima by Newton steps until they are stationary to the last digits [2]_.
 
-    Descents compare sums of squares, and so find an optimum to half the digits. Its vanishing
-    gradient locates it to all of them. Gauss-Newton steps need not converge there: for an element
-    too weak to be seen, second derivatives of the residuals decide how the gradient changes. So
-    the steps are Newton's. The first are damped, and compared on condensed rows. Each of the last
-    is compared, on all readings, with the point before it, and kept only if it fits no worse.
+    Descents compare sums of squares, and so find an optimum to half the digits; its vanishing
+    gradient locates it to all of them. For an element too weak to be seen, second derivatives of
+    the residuals decide how the gradient changes: Gauss-Newton steps need not converge. The first
+    steps are damped, and compared on condensed rows. Each of the last is compared, on all readings,
+    with the point before it, and kept only if it fits no worse.
 
     Found are optima, fitted with the finest tolerance, each to the trace of an index, (n,).
-    Returned are optima with their misfits on all readings, none above that of `found`, and the
+    Returned are optima with misfits on all readings, none above that of `found`, and the
     evaluations of the refinement; branches sorted by relaxation time. An optimum has converged if
-    its next step would change the sum of squares by next to nothing of what the fit leaves of one
-    reading, or by rounding.
+    its next step would change the sum of squares by next to nothing of what the fit leaves of a
+    reading.
     """
 
     def convex(x: Array, fit: IntArray) -> Normal:
@@ -446,7 +442,7 @@ def _newton_step(low: Array, high: Array, normal: Normal, x: Array, damping: Arr
 
 def _convex(fits: LocalFits, x: Array, trace: IntArray) -> Normal:
     """Return normal equations with the moduli of the Hessian's eigenvalues."""
-    normal = fits.curved(x, trace)
+    normal = fits.normal(x, trace, curved=True)
     # A parameter pushed against a bound does not move, whatever the curvature there.
     at_low, at_high = x <= fits.low[trace], x >= fits.high[trace]
     fixed = at_low & (normal.gradient > 0) | at_high & (normal.gradient < 0)

@@ -1,14 +1,13 @@
 """Levenberg-Marquardt least squares within bounds, for many problems at once [1]_, [2]_.
 
-Every problem has its own damping, adapted as in [4]_, and is removed when it has
-converged [3]_. A step stays within the bounds and within a box about its origin:
-parameters that would leave are fixed at the edge, and the others are solved for again.
-No sum runs over problems, nor in an order that depends on their number: the result of
-a problem does not depend, to the last bit, on the problems solved with it.
+Every problem has its own damping, adapted as in [4]_, and is removed when it has converged [3]_. A
+step stays within the bounds and within a box about its origin: parameters that would leave are
+fixed at the edge, and the others are solved for again. No sum runs over problems, nor in an order
+that depends on their number: no result depends, to the last bit, on the other problems.
 
-Points are rounded to a grid far finer than the statistical uncertainty. Processors differ
-in the last bits of a step, and a descent along a valley would amplify these until decisions
-differ. On the grid, every step begins with the same bits on all processors.
+Points are rounded to a grid far finer than the statistical uncertainty. Processors differ in the
+last bits of a step, and a descent along a valley would amplify these until decisions differ. On the
+grid, every step begins with the same bits on all processors.
 
 References
 ----------
@@ -127,10 +126,9 @@ def minimize(
 ) -> Minima:
     """Minimize the sum of squares of every problem from its start.
 
-    Starts and bounds are logarithms, (n, n_parameters), on the constraint if there is one; equal
-    bounds fix a parameter. A problem has converged when the actual and the predicted relative
-    decrease of its sum are below the tolerance. The initial damping is relative to the diagonal of
-    the information.
+    Starts and bounds, (n, n_parameters), are logarithms; equal bounds fix a parameter. A problem
+    has converged when the actual and the predicted relative decrease of its sum are below the
+    tolerance. The initial damping is relative to the diagonal of the information.
     """
     everyone, count = np.arange(len(starts)), len(starts)
     never = np.full(count, np.inf), np.ones(count, dtype=np.int64), np.zeros(count, dtype=bool)
@@ -177,7 +175,9 @@ def _advance(
     _damp(state, gained, predicted)
     better = gained > 0
     state.x = np.where(better[:, None], tried, x)
-    state.normal = _either(better, found, normal)
+    pairs = zip(found.parts, normal.parts, strict=True)
+    chosen = (np.where(better.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in pairs)
+    state.normal = Normal(*chosen)
     return done
 
 
@@ -259,12 +259,6 @@ def _damp(state: _State, gained: Array, predicted: Array) -> None:
 def _leave(state: _State, minima: Minima) -> None:
     minima.x[state.problem] = state.x
     minima.misfit[state.problem] = state.normal.misfit
-
-
-def _either(which: BoolArray, one: Normal, other: Normal) -> Normal:
-    pairs = zip(one.parts, other.parts, strict=True)
-    chosen = (np.where(which.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in pairs)
-    return Normal(*chosen)
 
 
 def _times(matrices: Array, vectors: Array) -> Array:

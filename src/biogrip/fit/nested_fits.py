@@ -48,9 +48,9 @@ Answers = list[Fit]
 def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> Answers:
     """Return the fits of traces by one model, or lower ones with another relaxation time.
 
-    Random starts may all miss a basin in which an element hardly shows: then no time that they end
-    with is near. So every spring and its damper start once more, as stiff as the others on average,
-    with times from that of the closest readings to the trace's length.
+    Random starts may all miss a basin in which an element hardly shows. So every spring and its
+    damper start once more, as stiff as the others on average, with times from that of the closest
+    readings to the trace's length.
     """
     model = problems[0].residuals.model
     names = model.names
@@ -91,10 +91,10 @@ def fit_models(
 ) -> dict[str, Answers]:
     """Fit nested models to traces by least squares, and return the best fit to each trace.
 
-    By candidate, the problems of the same traces are given, a random generator for each of these,
-    and additional starts, log-parameters (n_traces, n_parameters); `done` is called after every
-    model. Parameters found may be zero or infinite. A fit worse than a nested model's within its
-    own range has not converged.
+    By candidate, the problems of the same traces are given, a random generator for each, and
+    additional starts, (n_traces, n_parameters); `done` is called after every model. Parameters
+    found may be zero or infinite. A fit worse than a nested model's within its own range has not
+    converged.
     """
     found: dict[str, Answers] = {}
     for name in sorted(problems, key=lambda each: len(CANDIDATES[each].model.names)):

@@ -1,18 +1,15 @@
 """Noise of a trace, estimated from the residuals of its fit.
 
-Outliers are readings with far more noise than those around (`outliers_of`).
+Outliers are readings with far more noise than those around (`outliers_of`). Noise may grow with the
+rotation (`compute_growth`). A test ranks the sizes of residuals against those of the rotation, so
+that outliers count no more than other readings [1]_. The standard deviation is then that of two
+independent parts, one the same everywhere and one proportional to the rotation, with the shares of
+highest likelihood under Student's t, which bounds the influence of outliers [2]_.
 
-Noise may grow with the rotation (`compute_growth`). A test ranks the sizes of residuals against
-those of the rotation, so that outliers count no more than other readings [1]_. The standard
-deviation is then that of two independent parts, one the same everywhere and one proportional to
-the rotation, with the shares of highest likelihood under Student's t distribution, which bounds
-the influence of outliers [2]_.
-
-Autocorrelation is estimated by restricted maximum likelihood (`NoiseModelLikelihood`). Residuals
-have less noise than the trace, most of all at low frequencies, where parameters, offset and drift
-absorb it. The restricted likelihood is that of the part that none of them can absorb, which
-removes the bias [3]_. A prior keeps the share of 1/f noise and of a random walk, without its mean,
-from vanishing, as it often would by chance alone [4]_.
+Autocorrelation is estimated by restricted maximum likelihood (`NoiseModelLikelihood`), of the part
+of the trace that parameters, offset and drift cannot absorb: what they absorb would bias it [3]_. A
+prior keeps the share of 1/f noise and of a random walk, without its mean, from vanishing, as it
+often would by chance alone [4]_.
 
 References
 ----------
@@ -187,7 +184,7 @@ class NoiseModelLikelihood:
         They are those of a chi-squared variable whose relative spread is that of the variance,
         given the uncertainty of the noise model of highest likelihood (Satterthwaite [6]_).
         Derivatives by the log-parameters, (n_parameters, n_samples), are over the noise's standard
-        deviation; nuisance functions of the instrument are (n_functions, n_samples).
+        deviation.
         """
 
         def variances(x: Array) -> Array:

@@ -135,13 +135,10 @@ def fit_traces(
 
     Traces of plain noise are fitted together. With a coloured noise model, outliers are removed,
     and the noise is a sum of white, Ornstein-Uhlenbeck and 1/f noise and a random walk. If it grows
-    with the rotation, so does a part of the white noise: the parts whose readings depend on each
-    other are of the instrument's zero. The effect of the gripper's uncertainty on the rotation is
-    one more component of the noise.
-
-    `find` finds the global optima of the problems of given traces. A trace is its ascending times
-    and readings, (n_samples,), and has assumptions of its own. Too many readings for a coloured
-    noise model are a `BiogripError`.
+    with the rotation, so does a part of the white noise. The effect of the gripper's uncertainty is
+    one more component. `find` finds the global optima of problems of given traces. A trace is its
+    ascending times and readings, (n_samples,), and has assumptions of its own. Too many readings
+    for a coloured noise model are a `BiogripError`.
     """
     plain = [trace for trace, experiment in enumerate(experiments) if experiment.plain]
     problems = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])

@@ -122,12 +122,6 @@ def estimate(values: Array, errors: Array) -> Estimate:
     return Estimate(float(mean), float(variance) ** 0.5, freedom)
 
 
-def mean_of_units(means: Sequence[float]) -> Estimate:
-    """Estimate the mean of a population of units from the means of some of them."""
-    error = max(float(np.std(means, ddof=1)), _LEAST_WIDTH) / sqrt(len(means))
-    return Estimate(float(np.mean(means)), error, len(means) - 1)
-
-
 def adjusted(p_values: Sequence[float]) -> list[float]:
     """Return p values adjusted for their number by Holm's method."""
     found, largest = [0.0] * len(p_values), 0.0
@@ -173,7 +167,9 @@ def compare(
                 if 2 * len(means) >= max(len({it.unit for it in these}), 1):
                     row["median"] = no_longer_log(float(np.mean([*means.values()])))
                     if len(means) >= FEWEST_UNITS:
-                        estimates[group] = mean_of_units([*means.values()])
+                        error = max(float(np.std([*means.values()], ddof=1)), _LEAST_WIDTH)
+                        mean, count = float(np.mean([*means.values()])), len(means)
+                        estimates[group] = Estimate(mean, error / sqrt(count), count - 1)
             elif len(known) >= max(FEWEST_CELLS, len(these) / 2):
                 estimates[group] = estimate(*np.array(known).T)
             if group in estimates:

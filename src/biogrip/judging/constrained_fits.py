@@ -32,10 +32,9 @@ _SMALLEST = 1e-200
 class QuantityConstraint:
     """A constraint on each of n fits, which holds one quantity at a given value.
 
-    Of the quantities that may be held, each fit has the index of its own, (n,), and the logarithm
-    of its value, within the quantity's range. Bounds of the log-parameters are (n, n_parameters).
-    Branches must relax within a time for quantities that require it; the penalty is in standard
-    deviations of the noise, over which the fits' unit is (n,).
+    Each fit has the index of its quantity, (n,), and the logarithm of its value, within its range.
+    Bounds are (n, n_parameters). Branches must relax within a time for quantities that require it;
+    the penalty is in standard deviations of the noise, over which the fits' unit is (n,).
     """
 
     def __init__(
@@ -190,14 +189,13 @@ CLOSE = 1e-7
 
 
 class ConstrainedFits:
-    """Fits of several traces with one of several quantities held at given values.
+    """Fits of several traces, whose problems are `alike`, with one of several quantities held.
 
-    Each profile belongs to a trace and a quantity; those of the first trace come first. The
-    problems of the traces have to be `alike`. Of each profile there are the index of its `trace`,
-    the trace's optimum `best`, (n_profiles, n_parameters), the logarithm of the quantity `at_best`,
-    and `threshold` and `certainty` as in `Likelihood`, the latter no less than the former.
-    `missed` has, by trace, the lowest increase of chi^2 and its log-parameters, if it is so far
-    below zero that the trace's global optimum was missed.
+    Each profile belongs to a trace and a quantity; those of the first trace come first. Of each
+    there are the index of its `trace`, the optimum `best`, (n_profiles, n_parameters), the
+    logarithm of the quantity `at_best`, and `threshold` and `certainty`, no less, as in
+    `Likelihood`. `missed` has, by trace, the lowest increase of chi^2 and its log-parameters, if
+    the optimum was missed.
     """
 
     def __init__(self, likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> None:
@@ -224,10 +222,9 @@ class ConstrainedFits:
     ) -> tuple[Array, Array]:
         """Minimize chi^2 over all parameters with one quantity held at a value.
 
-        A profile has the trace that is fitted and the quantity that is held, the target is the
-        logarithm at which it is held, within its range; both (n,). Starts near the fit are
-        log-parameters, (n, n_parameters), moved onto the constraint. Returns the increases of chi^2
-        over each trace's optimum, (n,), and the fitted log-parameters.
+        A target is the logarithm at which the quantity of a profile is held, within its range,
+        (n,). Starts near the fit, (n, n_parameters), are moved onto the constraint. Returns the
+        increases of chi^2 over each trace's optimum, (n,), and the fitted log-parameters.
         """
         trace, which = np.divmod(profile, len(self.quantities))
         low, high = self._fits.low[trace], self._fits.high[trace]

@@ -154,7 +154,7 @@ def diagnose_all(
     """Judge the identification of each of several traces by profile likelihoods.
 
     No diagnosis depends on the other traces. Found are their global optima, as far as is known; the
-    noise of each, if its standard deviation is not known, is that of the residual. Limits have a
+    noise, if its standard deviation is not known, is that of the residual. Limits have a
     confidence, e.g. 0.95. If `valley` is true, chi^2 is mapped over exchangeable parameters, too.
     """
 

@@ -2,17 +2,15 @@
 
 The heaviest note decides the status of a fit: ok, doubtful or rejected (`compute_status`).
 Residuals are tested for white noise (`biogrip.judging.whiteness`), each test at the level
-`FALSE_ALARM`: correlation of neighbours, the cumulative periodogram, means over stretches,
-outliers, a line in the spectrum, a step at any time, parts that differ
-(`biogrip.judging.whiteness`). A line or a step that explains the others is named in their place.
-Noise that grows with the rotation is told first, and the other tests are of what it leaves.
+`FALSE_ALARM`. A line or a step that explains the others is named in their place. Noise that grows
+with the rotation is told first, and the other tests are of what it leaves.
 
 What is correlated beyond chance (`CERTAIN_MISFIT`) and larger than the scatter of neighbouring
 readings may be noise all the same: if it is correlated for a short time (`has_fast_noise`), or if
-the noise differs from one part of the trace to another (`has_uneven_noise`). Else it is misfit. A
-misfit of 2 % of the peak or more rejects the fit. With a smaller one limits are given that count
-independent residuals only: the fit is good to so much of the peak, which is doubtful, not wrong. A
-noise model may be misfit, too (`find_slow_misfit`): if it is correlated for too long.
+it differs from one part of the trace to another (`has_uneven_noise`). Else it is misfit. A misfit
+of 2 % of the peak or more rejects the fit. With a smaller one limits count independent residuals
+only: the fit is good to so much of the peak, which is doubtful, not wrong. A noise model that is
+correlated for too long may be misfit, too (`find_slow_misfit`).
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -418,9 +416,8 @@ def find_slow_misfit(
 ) -> Note | None:
     """Return a note if the slow parts of a noise model may be misfit.
 
-    Its correlation time and the odds of its walk count less `SURE` times the standard deviations of
-    their logarithms, `errors`. `share_of_peak` is the standard deviation of those parts over the
-    largest response; `suspects` says what is wrong if they are misfit.
+    Its correlation time and the odds of its walk count less `SURE` times the `errors` of their
+    logarithms. `share_of_peak` is the standard deviation of those parts over the largest response.
     """
     share, time_s = noise_model.ar1, noise_model.time_s
     certain = np.exp(-levels.SURE * np.array(errors))
@@ -445,8 +442,8 @@ def find_slow_misfit(
 def has_fast_noise(residuals: Residuals, residual: Array, slopes: Array) -> bool:
     """Return True if what a fit leaves is stationary noise that is correlated for a short time.
 
-    Given are the residuals, (n_samples,), and their slopes, (n_parameters, n_samples). That is not
-    estimated of more than `MOST_SAMPLES` readings, nor of residuals that are white.
+    Slopes are (n_parameters, n_samples). Of more than `MOST_SAMPLES` readings, or white ones, it is
+    not.
     """
     time_s = residuals.trace.time_s
     if residuals.coloured or len(time_s) > MOST_SAMPLES:

@@ -3,10 +3,9 @@
 Errors of several kinds are planted in the trace's own best fit, to first order: readings that jump
 at some time, or are scaled from then on; a load that starts late; a second branch of the sample. A
 fit absorbs a part of each, which moves the parameters, and leaves a part, by which tests tell it.
-The size is that which the most sensitive test just misses: a scan for steps, parts of the trace
-fitted apart, and means over stretches. As readings scatter, half of such errors are told. No error
-is larger than its kind may well be, nor than what moves a quantity twofold, up to where first order
-may hold.
+The size is that which the most sensitive test just misses, a scan for steps, parts fitted apart, or
+means over stretches: half of such errors are told. No error is larger than its kind may well be,
+nor than what moves a quantity twofold, up to where first order may hold.
 """
 
 from collections.abc import Iterator, Sequence

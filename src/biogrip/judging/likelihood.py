@@ -85,9 +85,8 @@ class Likelihood:
     def deviation(self, quantity: Quantity) -> float:
         """Return the first-order standard deviation of a quantity's logarithm.
 
-        Every parameter has a prior standard deviation of one e-fold, beyond which the
-        linear approximation fails; so the result is some e-folds at most. Unlike in a
-        `bound`, no parameter is left out for want of information.
+        Every parameter has a prior of one e-fold, beyond which the linear approximation fails.
+        Unlike in a `bound`, no parameter is left out for want of information.
         """
         rows = self.problem.residuals.condensed_responses(self.best[None])[0]
         relative = rows[1:] / self.noise_sd
@@ -169,21 +168,17 @@ def covariance(
 ) -> Array:
     """Compute the first-order covariance of quantities estimated by least squares.
 
-    With the same Gaussian noise everywhere, it is the inverse of the Fisher
-    information J J^T / sigma^2: the Cramér-Rao bound, which no unbiased
-    estimator undercuts. With noise that changes along the trace, it is the
-    covariance of unweighted least squares [4]_, A J diag(sigma^2) J^T A with
-    A = (J J^T)^-1, and no longer a bound.
+    With the same Gaussian noise everywhere, it is the inverse of the Fisher information J J^T /
+    sigma^2: the Cramér-Rao bound, which no unbiased estimator undercuts. With noise that changes
+    along the trace, it is that of unweighted least squares [4]_, A J diag(sigma^2) J^T A with A =
+    (J J^T)^-1, and no longer a bound. A parameter whose standard deviation exceeds one e-fold even
+    with all others known carries no information, and is fixed for the others' covariance: near zero
+    on a logarithmic scale, the linear approximation fails.
 
-    A parameter whose standard deviation exceeds one e-fold even with all others known
-    carries no information. It is fixed for the others' covariance: near zero on a
-    logarithmic scale, the linear approximation of its effect fails.
-
-    J is d response / d log parameter, (n_parameters, n_samples), sigma a number or
-    (n_samples,). Gradients are d quantity / d log parameter, (n_quantities, n_parameters); without
-    them quantities are the log-parameters. The covariance, (n_quantities, n_quantities), is
-    infinite on the diagonal for what rests on a parameter without information or changes along a
-    direction in which the response does not. It is zero without noise.
+    J is d response / d log parameter, (n_parameters, n_samples), sigma a number or (n_samples,).
+    Gradients are d quantity / d log parameter, (n_quantities, n_parameters), by default of the
+    log-parameters. The covariance, (n_quantities, n_quantities), is infinite on the diagonal for
+    what the response does not show, and zero without noise.
     """
     slopes = np.eye(len(sensitivity)) if gradients is None else gradients
     sigma = np.broadcast_to(noise_sd, sensitivity.shape[1])
@@ -224,8 +219,7 @@ def bounds_percent(
     """Compute the Cramér-Rao bounds of all identified quantities of a case with its noise.
 
     They are 100 times the standard deviation of a quantity's logarithm, NaN without noise, at
-    parameters in SI units and sampling times, (n_samples,). A parameter of zero comes out as
-    undetermined, for its logarithm has no effect on the trace.
+    parameters in SI units and sampling times, (n_samples,); a parameter of zero is undetermined.
     """
     model = problem.searched
     quantities = parameters_and_sum(model)
@@ -245,8 +239,7 @@ def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:
     """Return the best and the worst determined quantity of several points, by label.
 
     Quantities count if their bound in percent, not NaN, is below `DETERMINED_PERCENT` at half of
-    the points or more. Parts of a sum do not count beside it: a first-order bound does not show
-    that they trade against each other far from their values.
+    the points or more. Parts of a sum, which may trade against each other, do not count beside it.
     """
     percents: dict[str, list[float]] = {}
     for label, percent in bounds:

@@ -247,10 +247,8 @@ def notes_on_start(
 
     A trace that begins constant, and fits far better with a later start, tells nothing of the
     sample under the protocol as given, whatever noise model absorbs the misfit: the test is a
-    likelihood ratio. One that begins long after its first step, as if cut off there, may have been
-    recorded on another clock: then it is fitted with that step just before it.
-
-    The protocol starts at 0, times ascend, (n_samples,), and the diagnosis is that of the best fit.
+    likelihood ratio. One that begins as if cut off there may be on another clock. Times ascend,
+    (n_samples,), and the diagnosis is that of the best fit with a start at 0.
     """
     may_be_late = not experiment.start_given
     fits, ramped = OnsetFits(experiment, time_s, readings), _with_ramp(experiment, time_s)

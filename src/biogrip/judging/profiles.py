@@ -46,9 +46,9 @@ _NEWS = 1e-3
 class Points:
     """Points of several profiles, one profile after the other, with their best fits so far.
 
-    Grids are of each profile, ascending logarithms of the quantity, that of the optimum among them.
-    Each point has the index of its `profile`, its value of `values`, and of its best fit
-    `increases` of chi^2, (n_points,), and log-parameters `x`, (n_points, n_parameters).
+    Grids are ascending logarithms of each quantity, with that of the optimum. A point has the index
+    of its `profile`, one of `values`, and of its best fit `increases` and `x`, (n_points,
+    n_parameters).
     """
 
     def __init__(self, fits: ConstrainedFits, grids: Sequence[Array]) -> None:
@@ -281,9 +281,8 @@ class Brackets:
 def crossings(fits: ConstrainedFits, brackets: Brackets) -> Array:
     """Find the logarithms of quantities at which the increase of chi^2 equals the threshold, (n,).
 
-    The accuracy is that of the square root of the increase. Lower fits that are found at outer ends
-    of brackets replace theirs, in place. NaN is where a deeper basin turns out to be below the
-    threshold at the outer end, so that the crossing lies further out.
+    Lower fits that are found at outer ends of brackets replace theirs, in place. NaN is where a
+    deeper basin is below the threshold there, so that the crossing lies further out.
     """
     profile, threshold = brackets.profile, fits.threshold[brackets.profile]
     root_threshold = np.sqrt(threshold)
@@ -370,11 +369,10 @@ def compute_valley(
 ) -> tuple[dict[str, Any] | None, Array | None]:
     """Compute the increase of chi^2 over two exchangeable parameters, with the others fitted.
 
-    The first returned has ``x`` and ``y``, names and units; ``best``; and under ``grids``, one
-    along the valley of constant sum and one along its arm of constant second parameter,
-    ``x_values``, ``y_values`` and ``increases``, nested lists. It is None unless exactly two
-    exchangeable parameters were searched, among others. The second are log-parameters whose chi^2
-    is clearly below that of the optimum, which is then not the global one, or None.
+    The first returned has ``x`` and ``y``, names and units; ``best``; and ``grids``, along the
+    valley of constant sum and its arm of constant second parameter: ``x_values``, ``y_values`` and
+    ``increases``. It is None unless just two, among others, were searched. The second is a missed
+    optimum, or None.
     """
     pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
     if len(pair) != 2 or len(model.parameters) == 2:

@@ -98,9 +98,8 @@ class Quantity:
     def range(self, low: Array, high: Array) -> tuple[float, float]:
         """Return its lowest and highest logarithm for log-parameters within bounds.
 
-        The upper end of a sum, and the lower end of a series combination, is what one member
-        can reach whatever the others are. Beyond it, all members would be at the ends of their
-        ranges, and these ends, not the trace, would bound the quantity.
+        The upper end of a sum, and the lower end of a series combination, is what one member can
+        reach whatever the others are: beyond it, the ends of the ranges would bound the quantity.
         """
         members = list(self.members)
         if not self.sense:
@@ -148,9 +147,9 @@ def characteristic_times(model: SampleModel) -> list[Quantity]:
 def find_combinations(model: SampleModel, members: list[int]) -> list[Quantity]:
     """Return combinations of two parameters that may be determined if neither is alone.
 
-    Two springs or two dampers have their sum (in parallel) and their series combination,
-    a damper and a spring their relaxation time c/k. A springpot has none: what its
-    modulus trades off against depends on its exponent.
+    Two springs or two dampers have their sum and their series combination, a damper and a spring
+    their relaxation time c/k. A springpot has none, as its exponent decides what it trades off
+    against.
     """
     found = []
     ordered = _ordered(model)

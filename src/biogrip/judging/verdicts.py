@@ -167,9 +167,8 @@ def find_trade_offs(
 ) -> list[list[Trade]]:
     """Find, in each of several traces, determined combinations of undetermined parameters.
 
-    Combinations among the findings come first. Of other pairs of undetermined parameters, the
-    combination known best to first order is profiled, if it is worth a look; traces with the same
-    combination are profiled together.
+    Combinations among the findings come first. Of other pairs, the combination known best to first
+    order is profiled, if it is worth a look; traces with the same one are profiled together.
     """
     found: list[list[tuple[tuple[int, ...], Finding]]] = [[] for _ in findings]
     pairs: list[tuple[int, tuple[int, ...], Quantity]] = []

@@ -3,20 +3,18 @@
 A fit of p parameters to n readings leaves M e of white noise e, where M = 1 - Q^T Q projects out
 the directions Q that it absorbs. So ratios of quadratic forms of residuals, e^T M A M e / e^T M e,
 have moments that are traces of M A, and follow nearly a beta distribution with the same mean and
-variance, whatever the number of readings, their times and the standard deviation of the noise [1]_.
-That of successive differences tests for correlation, that of means over stretches for what is slow.
+variance [1]_. That of successive differences tests for correlation, that of means over stretches
+for what is slow.
 
-A step of all readings from some time on, without what the fit absorbs of it, is one direction more:
-its share of the sum of squares is beta-distributed in white noise. `find_step` scans all times. The
-chance that a scan of correlated statistics exceeds a level is that of the first one, and for each
-further one that of a random walk's upcrossing, which steps from reading to reading [9]_.
-`compare_halves` asks whether two parts of the trace, fitted apart, agree (a change of the gain, or
-of the sample): Chow's test [8]_, with the fit's slopes. Of a frequency sweep the parts are its
-moduli, and inertia is one direction more (`about_moduli`).
+A step of all readings from some time on is one direction more: its share of the sum of squares is
+beta-distributed in white noise. `find_step` scans all times; the chance that a scan of correlated
+statistics exceeds a level is that of the first one, and for each further one that of a random
+walk's upcrossing [9]_. `compare_halves` asks whether two parts of the trace, fitted apart, agree:
+Chow's test [8]_, with the fit's slopes. Of a frequency sweep the parts are its moduli, and inertia
+is one direction more (`about_moduli`).
 
 Residuals, (n_samples,), are over the noise's standard deviation where that is not the same. The
-basis of what the fit absorbs has orthonormal rows, (n_directions, n_samples), as
-`biogrip.fit.noise_model_fit.absorbed` returns them.
+basis of what the fit absorbs has orthonormal rows, (n_directions, n_samples), see `absorbed`.
 
 References
 ----------
@@ -185,9 +183,9 @@ def by_leverage(residual: Array, basis: Array) -> Array:
 def far_out(residual: Array, struck: BoolArray, basis: Array) -> float:
     """Return the chance that white noise has readings as far out as those that are struck.
 
-    They are held against the fit to the others, to first order: their distances are in standard
-    deviations of these, with Student's distribution [3]_. That of the nearest of them, and their
-    number, have Poisson's distribution, and so has that of the farthest alone.
+    Their distances from the fit to the others, to first order, are in standard deviations of these,
+    with Student's distribution [3]_. That of the nearest of them, and their number, have Poisson's
+    distribution, and so has that of the farthest alone.
     """
     from scipy.special import pdtrc, stdtr
 
@@ -216,15 +214,12 @@ def far_out(residual: Array, struck: BoolArray, basis: Array) -> float:
 def as_correlated(residual: Array, basis: Array) -> tuple[float, float]:
     """Return how many independent residuals a misfit is worth, and the freedom of its variance.
 
-    The misfit is taken for a random function of the reading's number, with a correlation that
-    falls exponentially or as a Gaussian, and white noise; size, correlation length and share of the
-    noise are those of highest restricted likelihood, which allows for what the fit absorbs [4]_. Of
-    many residuals sums over stretches are taken, since what is slow matters.
-
-    The n residuals count as this many: n times their mean square over the variance of the misfit in
-    the direction, of those that the fit absorbs, in which it is largest. The freedom is
-    (tr V)^2 / tr V^2 for the covariance V of what is left [5]_. Without a basis, what the fit
-    absorbs is not known.
+    The misfit is taken for a random function of the reading's number, with a correlation that falls
+    exponentially or as a Gaussian, and white noise, of highest restricted likelihood [4]_, which
+    allows for what the fit absorbs. Of many residuals sums over stretches are taken. The n
+    residuals count as n times their mean square over the variance of the misfit in the direction,
+    of those that the fit absorbs, in which it is largest. The freedom is (tr V)^2 / tr V^2 for the
+    covariance V of what is left [5]_. Without a basis, what the fit absorbs is not known.
     """
     n = len(residual)
     sums = min(n, _SUMS)

@@ -1,13 +1,12 @@
 """Condensed least squares: a few rows with the sum of squares of all readings.
 
-First, nodes replace dense readings in sums of products of smooth functions (`DenseSamples`). After
-a change of the load, modes of all rates respond; later, only slow ones remain. On a piece of time
-twice as far from the last change at its end as at its start, a response is a polynomial of degree
-19 to 1e-15 of its peak, whatever the rate: with e^(-rho (3 + s)), |s| <= 1, Chebyshev coefficients
-fall like 5.8^-n [1]_. Earlier changes are further away. So a piece with thousands of readings needs
-twenty nodes, and sums of products over its readings follow from one small matrix, which is summed
-up block by block. If readings are few, they are the nodes; so they are where the course changes at
-nearly every one of them, as one that was recorded.
+First, nodes replace dense readings in sums of products of smooth functions (`DenseSamples`). On a
+piece of time twice as far from the last change of the load at its end as at its start, a response
+is a polynomial of degree 19 to 1e-15 of its peak, whatever the rates of its modes: with e^(-rho (3
++ s)), |s| <= 1, Chebyshev coefficients fall like 5.8^-n [1]_. So a piece with thousands of readings
+needs twenty nodes, and sums of products over its readings follow from one small matrix, which is
+summed up block by block. If readings are few, they are the nodes; so they are where the course
+changes at nearly every one of them, as one that was recorded.
 
 Second, some seventy modes stand for all (`SpanningModes`): whatever the course, the response of any
 mode is a sum of theirs. A triangular matrix has all products of these at the nodes (`Condensed`),

@@ -3,14 +3,12 @@
 Between two torque steps the inertia-free response of the paper's samples is a constant plus two
 exponentials, so at uniform sampling it is a_0 + a_1 z_1^n + a_2 z_2^n. Its squared distance from
 the samples y_n expands into geometric series in z_i z_j, and into the projections of the trace on
-the response of each mode. These projections are long sums, but functions of the mode's rate alone:
-computed once at some hundred rates, they are interpolated for all others. No response is formed.
-Other samples, grippers, protocols and samplings, and noise that is not white, need the condensed
-rows of `biogrip.physics.residuals`, which take three to ten times as long.
+the response of each mode, which are interpolated in the mode's rate. No response is formed. Other
+samples, grippers, protocols, samplings and noise need the condensed rows of
+`biogrip.physics.residuals`, which take three to ten times as long.
 
-The misfit of an individual is computed element by element, in a fixed order, without reductions of
-arrays: it does not depend, to the last bit, on the rest of the population or on the number of
-populations.
+The misfit of an individual is computed element by element, in a fixed order: it does not depend, to
+the last bit, on the rest of the population or on the number of populations.
 """
 
 from collections.abc import Callable, Sequence
@@ -229,8 +227,15 @@ def _power_sums(traces: Array, first_samples: IntArray, rates: Array) -> Array:
     across = np.exp(rates[:, None] * (block * np.arange(-(-longest // block))))
     sums = []
     for trace in traces:
-        folded, columns = _fold(np.split(trace, first_samples[1:]), block)
-        rows = within @ folded
+        folded, columns, start = [], [], 0
+        for piece in np.split(trace, first_samples[1:]):
+            count = -(-len(piece) // block)
+            padded = np.zeros(block * count)
+            padded[: len(piece)] = piece
+            folded.append(padded.reshape(count, block).T)
+            columns.append((start, start + count))
+            start += count
+        rows = within @ np.ascontiguousarray(np.concatenate(folded, axis=1))
         sums.append(
             [
                 np.einsum("mr,mr->m", rows[:, start:stop], across[:, : stop - start])
@@ -238,16 +243,3 @@ def _power_sums(traces: Array, first_samples: IntArray, rates: Array) -> Array:
             ]
         )
     return np.array(sums)
-
-
-def _fold(pieces: list[Array], block: int) -> tuple[Array, list[tuple[int, int]]]:
-    """Fold each piece to (block, rows), side by side; return also the columns of each."""
-    folded, columns, start = [], [], 0
-    for piece in pieces:
-        rows = -(-len(piece) // block)
-        padded = np.zeros(block * rows)
-        padded[: len(piece)] = piece
-        folded.append(padded.reshape(rows, block).T)
-        columns.append((start, start + rows))
-        start += rows
-    return np.ascontiguousarray(np.concatenate(folded, axis=1)), columns

@@ -6,13 +6,10 @@ spring k and a damper c in series). Its force follows the shortening delta of th
     F(s) = [k_p + c_p s + sum_j k_j c_j s / (k_j + c_j s)] delta(s)
 
 A model is one entry of `MODELS`, declared beside its network; genome, tables and figures follow
-from it. Where an element vanishes, a model becomes a simpler one: a spring or damper beside others
-at zero, one in series with others rigid, at infinity; a springpot is a spring at an exponent of
-zero, and a damper at one. The simpler model's parameters are turned into those of the richer one,
-zeros and infinities among them, and such samples have the same response. Each model says which it
-contains directly; those in these are in it as well.
-
-True parameters of simulated samples, and the paper's results to compare with, are here, too.
+from it. Where an element vanishes, at zero beside others or at infinity in series, a model becomes
+a simpler one; a springpot is a spring at an exponent of zero, and a damper at one. The simpler
+model's parameters are turned into those of the richer one. Each model says which it contains
+directly; those in these are in it as well. The paper's results to compare with are here, too.
 """
 
 from collections.abc import Collection, Mapping

@@ -2,19 +2,17 @@
 
 A parameter with a relative imaginary part of 1e-30 carries its derivative through the arithmetic of
 the transfer function without changing the real part: the complex step [1]_, [2]_. Rates and weights
-of modes are differentiated analytically, without cancellation for slow or fast modes; so are
-responses, sums of modes. The result for a sample does not depend, to the last bit, on the other
-samples.
+of modes, and responses, are differentiated analytically, without cancellation. The result for a
+sample does not depend, to the last bit, on the other samples.
 
-The response of one mode of unit weight to a protocol has a derivative by the mode's rate. After a
-load's unit step the response is one of modes e^(r t) - 1, with rates r < 0. So a mode that follows
-a load T(t), and a branch, spring and damper in series, stretched by x(t), obey
+After a load's unit step the response is one of modes e^(r t) - 1, with rates r < 0. So a mode that
+follows a load T(t), and a branch, spring and damper in series, stretched by x(t), obey
 
     g' = r g + r T        g' = r g + x'
 
 Both are carried on from phase to phase: a superposition of responses since the start would lose
-digits by cancellation. The second is no difference of the first and x: of a fast branch it would
-leave rounding errors only. Within a phase a load t^n/n! gives, with z = r t,
+digits by cancellation, and so would the second as a difference of the first and x, of a fast
+branch. Within a phase a load t^n/n! gives, with z = r t,
 
     g = r t^(n+1) phi_(n+1)(z)        dg/dr = t^(n+1) [phi_n(z) - n phi_(n+1)(z)]
 

@@ -130,7 +130,15 @@ class Noise(Block):
 def add_noise(
     readings: Array, noise: Noise, rng: np.random.Generator, time_s: Array | None = None
 ) -> Array:
-    """Return a noisy copy of a trace, (n_samples,); times are needed unless the noise is white."""
+    """Return a noisy copy of a trace, (n_samples,).
+
+    Ascending sampling times, (n_samples,), are required unless the noise is white.
+
+    Raises
+    ------
+    ValueError
+        If the times are required and missing.
+    """
     unit = KINDS[noise.kind](rng, len(readings))
     if not noise.white:
         if time_s is None:
@@ -250,10 +258,9 @@ def with_uncertain(basis: Array, functions: Array) -> Array:
     """Add functions of random amplitude to a basis, so that `without` whitens noise with them.
 
     The basis, (n_basis, n_times), is orthonormal; functions, (n_functions, n_times), are times the
-    standard deviation of their amplitude, over that of white noise. Returns orthogonal functions of
-    norm one and less, (n_basis + n_functions, n_times): with singular values s of the functions,
-    `without` removes the part 1 - 1/sqrt(1 + s^2) of each direction, so that the sum of noise and
-    functions becomes white noise.
+    standard deviation of their amplitude, over that of white noise. Returns orthogonal functions,
+    (n_basis + n_functions, n_times): with singular values s of the functions, `without` removes the
+    part 1 - 1/sqrt(1 + s^2) of each direction.
     """
     rest = without(basis, functions)
     _, sizes, directions = np.linalg.svd(rest, full_matrices=False)

@@ -1,20 +1,15 @@
 """The corrected nonlinear model, eqs. (1)-(3), as a correction to the exact linear solution.
 
-In the displacements u of the tips the sample stays linear; an arm is nonlinear
-only through its rotation phi(u) and its lever b(phi) = l sin(hat-theta_2 - phi).
-Divided by the lever, an arm's equation is
-
-    (c phi' + k phi)/b + F = tau/b
-
-and the linear model's is (c u' + k u)/b_0^2 + F = tau/b_0. So the nonlinear
-displacement is the linear one plus the linear response to the load
+In the displacements u of the tips the sample stays linear; an arm is nonlinear only through its
+rotation phi(u) and its lever b(phi) = l sin(hat-theta_2 - phi). Divided by the lever, an arm's
+equation is (c phi' + k phi)/b + F = tau/b, and the linear model's (c u' + k u)/b_0^2 + F = tau/b_0.
+So the nonlinear displacement is the linear one plus the linear response to the load
 
     g = tau (1/b - 1/b_0) - k (phi/b - u/b_0^2) - c u' (1/b^2 - 1/b_0^2)
 
-which is small, of second order in the rotation. It is found by repeated
-substitution; each sweep is an implicit collocation (Radau IIA, five stages) of
-uncoupled linear modes on a mesh graded towards the torque's jumps, for all
-samples at once. Inertia acts on the linear part alone.
+which is small, of second order in the rotation. It is found by repeated substitution; each sweep is
+an implicit collocation (Radau IIA, five stages [1]_) of uncoupled linear modes on a mesh graded
+towards the torque's jumps, for all samples at once. Inertia acts on the linear part alone.
 
 References
 ----------

@@ -50,14 +50,10 @@ def _series(places: Array, degree: int) -> NDArray[np.floating]:
     return chebyshev.chebvander(2 * places - 1, degree)
 
 
-def _power_rows() -> Array:
-    """Return the power coefficients of Chebyshev polynomials on (0, 1), one in each row."""
-    polynomials = (Chebyshev.basis(n, domain=(0, 1)).convert(kind=Polynomial) for n in _ORDERS)
-    return np.array([np.pad(p.coef, (0, len(_ORDERS) - len(p.coef))) for p in polynomials])
-
-
 _TO_SERIES = np.linalg.inv(_series(_SHORT_NODES, len(_ORDERS) - 1)).T
-_TO_POWERS = _power_rows()
+# Power coefficients of Chebyshev polynomials on (0, 1), one in each row.
+_SERIES = (Chebyshev.basis(n, domain=(0, 1)).convert(kind=Polynomial).coef for n in _ORDERS)
+_TO_POWERS: Array = np.array([np.pad(each, (0, len(_ORDERS) - len(each))) for each in _SERIES])
 
 
 def _in_short_pieces(values: Array, shorter: int) -> Array:
@@ -108,14 +104,11 @@ class ModeRows:
     """Condensed rows of the responses of many samples, with their derivatives.
 
     The rows of a mode are tabulated over T r, T the last time, so that they are as large for slow
-    modes as for fast ones; under a deformation, which modes forget the faster the faster they are,
-    times 1 - T r. A response with its derivatives is then one small product: weights and powers of
-    the places within pieces, times the pieces' coefficients.
-
-    Of a mode so fast that nothing lasts until the next reading, only powers of 1/r remain, up to
-    the fifth: the last piece is a polynomial in those.
-
-    Given are modes that stand for all, and the rows of their responses, (n_modes, n_rows).
+    modes as for fast ones; under a deformation, times 1 - T r. A response with its derivatives is
+    then one small product: weights and powers of the places within pieces, times the pieces'
+    coefficients. Of a mode so fast that nothing lasts until the next reading, the last piece is a
+    polynomial in 1/r. Given are modes that stand for all, and rows of their responses, (n_modes,
+    n_rows).
     """
 
     def __init__(self, modes: "SpanningModes", rows: Array) -> None:

@@ -5,14 +5,10 @@ sin(hat-theta_2) the lever and tau the torque of both arms, the closing rotation
 
     phi_2 = Z_4 tau / E    phi_4 = Z_2 tau / E    E = Z_2 Z_4 + b^2 G (Z_2 + Z_4)
 
-and of equal arms, after Z cancels, phi = tau / (Z + 2 b^2 G). The jaws exert the force F = G delta
-on the sample, positive while they press:
-
-    F = b G (Z_2 + Z_4) tau / E
-
-or 2 b G tau / (Z + 2 b^2 G). The arm's equation gives it too, b F = tau - Z phi, but where a liquid
-has given way that is a difference of nearly equal torques; here the constant and every mode are
-products of what is positive, and late in a phase only what is left of the slow modes is summed.
+and of equal arms, after Z cancels, phi = tau / (Z + 2 b^2 G). The jaws exert the force F = b G (Z_2
++ Z_4) tau / E on the sample, positive while they press. The arm's equation gives it too, b F = tau
+- Z phi, but where a liquid has given way that is a difference of nearly equal torques; here the
+constant and every mode are products of what is positive.
 
 Without inertia the arms, seen from the sample, have the impedance Z = Z_2 Z_4 / (Z_2 + Z_4), which
 is that of a spring, a damper and one Maxwell branch. So with the sample's
@@ -26,9 +22,8 @@ r_j)^2, a sum of positive terms. Equal arms need no branch of theirs: then 2 phi
 
 With inertia, arms ring. E, or Z + 2 b^2 G, times the product of all s + r_j is a polynomial. The
 iteration that finds its roots needs only its quotient with its derivative, a sum over the branches.
-A root is kept as its distance from the nearest branch, so that it has all digits where a branch is
-weak. Starts are the rates without inertia, and the ringing of arms on a sample whose Maxwell
-dampers are rigid.
+A root is kept as its distance from the nearest branch, so that it has all digits. Starts are the
+rates without inertia, and the ringing of arms on a sample whose Maxwell dampers are rigid.
 """
 
 from dataclasses import dataclass
@@ -321,7 +316,10 @@ class Ringing:
         self._highest = left if self._alike else left * right
         self._k_p, self._c_p = network.k_p[:, None], network.c_p[:, None]
         self._k, self._rates = (of.T[:, None] for of in ascending_branches(network))
-        origin, beyond = self._begin(zeros)
+        branches, ring = self._k.shape[2], spread_starts(self._ring())
+        # Starts of the iteration: their origins, and distances beyond them.
+        origin = np.concatenate((zeros.pole[:branches].T, np.zeros(ring.shape)), axis=1)
+        beyond = np.concatenate((-zeros.beyond[:branches].T * _ASIDE, ring), axis=1)
         beyond = find_zeros(beyond, lambda points: self._newton_step(origin, points), origin)
         self.rates = s = beyond - origin
         """Roots of E in 1/s, (n, n_modes)."""
@@ -348,14 +346,6 @@ class Ringing:
         pressing = [self._lever_m * self._sample * (left + right)] if force else [right, left]
         weights: ComplexArray = np.array(pressing) / (self.rates * self._slope)
         return weights.swapaxes(1, 2)
-
-    def _begin(self, zeros: Zeros) -> tuple[Array, ComplexArray]:
-        """Return starts of the iteration: their origins, and distances beyond them."""
-        branches = self._k.shape[2]
-        ring = spread_starts(self._ring())
-        origin = np.concatenate((zeros.pole[:branches].T, np.zeros(ring.shape)), axis=1)
-        slow = -zeros.beyond[:branches].T * _ASIDE
-        return origin, np.concatenate((slow, ring), axis=1)
 
     def _ring(self) -> Array:
         """Return E with a spring and a damper as sample, ascending powers, (n, terms)."""

@@ -1,17 +1,16 @@
 """Roots of functions of the rate, many at once.
 
-The coefficients of a gripper-sample polynomial span dozens of decades. An eigenvalue solver loses
-the small roots there; iterating on the function itself [1]_, [2]_, from starting radii read off
-the Newton polygon of its arms [3]_, keeps every root to full relative accuracy.
+The coefficients of a gripper-sample polynomial span dozens of decades. Iterating on the function
+itself [1]_, [2]_, from starting radii read off the Newton polygon of its arms [3]_, keeps every
+root to full relative accuracy, which an eigenvalue solver would not.
 
 A network of springs and dampers with parallel Maxwell branches has as many modes as branches, or
 one more. With branch rates p_0 < p_1 < ... the rates of the modes are the zeros of
 
     f(x) = sum_j w_j / (x - p_j) - b,    w_j, b > 0,
 
-one in each interval between neighbouring rates and one beyond the last. Each zero is found
-independently [4]_, as its distance from the nearer pole [5]_. So a zero close to a pole keeps all
-its digits, and no polynomial is needed, whose coefficients would span hundreds of decades.
+one in each interval between neighbouring rates and one beyond the last. Each is found independently
+[4]_, as its distance from the nearer pole [5]_. So a zero close to a pole keeps all its digits.
 
 References
 ----------

@@ -1,12 +1,9 @@
-"""Simulated rotation and shortening of samples, and the force on them, linear or nonlinear.
+"""Simulated rotation of samples, and the force on them, linear or nonlinear.
 
-In the nonlinear model, the arm's equation, divided by its lever, gives
-F - F_linear = g - (c u' + k u)/b_0^2 with g the load and u the correction of
-`biogrip.physics.nonlinear`. All of them are of second order: again no large terms cancel.
-
-Targets have the arms' inertia, fits leave it out: after a change of the torque, arms ring for
-milliseconds, and later changes by inertia are negligible (docs/model.md, "Without inertia"). What
-of the ring shows in a trace is found here, too.
+In the nonlinear model F - F_linear = g - (c u' + k u)/b_0^2, with g the load and u the correction
+of `biogrip.physics.nonlinear`, all of second order: no large terms cancel. Targets have the arms'
+inertia, fits leave it out: after a change of the torque, arms ring for milliseconds, and later
+changes are negligible (docs/model.md, "Without inertia"). What shows of the ring is found here.
 """
 
 from collections.abc import Callable
@@ -84,7 +81,11 @@ class Grip:
 
 def compute_grip(gripper: Gripper, network: Network, course: Course, *, nonlinear: bool) -> Grip:
     """Compute the extreme forces of the jaws on the first sample, without inertia."""
-    time_s = _instants(course)
+    # Dense after every change of the load.
+    lengths = np.diff(course.time_s, append=course.end_s)
+    count = max(3, min(_TIMES_OF_PHASE, _MOST_TIMES // len(lengths)))
+    after = np.outer(lengths, np.geomspace(1e-9, 1.0, count)[:-1])
+    time_s = np.unique(np.append(course.time_s[:, None] + after, course.end_s))
     force = jaw_force(gripper, network, course, time_s, nonlinear=nonlinear, inertia=False)[0]
     least_shown = _LEAST_FORCE * float(np.abs(force).max()) or 1.0
     shown = np.round(force / least_shown)
@@ -97,15 +98,6 @@ def compute_grip(gripper: Gripper, network: Network, course: Course, *, nonlinea
         float(time_s[least]),
         float(time_s[negative[0]]) if len(negative) else None,
     )
-
-
-def _instants(course: Course) -> Array:
-    """Return times that are dense after every change of the load."""
-    lengths = np.diff(course.time_s, append=course.end_s)
-    count = max(3, min(_TIMES_OF_PHASE, _MOST_TIMES // len(lengths)))
-    share = np.geomspace(1e-9, 1.0, count)[:-1]
-    pieces = [start + length * share for start, length in zip(course.time_s, lengths, strict=True)]
-    return np.unique(np.append(np.concatenate(pieces), course.end_s))
 
 
 def simulated_response(
