@@ -112,6 +112,20 @@ def test_all_problems_are_said_once_and_many_are_cut_short(tmp_path: Path) -> No
     assert "and 44 more" in refusal(tmp_path, "\n".join(f"wrong_{i}: 1" for i in range(50)))
 
 
+def test_models_have_their_usual_names_too(tmp_path: Path) -> None:
+    """As on the command line, in any case of letters."""
+    text = "{model_selection: {models: [SLS, kv]}, traces: {table: x.csv, model: Zener}, "
+    config = load(
+        tmp_path, text + "cases: {a: {sample: {model: drop, k: 1, k_p: 1, c: 1}}}}"
+    ).config
+    assert config.model_selection.models == ("zener_maxwell", "kelvin_voigt")
+    assert config.traces is not None
+    assert config.traces.model == "zener_maxwell"
+    assert config.cases["a"].sample.model == "liquid_drop"
+    twice = "model_selection: {models: [zener, zener_maxwell]}"
+    assert "model_selection.models" in refusal(tmp_path, twice)
+
+
 def test_a_block_without_default_must_be_there() -> None:
     config = read_config(CONFIG)
     del config["gripper"]["left"]["inertia_kgm2"]

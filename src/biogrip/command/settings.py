@@ -59,6 +59,9 @@ MODEL = "generalized_maxwell"
 
 _FILES = ("file", "filename", "filepath", "path", "trace", "tracefile")
 
+TRACE = "TRACE"
+"""Place of a trace that no table lists."""
+
 LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
@@ -80,7 +83,7 @@ class Setting:
     """A key of the config, and the value that an option or a cell of a table gives it."""
 
     by: str
-    """The option, or the line of the table, for messages."""
+    """The option, or line and column of the table, for messages."""
     path: tuple[str, ...]
     """The key."""
     value: Any
@@ -97,7 +100,7 @@ class Asked:
     """YAML file laid over the default study: gripper, protocol, search range, ..."""
     settings: tuple[Setting, ...] = ()
     """Settings laid over the config, the later over the earlier."""
-    place: str = "TRACE"
+    place: str = TRACE
     """Row of a table that lists the trace, for messages."""
     copied: Mapping[str, str] = field(default_factory=dict)
     """Other cells of that row, by column."""
@@ -220,6 +223,8 @@ def _with_instrument(
     was recorded, see `Experiment.record`.
     """
     level = merged.pop(HOLD[0], None)
+    row = "" if asked.place == TRACE else f"{asked.place}: "
+    by = next((it.by for it in asked.settings[::-1] if it.path == HOLD), f"{row}--hold")
     if not isinstance(merged["measurement"], dict):
         return merged, None, None
     instrument = _instrument(merged, given)
@@ -233,7 +238,7 @@ def _with_instrument(
     of_column = measurement.get(LOAD[-1]) is not None
     if instrument.sweeps:
         if level is not None:
-            raise BiogripError("--hold: is of a trace in time, not of a sweep; leave it out.")
+            raise BiogripError(f"{by}: is of a trace in time, not of a sweep; leave it out.")
         held = {"phases": [{"duration_s": 1.0, controlled.column: 1.0}]}
         return {**found, "protocol": held}, None, None
     if level is None and not of_column:
@@ -242,11 +247,11 @@ def _with_instrument(
         if not instrument.relative:
             unit = f" in {controlled.unit}" if controlled.unit else ""
             raise BiogripError(
-                f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, a "
+                f"{by}: is missing; allowed is the {controlled.name}{unit} that was held, a "
                 "column of it by --load, or a protocol in --config."
             )
     if level is not None:
-        level, unit = held_unit(level, controlled)
+        level, unit = held_unit(level, controlled, by)
         level *= controlled.units[unit]
     own = _recording(asked, measurement)
     phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
@@ -413,7 +418,9 @@ def read_table(
         for name, cell in by_name.items():
             if ("." in name or name in options_of) and cell:
                 try:
-                    settings += _settings_of(cell, name, options_of.get(name), place(path, line))
+                    settings += _settings_of(
+                        cell, name, options_of.get(name), place(path, line, name)
+                    )
                 except (BiogripError, ValueError) as error:
                     problems.append(f"{place(path, line, name)}: {error}")
         used = {"", *options_of, *(name for name in by_name if "." in name)}
