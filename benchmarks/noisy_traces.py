@@ -22,8 +22,7 @@ from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
 from biogrip.physics.whitening import nuisance_basis
-from biogrip.study.load import load_study
-from biogrip.study.study import Case
+from biogrip.study.study import Case, load_study
 
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
 BATCH = 25

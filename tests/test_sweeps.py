@@ -16,7 +16,7 @@ from biogrip.errors import BiogripError
 from biogrip.library import INSTRUMENTS, Sample, hold, set_up, simulate
 from biogrip.physics.models import MODELS
 from biogrip.records.identifications import read_verdicts
-from biogrip.stages.judgement import judge
+from biogrip.stages.identification import judge
 from biogrip.stages.targets import record
 from tests.helpers.default import study_of
 from tests.helpers.identified import by_quantity, identified, identify, told

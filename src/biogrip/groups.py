@@ -11,9 +11,9 @@ from pathlib import Path
 from textwrap import fill
 
 from biogrip import __version__
-from biogrip.command.methods import in_sentences, outcome_in_words, paragraph, together
 from biogrip.command.outputs import COLUMNS as OF_TRACES
 from biogrip.command.outputs import FAILED, LINEAR, METHODS, REASONS, WRITTEN_BY, check_output
+from biogrip.command.words import in_sentences, outcome_in_words, paragraph, together
 from biogrip.digits import counted, plain, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import atomic_write, refuse_inputs

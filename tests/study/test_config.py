@@ -13,9 +13,8 @@ from biogrip.errors import BiogripError
 from biogrip.fit.methods import METHODS
 from biogrip.physics.gripper import torque
 from biogrip.study.case_blocks import OVERRIDABLE
-from biogrip.study.load import load_given_study, load_study
 from biogrip.study.source import LARGEST_BYTES, overlaid, read_config, read_source
-from biogrip.study.study import Study
+from biogrip.study.study import Study, load_given_study, load_study
 from tests.helpers.key_reference import STUDY, file_schema, leaves
 from tests.helpers.places import CONFIG, ROOT
 

@@ -24,8 +24,8 @@ from biogrip.records.rows import read_frame
 from biogrip.records.success import median_with_limits, near_noise, share_with_limits
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
+from biogrip.tables.cases import value_in_case
 from biogrip.tables.layout import Column, Row, ShownTable, write
-from biogrip.tables.printed import value_in_case
 
 if TYPE_CHECKING:
     snakemake: Any

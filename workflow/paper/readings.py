@@ -19,8 +19,8 @@ from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.source import overlaid
 from biogrip.study.study import Study
+from biogrip.tables.cases import interval_of_value, value_in_case
 from biogrip.tables.layout import Column, Row, ShownTable, write
-from biogrip.tables.printed import interval_of_value, value_in_case
 
 if TYPE_CHECKING:
     snakemake: Any

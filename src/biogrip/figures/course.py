@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from biogrip.digits import with_unit
-from biogrip.figures.results import first_of_basins, read_history, seeds_in_words
+from biogrip.figures.fit import first_of_basins, read_history, seeds_in_words
 from biogrip.figures.style import (
     ALL_SEEDS,
     COLUMN_IN,

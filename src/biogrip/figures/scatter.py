@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator
 
 from biogrip.arrays import Array
-from biogrip.figures.results import SHOWN_SEEDS, seeds_in_words
+from biogrip.figures.fit import SHOWN_SEEDS, seeds_in_words
 from biogrip.figures.style import (
     PAPER,
     SHADE,
