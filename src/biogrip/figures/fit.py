@@ -32,9 +32,14 @@ from biogrip.physics.protocol import is_storage
 from biogrip.physics.simulation import jaw_force, simulated_response
 from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
 from biogrip.physics.whitening import within
-from biogrip.records.identifications import read_histories, read_identifications, read_verdicts
+from biogrip.records.identifications import (
+    ALL,
+    basins,
+    read_histories,
+    read_identifications,
+    read_verdicts,
+)
 from biogrip.records.rows import seeds_of
-from biogrip.records.success import ALL, basins
 from biogrip.records.traces import Measurements, read_measurements, read_target
 from biogrip.stages.identification import TRACE, experiment_for
 from biogrip.study.study import Case

@@ -45,8 +45,12 @@ from biogrip.figures.style import (
 from biogrip.judging.verdicts import BOUNDED_ABOVE
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
-from biogrip.records.identifications import read_identifications, read_verdicts
-from biogrip.records.success import near_noise, near_noise_words
+from biogrip.records.identifications import (
+    near_noise,
+    near_noise_words,
+    read_identifications,
+    read_verdicts,
+)
 from biogrip.records.traces import read_target
 from biogrip.study.study import Case, Study
 

@@ -22,9 +22,8 @@ from biogrip.keys import built
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.physics.simulation import simulated_response
-from biogrip.records.identifications import READINGS, read_batch
+from biogrip.records.identifications import READINGS, near_noise, read_batch
 from biogrip.records.rows import RowFile
-from biogrip.records.success import near_noise
 from biogrip.records.traces import read_target
 from biogrip.stages.identification import groups
 from biogrip.stages.targets import response

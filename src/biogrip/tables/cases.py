@@ -15,8 +15,15 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import counted
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.records.identifications import read_identifications, read_verdicts
-from biogrip.records.success import ALL, basins, near_noise, near_noise_words, share_with_limits
+from biogrip.records.identifications import (
+    ALL,
+    basins,
+    near_noise,
+    near_noise_words,
+    read_identifications,
+    read_verdicts,
+    share_with_limits,
+)
 from biogrip.study.study import Case, Study
 from biogrip.tables.layout import Column, Row, ShownTable
 
