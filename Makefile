@@ -125,7 +125,7 @@ report: $(READY)
 # And the picture of the rules.
 docs: $(TEST_READY)
 	$(BIN)/python -m tests.generated_docs
-	$(BIN)/snakemake -j1 docs/rules.png
+	$(BIN)/python docs/rules.py docs/rules.png
 
 # Written from CITATION.cff, after it is checked by its schema.
 citation: $(SITE_READY)

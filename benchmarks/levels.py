@@ -39,7 +39,7 @@ from biogrip.physics.models import Sample
 from biogrip.physics.noise import stream
 from biogrip.physics.protocol import Phase, hold, ramp
 from biogrip.physics.simulation import simulated_response
-from biogrip.records.success import share_in_words
+from biogrip.records.identifications import share_in_words
 
 INSTRUMENTS_JUDGED = ("creep", "relaxation", "gripper")
 READINGS = (10, 20, 40, 80, 400, 4000)

@@ -21,8 +21,7 @@ from biogrip.physics.protocol import Course, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
-from biogrip.study.load import load_study
-from biogrip.study.study import Case
+from biogrip.study.study import Case, load_study
 
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
 BATCH = 25

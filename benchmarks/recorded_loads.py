@@ -20,7 +20,7 @@ import pandas as pd
 
 from benchmarks.one_thread import keep_to_one_thread
 from biogrip.arrays import Array
-from biogrip.records.success import share_in_words
+from biogrip.records.identifications import share_in_words
 
 Course = Callable[[Array], Array]
 _SEED, _NOISE = 62, 0.01

@@ -29,8 +29,8 @@ from biogrip.page.answers import (
 )
 from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.simulation import simulated_response
+from biogrip.records.identifications import share_in_words
 from biogrip.records.rows import read_table
-from biogrip.records.success import share_in_words
 from biogrip.terminal import QUIET
 from tests.helpers.default import study_of
 from tests.helpers.key_reference import file_schema, reference

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.command.notebook import identify_trace
+from biogrip.library import identify_trace
 
 TIMES = np.logspace(-1, 6, 46)
 # Four processes and an equilibrium.

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.command.notebook import identify_trace
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
@@ -19,7 +18,7 @@ from biogrip.judging.doubts import (
     find_reasons,
     order_notes,
 )
-from biogrip.library import Sample, TraceResult, set_up, simulate
+from biogrip.library import Sample, TraceResult, identify_trace, set_up, simulate
 from biogrip.physics.protocol import hold
 from tests.helpers.identified import told
 from tests.helpers.problems import GRIPPER

@@ -8,8 +8,8 @@ import pytest
 from biogrip.cli import main
 from biogrip.command.settings import Asked, check_settings, is_table, read_table
 from biogrip.errors import BiogripError
-from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config
+from biogrip.study.study import load_study, read_configs
 from tests.helpers.identified import FEW, identify
 from tests.helpers.places import EXAMPLE
 

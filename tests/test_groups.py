@@ -193,16 +193,16 @@ def test_cells_that_are_only_bounded_are_named_with_what_follows(
     logs = [float(row["k value (N/m)"]) for row in rows[2:5]]
     with_one_at_30 = f"{np.exp(np.mean(np.log([*logs, 30]))):.3g}"
     assert (
-        "k of left: only bounded in left0.csv (at least 30), which the median leaves out. With "
+        "k of left: only bounded in left0.csv (at least 30), which the mean leaves out. With "
         f"them at these bounds it is {with_one_at_30}, and of all cells it is higher."
     ) in found
     assert "k of left: nothing is told by left1.csv." in found
-    assert "right0.csv (at most 9), which the median leaves out. With them" in found
+    assert "right0.csv (at most 9), which the mean leaves out. With them" in found
     assert "of all cells it is lower." in found
     rows[2] |= {**none, "k verdict": "not determined"}
     assert "too few" in said(rows)
     rows[3] |= {**none, "k verdict": "not determined"}
-    assert "(at least 30), which the median leaves out. That of all cells is higher." in said(rows)
+    assert "(at least 30), which the mean leaves out. That of all cells is higher." in said(rows)
 
 
 def test_a_median_takes_cells_enough_and_half_of_all() -> None:
@@ -381,6 +381,7 @@ def test_units_are_compared_by_the_t_test_of_their_means(tmp_path: Path, said: S
     found = said(rows, "--unit", "day", "--csv", str(table), header=DAYS)
     assert "35 traces, 35 cells, 7 units (day), 95 % limits" in found
     assert "15 of 15" in found
+    assert "In several groups: 0, 1, 2. Each counts there as another one" in found
     frame = pd.DataFrame(rows)
     frame["log"] = np.log(frame["k value (N/m)"].astype(float))
     means = frame.groupby(["dish", "day"])["log"].mean()
@@ -408,6 +409,7 @@ def test_a_column_that_nests_tells_cells_apart_and_is_named(said: Said) -> None:
     assert "30 traces, 30 cells, 95 % limits" in found
     assert "Averages" not in found
     with_unit = said(rows, "--unit", "day", header=DAYS)
+    assert "In several groups" not in with_unit
     p, here = (text.splitlines()[4].split()[-1] for text in (with_unit, found))
     assert (
         "Column day puts 30 cells into 6 units: if these are what was repeated, cells are not "
@@ -415,7 +417,7 @@ def test_a_column_that_nests_tells_cells_apart_and_is_named(said: Said) -> None:
     ) in found
 
 
-def test_of_fewer_than_two_units_a_group_nothing_is_told_but_medians(said: Said) -> None:
+def test_of_fewer_than_two_units_a_group_nothing_is_told_but_means(said: Said) -> None:
     rows = of_dishes(np.random.default_rng(7), (3, 1))
     lines = said(rows, "--unit", "day", header=DAYS).splitlines()
     assert "(" in lines[3].split("15 of 15")[1]

@@ -8,12 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.library import INSTRUMENTS, Sample, hold, set_up, simulate
 from biogrip.physics.models import MODELS
+from biogrip.records.identifications import read_verdicts
+from biogrip.stages.identification import judge
+from biogrip.stages.targets import record
+from tests.helpers.default import study_of
 from tests.helpers.identified import by_quantity, identified, identify, told
 from tests.helpers.laplace import IMPEDANCES
 
@@ -124,6 +129,29 @@ def test_sweeps_alone_and_together_have_a_page_a_table_and_methods(tmp_path: Pat
         assert status == 0, printed + said
         for text in (table.read_text(), page.read_text()):
             assert "In oscillation storage and loss moduli were recorded over frequency." in text
+
+
+def test_a_study_says_of_a_recorded_sweep_what_the_command_says(tmp_path: Path) -> None:
+    """Its limits are wider where nothing tells the noise, but how it scatters."""
+    values, trace = solid(), tmp_path / "sweep.csv"
+    header = "w (rad/s),G' (Pa),G'' (Pa)"
+    np.savetxt(trace, np.c_[OMEGA, values.T], "%.9g", ",", header=header, comments="")
+    measured = {"file": str(trace), "frequency": "w (rad/s)", "loss": "G'' (Pa)"}
+    block = {
+        "instrument": "oscillation",
+        "protocol": {"phases": [{"duration_s": 1.0, "strain": 1.0}]},
+        "sample": {"model": "SLS"},
+        "measurement": measured | {"storage": "G' (Pa)"},
+    }
+    given = {"cases": {"mine": block}, "model_selection": {"models": []}}
+    case = study_of(yaml.safe_dump(given)).cases["mine"]
+    traces, verdicts = tmp_path / "t.npz", tmp_path / "v.json"
+    record(case, trace, traces)
+    judge(case, traces, [], verdicts)
+    found, said = (by_quantity(it) for it in (read_verdicts(verdicts), swept(values).data))
+    for name in said:
+        for key in ("value", "low", "high"):
+            assert found[name][key] == pytest.approx(said[name][key], rel=2e-5)
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,7 @@ def test_a_table_is_told_by_its_column(tmp_path: Path, name: str, separator: str
     text = "\ufefffile|dish||fixed.c_p|'cell, no'\nd1/a.csv|left|||\n\n|||\nb.csv||| 0\nc.csv|NA\n"
     path.write_text(text.replace("|", separator).replace("'", '"'), encoding="utf-8")
     assert is_table(Asked(path))
-    setting = Setting(f"{path}, line 5", ("fixed", "c_p"), 0)
+    setting = Setting(f"{path}, line 5, column 'fixed.c_p'", ("fixed", "c_p"), 0)
     assert [(row.place, row.trace, row.settings, row.copied) for row in read_table(path)] == [
         (f"{path}, line {line}", tmp_path / trace, settings, {"dish": dish, "cell, no": ""})
         for line, trace, settings, dish in (
@@ -197,7 +197,7 @@ def test_text_that_is_no_table_is_refused(tmp_path: Path, text: str, said: str) 
 
 
 def test_settings_that_cannot_be_used_are_said_at_once(here: Path) -> None:
-    """As those of a config are, by row and key."""
+    """As those of a config are, by row, column and key."""
     header = ["file", "measurement.noise_rad", "fixed.k_s", "sample.model", "measurment.skip"]
     rows = [["usual.csv", "-1", "", "maxwel", "2"], ["other.csv", "", "2", "", ""]]
     write(here / "cells.tsv", [header, *rows])
@@ -205,14 +205,30 @@ def test_settings_that_cannot_be_used_are_said_at_once(here: Path) -> None:
     assert status == 1
     lines = error.splitlines()
     assert [line.removeprefix("biogrip: ").partition(" Allowed")[0] for line in lines] == [
-        "cells.tsv, line 2: measurement.noise_rad: found -1, allowed is at least 1e-15 and at most "
-        "1e+12 rad.",
-        "cells.tsv, line 2: sample.model: found 'maxwel'. Did you mean 'maxwell'?",
-        "cells.tsv, line 2: measurment: unknown key. Did you mean 'measurement'?",
-        "cells.tsv, line 3: fixed.k_s: is no parameter of the sample, which has k_p, c_p. Did you "
-        "mean 'k_p'?",
+        "cells.tsv, line 2, column 'measurement.noise_rad': measurement.noise_rad: found -1, "
+        "allowed is at least 1e-15 and at most 1e+12 rad.",
+        "cells.tsv, line 2, column 'sample.model': sample.model: found 'maxwel'. Did you mean "
+        "'maxwell'?",
+        "cells.tsv, line 2, column 'measurment.skip': measurment: unknown key. Did you mean "
+        "'measurement'?",
+        "cells.tsv, line 3, column 'fixed.k_s': fixed.k_s: is no parameter of the sample, which "
+        "has k_p, c_p. Did you mean 'k_p'?",
     ]
     assert not list(here.glob("*.json"))
+
+
+@pytest.mark.parametrize(
+    ("hold", "said"),
+    [
+        ("soon", "line 2, column 'hold': found 'soon', allowed is a number"),
+        ("5 soon", "line 2, column 'hold': found the unit 'soon' of a stress, allowed are Pa"),
+        ("", "line 2: --hold: is missing; allowed is the stress in Pa"),
+    ],
+)
+def test_what_was_held_is_refused_with_its_place(here: Path, hold: str, said: str) -> None:
+    write(here / "cells.tsv", [["file", "hold"], ["usual.csv", hold]])
+    status, _, error = identify("cells.tsv", "--reading", "strain=rotation_rad")
+    assert (status, said in error) == (1, True)
 
 
 def test_traces_of_a_command_read_one_quantity(here: Path) -> None:

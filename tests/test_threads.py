@@ -27,7 +27,6 @@ from threadpoolctl import threadpool_info
 
 import biogrip
 from biogrip import library
-from biogrip.command import notebook
 
 def threads():
     return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
@@ -37,7 +36,7 @@ def tell(*given, **more):
 
 before, time_s = threads(), np.arange(1, 30.0)
 trace = time_s, 2 - np.exp(-time_s)
-notebook.read_trace = library.identify_many = library.diagnose = tell
+library.read_trace = library.identify_many = library.diagnose = tell
 held, model = (biogrip.hold(30.0, 1.0),), biogrip.Sample("liquid_drop")
 creep = biogrip.set_up(biogrip.INSTRUMENTS["strain"], held, model)
 for use in (

@@ -14,11 +14,10 @@ import pytest
 
 from biogrip.command import files as command
 from biogrip.command.files import identify_batch
-from biogrip.command.methods import set_up_in_words
 from biogrip.command.outputs import Outcome
 from biogrip.command.page import beyond, common, draw_traces, write_page
 from biogrip.command.settings import Asked, Setting
-from biogrip.command.words import columns_of
+from biogrip.command.words import columns_of, set_up_in_words
 from biogrip.digits import within_limits
 from tests.helpers.browser import Opened
 from tests.helpers.identified import FEW

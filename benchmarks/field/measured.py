@@ -27,7 +27,7 @@ from biogrip.fit.problem import Fit
 from biogrip.identify.prepare import prepare, ranges_of
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.library import Phase, Sample, hold, identify_sample, judge, simulate
-from biogrip.study.load import load_study, read_configs
+from biogrip.study.study import load_study, read_configs
 from biogrip.traces.reader import Recording, read_recording
 
 ROOT = Path(__file__).parents[2]

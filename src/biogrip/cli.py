@@ -253,7 +253,9 @@ def _groups_parser(stages: Any) -> None:
     groups.add_argument("--by", required=True, metavar="COLUMN", help="column that makes groups")
     text = "column of what was repeated: dishes, animals, days [cells]"
     groups.add_argument("--unit", metavar="COLUMN", help=text)
-    groups.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row a median")
+    groups.add_argument(
+        "--csv", type=Path, metavar="TABLE", help="CSV file, a row for a quantity of a group"
+    )
     text = "figure of every cell, by unit: a name that ends with .png or .pdf"
     groups.add_argument("--plot", type=Path, metavar="FIGURE", help=text)
 

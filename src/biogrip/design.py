@@ -27,9 +27,8 @@ from biogrip.physics.protocol import Phase, hold, join_phases, largest_load, sam
 from biogrip.physics.response import linear_jaw_force, step_response
 from biogrip.physics.simulation import compute_grip, simulated_response
 from biogrip.study.config import DesignBlock
-from biogrip.study.load import load_study, read_configs
 from biogrip.study.source import default_config, overlaid, read_config
-from biogrip.study.study import Case
+from biogrip.study.study import Case, load_study, read_configs
 from biogrip.terminal import aligned, visible_lines
 
 GENERATIONS = 500

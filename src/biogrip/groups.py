@@ -4,15 +4,16 @@
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from math import inf, isnan, nan
 from pathlib import Path
 from textwrap import fill
 
 from biogrip import __version__
-from biogrip.command.methods import in_sentences, outcome_in_words, paragraph, together
 from biogrip.command.outputs import COLUMNS as OF_TRACES
 from biogrip.command.outputs import FAILED, LINEAR, METHODS, REASONS, WRITTEN_BY, check_output
+from biogrip.command.words import in_sentences, outcome_in_words, paragraph, together
 from biogrip.digits import counted, plain, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import atomic_write, refuse_inputs
@@ -112,6 +113,7 @@ def groups(
         _printed(compared, names, units, unit),
         *_left_out(traces, made_by, cells, told),
         *_not_known(cells, compared, confidence, unit),
+        *_not_paired(cells, unit),
         *([] if unit else _shared(told, by, names, confidence, compared)),
     ]
     if doubtful := [cell.name for cell in cells if cell.doubtful]:
@@ -227,11 +229,11 @@ def _printed(
     for (name, group), row in compared.items():
         if not any(compared[name, each]["determined"] for each in names):
             continue
-        median, ratio, p = "too few", "", ""
+        mean, ratio, p = "too few", "", ""
         if "low" in row:
-            median = with_limits(row["median"], row["low"], row["high"])
+            mean = with_limits(row["median"], row["low"], row["high"])
         elif "median" in row:
-            median = plain(row["median"])
+            mean = plain(row["median"])
         if "p" in row:
             ratio = with_limits(row["ratio"], row["ratio_low"], row["ratio_high"])
             p = f"{row['p']:.2g}"
@@ -242,10 +244,11 @@ def _printed(
             scatters = [row.get("scatter_of_cells"), row.get("scatter_of_units")]
             shown = ("?" if it is None else f"{plain(100 * it, 2)} %" for it in scatters)
             determined += [str(row["units"]), ", ".join(shown)]
-        rows.append((with_unit(name, units[name]), group, *determined, median, ratio, p))
+        rows.append((with_unit(name, units[name]), group, *determined, mean, ratio, p))
     of_units = [unit, f"scatter of cells, {unit}"] if unit else []
     ratio_to = f"ratio to {names[0]}"
-    return aligned(rows, ("quantity", "group", "determined in", *of_units, "median", ratio_to, "p"))
+    of_group = "geometric mean", ratio_to, "p"
+    return aligned(rows, ("quantity", "group", "determined in", *of_units, *of_group))
 
 
 def _left_out(
@@ -278,7 +281,7 @@ def _left_out(
 def _not_known(
     cells: Sequence[Cell], compared: Compared, confidence: float, unit: str | None
 ) -> Iterator[str]:
-    """Say which cells are in no median, as they do not determine the quantity."""
+    """Say which cells are in no mean, as they do not determine the quantity."""
     for name in dict.fromkeys(name for name, _ in compared):
         if any(row["determined"] for (own, _), row in compared.items() if own == name):
             groups = [group for own, group in compared if own == name]
@@ -308,7 +311,7 @@ def _bounds(name: str, cells: Sequence[Cell], most: int) -> Iterator[str]:
 def _of_group(
     name: str, group: str, cells: Sequence[Cell], confidence: float, unit: str | None
 ) -> Iterator[str]:
-    """Say what cells of a group leave open, and what median bounds would give as values."""
+    """Say what cells of a group leave open, and what mean bounds would give as values."""
     for verdict, (_, moved) in _ONE_SIDED.items():
         own = [cell for cell in cells if cell.others.get(name, ("",))[0] == verdict]
         for said in _bounds(name, own, _FEW):
@@ -319,10 +322,18 @@ def _of_group(
             if "median" in row:
                 at = f"With them at these bounds it is {plain(row['median'])}"
                 moves = f"{at}, and of all cells it is {moved}."
-            yield f"{what} the median leaves out. {moves}"
+            yield f"{what} the mean leaves out. {moves}"
     told = {*_ONE_SIDED, FIT_REJECTED}
     if some := [it.name for it in cells if name in it.others and it.others[name][0] not in told]:
         yield f"{name} of {group}: nothing is told by {_few(some)}."
+
+
+def _not_paired(cells: Sequence[Cell], unit: str | None) -> Iterator[str]:
+    """Say which units stand in several groups."""
+    groups = Counter(name for name, _ in {(cell.unit, cell.group) for cell in cells})
+    if unit and (both := sorted(name for name, count in groups.items() if count > 1)):
+        several = ", ".join(both) if len(both) <= _FEW else f"{len(both)} of {unit}"
+        yield f"In several groups: {several}. Each counts there as another one; nothing is paired."
 
 
 def _shared(
@@ -356,13 +367,13 @@ def _tests(cells: Sequence[Cell], names: Sequence[str], by: str, unit: str | Non
     yield f"Groups are those of {by}: {'; '.join(counts)}."
     if unit:
         yield (
-            f"The unit is the {unit}: medians are means of the units' means of logarithms, with "
-            "limits of Student's t, and ratios are compared by Welch's t test (Lord et al., "
+            f"The unit is the {unit}: geometric means are those of the units' geometric means, "
+            "with limits of Student's t, and ratios are compared by Welch's t test (Lord et al., "
             "Journal of Cell Biology 219 (2020), e202001064)."
         )
     else:
         yield (
-            "Cells are taken for independent: medians are means of logarithms with random effects "
+            "Cells are taken for independent: geometric means have random effects "
             "(DerSimonian and Laird 1986) and limits after Hartung and Knapp, and ratios are "
             "compared by Welch's t test."
         )

@@ -9,11 +9,9 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from biogrip.arrays import Array
-from biogrip.figures.course import draw_convergence
-from biogrip.figures.fit import draw_fit, draw_fits
+from biogrip.figures.course import draw_convergence, draw_scatter
+from biogrip.figures.fit import Fit, draw_fit, draw_fits
 from biogrip.figures.likelihood import draw_profile, draw_valley
-from biogrip.figures.results import Fit
-from biogrip.figures.scatter import draw_scatter
 from biogrip.figures.style import ALL_SEEDS, RUNS, figure, styled
 from biogrip.fit.problem import METHODS
 from biogrip.physics.instruments import MODULUS

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.lines import Line2D
 
-from biogrip.figures.results import scale_of
+from biogrip.figures.fit import scale_of
 from biogrip.figures.style import (
     figure,
     line_of,

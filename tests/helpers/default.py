@@ -5,9 +5,8 @@ from typing import Any
 
 import yaml
 
-from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config
-from biogrip.study.study import Study
+from biogrip.study.study import Study, load_study
 from tests.helpers.places import CONFIG
 
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.cli import main
-from biogrip.command.notebook import TraceResult, identify_trace
-from biogrip.library import Sample, set_up, simulate
+from biogrip.library import Sample, TraceResult, identify_trace, set_up, simulate
 from tests.helpers.default import STUDY
 
 FEW = """

@@ -14,7 +14,7 @@ from biogrip.arrays import Array
 from biogrip.identify.identify import identify
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.library import INSTRUMENTS, BiogripError, Sample, hold, set_up
-from biogrip.stages.judgement import judge
+from biogrip.stages.identification import judge
 from biogrip.stages.targets import record
 from biogrip.traces.columns import Columns
 from biogrip.traces.reader import Recording, recording_of_arrays

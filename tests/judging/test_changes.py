@@ -7,11 +7,11 @@ import pytest
 from scipy.stats import f as fisher
 
 from biogrip.arrays import Array
-from biogrip.command.notebook import identify_trace
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.judging.doubts import DOUBTFUL
 from biogrip.judging.levels import FALSE_ALARM
 from biogrip.judging.whiteness import compare_halves, find_step, steps_of
+from biogrip.library import identify_trace
 
 NOISE, QUIET = 3.6, 1.2
 LEVEL = 0.01

@@ -9,7 +9,6 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from biogrip.arrays import Array
-from biogrip.command.notebook import identify_trace
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
@@ -20,6 +19,7 @@ from biogrip.judging.doubts import (
     has_fast_noise,
 )
 from biogrip.judging.likelihood import make_likelihood
+from biogrip.library import identify_trace
 from biogrip.physics.noise import AR1, Noise, NoiseModel, Outliers, add_noise
 from tests.helpers.default import seen
 from tests.helpers.problems import MODEL, clean, likelihood_of, pose_noisy, posed_for

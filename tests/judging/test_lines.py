@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.command.notebook import identify_trace
 from biogrip.judging.doubts import DOUBTFUL
 from biogrip.judging.whiteness import find_line
+from biogrip.library import identify_trace
 
 
 def test_white_noise_has_a_line_as_often_as_its_level_says() -> None:

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from biogrip.digits import legible
-from biogrip.figures.results import Fit
+from biogrip.figures.fit import Fit
 from biogrip.fit.problem import METHODS
 from biogrip.page.answers import (
     say_what_claims_are,

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from biogrip.records.success import ALL, basins, near_noise, near_noise_words
+from biogrip.records.identifications import ALL, basins, near_noise, near_noise_words
 
 
 def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:

@@ -6,10 +6,10 @@ import numpy as np
 
 from biogrip.records.identifications import READINGS, read_identifications
 from biogrip.stages.identification import identify
-from biogrip.stages.sweeps import identify_readings
 from biogrip.stages.targets import measure, simulate
 from tests.helpers.default import study_of
 from workflow.paper.readings import found_by_readings, read
+from workflow.paper.readings_of_case import identify_readings
 
 OVERLAY = """
 seeds: 3

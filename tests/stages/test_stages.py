@@ -12,7 +12,6 @@ from biogrip.physics.models import Sample
 from biogrip.physics.protocol import Phase, hold, join_phases, sample_times
 from biogrip.records.traces import read_target
 from biogrip.stages import identification as identifications
-from biogrip.stages import judgement
 from biogrip.stages import targets as target
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import EXAMPLE
@@ -79,7 +78,7 @@ def test_all_stages_weight_the_readings(tmp_path: Path) -> None:
     ).cases["mine"]
     traces, verdicts = tmp_path / "t.npz", tmp_path / "v.json"
     target.record(case, EXAMPLE, traces)
-    judgement.judge(case, traces, [], verdicts)
+    identifications.judge(case, traces, [], verdicts)
     judged = json.loads(verdicts.read_text())
     assert judged["threshold"] == pytest.approx(3.8415, abs=1e-4)
     outputs = [tmp_path / name for name in ("p.csv", "h.npz")]

@@ -13,9 +13,9 @@ from biogrip.keys import built, plain
 from biogrip.physics.models import MODELS
 from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.config import StudyConfig
-from biogrip.study.load import load_study
 from biogrip.study.messages import Schema
 from biogrip.study.source import overlaid, read_config
+from biogrip.study.study import load_study
 from tests.helpers.key_reference import STUDY, leaves
 
 DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"

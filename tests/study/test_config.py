@@ -13,9 +13,8 @@ from biogrip.errors import BiogripError
 from biogrip.fit.problem import METHODS
 from biogrip.physics.gripper import torque
 from biogrip.study.case_blocks import OVERRIDABLE
-from biogrip.study.load import load_given_study, load_study
 from biogrip.study.source import LARGEST_BYTES, overlaid, read_config, read_source
-from biogrip.study.study import Study
+from biogrip.study.study import Study, load_given_study, load_study
 from tests.helpers.key_reference import STUDY, file_schema, leaves
 from tests.helpers.places import CONFIG, ROOT
 
@@ -110,6 +109,20 @@ def test_all_problems_are_said_once_and_many_are_cut_short(tmp_path: Path) -> No
     keys = ("arm_length_m: found", "seedz: ", "methods[0]")
     assert [said.count(key) for key in keys] == [1, 1, 1]
     assert "and 44 more" in refusal(tmp_path, "\n".join(f"wrong_{i}: 1" for i in range(50)))
+
+
+def test_models_have_their_usual_names_too(tmp_path: Path) -> None:
+    """As on the command line, in any case of letters."""
+    text = "{model_selection: {models: [SLS, kv]}, traces: {table: x.csv, model: Zener}, "
+    config = load(
+        tmp_path, text + "cases: {a: {sample: {model: drop, k: 1, k_p: 1, c: 1}}}}"
+    ).config
+    assert config.model_selection.models == ("zener_maxwell", "kelvin_voigt")
+    assert config.traces is not None
+    assert config.traces.model == "zener_maxwell"
+    assert config.cases["a"].sample.model == "liquid_drop"
+    twice = "model_selection: {models: [zener, zener_maxwell]}"
+    assert "model_selection.models" in refusal(tmp_path, twice)
 
 
 def test_a_block_without_default_must_be_there() -> None:

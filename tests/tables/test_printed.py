@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from biogrip.tables.printed import interval_of, interval_of_value, value_in_case
+from biogrip.tables.cases import interval_of, interval_of_value, value_in_case
 from tests.helpers.default import STUDY
 
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.command.held import load_in_words
-from biogrip.command.settings import Asked, Setting, case_of, read_trace
+from biogrip.command.settings import Asked, Setting, case_of, load_in_words, read_trace
 from biogrip.errors import BiogripError
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import identify

@@ -96,5 +96,7 @@ def test_a_table_that_cannot_be_used_stops_with_line_and_key(lab: Path) -> None:
     table.write_text(CELLS.replace("fixed.c\n", "fixed.x\n"))
     run = snakemake(lab, "-n", "--", TABLE, config=STUDY)
     assert run.status == 1
-    assert "cells.tsv, line 4: fixed.x: is no parameter of the sample" in run.output
+    assert (
+        "cells.tsv, line 4, column 'fixed.x': fixed.x: is no parameter of the sample" in run.output
+    )
     assert "Traceback" not in run.output

@@ -19,13 +19,19 @@ from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.calibration import ARM_KEYS, FreeMotion, calibrate, free_motion
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import sample_times
-from biogrip.records.identifications import read_histories, read_identifications, read_readings
+from biogrip.records.identifications import (
+    median_with_limits,
+    near_noise,
+    read_histories,
+    read_identifications,
+    read_readings,
+    share_with_limits,
+)
 from biogrip.records.rows import read_frame
-from biogrip.records.success import median_with_limits, near_noise, share_with_limits
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
+from biogrip.tables.cases import value_in_case
 from biogrip.tables.layout import Column, Row, ShownTable, write
-from biogrip.tables.printed import value_in_case
 
 if TYPE_CHECKING:
     snakemake: Any

@@ -22,9 +22,8 @@ from biogrip.physics.protocol import sample_times
 from biogrip.records.traces import read_measurements
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
-from biogrip.tables.cases import error_percent
+from biogrip.tables.cases import error_percent, value_in_case
 from biogrip.tables.layout import Column, Row, ShownTable, write
-from biogrip.tables.printed import value_in_case
 
 if TYPE_CHECKING:
     snakemake: Any

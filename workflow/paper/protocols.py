@@ -17,8 +17,7 @@ from biogrip.judging.levels import DETERMINED_PERCENT
 from biogrip.judging.likelihood import bounds_percent
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.simulation import compute_grip, jaw_force, simulated_response
-from biogrip.records.identifications import read_batch
-from biogrip.records.success import share_with_limits
+from biogrip.records.identifications import read_batch, share_with_limits
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
 from biogrip.tables.layout import Column, Row, ShownTable, write

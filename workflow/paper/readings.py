@@ -13,14 +13,18 @@ import pandas as pd
 
 from biogrip.arrays import Array
 from biogrip.keys import built
-from biogrip.records.identifications import read_readings
-from biogrip.records.success import near_noise, near_noise_words, share_with_limits
+from biogrip.records.identifications import (
+    near_noise,
+    near_noise_words,
+    read_readings,
+    share_with_limits,
+)
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.source import overlaid
 from biogrip.study.study import Study
+from biogrip.tables.cases import interval_of_value, value_in_case
 from biogrip.tables.layout import Column, Row, ShownTable, write
-from biogrip.tables.printed import interval_of_value, value_in_case
 
 if TYPE_CHECKING:
     snakemake: Any

@@ -47,21 +47,3 @@ rule publish:
         "Publishing the tables and figures"
     script:
         "../scripts/publish.py"
-
-
-# The picture of these rules in the documentation; `make docs` draws it.
-rule rulegraph:
-    input:
-        sorted(map(str, shipped("workflow/rules").glob("*.smk"))),
-    output:
-        "docs/rules.png",
-    log:
-        "results/logs/rulegraph.log",
-    localrule: True
-    params:
-        snakefile=str(snakefile()),
-        target="results/report.html",
-    message:
-        "Drawing the graph of the rules"
-    script:
-        "../scripts/rulegraph.py"

@@ -24,11 +24,10 @@ from biogrip.errors import BiogripError
 from biogrip.files import digest_of, software
 from biogrip.fit.problem import METHODS
 from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases
-from biogrip.stages.job import settings
-from biogrip.study.load import load_given_study
+from biogrip.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases, settings
+from biogrip.study.study import load_given_study
 from biogrip.study.measurement_block import MeasurementBlock
-from biogrip.study.source import default_config, shipped, snakefile
+from biogrip.study.source import default_config, shipped
 
 
 def usable(read, *given):

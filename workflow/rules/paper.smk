@@ -135,7 +135,7 @@ rule readings_of_case:
     message:
         "Identifying {wildcards.case} under every reading of the paper"
     script:
-        "../scripts/readings_of_case.py"
+        "../paper/readings_of_case.py"
 
 
 rule readings:

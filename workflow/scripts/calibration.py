@@ -1,13 +1,7 @@
 """Calibrate the gripper by a test without sample."""
 
-from pathlib import Path
-
-from biogrip.stages.job import job_case, logged
-from biogrip.stages.targets import run
+from biogrip.stages.job import logged, run
+from biogrip.stages.targets import calibrate_gripper
 
 with logged(snakemake):
-    run(
-        job_case(snakemake),
-        Path(snakemake.output.gripper),
-        Path(snakemake.output.records),
-    )
+    run(snakemake, calibrate_gripper)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from biogrip.figures import course, fit, force, likelihood, scatter
+from biogrip.figures import course, fit, likelihood
 from biogrip.figures.style import save, styled
 from biogrip.page.page import write_summary
 from biogrip.stages.job import job_case, logged, paths
@@ -20,8 +20,8 @@ with logged(snakemake):
         "judged_fit": lambda: fit.draw_judged_fit(case, verdicts, measured[0], calibrated),
         "profiles": lambda: likelihood.draw_profiles(case, verdicts, expected),
         "valley": lambda: likelihood.draw_valley(case, verdicts, found),
-        "force": lambda: force.draw_force(case, *target),
-        "scatter": lambda: scatter.draw_scatter(case, found, *target, *expected, calibrated),
+        "force": lambda: fit.draw_force(case, *target),
+        "scatter": lambda: course.draw_scatter(case, found, *target, *expected, calibrated),
     }
     *figures, summary = paths(snakemake.output)
     drawn = {}

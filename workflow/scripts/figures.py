@@ -1,6 +1,6 @@
 """Draw the figures of the study, as far as it has what they show."""
 
-from biogrip.figures import moduli, overview
+from biogrip.figures import overview
 from biogrip.figures.overview import draw_answer, shown_cases
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
@@ -22,7 +22,7 @@ with logged(snakemake):
         "answer": lambda: draw_answer(
             study.cases[answered], *given["answered"], calibrated_of(answered)
         ),
-        "moduli": lambda: moduli.draw_moduli(shown, of("identifications"), of("targets")),
+        "moduli": lambda: overview.draw_moduli(shown, of("identifications"), of("targets")),
         "overview": lambda: overview.draw_overview(
             shown,
             of("identifications"),

@@ -1,16 +1,7 @@
 """Estimate and bound the quantities of a case in many traces."""
 
-from pathlib import Path
-
 from biogrip.stages.intervals import estimate
-from biogrip.stages.job import job_case, job_seeds, logged, paths
+from biogrip.stages.job import logged, run
 
 with logged(snakemake):
-    estimate(
-        job_case(snakemake),
-        job_seeds(snakemake),
-        Path(snakemake.input.target),
-        Path(snakemake.input.expected),
-        paths(snakemake.input.calibrated),
-        Path(snakemake.output.intervals),
-    )
+    run(snakemake, estimate)

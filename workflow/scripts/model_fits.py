@@ -1,15 +1,7 @@
 """Fit every sample model to the traces of a batch."""
 
-from pathlib import Path
-
 from biogrip.stages.identification import fit
-from biogrip.stages.job import job_case, job_seeds, logged, paths
+from biogrip.stages.job import logged, run
 
 with logged(snakemake):
-    fit(
-        job_case(snakemake),
-        job_seeds(snakemake),
-        Path(snakemake.input.measurements),
-        paths(snakemake.input.calibrated),
-        Path(snakemake.output.fits),
-    )
+    run(snakemake, fit)

@@ -1,13 +1,7 @@
 """Read and check a recorded trace."""
 
-from pathlib import Path
-
-from biogrip.stages.job import job_case, logged
+from biogrip.stages.job import logged, run
 from biogrip.stages.targets import record
 
 with logged(snakemake):
-    record(
-        job_case(snakemake),
-        Path(snakemake.input.recorded),
-        Path(snakemake.output.measurements),
-    )
+    run(snakemake, record)

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from biogrip import __version__
-from biogrip.command.held import load_in_words
 from biogrip.command.outputs import (
     WRITTEN_BY,
     Outcome,
@@ -32,10 +31,10 @@ from biogrip.command.settings import (
     Setting,
     check_settings,
     is_table,
+    load_in_words,
     read_table,
     read_trace,
 )
-from biogrip.command.side_by_side import side_by_side
 from biogrip.command.words import in_columns, in_words
 from biogrip.errors import BiogripError
 from biogrip.files import digest_of, refuse_inputs, software
@@ -46,6 +45,7 @@ from biogrip.identify.other_fits import Trace
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
+from biogrip.processes import side_by_side
 from biogrip.study.source import default_config
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from biogrip import __version__
-from biogrip.command.methods import set_up_in_words
+from biogrip.command.words import set_up_in_words
 from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_path, write_text

@@ -18,19 +18,18 @@ from matplotlib.figure import Figure
 
 from biogrip import __version__
 from biogrip.command import words
-from biogrip.command.methods import (
+from biogrip.command.outputs import FAILED, WRITTEN_BY, Outcome
+from biogrip.command.words import (
     outcome_in_words,
     paragraph,
     preferred_in_words,
     set_up_in_words,
     together,
 )
-from biogrip.command.outputs import FAILED, WRITTEN_BY, Outcome
 from biogrip.digits import with_unit
 from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
-from biogrip.figures.fit import draw_fit
+from biogrip.figures.fit import draw_fit, fit_of
 from biogrip.figures.likelihood import draw_profiles_of
-from biogrip.figures.results import fit_of
 from biogrip.figures.style import (
     COLUMN_IN,
     FITTED,

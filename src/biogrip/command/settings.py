@@ -27,15 +27,14 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.command.held import remarks_on_hold
 from biogrip.command.options import OPTIONS
 from biogrip.command.outputs import COLUMNS
-from biogrip.digits import counted
+from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
+from biogrip.identify.other_fits import Trace
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.study.experiment_blocks import LONGEST_S, SHORTEST_S
-from biogrip.study.load import load_study, read_configs
 from biogrip.study.measurement_block import ARRAYS, READINGS, MeasurementBlock
 from biogrip.study.messages import checked, schema_of
 from biogrip.study.source import (
@@ -48,7 +47,7 @@ from biogrip.study.source import (
     overlaid,
     value_of,
 )
-from biogrip.study.study import Case
+from biogrip.study.study import Case, load_study, read_configs
 from biogrip.terminal import visible
 from biogrip.traces.columns import Columns, held_unit, listed, place, trace_file_problem
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
@@ -58,6 +57,9 @@ MODEL = "generalized_maxwell"
 """Sample model of traces of which nothing says another."""
 
 _FILES = ("file", "filename", "filepath", "path", "trace", "tracefile")
+
+TRACE = "TRACE"
+"""Place of a trace that no table lists."""
 
 LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
@@ -80,7 +82,7 @@ class Setting:
     """A key of the config, and the value that an option or a cell of a table gives it."""
 
     by: str
-    """The option, or the line of the table, for messages."""
+    """The option, or line and column of the table, for messages."""
     path: tuple[str, ...]
     """The key."""
     value: Any
@@ -97,7 +99,7 @@ class Asked:
     """YAML file laid over the default study: gripper, protocol, search range, ..."""
     settings: tuple[Setting, ...] = ()
     """Settings laid over the config, the later over the earlier."""
-    place: str = "TRACE"
+    place: str = TRACE
     """Row of a table that lists the trace, for messages."""
     copied: Mapping[str, str] = field(default_factory=dict)
     """Other cells of that row, by column."""
@@ -220,6 +222,8 @@ def _with_instrument(
     was recorded, see `Experiment.record`.
     """
     level = merged.pop(HOLD[0], None)
+    row = "" if asked.place == TRACE else f"{asked.place}: "
+    by = next((it.by for it in asked.settings[::-1] if it.path == HOLD), f"{row}--hold")
     if not isinstance(merged["measurement"], dict):
         return merged, None, None
     instrument = _instrument(merged, given)
@@ -233,7 +237,7 @@ def _with_instrument(
     of_column = measurement.get(LOAD[-1]) is not None
     if instrument.sweeps:
         if level is not None:
-            raise BiogripError("--hold: is of a trace in time, not of a sweep; leave it out.")
+            raise BiogripError(f"{by}: is of a trace in time, not of a sweep; leave it out.")
         held = {"phases": [{"duration_s": 1.0, controlled.column: 1.0}]}
         return {**found, "protocol": held}, None, None
     if level is None and not of_column:
@@ -242,11 +246,11 @@ def _with_instrument(
         if not instrument.relative:
             unit = f" in {controlled.unit}" if controlled.unit else ""
             raise BiogripError(
-                f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, a "
+                f"{by}: is missing; allowed is the {controlled.name}{unit} that was held, a "
                 "column of it by --load, or a protocol in --config."
             )
     if level is not None:
-        level, unit = held_unit(level, controlled)
+        level, unit = held_unit(level, controlled, by)
         level *= controlled.units[unit]
     own = _recording(asked, measurement)
     phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
@@ -413,7 +417,9 @@ def read_table(
         for name, cell in by_name.items():
             if ("." in name or name in options_of) and cell:
                 try:
-                    settings += _settings_of(cell, name, options_of.get(name), place(path, line))
+                    settings += _settings_of(
+                        cell, name, options_of.get(name), place(path, line, name)
+                    )
                 except (BiogripError, ValueError) as error:
                     problems.append(f"{place(path, line, name)}: {error}")
         used = {"", *options_of, *(name for name in by_name if "." in name)}
@@ -501,3 +507,49 @@ def _name_problems(path: Path, header: Sequence[str], used: Collection[str]) -> 
             text = "is a column of the results; allowed is another name."
         if text:
             yield f"{place(path, 1, name)}: {text}"
+
+
+def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
+    """Return what was held or loaded; nothing where a config has the protocol.
+
+    Given are the blocks of the config that the user has set.
+    """
+    (recording, experiment), controlled = trace, case.instrument.controlled
+    form, start_s = recording.form, case.columns.start_s or 0.0
+    if recording.load is not None and experiment.record is not None:
+        column, loads = form["columns"]["load"], experiment.record[:, 1]
+        if case.instrument.relative:
+            loads = loads * getattr(case.block.protocol.phases[0], controlled.column)
+        ends = loads.min(), loads.max()
+        low, high = (plain(end / controlled.units[column["unit"]]) for end in ends)
+        what = _with_unit(high if low == high else f"{low} to {high}", column["unit"])
+        count = np.count_nonzero(recording.load[:, 0] >= start_s)
+        rows = f"column {column['column']}, {count:,} rows"
+        return f"Load: {what} from {start_s:g} s ({rows})."
+    if HOLD[0] not in given:
+        return ""
+    number, unit = held_unit(given[HOLD[0]], controlled)
+    start = "its start, as fitted," if experiment.fit_start else f"{start_s:g} s"
+    return f"Held: {_with_unit(f'{number:g}', unit)} from {start} to {form['last_s']:g} s."
+
+
+def _with_unit(number: str, unit: str) -> str:
+    return number if unit == "1" else f"{number} {unit}"
+
+
+def remarks_on_hold(recording: Recording, case: Case, given: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a sentence if readings have a unit with a prefix, and what was held is a number."""
+    read, controlled = case.instrument.read, case.instrument.controlled
+    unit, held = recording.units[1], given.get(HOLD[0])
+    prefix = unit.removesuffix(read.unit)
+    if held is None or not (prefix and read.unit and controlled.unit) or prefix == unit:
+        return ()
+    number, own = held_unit(held, controlled)
+    if own != controlled.unit or str(held).rstrip().endswith(own):
+        return ()
+    likely = prefix + controlled.unit
+    likely = likely if likely in controlled.units else controlled.unit
+    return (
+        f"The {read.name} is in {unit}, but what was held, {number:g}, is taken to be in {own}: "
+        f'say its unit, as in --hold "{number:g} {likely}".',
+    )

@@ -1,33 +1,152 @@
-"""Figures 9, 11 and 12: target, noisy trace, fits, and the residuals."""
+"""Figures 9, 11 and 12: target, noisy trace, fits, and the residuals; and the force of the jaws."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
-from biogrip.figures.results import Fit, fit_of, fits_of_basins, scale_of_fit
+from biogrip.errors import BiogripError
 from biogrip.figures.style import (
+    BLACK,
     BLUE,
     COLUMN_IN,
     FITTED,
     MEASURED,
+    ORANGE,
     RUNS,
     TARGET,
     figure,
     is_over_decades,
     literal,
 )
-from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.fit.experiment import Experiment
+from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
+from biogrip.physics.noise import within
 from biogrip.physics.protocol import is_storage
-from biogrip.records.identifications import read_verdicts
-from biogrip.records.traces import read_measurements
-from biogrip.stages.judgement import TRACE, experiment_for
+from biogrip.physics.simulation import jaw_force, simulated_response
+from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
+from biogrip.records.identifications import (
+    ALL,
+    basins,
+    read_histories,
+    read_identifications,
+    read_verdicts,
+)
+from biogrip.records.rows import seeds_of
+from biogrip.records.traces import Measurements, read_measurements, read_target
+from biogrip.stages.identification import TRACE, experiment_for
 from biogrip.study.study import Case
+
+SHOWN_SEEDS = 100
+"""Most seeds drawn individually; figures show the first ones."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A trace and the response that was fitted to it."""
+
+    time_s: Array
+    """Sampling times, (n_samples,)."""
+    target: Array | None
+    """Noise-free rotation, (n_samples,); None if the trace was recorded."""
+    measured: Array
+    """Noisy rotation, (n_samples,)."""
+    fitted: Array
+    """Fitted rotation, (n_samples,)."""
+    sd: Array | None = None
+    """Standard deviations of the readings, (n_samples,), where they are known."""
+    read: Channel = ROTATION
+    """What is read."""
+
+
+def first_of_basins(found: pd.DataFrame, tolerance: float) -> dict[str, pd.Series]:
+    """Return the first run of each of the `basins`, by what it is called in a legend."""
+    if len(found) == 1:
+        return {"the only trace": found.iloc[0]}
+    return {
+        f"seed {runs['seed'].iloc[0]}" + f", {name}" * (name != ALL): runs.iloc[0]
+        for name, runs in basins(found, tolerance).items()
+    }
+
+
+def fits_of_basins(
+    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
+) -> dict[str, Fit]:
+    """Return the fit of the first run of each basin, by label, from files of a case."""
+    found = read_identifications(identifications, case, case.study.shown)
+    fits = {}
+    for words, run in first_of_basins(found, case.study.near_noise_tolerance).items():
+        seed = int(run["seed"])
+        values = {p.name: float(run[p.column]) for p in case.sample.model.parameters}
+        recorded = read_measurements(_holding(seed, measurements), [seed])
+        experiment = experiment_for(case.experiment, recorded, calibrated)
+        fits[f"fit ({words})"] = fit_of(experiment, values, recorded, seed)
+    return fits
+
+
+def fit_of(
+    problem: Experiment, parameters: Mapping[str, float], recorded: Measurements, seed: int
+) -> Fit:
+    """Return the trace of a seed, and the response of parameters with nuisance terms fitted."""
+    network = problem.model.sample(parameters)
+    simulated = simulated_response(
+        problem.gripper, network, problem.torque, recorded.time_s, nonlinear=False
+    )[0]
+    measured = recorded.readings[seed]
+    nuisance = problem.nuisance(recorded.time_s)
+    fitted = simulated + within(nuisance, measured - simulated, recorded.sd)
+    target, read = recorded.target, problem.instrument.read
+    return Fit(recorded.time_s, target, measured, fitted, recorded.sd, read)
+
+
+def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
+    """Return the identifications of seeds that are drawn individually."""
+    return found[found["seed"] < SHOWN_SEEDS]
+
+
+def seeds_in_words(count: int) -> str:
+    """Return in words how many seeds are drawn individually."""
+    if count == 1:
+        return "the only trace"
+    return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
+
+
+def read_history(
+    path: Path, method: str, shown: Sequence[int], values: Sequence[str] = ("best_misfit",)
+) -> pd.DataFrame:
+    """Read one method's histories of the seeds drawn individually and of those shown."""
+    found = read_histories(path, method, values)
+    return found[found["seed"].isin({*range(SHOWN_SEEDS), *shown})]
+
+
+def scale_of(values: Array, unit: str) -> tuple[float, str]:
+    """Return factor and unit that put values between 1 and 1000, e.g. ``(1e6, "µrad")``."""
+    largest = float(np.max(np.abs(values)))
+    for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ")):
+        if largest * factor >= 1:
+            return factor, prefix + unit
+    return 1e9, f"n{unit}"
+
+
+def scale_of_fit(fit: Fit) -> tuple[float, str]:
+    """Return factor and unit with a prefix, where the unit of the readings may have one."""
+    plain = fit.read.unit.isalpha()
+    return scale_of(fit.fitted, fit.read.unit) if plain else (1.0, fit.read.unit)
+
+
+def _holding(seed: int, measurements: list[Path]) -> Path:
+    for path in measurements:
+        if seed in seeds_of(path.stem):
+            return path
+    raise BiogripError(f"no measurement file holds seed {seed}.")
+
 
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
 # Readings that are drawn in full colour; of more, residuals have means of so many parts.
@@ -153,3 +272,55 @@ def draw_sweep(fit: Fit, title: str) -> Figure:
     residuals.set(xlabel="angular frequency (rad/s)", ylabel="residual (%)")
     drawn.align_ylabels()
     return drawn
+
+
+def draw_force(case: Case, target: Path) -> Figure:
+    """Draw the jaw force under bilateral contact, and the rotation with and without adhesion."""
+    time_s, _, rotation = read_target(target, case.times_s)
+    device = case.gripper, case.network, case.torque
+    # Without inertia, since the jaws ring for less than a sampling interval after a step.
+    sticking = jaw_force(*device, time_s, nonlinear=case.nonlinear_target, inertia=False)[0]
+    drawn = figure(COLUMN_IN, 3.2)
+    forces, rotations = drawn.subplots(2, 1, sharex=True, height_ratios=[1.25, 1])
+    factor, unit = scale_of(sticking, "N")
+    forces.axhline(0, color=BLACK, linewidth=0.6)
+    forces.plot(time_s, factor * sticking, color=BLUE, label="jaws that hold the sample")
+    negative = np.minimum(factor * sticking, 0)
+    pulling = bool(negative.min() < -1e-9 * factor * np.abs(sticking).max())
+    if pulling:
+        forces.fill_between(
+            time_s, negative, 0, color=ORANGE, alpha=0.35, linewidth=0, hatch="////",
+            label="the jaws would have to pull",
+        )  # fmt: skip
+    apart = None
+    if pulling and not case.nonlinear_target:
+        apart = unilateral_response(*device, time_s)
+        shown = _from_loss(apart, apart.jaw_force_N)
+        forces.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
+    forces.set_ylabel(f"jaw force ({unit})")
+    low, high = float(negative.min()), factor * float(sticking.max())
+    forces.set_ylim(low - 0.08 * (high - low), high + (0.62 if apart else 0.42) * (high - low))
+    forces.legend(loc="upper right")
+    forces.set_title(case.title)
+
+    factor, unit = scale_of(rotation, "rad")
+    name = "target" + (", jaws that let go" if case.unilateral else "")
+    rotations.plot(time_s, factor * rotation, color=BLACK, label=name)
+    if apart and not case.unilateral:
+        shown = _from_loss(apart, apart.rotation[0])
+        rotations.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
+    rotations.set_ylabel(f"rotation ({unit})")
+    low, high = (factor * float(end) for end in (min(rotation.min(), 0), rotation.max()))
+    rotations.set_ylim(low, high + 0.4 * (high - low))
+    rotations.set_xlabel("time (s)")
+    rotations.set_xlim(time_s[0], time_s[-1])
+    rotations.legend(loc="upper right", ncols=2)
+    drawn.align_ylabels()
+    return drawn
+
+
+def _from_loss(found: UnilateralResponse, values: Array) -> Array:
+    """Return values from the last sample before contact is first lost, NaN before."""
+    lost = np.flatnonzero(~found.touching)
+    start = max(lost[0] - 1, 0) if len(lost) else len(values)
+    return np.where(np.arange(len(values)) >= start, values, np.nan)

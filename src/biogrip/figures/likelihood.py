@@ -16,7 +16,7 @@ from scipy.interpolate import PchipInterpolator
 
 from biogrip.arrays import Array
 from biogrip.digits import SUPERSCRIPTS, with_unit
-from biogrip.figures.results import first_seeds, seeds_in_words
+from biogrip.figures.fit import first_seeds, seeds_in_words
 from biogrip.figures.style import (
     BLUE,
     COLUMN_IN,

@@ -1,4 +1,4 @@
-"""Medians and ratios of groups of cells, from what traces tell.
+"""Geometric means and ratios of groups of cells, from what traces tell.
 
 The logarithm of a quantity varies from cell to cell with the variance tau^2, and is known of cell i
 with the standard error s_i, from its limits. A mean of cells weighs each by 1/(s_i^2 + tau^2), with
@@ -26,13 +26,14 @@ from biogrip.judging.doubts import OK
 from biogrip.judging.verdicts import DETERMINED, FIT_REJECTED
 
 FEWEST_CELLS, FEWEST_UNITS = 3, 2
-"""Fewest cells of which a median is estimated, and fewest units of which its limits are."""
+"""Fewest cells of which a mean is estimated, and fewest units of which its limits are."""
 
 COLUMNS = (
     *("cells", "determined", "units", "scatter_of_cells", "scatter_of_units"),
     *("median", "low", "high", "ratio", "ratio_low", "ratio_high", "p"),
 )
-"""What is said of a quantity in a group. Scatters are standard deviations of logarithms."""
+"""What is said of a quantity in a group. Scatters are standard deviations of logarithms; ``median``
+is the geometric mean, which is the median where logarithms are symmetric."""
 
 CELL = "cell"
 """Column of a table of traces that names the cell of a trace."""
@@ -149,7 +150,7 @@ def compare(
 ) -> Compared:
     """Return `COLUMNS` by quantity and group; ratio and p value are against the first group.
 
-    Of cells whose fit is rejected it takes what is told without a model. A median takes
+    Of cells whose fit is rejected it takes what is told without a model. A mean takes
     `FEWEST_CELLS` that determine the quantity, and no fewer than do not; of units, half of them,
     and limits take `FEWEST_UNITS`.
     """

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from biogrip.digits import legible, plain, with_unit
 from biogrip.judging.quantities import PROVIDED
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.records.success import ALL, share_with_limits
+from biogrip.records.identifications import ALL, share_with_limits
 
 Row = Mapping[str, str]
 

@@ -9,12 +9,12 @@ from plotly.graph_objects import Figure, Scatter
 
 from biogrip.arrays import Array
 from biogrip.digits import significant, with_unit
-from biogrip.figures.results import Fit, fit_of, scale_of_fit
+from biogrip.figures.fit import Fit, fit_of, scale_of_fit
 from biogrip.figures.style import COLORS, MEASURED, TARGET, is_over_decades
 from biogrip.fit.problem import Method
 from biogrip.records.identifications import read_identifications
 from biogrip.records.traces import read_measurements
-from biogrip.stages.judgement import TRACE, experiment_for
+from biogrip.stages.identification import TRACE, experiment_for
 from biogrip.study.study import Case
 
 # As many readings as a phone draws.

@@ -20,7 +20,7 @@ from biogrip.page import answers
 from biogrip.page.explorer import explorer, fits_of
 from biogrip.records.identifications import read_verdicts
 from biogrip.records.rows import read_table, whole
-from biogrip.stages.judgement import TRACE
+from biogrip.stages.identification import TRACE
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import target_of
 

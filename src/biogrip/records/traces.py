@@ -29,6 +29,8 @@ class Measurements:
     """Noisy trace of each seed, (n_samples,) each."""
     sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
+    sd_known: bool = True
+    """False if only their ratios are, see `Recording.sd_known`."""
     onset_s: float | None = None
     """Time of a recording's clock from which the times count, if it was given or fitted."""
     remarks: tuple[str, ...] = ()
@@ -44,6 +46,7 @@ class Measurements:
             readings,
             index,
             sd=self.sd,
+            sd_known=self.sd_known,
             onset_s=self.onset_s,
             remarks_before=self.remarks,
         )
@@ -56,6 +59,7 @@ def of_recording(recording: Recording) -> Measurements:
         None,
         {0: recording.readings},
         sd=recording.sd,
+        sd_known=recording.sd_known,
         onset_s=recording.onset_s,
         remarks=tuple(recording.remarks()),
     )
@@ -114,6 +118,7 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
         "time_s": measurements.time_s,
         "target": measurements.target,
         "sd": measurements.sd,
+        "sd_known": None if measurements.sd_known else False,
         "seeds": list(measurements.readings),
         "traces": list(measurements.readings.values()),
         "onset_s": measurements.onset_s,
@@ -135,6 +140,7 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
         found.get("target"),
         chosen,
         sd=found.get("sd"),
+        sd_known="sd_known" not in found,
         onset_s=None if onset_s is None else float(onset_s),
         remarks=tuple(map(str, found.get("remarks", ()))),
     )

@@ -4,13 +4,14 @@ A rule's ``params`` are some keys of the config as plain values, those of its ca
 study's (`settings`). Its script makes a `Case` or a `Study` of these again (`job_case`,
 `job_study`), in which every other key is an error: a rule that forgets to name one fails, and
 cannot give a result that Snakemake would not renew. Each job has a batch of the case's seeds
-(`batch_names`, `job_seeds`), and writes what it says to its log (`logged`).
+(`batch_names`), does a stage (`run`), and writes what it says to its log (`logged`).
 """
 
 import traceback
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import MISSING, Field, fields
+from inspect import signature
 from pathlib import Path
 from typing import Any, ClassVar, get_type_hints
 
@@ -165,9 +166,20 @@ def job_settings(job: Any) -> dict[str, Any]:
     return given
 
 
-def job_seeds(job: Any) -> list[int]:
-    """Return the seeds of a job's batch."""
-    return list(seeds_of(job.wildcards.batch))
+def run(job: Any, stage: Callable[..., None]) -> None:
+    """Do a stage, whose arguments have the names of wildcards and files of a job's rule.
+
+    ``case`` is the case, and ``seeds`` are those of the batch.
+    """
+    of_job = (dict(of.items()) for of in (job.wildcards, job.input, job.output))
+    given: dict[str, Any] = {name: it for of in of_job for name, it in of.items()}
+    for name, kind in get_type_hints(stage).items():
+        if kind is Path:
+            (given[name],) = paths(given[name])
+        elif kind == list[Path]:
+            given[name] = paths(given[name])
+    given |= {"case": job_case(job), "seeds": [*seeds_of(given.get("batch", "seeds_0-0"))]}
+    stage(**{name: given[name] for name in signature(stage).parameters})
 
 
 def paths(files: Any) -> list[Path]:

@@ -1,38 +1,22 @@
-"""Studies around a study: points of a sweep, and other readings of the paper.
-
-`judge` reads what is identified at every point of a sweep, and writes the errors and the share of
-seeds in the basin of the truth. `identify_readings` identifies the traces of a case by the
-genetic algorithm under every reading of the paper.
-"""
+"""Points of a sweep: errors of what is identified, and the share of seeds in the true basin."""
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.fit.genetic import identify_many
 from biogrip.fit.genome import nearest_encodable
 from biogrip.judging.likelihood import bounds_percent, headlines
 from biogrip.judging.quantities import Quantity
-from biogrip.keys import built
-from biogrip.physics.noise import add_noise, rms, stream
-from biogrip.physics.sample_model import SINGLE_BRANCH
+from biogrip.physics.noise import rms
 from biogrip.physics.simulation import simulated_response
-from biogrip.records.identifications import READINGS, read_batch
+from biogrip.records.identifications import near_noise, read_batch
 from biogrip.records.rows import RowFile
-from biogrip.records.success import near_noise
-from biogrip.records.traces import read_target
-from biogrip.stages.identification import groups
-from biogrip.stages.targets import response
-from biogrip.study.case_blocks import CaseBlock
-from biogrip.study.source import overlaid
 from biogrip.study.study import Case, Study
 from biogrip.study.sweeps import Point
-from biogrip.terminal import Progress
 
 POINTS = RowFile(
     "a sweep",
@@ -153,43 +137,3 @@ def _resolution(point: Case, true: Mapping[str, float]) -> float:
         nonlinear=False,
     )
     return rms(both[1] - both[0])
-
-
-def identify_readings(case: Case, target: Path, rows: Path) -> None:
-    """Identify every noisy trace of a case under every reading by the genetic algorithm.
-
-    Random streams are those of the study, so a reading that changes nothing reproduces the
-    study's results.
-    """
-    READINGS.write(rows, _reading_rows(case, target))
-
-
-def _reading_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
-    time_s, _, rotation = read_target(target, case.times_s)
-    readings = case.study.config.readings
-    progress = Progress(f"{case.name}, readings", len(readings) * case.seeds)
-    for name, reading in readings.items():
-        block = built(CaseBlock, overlaid(case.plain, reading.changes))
-        read = replace(case, block=block)
-        experiment, at, clean = read.experiment, time_s, rotation
-        if read.samples != len(time_s):
-            at, (clean, _) = read.times_s, response(read, read.times_s)
-        for seeds in groups(range(case.seeds)):
-            noises, searches = (
-                [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]
-                for purpose in ("noise", "genetic")
-            )
-            traces = [add_noise(clean, read.noise, rng, at) for rng in noises]
-            problems = experiment.of_each(at, traces)
-            answers = identify_many(problems, block.genetic_algorithm, searches)
-            for seed, trace, answer in zip(seeds, traces, answers, strict=True):
-                names = experiment.searched.names
-                values = {**experiment.fixed, **dict(zip(names, answer.parameters, strict=True))}
-                falls = np.flatnonzero(np.diff(answer.history.best_misfit) < 0)
-                yield (
-                    *(case.name, name, seed),
-                    *(f"{values.get(p.name, 0.0):.6g}" for p in SINGLE_BRANCH),
-                    *(f"{answer.misfit:.6e}", f"{rms(trace - clean):.6e}", answer.generations),
-                    int(falls[-1]) + 1 if len(falls) else 0,
-                )
-            progress.done(len(seeds))

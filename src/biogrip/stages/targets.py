@@ -97,7 +97,7 @@ def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) 
     write_measurements(measurements, Measurements(time_s, rotation, traces))
 
 
-def run(case: Case, gripper: Path, records: Path) -> None:
+def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
     """Simulate both arms' free motion with noise, and identify their properties."""
     test = case.block.calibration
     time_s = sample_times(test.duration_s, test.rate_Hz)

@@ -13,6 +13,7 @@ from biogrip.physics.fractional import LONGEST_S
 from biogrip.physics.gripper import CombDrive
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
+from biogrip.study.experiment_blocks import USUAL_NAMES
 from biogrip.study.sweeps import MOST_POINTS, SweepBlock, list_points, name_complaints
 
 _MOST_CASES = 2000
@@ -32,15 +33,14 @@ _Name = Annotated[
         json_schema_extra={"form": "a letter, then up to 31 letters, digits or '_'"},
     ),
 ]
+_Candidate = Annotated[str, OneOf(CANDIDATES), USUAL_NAMES]
 
 
 @dataclass(frozen=True)
 class ModelSelection(Block):
     """Selection of the simplest adequate sample model by AIC and BIC."""
 
-    models: Annotated[
-        tuple[Annotated[str, OneOf(CANDIDATES)], ...], Field(max_length=100), Distinct()
-    ]
+    models: Annotated[tuple[_Candidate, ...], Field(max_length=100), Distinct()]
     """Sample models fitted to every trace, beside that of its case; with an empty list none are. A
     number counts Maxwell branches."""
 
@@ -93,7 +93,7 @@ class TracesBlock(Block):
     config: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
     """Config of the traces, as `biogrip identify --config` takes it: gripper, protocol, ... By
     default the default study's."""
-    model: Annotated[str, OneOf(CANDIDATES)] = "generalized_maxwell"
+    model: _Candidate = "generalized_maxwell"
     """Sample model of all traces; a column `sample.model` goes before it."""
     rows_a_batch: Annotated[int, Field(ge=1, le=100_000)] = 100
     """Number of rows per job. Changes no result."""

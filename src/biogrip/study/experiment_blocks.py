@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, BeforeValidator, Field
 
 from biogrip.errors import nearest
 from biogrip.keys import OPEN, Block, Checked, Complaint, OneOf
@@ -24,7 +24,7 @@ from biogrip.physics.gripper import (
     contact,
 )
 from biogrip.physics.instruments import CONTROLLED, Instrument
-from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.models import ALIASES, MODELS, Sample
 from biogrip.physics.protocol import Phase, hold, largest_load, ramp
 from biogrip.physics.sample_model import MOST_BRANCHES, SampleModel
 
@@ -38,6 +38,11 @@ _PULLS = _BASES[:2]
 # Share of a property; a larger change of the response would not be linear.
 _MOST_UNCERTAIN = 0.5
 _OWN = ("arm_length_m", "reference_angle_deg")
+
+USUAL_NAMES = BeforeValidator(
+    lambda name: ALIASES.get(name.lower(), name) if isinstance(name, str) else name
+)
+"""Annotation of a model's name, which may be a usual one, as SLS."""
 
 # A load or a deformation, either way.
 _SMALLEST = 1e-50
@@ -230,6 +235,7 @@ class SampleBlock(Checked, BaseModel):
     model: Annotated[
         str,
         OneOf(MODELS),
+        USUAL_NAMES,
         Field(description='Constitutive model, see "Sample models" for its parameters.'),
     ]
     branches: Annotated[

@@ -6,9 +6,15 @@ import numpy as np
 import pandas as pd
 
 from biogrip.fit.nested_fits import aic_and_bic
-from biogrip.records.identifications import ENCODABLE, MODEL_FITS, read_identifications
+from biogrip.records.identifications import (
+    ENCODABLE,
+    MODEL_FITS,
+    chi_square_increase,
+    reached_encodable,
+    read_identifications,
+    share_with_limits,
+)
 from biogrip.records.rows import seeds_of
-from biogrip.records.success import chi_square_increase, reached_encodable, share_with_limits
 from biogrip.study.study import Study
 from biogrip.tables.cases import error_percent, target_of
 from biogrip.tables.layout import Column, Row, ShownTable

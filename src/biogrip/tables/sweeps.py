@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from biogrip.judging.likelihood import headlines
-from biogrip.records.success import near_noise_words
+from biogrip.records.identifications import near_noise_words
 from biogrip.stages.sweeps import POINTS
 from biogrip.study.study import Study
 from biogrip.study.sweeps import AxisBlock

@@ -252,15 +252,15 @@ def number_and_unit(text: str) -> tuple[float, str]:
     return float(found[1]), found[2]
 
 
-def held_unit(value: float | str, controlled: Channel) -> tuple[float, str]:
+def held_unit(value: float | str, controlled: Channel, by: str = "--hold") -> tuple[float, str]:
     """Return the number and the unit of what was held, a key of its units; a number is in SI units.
 
-    A `BiogripError` has the units that are allowed.
+    A `BiogripError` has what gave it, `by`, and the units that are allowed.
     """
     try:
         number, written = number_and_unit(str(value))
     except ValueError as error:
-        raise BiogripError(f"--hold: {error}.") from error
+        raise BiogripError(f"{by}: {error}.") from error
     unit = known_unit(written, controlled.units) if written else controlled.unit or "1"
     if unit is None:
         allowed = ", ".join(controlled.units)
@@ -269,7 +269,7 @@ def held_unit(value: float | str, controlled: Channel) -> tuple[float, str]:
             name for name, it in INSTRUMENTS.items() if known_unit(written, it.controlled.units)
         ]
         other = f" Or say what is read, as by --reading {others[0]}=COLUMN." if others else ""
-        raise BiogripError(f"--hold: {found}, allowed are {allowed}.{other}")
+        raise BiogripError(f"{by}: {found}, allowed are {allowed}.{other}")
     return number, unit
 
 

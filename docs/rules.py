@@ -1,4 +1,4 @@
-"""Draw which rules read what others make, as far as others between them do not say it already."""
+"""Draw which rules read what others make, as far as others between do not say it: `make docs`."""
 
 import re
 import subprocess
@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from biogrip.figures.style import BLACK, GREY, save_png, styled
-from biogrip.stages.job import logged
 
 # Sweeps over the columns, after which no row changes any more.
 SWEEPS = 20
@@ -43,20 +42,19 @@ def lay_out(graph):
     return place, lines
 
 
-with logged(snakemake):
-    params = snakemake.params
-    command = [sys.executable, "-m", "snakemake", "-s", params.snakefile, params.target]
-    dot = subprocess.run([*command, "--rulegraph"], check=True, capture_output=True, text=True)
-    names = dict(re.findall(r'(\d+)\[label = "(\w+)"', dot.stdout))
-    reads = [(names[a], names[b]) for a, b in re.findall(r"(\d+) -> (\d+)", dot.stdout)]
-    place, lines = lay_out(nx.transitive_reduction(nx.DiGraph(sorted(reads))))
-    with styled():
-        drawn = Figure((7.2, 2.0))
-        axes = drawn.add_axes((0.05, 0.05, 0.9, 0.9))
-        axes.axis("off")
-        for line in lines:
-            axes.plot(*zip(*(place[point] for point in line), strict=True), color=GREY, zorder=1)
-        box = {"boxstyle": "round", "facecolor": "white", "edgecolor": BLACK}
-        for name in sorted(names.values()):
-            axes.text(*place[name], name, ha="center", va="center", bbox=box, fontsize=7)
-        save_png(drawn, Path(snakemake.output[0]))
+snakefile = Path(__file__).parents[1] / "Snakefile"
+command = [sys.executable, "-m", "snakemake", "-s", snakefile, "results/report.html"]
+dot = subprocess.run([*command, "--rulegraph"], check=True, capture_output=True, text=True)
+names = dict(re.findall(r'(\d+)\[label = "(\w+)"', dot.stdout))
+reads = [(names[a], names[b]) for a, b in re.findall(r"(\d+) -> (\d+)", dot.stdout)]
+place, lines = lay_out(nx.transitive_reduction(nx.DiGraph(sorted(reads))))
+with styled():
+    drawn = Figure((7.2, 2.0))
+    axes = drawn.add_axes((0.05, 0.05, 0.9, 0.9))
+    axes.axis("off")
+    for line in lines:
+        axes.plot(*zip(*(place[point] for point in line), strict=True), color=GREY, zorder=1)
+    box = {"boxstyle": "round", "facecolor": "white", "edgecolor": BLACK}
+    for name in sorted(names.values()):
+        axes.text(*place[name], name, ha="center", va="center", bbox=box, fontsize=7)
+    save_png(drawn, Path(sys.argv[1]))
