@@ -56,6 +56,6 @@ def test_what_is_pushed_against_a_bound_has_no_curvature(
     information = np.array([[[2.0, 1.0], [1.0, 2.0]]])
     normal = Normal(np.ones(1), np.array([[gradient, 0.5]]), information, np.ones(1))
     bounds = {"low": np.full((1, 2), -1.0), "high": np.full((1, 2), 1.0)}
-    fits: Any = seen(curved=lambda x, trace: normal, **bounds)
+    fits: Any = seen(normal=lambda x, trace, curved: normal, **bounds)
     found = _convex(fits, np.array([[x, 0.0]]), np.zeros(1, dtype=np.int64)).information[0]
     assert found.tolist() == ([[1.0, 0.0], [0.0, 2.0]] if held else [[2.0, 1.0], [1.0, 2.0]])
