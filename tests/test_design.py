@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
+from biogrip import design
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.design import (
@@ -202,8 +203,11 @@ def within(folder: Path, asked: str, text: str, capsys: pytest.CaptureFixture[st
 
 
 def test_the_shortest_protocol_is_found_and_what_noise_a_better_one_takes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """By searches a fifth as long."""
+    monkeypatch.setattr(design, "_QUICK", 5)
+    monkeypatch.setattr(design, "_FEWER", 20)
     said = within(tmp_path, "k_s=6", KELVIN, capsys)
     found = WITHIN.search(said)
     assert found

@@ -227,10 +227,10 @@ def test_a_late_start_is_advised_with_its_limits_and_with_the_tare() -> None:
     """A ramp from 8.4 to 8.7 s, and a preload: a start without the offset would be biased."""
     times = np.arange(0, 60, 0.5)
     since = [np.clip(times - start_s, 0.0, None) for start_s in (8.4, 8.7)]
-    first, second = (60 * s - 800 * -np.expm1(-s / 20) for s in since)
+    first, second = (40 * s - 800 * -np.expm1(-s / 20) for s in since)
     values = 42 + (first - second) / 0.3
     values += 0.3 * np.random.default_rng(2).standard_normal(len(times))
-    given: dict[str, Any] = {"reads": "strain", "model": "zener_kelvin", "hold": 1.0}
+    given: dict[str, Any] = {"reads": "strain", "model": "kelvin_voigt", "hold": 1.0}
     status, notes = notes_on(times, values, **given)
     assert status == "rejected"
     (limits,) = re.findall(r"constant until \S+ s \((\S+) to (\S+)\) of its clock", notes)
@@ -263,9 +263,9 @@ def test_a_fitted_onset_lies_between_its_readings_on_any_clock(unit_s: float) ->
     """Log-spaced over five decades on either side, most readings far further apart than there."""
     apart = np.geomspace(1e-3, 1e2, 60)
     times = np.r_[-apart[::-3], apart]
-    values = np.where(times > 0, 500 + 1000 * np.exp(-np.clip(times, 0, None)), 0.0)
+    values = np.where(times > 0, 1000 * np.exp(-np.clip(times, 0, None)), 0.0)
     values += 5.0 * np.random.default_rng(7).standard_normal(len(times))
-    given: dict[str, Any] = {"reads": "modulus", "model": "zener_maxwell", "start": "fit"}
+    given: dict[str, Any] = {"reads": "modulus", "model": "maxwell", "start": "fit"}
     found = told(unit_s * (times + 200), values, **given)
     ends_s = np.array([found.data["onset_s"], *found.data["onset_limits_s"]])
     assert np.abs(ends_s / unit_s - 200).max() < 1.5e-3
@@ -295,12 +295,6 @@ def test_a_clock_may_count_seconds_since_1970() -> None:
             "force",
             2.0 * np.exp(-HOLD / 8),
             "If it starts at any time from 0 to 16.4 s of the clock, the trace fits as well: k ",
-        ),
-        (
-            "maxwell",
-            "strain",
-            1 / 100 + HOLD / 5000,
-            "of the clock, the trace fits as well: k would",
         ),
         ("kelvin_voigt", "strain", (1 - np.exp(-HOLD / 8)) / 100, "If it starts at 16 s of the"),
     ],
@@ -344,7 +338,7 @@ def test_a_ramp_before_the_first_reading_is_said_to_change_values(ramp_s: float)
     assert "If the load was no step" not in notes_on(times, values, config=protocol, **given)[1]
 
 
-@pytest.mark.parametrize("readings", [6, 12, 40])
+@pytest.mark.parametrize("readings", [6, 12])
 def test_an_onset_leaves_readings_to_fit(readings: int) -> None:
     """Of a trace that is nearly constant any onset fits; three parameters take five readings."""
     times: Array = 2.5 * np.arange(1.0, readings + 1)

@@ -346,11 +346,9 @@ def test_what_a_row_says_goes_before_options(here: Path) -> None:
 
 
 def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None:
-    """In one batch, or in several: noise, drift, gripper, known and unknown parameters, model."""
+    """In one batch, or in several: noise, gripper, known and unknown parameters, model."""
     settings = {
         "measurement.noise_model": "coloured",
-        "measurement.drift": "true",
-        "measurement.noise_rad": "1e-6",
         "gripper.arm_length_m": "2e-3",
         "fixed.c_p": "250",
         "sample.model": "maxwell",

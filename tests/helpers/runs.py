@@ -87,8 +87,16 @@ def ran(folder: Path, *command: str | Path, **environment: str) -> Run:
 # Processes for Snakemake come from one that has loaded it: of 4 s of a dry run that is 3.
 _LOADED = multiprocessing.get_context("forkserver")
 _LOADED.set_forkserver_preload(
-    ["snakemake.cli", "snakemake.report", "smart_open", "yte", "pandas", "scipy.optimize"]
-    + ["scipy.special", "biogrip.stages.job", "biogrip.study.load", "biogrip.command.settings"]
+    [
+        "snakemake.cli",
+        "snakemake.report",
+        "smart_open",
+        "yte",
+        "pandas",
+        "biogrip.stages.job",
+        "biogrip.study.load",
+        "biogrip.command.settings",
+    ]
 )
 _PYTHONPATH = os.environ.get("PYTHONPATH")
 

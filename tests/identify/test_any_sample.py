@@ -54,7 +54,7 @@ def test_five_lines_follow_a_model_that_fits() -> None:
 
 
 def test_table_and_page_have_it(tmp_path: Path) -> None:
-    """Of a rejected model, too; what was asked for at one time, and all kinds of it."""
+    """Of a rejected model, too; all kinds of what was asked for at a time."""
     trace = write_trace(tmp_path / "a.csv", SECONDS, SOFTENING + SCATTER, "time_s,modulus_Pa")
     files = "--csv", tmp_path / "found.csv", "--report", tmp_path / "page.html"
     given = (
@@ -74,10 +74,6 @@ def test_table_and_page_have_it(tmp_path: Path) -> None:
     assert float(row["G(3 s) low (Pa)"]) < AT_3_S < float(row["G(3 s) high (Pa)"])
     assert row["exponent(3 s) verdict"] == "determined"
     assert "tan delta(0.333 rad/s) value" in row
-    assert identify(trace, *files, *given)[0] == 0
-    header = (tmp_path / "found.csv").read_text().splitlines()[0]
-    assert "exponent(10 s) value" in header
-    assert "tan delta" not in header
     page = (tmp_path / "page.html").read_text()
     assert page.index("Whatever the model") < page.index("Quantity</th>")
     assert page.count("limits over all linear samples") == 1

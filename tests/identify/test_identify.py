@@ -62,7 +62,7 @@ cases:
 
 
 # A fitted start takes half a minute.
-TERMS = "", "offset: true", "noise_share: 0.02"
+TERMS = "", "offset: true, noise_share: 0.02"
 ALSO = pytest.param("fit_start: true", marks=pytest.mark.nightly)
 
 

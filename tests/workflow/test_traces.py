@@ -42,7 +42,8 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_batches_give_the_table_of_the_command(lab: Path) -> None:
-    """To the byte."""
+    """To the byte; one batch with a trace that cannot be read, and one without."""
+    (lab / "cells.tsv").write_text("".join(CELLS.splitlines(keepends=True)[:4]))
     run = snakemake(lab, "--", TABLE, config=STUDY)
     assert run.status == 0, run.output
     options = ("--config", "lab.yaml", "--model", "liquid_drop", "--csv", "found.csv")
