@@ -86,18 +86,9 @@ def ran(folder: Path, *command: str | Path, **environment: str) -> Run:
 
 # Processes for Snakemake come from one that has loaded it: of 4 s of a dry run that is 3.
 _LOADED = multiprocessing.get_context("forkserver")
-_LOADED.set_forkserver_preload(
-    [
-        "snakemake.cli",
-        "snakemake.report",
-        "smart_open",
-        "yte",
-        "pandas",
-        "biogrip.stages.job",
-        "biogrip.study.load",
-        "biogrip.command.settings",
-    ]
-)
+_USED = "snakemake.cli snakemake.report smart_open yte pandas biogrip.study.load"
+_USED += " biogrip.stages.job biogrip.command.settings"
+_LOADED.set_forkserver_preload(_USED.split())
 _PYTHONPATH = os.environ.get("PYTHONPATH")
 
 
