@@ -158,8 +158,13 @@ def test_parameters_that_trade_have_no_bound() -> None:
 
 @pytest.mark.parametrize(("instrument", "held"), [("creep", "stress_Pa"), ("relaxation", "strain")])
 def test_creep_and_relaxation_are_designed(
-    tmp_path: Path, instrument: str, held: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    instrument: str,
+    held: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(design, "GENERATIONS", 20)
     output = designed(tmp_path, CREEP.replace("HELD", held).replace("creep", instrument))
     said = capsys.readouterr().out
     assert "jaws" not in said

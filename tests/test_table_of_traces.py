@@ -364,12 +364,6 @@ def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None
     written = {row[0]: found(row[0]) for row in rows}
     for file in here.glob("*.json"):
         file.unlink()
-    # As a batch of a workflow.
-    usual = [Setting("--model", ("sample", "model"), "kelvin_voigt")]
-    given = ([Path("cells.tsv")], Path("few.yaml"), usual)
-    assert command.identify_files(*given, table=Path("some.csv"), rows=(2, 4)) == 0
-    assert [row["trace"] for row in listed("some.csv")] == [row[0] for row in rows[2:5]]
-    assert not list(here.glob("*.json"))
     for row in rows:
         write(here / "cells.tsv", [header, row])
         assert identify("cells.tsv")[0] == 0

@@ -163,8 +163,7 @@ def test_a_gripper_tells_the_stiffness_beside_its_arms() -> None:
     assert at_rest.low is None
 
 
-@pytest.mark.parametrize("a_decade", [4, 6, 8])
-@pytest.mark.parametrize("shift", [0.0, 0.4])
+@pytest.mark.parametrize(("a_decade", "shift"), [(4, 0.0), (6, 0.4), (8, 0.0)])
 def test_the_grid_changes_nothing(
     a_decade: int, shift: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,7 +13,7 @@ from tests.helpers.places import CONFIG
 from tests.helpers.runs import planned, snakemake
 
 TABLE = "results/tables/traces.csv"
-TRACES = {"table": "cells.tsv", "config": "lab.yaml", "model": "liquid_drop", "rows_a_batch": 2}
+TRACES = {"table": "cells.tsv", "config": "lab.yaml", "model": "maxwell", "rows_a_batch": 2}
 STUDY: dict[str, Any] = {"traces": TRACES}
 LAB = """measurement: {noise_rad: 1.0e-6}
 least_squares: {candidates: 50, starts: 2}
@@ -46,7 +46,7 @@ def test_batches_give_the_table_of_the_command(lab: Path) -> None:
     (lab / "cells.tsv").write_text("".join(CELLS.splitlines(keepends=True)[:4]))
     run = snakemake(lab, "--", TABLE, config=STUDY)
     assert run.status == 0, run.output
-    options = ("--config", "lab.yaml", "--model", "liquid_drop", "--csv", "found.csv")
+    options = ("--config", "lab.yaml", "--model", "maxwell", "--csv", "found.csv")
     assert main(["identify", "cells.tsv", *options]) == 1
     assert (lab / TABLE).read_bytes() == (lab / "found.csv").read_bytes()
 
@@ -73,7 +73,7 @@ def test_what_is_changed_and_only_that_is_identified_again(lab: Path) -> None:
     assert planned(lab, TABLE, config=STUDY) == {"traces_batch": 1, "traces": 1}
     (lab / "lab.yaml").write_text(LAB.replace("1.0e-6", "2.0e-6"))
     assert planned(lab, TABLE, config=STUDY) == {"traces_batch": 2, "traces": 1}
-    other = overlaid(STUDY, {"traces": {"model": "maxwell"}})
+    other = overlaid(STUDY, {"traces": {"model": "liquid_drop"}})
     assert planned(lab, TABLE, config=other) == {"traces_batch": 2, "traces": 1}
 
 
