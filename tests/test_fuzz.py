@@ -8,8 +8,6 @@ import pytest
 from biogrip.cli import main
 from biogrip.command.settings import Asked, check_settings, is_table, read_table
 from biogrip.errors import BiogripError
-from biogrip.study.load import load_study, read_configs
-from biogrip.study.source import default_config
 from tests.helpers.identified import FEW, identify
 from tests.helpers.places import EXAMPLE
 
@@ -142,39 +140,3 @@ def test_a_damaged_sheet_asks_for_traces_or_is_refused(tmp_path: Path, seed: int
         said = str(error)
     assert len(said.splitlines()) <= 11
     assert is_table(Asked(tmp_path / "cells.csv")) in (True, False)
-
-
-@pytest.mark.parametrize("seed", range(500))
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("error")
-def test_a_damaged_config_is_used_or_refused_with_its_line(tmp_path: Path, seed: int) -> None:
-    rng = np.random.default_rng([66, seed])
-    lines = default_config().read_text(encoding="utf-8").splitlines()
-    for way in rng.integers(0, 6, rng.integers(1, 4)):
-        at, other = rng.integers(len(lines), size=2)
-        key = lines[at].partition(":")[0]
-        if way == 0:
-            lines[at] = f"{key}: {rng.choice([*NUMBERS, '*a', '&a', '[', '{', '~', '!!set', 'no'])}"
-        elif way == 1:
-            lines[at] = rng.choice([" ", "\t", "- ", "# ", "? "]) + lines[at]
-        elif way == 2:
-            del lines[at : at + rng.integers(1, 6)]
-        elif way == 3:
-            lines[at], lines[other] = lines[other], lines[at]
-        elif way == 4:
-            lines[at] = lines[at].replace(key.strip()[-1:], "x", 1)
-        else:
-            lines.insert(at, lines[other])
-    content = bytearray("\n".join(lines).encode())
-    if seed % 4 == 0:
-        content[rng.integers(len(content))] = rng.integers(256)
-    (tmp_path / "mine.yaml").write_bytes(
-        content if seed % 7 else content[: rng.integers(len(content))]
-    )
-    said = ""
-    try:
-        files = [default_config(), tmp_path / "mine.yaml"]
-        load_study(read_configs(files), files)
-    except BiogripError as error:
-        said = str(error)
-    assert not said or "mine.yaml" in said

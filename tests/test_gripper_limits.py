@@ -37,26 +37,6 @@ def test_a_torque_is_uncertain_by_percent() -> None:
     assert study.case("liquid_drop_1").experiment.uncertainty == expected
 
 
-@pytest.mark.nightly
-def test_limits_hold_the_truth_of_a_wrong_gripper_only_with_its_uncertainty() -> None:
-    """Arms 7 % too long and a torque 8 % too large: some 1.5 standard uncertainties each."""
-    trace = simulated(CASE.parameters, torque=1.08, length=0.93)
-    uncertain = {"gripper": {"uncertainty": {"arm_length_m": 7.5e-5, "torque_percent": 5}}}
-    found = {
-        name: told(TIMES, trace, ["maxwell", "burgers"], config=config)
-        for name, config in {"exact": {}, "uncertain": uncertain}.items()
-    }
-    assert found["exact"].data["limits"].startswith("Limits are statistical only")
-    assert found["uncertain"].data["limits"].endswith("gripper.arm_length_m, torque.")
-    truth = CASE.parameters["c"] + CASE.parameters["c_p"]
-    for name, each in found.items():
-        held = each.to_frame().loc["c + c_p"]
-        assert (held["low"] < truth < held["high"]) == (name != "exact")
-        assert each.status == ("rejected" if name == "exact" else "ok")
-    # No model is asked for in place of the gripper's error.
-    assert "not adequate" not in found["uncertain"].data["advice"]
-
-
 def test_a_stiff_sample_is_identified_where_the_noise_is_given() -> None:
     stiff = {"k": 2e4, "k_p": 1e4, "c": 1e6, "c_p": 1.0}
     trace = simulated(stiff)

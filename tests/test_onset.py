@@ -119,31 +119,6 @@ def test_a_trace_over_many_decades_of_time_has_an_answer(last_s: float) -> None:
     np.testing.assert_allclose(found["value"], 1.0, rtol=1e-6)
 
 
-@pytest.mark.parametrize("noise_model", ["white", "coloured"])
-@pytest.mark.parametrize("onset_s", [0.87, 3.0])
-@pytest.mark.nightly
-def test_a_late_protocol_determines_nothing(onset_s: float, noise_model: str) -> None:
-    """However few readings are before it, and whatever the noise model makes of the misfit."""
-    found = gripped(*late(2, onset_s), noise_model=noise_model)
-    assert found.status == "rejected"
-    (said,) = [text for text in found.data["reasons"] if "The trace is constant until" in text]
-    assert "start fit" in said
-    assert {*found.to_frame()["verdict"]} == {"fit rejected"}
-
-
-@pytest.mark.nightly
-def test_a_fitted_onset_widens_limits_that_hold_the_truth() -> None:
-    given, fitted = (gripped(*late(2), start=start) for start in (ONSET_S, "fit"))
-    for found in (given, fitted):
-        assert (found.status, found.data["samples"], len(holding(found))) == ("ok", 301, 6)
-    assert given.data["assumed"]["measurement"]["start_s"] == ONSET_S
-    assert fitted.data["onset_s"] == pytest.approx(ONSET_S, abs=0.1)
-    limits = (found.to_frame().fillna({"low": 0.0}) for found in (fitted, given))
-    wide, narrow = (own["high"] - own["low"] for own in limits)
-    assert (wide / narrow)["c_p"] > 1.05
-    assert (wide / narrow).min() > 0.99
-
-
 @pytest.mark.nightly
 def test_readings_near_a_fitted_onset_are_not_said_to_show_a_ring() -> None:
     """Of milliseconds, where the onset is known to tenths of a second."""

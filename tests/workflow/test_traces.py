@@ -1,6 +1,5 @@
 """A table of traces in a study: batches of its rows, and all in one table."""
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -75,19 +74,6 @@ def test_what_is_changed_and_only_that_is_identified_again(lab: Path) -> None:
     assert planned(lab, TABLE, config=STUDY) == {"traces_batch": 2, "traces": 1}
     other = overlaid(STUDY, {"traces": {"model": "liquid_drop"}})
     assert planned(lab, TABLE, config=other) == {"traces_batch": 2, "traces": 1}
-
-
-@pytest.mark.nightly
-def test_an_older_trace_in_the_place_of_another_is_identified(lab: Path) -> None:
-    """And an older config of all."""
-    assert snakemake(lab, "--", TABLE, config=STUDY).status == 0
-    assert planned(lab, TABLE, config=STUDY) == {}
-    write_drop(lab / "other.csv", 9)
-    (lab / "other.yaml").write_text(LAB.replace("1.0e-6", "2.0e-6"))
-    for other, name, batches in (("other.csv", "2.csv", 1), ("other.yaml", "lab.yaml", 3)):
-        os.utime(lab / other, (1.5e9, 1.5e9))
-        (lab / other).replace(lab / name)
-        assert planned(lab, TABLE, config=STUDY) == {"traces_batch": batches, "traces": 1}
 
 
 def test_a_table_that_cannot_be_used_stops_with_line_and_key(lab: Path) -> None:
