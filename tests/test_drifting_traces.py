@@ -60,6 +60,7 @@ def test_a_trace_that_does_not_drift_is_not_suspected() -> None:
     assert suspected(gripped(0, DRIFT, offset=True, drift=True)) == []
 
 
+@pytest.mark.nightly
 def test_an_offset_beside_a_declared_drift_is_one_degree_of_freedom() -> None:
     """What is said of the fall of chi^2 is rounded to three digits, and its chance to one."""
     (said,) = suspected(gripped(0, OFFSET, drift=True))
@@ -110,9 +111,10 @@ def test_an_offset_alone_is_advised_if_it_explains_as_much() -> None:
     [
         (1000 * CREEP**-0.15, "rejected", {"model": "kelvin_voigt", "reads": "modulus"}),
         # Good to two per cent.
-        (
+        pytest.param(
             *(1e-2 * CREEP**0.15, "doubtful"),
             {"model": "zener_kelvin", "reads": "strain", "hold": 1.0, "level": 3e-3},
+            marks=pytest.mark.nightly,
         ),
     ],
 )

@@ -81,6 +81,7 @@ POLYSTYRENE = {
 }
 
 
+@pytest.mark.nightly
 def test_ranges_hold_samples_beyond_those_of_the_paper_and_given_ones_stay() -> None:
     given = {name: {"exponent": [-4, 8]} for name in ("c", "c_p")}
     gripper = Gripper(LEVER_M, 90.0, Arm(**ARM), Arm(**ARM))

@@ -97,6 +97,7 @@ def test_readings_at_the_instant_of_a_step_are_left_out() -> None:
     assert "they were taken: 1 reading, at " in str(found)
 
 
+@pytest.mark.nightly
 def test_the_power_law_of_a_cell_in_an_optical_stretcher() -> None:
     """The exponent is that of a published, independent fit."""
     config = yaml.safe_load((ROOT / "config/measured.yaml").read_text())["cases"]["hl60"]
@@ -108,6 +109,7 @@ def test_the_power_law_of_a_cell_in_an_optical_stretcher() -> None:
     assert alpha["low"] < 0.701 < alpha["high"]
 
 
+@pytest.mark.nightly
 def test_an_instrument_is_added_by_its_recipe(tmp_path: Path) -> None:
     """What the how-to says, done in a copy of the code; and what is said of a wrong unit."""
     for folder in ("src", "config"):

@@ -50,6 +50,7 @@ def test_what_the_documentation_shows_runs(
     assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.nightly
 def test_a_sampled_posterior_agrees_with_the_profiles(monkeypatch: pytest.MonkeyPatch) -> None:
     """By the code of the how-to, with a chain a fifth as long."""
     monkeypatch.chdir(ROOT)

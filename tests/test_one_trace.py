@@ -401,7 +401,6 @@ def test_models_that_are_named_are_held_against_the_chosen_one(
     assert "generalized_maxwell_3" in tried
     named = ["damper", "maxwell", "liquid_drop", "generalized_maxwell"]
     for model, others, tried, advice in (
-        ("liquid_drop", named, named, "none of the 4 models tried suits the trace better"),
         ("damper", named, named, "Bare damper is not adequate"),
         ("damper", named[:1], [], "None"),
     ):

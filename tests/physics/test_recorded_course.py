@@ -190,8 +190,9 @@ def condensed(deforms: bool, noise: str) -> Condensed:
     return Condensed(course, time_s, nuisance, whitening)
 
 
-@pytest.mark.parametrize("noise", ["plain", "drifting", "coloured"])
-@pytest.mark.parametrize("deforms", [False, True])
+@pytest.mark.parametrize(
+    ("deforms", "noise"), [(False, "plain"), (True, "drifting"), (True, "coloured")]
+)
 @pytest.mark.parametrize("name", MODELS)
 def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
     name: str, deforms: bool, noise: str

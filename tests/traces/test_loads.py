@@ -94,7 +94,7 @@ def test_scatter_that_readings_do_not_follow_is_smoothed_out(
     assert said.endswith("from 0 s (column stress_Pa, 400 rows).")
 
 
-@pytest.mark.parametrize("came_s", [9.05, 9.95])
+@pytest.mark.parametrize("came_s", [9.05, pytest.param(9.95, marks=pytest.mark.nightly)])
 def test_limits_allow_for_a_step_anywhere_between_two_rows(tmp_path: Path, came_s: float) -> None:
     """A Zener solid's creep, in closed form, under a step to 5 Pa that a log of 1 s has."""
     log_s = np.arange(100.0)
