@@ -23,13 +23,7 @@ PHASES = (hold(20.0, 1e-9), hold(20.0, 0.4e-9), hold(20.0, 1.2e-9))
 TRUTH = {"k": 29.0, "k_p": 6.0, "c": 100.0, "c_p": 20.0}
 EXPERIMENT = set_up(STUDY.gripper, PHASES, Sample("generalized_maxwell"))
 NOISE_RAD, ONSET_S = 3e-7, 8.07
-PROTOCOL = {
-    "phases": [
-        {"duration_s": 20, "torque_Nm": 1.0e-9},
-        {"duration_s": 20, "torque_Nm": 0.4e-9},
-        {"duration_s": 20, "torque_Nm": 1.2e-9},
-    ]
-}
+PROTOCOL = {"phases": [{"duration_s": 20, "torque_Nm": each.level} for each in PHASES]}
 
 
 def late(seed: int, onset_s: float = ONSET_S, *, flat: bool = False) -> tuple[Array, Array]:

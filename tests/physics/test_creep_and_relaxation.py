@@ -17,6 +17,7 @@ from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
 from biogrip.physics.simulation import simulated_response
 from tests.helpers.laplace import IMPEDANCES, Impedance, drawn, inverted
+from tests.physics.test_condensed import assert_alike
 
 DRIVEN = pytest.mark.parametrize("deforms", [False, True], ids=["creep", "relaxation"])
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
@@ -114,13 +115,8 @@ def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
     found = residuals.misfit(np.exp(logs))
     expected = [np.sqrt(np.mean(residuals(at)[0] ** 2)) for at in logs]
     assert found == pytest.approx(expected, rel=1e-10)
-    responses = residuals.condensed_responses(logs)
-    residual = responses[:, 0] - residuals.condensed_trace
-    gradient = np.einsum("npr,nr->np", responses[:, 1:], residual)
-    for at, own in zip(logs, gradient, strict=True):
-        left, slopes = residuals(at)
-        scale = float(np.linalg.norm(slopes) * np.linalg.norm(left))
-        assert np.abs(own - slopes @ left) == pytest.approx(0, abs=1e-9 * scale + 1e-15)
+    for at in logs:
+        assert_alike(residuals, at)
 
 
 def test_a_reading_at_the_instant_of_a_step_is_taken_before_it() -> None:
