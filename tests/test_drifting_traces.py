@@ -132,7 +132,8 @@ def test_a_power_law_is_not_taken_for_an_offset_and_a_drift(
 @pytest.mark.parametrize(
     ("model", "names"),
     [
-        *(("maxwell", "c"), ("generalized_maxwell", "c + c_p")),
+        ("maxwell", "c"),
+        pytest.param("generalized_maxwell", "c + c_p", marks=pytest.mark.nightly),
         pytest.param("burgers", "c_s", marks=pytest.mark.nightly),
     ],
 )

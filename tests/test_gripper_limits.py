@@ -52,6 +52,7 @@ def test_a_stiff_sample_is_identified_where_the_noise_is_given() -> None:
         assert quantity["value"] == pytest.approx(stiff[name], rel=0.02)
 
 
+@pytest.mark.nightly
 def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met() -> None:
     """A trace tells stiffnesses times the square of the sine: smaller samples seem stiffer."""
     trace = simulated(CASE.parameters)

@@ -199,6 +199,7 @@ def test_limits_are_those_of_scipy_and_lmfit(tmp_path: Path) -> None:
             assert least(name, found[name][end]) - best == pytest.approx(3.841, rel=0.02)
 
 
+@pytest.mark.nightly
 def test_creep_relaxation_and_sweep_of_a_sample_agree() -> None:
     """Limits of differences are roots of sums of squares: each of nine is missed once in 20."""
     times = np.geomspace(0.02, 30.0, 120)

@@ -128,7 +128,9 @@ def test_who_samples_fast_is_told_to_leave_out_the_first_milliseconds(model: str
     ("model", "truth", "interval_s", "level", "told"),
     [
         # Without inertia a damper between the jaws is the nearest that a fit has to a ring.
-        ("zener_kelvin", RINGING["zener_kelvin"], 0.002, 0.003, 1),
+        pytest.param(
+            *("zener_kelvin", RINGING["zener_kelvin"], 0.002, 0.003, 1), marks=pytest.mark.nightly
+        ),
         # A damper that is seen when the ring is over ends it.
         ("kelvin_voigt", {"k_p": 12.3, "c_p": 30.0}, 0.017, 0.02, 0),
     ],
