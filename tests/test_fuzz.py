@@ -11,6 +11,7 @@ from biogrip.errors import BiogripError
 from tests.helpers.identified import FEW, identify
 from tests.helpers.places import EXAMPLE
 
+pytestmark = [pytest.mark.nightly, pytest.mark.filterwarnings("error")]
 # Files of a test, one after the other: tests are counted by every worker, run or not.
 FILES = 100
 
@@ -51,8 +52,6 @@ def damaged(seed: int) -> bytes:
 
 
 @pytest.mark.parametrize("hundred", range(3))
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("error")
 def test_a_damaged_trace_gives_an_answer_or_one_message(tmp_path: Path, hundred: int) -> None:
     (tmp_path / "few.yaml").write_text(FEW)
     for seed in range(FILES * hundred, FILES * (hundred + 1)):
@@ -104,8 +103,6 @@ def found(trace: str, group: str, value: float) -> list[str]:
 
 
 @pytest.mark.parametrize("hundred", range(20))
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("error")
 def test_a_damaged_table_of_groups_gives_numbers_or_one_message(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], hundred: int
 ) -> None:
@@ -126,8 +123,6 @@ def test_a_damaged_table_of_groups_gives_numbers_or_one_message(
         assert "\x1b" not in said + text, seed
 
 
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("error")
 def test_a_damaged_sheet_asks_for_traces_or_is_refused(tmp_path: Path) -> None:
     header = ["file", "dish", "measurement.time", "fixed.c_p", "protocol.phases"]
     header += ["gripper.arm_length_m"]
