@@ -18,7 +18,7 @@ import yaml
 
 from tests.helpers.places import EXAMPLE, ROOT
 
-_SECONDS = 600
+_SECONDS = 1200
 _JOBS = re.compile(r"^(\w+) +(\d+) *$", re.MULTILINE)
 
 # Every kind of file, and of each as little as there can be: a simulated sample, and a trace that
