@@ -279,6 +279,7 @@ def test_what_is_no_table_of_results_is_refused(
     assert error.count("\n") == 1
 
 
+@pytest.mark.nightly
 def test_identify_and_groups_say_the_same_of_a_cell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
