@@ -56,10 +56,10 @@ def test_what_is_changed_and_only_that_is_identified_again(lab: Path) -> None:
     assert planned(lab, TABLE, config=STUDY) == {}
     # The config is laid over the default study's.
     inputs = snakemake(lab, "--detailed-summary", "--", TABLE, config=STUDY).output
-    assert inputs.count(str(CONFIG)) == 2
+    assert inputs.count(str(CONFIG)) == 3
     # A row more is in its batch, a word or a trace in that of its row.
     for old, new, batches in (
-        ("3.csv\tB\t\n", "3.csv\tB\t\n4.csv\tC\t\n", 1),
+        ("4.csv\tA\t\n", "4.csv\tA\t\n5.csv\tC\t\n", 1),
         ("2.csv\tA", "2.csv\tC", 1),
         ("1.csv\tB\t\n2.csv\tA", "1.csv\tC\t\n2.csv\tC", 2),
     ):
@@ -71,9 +71,9 @@ def test_what_is_changed_and_only_that_is_identified_again(lab: Path) -> None:
     write_drop(lab / "3.csv", 7)
     assert planned(lab, TABLE, config=STUDY) == {"traces_batch": 1, "traces": 1}
     (lab / "lab.yaml").write_text(LAB.replace("1.0e-6", "2.0e-6"))
-    assert planned(lab, TABLE, config=STUDY) == {"traces_batch": 2, "traces": 1}
+    assert planned(lab, TABLE, config=STUDY) == {"traces_batch": 3, "traces": 1}
     other = overlaid(STUDY, {"traces": {"model": "liquid_drop"}})
-    assert planned(lab, TABLE, config=other) == {"traces_batch": 2, "traces": 1}
+    assert planned(lab, TABLE, config=other) == {"traces_batch": 3, "traces": 1}
 
 
 def test_a_table_that_cannot_be_used_stops_with_line_and_key(lab: Path) -> None:
