@@ -50,7 +50,7 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     if executable() is None:
         cannot_run("BIOGRIP_REQUIRE_CHROMIUM", "Chromium is missing: apt-get install chromium")

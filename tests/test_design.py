@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
+from biogrip import design
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.design import (
@@ -157,8 +158,13 @@ def test_parameters_that_trade_have_no_bound() -> None:
 
 @pytest.mark.parametrize(("instrument", "held"), [("creep", "stress_Pa"), ("relaxation", "strain")])
 def test_creep_and_relaxation_are_designed(
-    tmp_path: Path, instrument: str, held: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    instrument: str,
+    held: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(design, "GENERATIONS", 20)
     output = designed(tmp_path, CREEP.replace("HELD", held).replace("creep", instrument))
     said = capsys.readouterr().out
     assert "jaws" not in said
@@ -202,8 +208,11 @@ def within(folder: Path, asked: str, text: str, capsys: pytest.CaptureFixture[st
 
 
 def test_the_shortest_protocol_is_found_and_what_noise_a_better_one_takes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """By searches a fifth as long."""
+    monkeypatch.setattr(design, "_QUICK", 5)
+    monkeypatch.setattr(design, "_FEWER", 20)
     said = within(tmp_path, "k_s=6", KELVIN, capsys)
     found = WITHIN.search(said)
     assert found

@@ -21,8 +21,8 @@ CLEAN = simulate(EXPERIMENT, TRUTH, TIMES)
 TRACE = CLEAN + 0.02 * CLEAN.max() * np.random.default_rng(0).standard_normal(len(TIMES))
 
 
-@pytest.mark.parametrize("fixed", [{"c_p": 0.0}, {"k_p": 4.9, "c_p": 50.0}])
-def test_the_others_are_scipys(fixed: dict[str, float]) -> None:
+def test_the_others_are_scipys() -> None:
+    fixed = {"k_p": 4.9, "c_p": 50.0}
     free = [name for name in SAMPLE.model.names if name not in fixed]
 
     def response(times: Array, *logs: float) -> Array:

@@ -8,12 +8,12 @@ import pytest
 from biogrip.cli import main
 from biogrip.command.settings import Asked, check_settings, is_table, read_table
 from biogrip.errors import BiogripError
-from biogrip.study.source import default_config
-from biogrip.study.study import load_study, read_configs
 from tests.helpers.identified import FEW, identify
 from tests.helpers.places import EXAMPLE
 
-FILES = 300
+pytestmark = [pytest.mark.nightly, pytest.mark.filterwarnings("error")]
+# Files of a test, one after the other: tests are counted by every worker, run or not.
+FILES = 100
 
 NUMBERS = ["", "nan", "inf", "-0", "1e308", "1e-320", "-1e30", "1,5", "0x1F", "٣", "1e400", "$x$"]
 NAMES = ["time_ms", "time [h]", "rotation_deg", "rotation [mrad]", "File", "", "\x1b[31m", "<b>"]
@@ -51,18 +51,17 @@ def damaged(seed: int) -> bytes:
     return bytes(content)
 
 
-@pytest.mark.parametrize("seed", range(FILES))
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("error")
-def test_a_damaged_trace_gives_an_answer_or_one_message(tmp_path: Path, seed: int) -> None:
+@pytest.mark.parametrize("hundred", range(3))
+def test_a_damaged_trace_gives_an_answer_or_one_message(tmp_path: Path, hundred: int) -> None:
     (tmp_path / "few.yaml").write_text(FEW)
-    (tmp_path / "trace.csv").write_bytes(damaged(seed))
-    status, said, text = identify(tmp_path / "trace.csv", "--config", tmp_path / "few.yaml")
-    assert status in (0, 1)
-    # What is recognised in an unusual file is told before.
-    assert said if status == 0 else f"\n{text}".count("\nbiogrip: ") == 1
-    assert "fault of biogrip" not in text
-    assert "\x1b" not in said + text
+    for seed in range(FILES * hundred, FILES * (hundred + 1)):
+        (tmp_path / "trace.csv").write_bytes(damaged(seed))
+        status, said, text = identify(tmp_path / "trace.csv", "--config", tmp_path / "few.yaml")
+        assert status in (0, 1), seed
+        # What is recognised in an unusual file is told before.
+        assert said if status == 0 else f"\n{text}".count("\nbiogrip: ") == 1, seed
+        assert "fault of biogrip" not in text, seed
+        assert "\x1b" not in said + text, seed
 
 
 WORDS = [*NUMBERS, "0", "-1", "1e-400", "0.9", "2", "1_0", "b", "a1", "<b>", "\x1b[31m", "=1+1"]
@@ -103,11 +102,9 @@ def found(trace: str, group: str, value: float) -> list[str]:
     return [trace, group, trace, "ok", "0.95", "determined", *numbers, *others]
 
 
-@pytest.mark.parametrize("seed", range(2000))
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("hundred", range(20))
 def test_a_damaged_table_of_groups_gives_numbers_or_one_message(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], seed: int
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], hundred: int
 ) -> None:
     header = ["trace", "dish", "cell", "fit", "confidence"]
     for name in ("k", "c"):
@@ -115,66 +112,29 @@ def test_a_damaged_table_of_groups_gives_numbers_or_one_message(
     rows = [
         found(f"{group}{n}", group, 18 + n + 9 * (group == "b")) for group in "ab" for n in range(4)
     ]
-    (tmp_path / "found.csv").write_bytes(sheet(seed, header, rows, WORDS))
-    status = main(["groups", str(tmp_path / "found.csv"), "--by", "dish"])
-    said, text = capsys.readouterr()
-    assert status in (0, 1)
-    assert text.count("\n") == status
-    assert "nan" not in said.replace(f"{tmp_path}", "")
-    assert "inf" not in said
-    assert "\x1b" not in said + text
+    for seed in range(FILES * hundred, FILES * (hundred + 1)):
+        (tmp_path / "found.csv").write_bytes(sheet(seed, header, rows, WORDS))
+        status = main(["groups", str(tmp_path / "found.csv"), "--by", "dish"])
+        said, text = capsys.readouterr()
+        assert status in (0, 1), seed
+        assert text.count("\n") == status, seed
+        assert "nan" not in said.replace(f"{tmp_path}", ""), seed
+        assert "inf" not in said, seed
+        assert "\x1b" not in said + text, seed
 
 
-@pytest.mark.parametrize("seed", range(500))
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("error")
-def test_a_damaged_sheet_asks_for_traces_or_is_refused(tmp_path: Path, seed: int) -> None:
+def test_a_damaged_sheet_asks_for_traces_or_is_refused(tmp_path: Path) -> None:
     header = ["file", "dish", "measurement.time", "fixed.c_p", "protocol.phases"]
     header += ["gripper.arm_length_m"]
     rows = [[f"{n}.csv", "left", "time_s", "0", "[]", "3e-3"] for n in range(4)]
     odd = [*NUMBERS, "1:30", "[1", "{a: 1}", "&a [*a]", "!!python/none", "? x", "off"]
     odd += ["0.csv", ".", "/"]
-    (tmp_path / "cells.csv").write_bytes(sheet(seed, header, rows, odd))
-    said = ""
-    try:
-        check_settings(read_table(tmp_path / "cells.csv"))
-    except BiogripError as error:
-        said = str(error)
-    assert len(said.splitlines()) <= 11
-    assert is_table(Asked(tmp_path / "cells.csv")) in (True, False)
-
-
-@pytest.mark.parametrize("seed", range(500))
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("error")
-def test_a_damaged_config_is_used_or_refused_with_its_line(tmp_path: Path, seed: int) -> None:
-    rng = np.random.default_rng([66, seed])
-    lines = default_config().read_text(encoding="utf-8").splitlines()
-    for way in rng.integers(0, 6, rng.integers(1, 4)):
-        at, other = rng.integers(len(lines), size=2)
-        key = lines[at].partition(":")[0]
-        if way == 0:
-            lines[at] = f"{key}: {rng.choice([*NUMBERS, '*a', '&a', '[', '{', '~', '!!set', 'no'])}"
-        elif way == 1:
-            lines[at] = rng.choice([" ", "\t", "- ", "# ", "? "]) + lines[at]
-        elif way == 2:
-            del lines[at : at + rng.integers(1, 6)]
-        elif way == 3:
-            lines[at], lines[other] = lines[other], lines[at]
-        elif way == 4:
-            lines[at] = lines[at].replace(key.strip()[-1:], "x", 1)
-        else:
-            lines.insert(at, lines[other])
-    content = bytearray("\n".join(lines).encode())
-    if seed % 4 == 0:
-        content[rng.integers(len(content))] = rng.integers(256)
-    (tmp_path / "mine.yaml").write_bytes(
-        content if seed % 7 else content[: rng.integers(len(content))]
-    )
-    said = ""
-    try:
-        files = [default_config(), tmp_path / "mine.yaml"]
-        load_study(read_configs(files), files)
-    except BiogripError as error:
-        said = str(error)
-    assert not said or "mine.yaml" in said
+    for seed in range(5 * FILES):
+        (tmp_path / "cells.csv").write_bytes(sheet(seed, header, rows, odd))
+        said = ""
+        try:
+            check_settings(read_table(tmp_path / "cells.csv"))
+        except BiogripError as error:
+            said = str(error)
+        assert len(said.splitlines()) <= 11, seed
+        assert is_table(Asked(tmp_path / "cells.csv")) in (True, False), seed

@@ -66,8 +66,7 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
     few.write_text(FEW)
     options = ["--model", SOLID.name, "--hold", str(held), "--reading", f"{reading}={column}"]
     options += ["--csv", str(table), "--output", str(output), "--config", str(few)]
-    # One page for each instrument.
-    options += ["--report", str(page)] if reading in ("displacement", "compliance") else []
+    options += ["--report", str(page)] if reading == "compliance" else ["--no-compare"]
     status, printed, _ = identify(trace, *options)
     assert status == 0
     found = json.loads(output.read_text())
@@ -98,6 +97,7 @@ def test_readings_at_the_instant_of_a_step_are_left_out() -> None:
     assert "they were taken: 1 reading, at " in str(found)
 
 
+@pytest.mark.nightly
 def test_the_power_law_of_a_cell_in_an_optical_stretcher() -> None:
     """The exponent is that of a published, independent fit."""
     config = yaml.safe_load((ROOT / "config/measured.yaml").read_text())["cases"]["hl60"]
@@ -109,6 +109,7 @@ def test_the_power_law_of_a_cell_in_an_optical_stretcher() -> None:
     assert alpha["low"] < 0.701 < alpha["high"]
 
 
+@pytest.mark.nightly
 def test_an_instrument_is_added_by_its_recipe(tmp_path: Path) -> None:
     """What the how-to says, done in a copy of the code; and what is said of a wrong unit."""
     for folder in ("src", "config"):

@@ -28,13 +28,7 @@ PHASES = (hold(20.0, 1e-9), hold(20.0, 0.4e-9), hold(20.0, 1.2e-9))
 TRUTH = {"k": 29.0, "k_p": 6.0, "c": 100.0, "c_p": 20.0}
 EXPERIMENT = set_up(STUDY.gripper, PHASES, Sample("generalized_maxwell"))
 NOISE_RAD, ONSET_S = 3e-7, 8.07
-PROTOCOL = {
-    "phases": [
-        {"duration_s": 20, "torque_Nm": 1.0e-9},
-        {"duration_s": 20, "torque_Nm": 0.4e-9},
-        {"duration_s": 20, "torque_Nm": 1.2e-9},
-    ]
-}
+PROTOCOL = {"phases": [{"duration_s": 20, "torque_Nm": each.level} for each in PHASES]}
 
 
 def late(seed: int, onset_s: float = ONSET_S, *, flat: bool = False) -> tuple[Array, Array]:
@@ -124,31 +118,6 @@ def test_a_trace_over_many_decades_of_time_has_an_answer(last_s: float) -> None:
     np.testing.assert_allclose(found["value"], 1.0, rtol=1e-6)
 
 
-@pytest.mark.parametrize("noise_model", ["white", "coloured"])
-@pytest.mark.parametrize("onset_s", [0.87, 3.0])
-@pytest.mark.nightly
-def test_a_late_protocol_determines_nothing(onset_s: float, noise_model: str) -> None:
-    """However few readings are before it, and whatever the noise model makes of the misfit."""
-    found = gripped(*late(2, onset_s), noise_model=noise_model)
-    assert found.status == "rejected"
-    (said,) = [text for text in found.data["reasons"] if "The trace is constant until" in text]
-    assert "start fit" in said
-    assert {*found.to_frame()["verdict"]} == {"fit rejected"}
-
-
-@pytest.mark.nightly
-def test_a_fitted_onset_widens_limits_that_hold_the_truth() -> None:
-    given, fitted = (gripped(*late(2), start=start) for start in (ONSET_S, "fit"))
-    for found in (given, fitted):
-        assert (found.status, found.data["samples"], len(holding(found))) == ("ok", 301, 6)
-    assert given.data["assumed"]["measurement"]["start_s"] == ONSET_S
-    assert fitted.data["onset_s"] == pytest.approx(ONSET_S, abs=0.1)
-    limits = (found.to_frame().fillna({"low": 0.0}) for found in (fitted, given))
-    wide, narrow = (own["high"] - own["low"] for own in limits)
-    assert (wide / narrow)["c_p"] > 1.05
-    assert (wide / narrow).min() > 0.99
-
-
 @pytest.mark.nightly
 def test_readings_near_a_fitted_onset_are_not_said_to_show_a_ring() -> None:
     """Of milliseconds, where the onset is known to tenths of a second."""
@@ -167,6 +136,7 @@ def test_padding_before_the_onset_is_no_measurement() -> None:
     assert "Left out for want of a number: 40 rows of 301." in str(found)
 
 
+@pytest.mark.nightly
 def test_readings_before_the_onset_tell_the_zero() -> None:
     """On a clock with negative times, too."""
     times, values = late(2)
@@ -232,10 +202,10 @@ def test_a_late_start_is_advised_with_its_limits_and_with_the_tare() -> None:
     """A ramp from 8.4 to 8.7 s, and a preload: a start without the offset would be biased."""
     times = np.arange(0, 60, 0.5)
     since = [np.clip(times - start_s, 0.0, None) for start_s in (8.4, 8.7)]
-    first, second = (60 * s - 800 * -np.expm1(-s / 20) for s in since)
+    first, second = (40 * s - 800 * -np.expm1(-s / 20) for s in since)
     values = 42 + (first - second) / 0.3
     values += 0.3 * np.random.default_rng(2).standard_normal(len(times))
-    given: dict[str, Any] = {"reads": "strain", "model": "zener_kelvin", "hold": 1.0}
+    given: dict[str, Any] = {"reads": "strain", "model": "kelvin_voigt", "hold": 1.0}
     status, notes = notes_on(times, values, **given)
     assert status == "rejected"
     (limits,) = re.findall(r"constant until \S+ s \((\S+) to (\S+)\) of its clock", notes)
@@ -263,14 +233,15 @@ def test_models_are_compared_each_at_its_own_onset() -> None:
     assert misfits["springpot"] == pytest.approx(0.02, rel=0.15)
 
 
-@pytest.mark.parametrize("unit_s", [1e-3, pytest.param(86_400.0, marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("unit_s", [1e-3, 86_400.0])
 def test_a_fitted_onset_lies_between_its_readings_on_any_clock(unit_s: float) -> None:
     """Log-spaced over five decades on either side, most readings far further apart than there."""
     apart = np.geomspace(1e-3, 1e2, 60)
     times = np.r_[-apart[::-3], apart]
-    values = np.where(times > 0, 500 + 1000 * np.exp(-np.clip(times, 0, None)), 0.0)
+    values = np.where(times > 0, 1000 * np.exp(-np.clip(times, 0, None)), 0.0)
     values += 5.0 * np.random.default_rng(7).standard_normal(len(times))
-    given: dict[str, Any] = {"reads": "modulus", "model": "zener_maxwell", "start": "fit"}
+    given: dict[str, Any] = {"reads": "modulus", "model": "maxwell", "start": "fit"}
     found = told(unit_s * (times + 200), values, **given)
     ends_s = np.array([found.data["onset_s"], *found.data["onset_limits_s"]])
     assert np.abs(ends_s / unit_s - 200).max() < 1.5e-3
@@ -301,12 +272,6 @@ def test_a_clock_may_count_seconds_since_1970() -> None:
             2.0 * np.exp(-HOLD / 8),
             "If it starts at any time from 0 to 16.4 s of the clock, the trace fits as well: k ",
         ),
-        (
-            "maxwell",
-            "strain",
-            1 / 100 + HOLD / 5000,
-            "of the clock, the trace fits as well: k would",
-        ),
         ("kelvin_voigt", "strain", (1 - np.exp(-HOLD / 8)) / 100, "If it starts at 16 s of the"),
     ],
 )
@@ -323,11 +288,9 @@ def test_a_hold_on_the_clock_of_the_whole_test_is_not_ok(
     assert "drifts" not in notes
     status, notes = notes_on(HOLD + 16, values, start=16.0, **given)
     assert (status, "begin" in notes) == ("ok", False)
-    if model == "maxwell":
-        assert notes_on(HOLD + 16, values, start=0.0, **given)[0] == "ok"
 
 
-@pytest.mark.parametrize("ramp_s", [0.0, 1.0])
+@pytest.mark.parametrize("ramp_s", [1.0, pytest.param(0.0, marks=pytest.mark.nightly)])
 def test_a_ramp_before_the_first_reading_is_said_to_change_values(ramp_s: float) -> None:
     """Not where it is told, nor where the first reading comes soon after a step."""
     times = np.geomspace(1.01 if ramp_s else 1e-3, 200.0, 200)
@@ -349,7 +312,7 @@ def test_a_ramp_before_the_first_reading_is_said_to_change_values(ramp_s: float)
     assert "If the load was no step" not in notes_on(times, values, config=protocol, **given)[1]
 
 
-@pytest.mark.parametrize("readings", [6, 12, 40])
+@pytest.mark.parametrize("readings", [6, 12])
 def test_an_onset_leaves_readings_to_fit(readings: int) -> None:
     """Of a trace that is nearly constant any onset fits; three parameters take five readings."""
     times: Array = 2.5 * np.arange(1.0, readings + 1)

@@ -3,6 +3,7 @@
 Samples are written down here, or in `tests.helpers.laplace`, as impedances.
 """
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,11 @@ def noisy(clean: Array, share: float = 0.02, seed: int = 0) -> Array:
 def swept(values: Array, omega: Array = OMEGA, **given: Any) -> Any:
     """What a sweep tells in a notebook."""
     return told(omega, values[0], loss=values[1], **(GIVEN | given))
+
+
+@cache
+def solid_in_a_notebook() -> dict[str, dict[str, Any]]:
+    return by_quantity(swept(solid()).data)
 
 
 def solid(seed: int = 1, **given: Any) -> Array:
@@ -102,13 +108,12 @@ def of_factor(values: Array, omega: Array) -> tuple[str, list[str]]:
 
 @pytest.mark.parametrize("written", [trios, anton_paar, bare, of_factor])
 def test_files_of_instruments_tell_the_same(tmp_path: Path, written: Any) -> None:
-    values, trace = solid(), tmp_path / "sweep.txt"
-    text, (frequency, *readings) = written(values, OMEGA)
+    trace, expected = tmp_path / "sweep.txt", solid_in_a_notebook()
+    text, (frequency, *readings) = written(solid(), OMEGA)
     trace.write_text(text, encoding="utf-8")
     options = [option for each in readings for option in ("--reading", each)]
     more = ["--frequency", frequency, *options, "--model", "zener_maxwell"]
     found = by_quantity(identified(tmp_path, trace, *more, config="model_selection: {models: []}"))
-    expected = by_quantity(swept(values).data)
     for name, truth in (SOLID | {"tau": 2 / 3}).items():
         assert found[name]["value"] == pytest.approx(expected[name]["value"], rel=1e-4)
         # Twice the half width of 95 % limits: four standard deviations.
@@ -222,6 +227,7 @@ def test_limits_are_those_of_scipy_and_lmfit(tmp_path: Path) -> None:
             assert least(name, found[name][end]) - best == pytest.approx(3.841, rel=0.02)
 
 
+@pytest.mark.nightly
 def test_creep_relaxation_and_sweep_of_a_sample_agree() -> None:
     """Limits of differences are roots of sums of squares: each of nine is missed once in 20."""
     times = np.geomspace(0.02, 30.0, 120)

@@ -362,11 +362,9 @@ def test_what_a_row_says_goes_before_options(here: Path) -> None:
 
 
 def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None:
-    """In one batch, or in several: noise, drift, gripper, known and unknown parameters, model."""
+    """In one batch, or in several: noise, gripper, known and unknown parameters, model."""
     settings = {
         "measurement.noise_model": "coloured",
-        "measurement.drift": "true",
-        "measurement.noise_rad": "1e-6",
         "gripper.arm_length_m": "2e-3",
         "fixed.c_p": "250",
         "sample.model": "maxwell",
@@ -382,12 +380,6 @@ def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None
     written = {row[0]: found(row[0]) for row in rows}
     for file in here.glob("*.json"):
         file.unlink()
-    # As a batch of a workflow.
-    usual = [Setting("--model", ("sample", "model"), "kelvin_voigt")]
-    given = ([Path("cells.tsv")], Path("few.yaml"), usual)
-    assert command.identify_files(*given, table=Path("some.csv"), rows=(2, 4)) == 0
-    assert [row["trace"] for row in listed("some.csv")] == [row[0] for row in rows[2:5]]
-    assert not list(here.glob("*.json"))
     for row in rows:
         write(here / "cells.tsv", [header, row])
         assert identify("cells.tsv")[0] == 0

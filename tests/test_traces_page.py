@@ -181,7 +181,7 @@ def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(
 ) -> None:
     traces = [Path(shutil.copy(EXAMPLE, tmp_path / name)) for name in ("a.csv", "b.csv")]
     monkeypatch.setattr(command, "MOST_DRAWN", 1)
-    model = [Setting("--model", ("sample", "model"), "liquid_drop")]
+    model = [Setting("--model", ("sample", "model"), "maxwell")]
     assert command.identify_files(traces, few, model, report=tmp_path / "page.html") == 0
     text = (tmp_path / "page.html").read_text()
     assert text.count("<img") == 1

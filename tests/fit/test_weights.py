@@ -5,13 +5,11 @@ from math import gamma
 
 import numpy as np
 import pytest
-from scipy.optimize import curve_fit
 
 from biogrip.arrays import Array
 from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.trace_fit import TraceFit, fit_traces
-from biogrip.judging.diagnosis import diagnose
 from biogrip.library import set_up
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.instruments import INSTRUMENTS
@@ -57,30 +55,6 @@ def test_the_published_fit_comes_out_to_five_digits() -> None:
     trace = noisy(0.0)
     fit = fitted(POLYSTYRENE.weighted(0.05 * trace), trace)
     assert fit.found.parameters == pytest.approx([V, BETA, ETA], rel=5e-6)
-
-
-@pytest.mark.nightly
-def test_weighted_fits_are_scipys() -> None:
-    """Standard errors but for the prior of one e-fold, a thousandth of them at most."""
-    trace = noisy(0.05)
-    deviations = 0.05 * trace
-    start = [np.log(V), BETA, np.log(ETA)]
-    expected, covariance = curve_fit(
-        rotation, TIMES, trace, start, deviations, absolute_sigma=True, xtol=1e-13, ftol=1e-13
-    )
-    problem = POLYSTYRENE.weighted(deviations)
-    fit, given = fitted(problem, trace), (problem.searched, problem.noise_sd)
-    diagnosis = diagnose(fit.problem, given[0], fit.found, confidence=0.95, noise_sd=given[1])
-    best = diagnosis.likelihood.best
-    assert [best[0], np.exp(best[1]), best[2]] == pytest.approx(expected, rel=2e-6)
-    errors = np.sqrt(np.diagonal(covariance)) / [1.0, expected[1], 1.0]
-    assert [each.deviation for each in diagnosis.findings] == pytest.approx(errors, rel=2e-3)
-    left = (trace - rotation(TIMES, *expected)) / deviations
-    likelihood = diagnosis.likelihood
-    chi_squared = len(TIMES) * (likelihood.misfit / likelihood.noise_sd) ** 2
-    assert chi_squared == pytest.approx(left @ left, rel=1e-6)
-    assert likelihood.threshold == pytest.approx(3.8415, abs=1e-4)
-    assert diagnosis.notes == []
 
 
 def test_a_plateau_is_no_noise() -> None:

@@ -1,4 +1,4 @@
-"""Equal arms and their sample by SciPy's Radau, from the corrected eqs. (1)-(3) or (4)-(6)."""
+"""Equal arms and their sample by SciPy's Radau, from the corrected eqs. (1)-(3)."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -29,7 +29,6 @@ def equal_arms(
     time_s: Array,
     peak: float,
     *,
-    linear: bool = False,
     inertia: bool = False,
 ) -> Array:
     """Rotation and jaw force, (2, n_times), of equal arms under torques until some times.
@@ -39,12 +38,9 @@ def equal_arms(
     k, k_p, c, c_p = (float(value) for value in sample)
     arm = gripper.left
 
-    def moved(phi: float) -> tuple[float, float]:
-        return (gripper.lever_m * phi, gripper.lever_m) if linear else tip(gripper, phi)
-
     def slope(t: float, state: Any, torque: Any) -> list[float]:
         phi, y = state[0], state[-1]
-        u, b = moved(phi)
+        u, b = tip(gripper, phi)
         tau = torque(t) if callable(torque) else torque
         rest = tau - arm.stiffness_Nm_per_rad * phi - b * (k_p * 2 * u + k * (2 * u - y))
         damping, y_rate = arm.damping_Nms_per_rad + 2 * c_p * b * b, k / c * (2 * u - y)
@@ -71,7 +67,7 @@ def equal_arms(
         assert solved.success, solved.message
         for t, now in zip(here, solved.y.T, strict=False):
             rate = now[1] if inertia else slope(t, now, torque)[0]
-            u, b = moved(now[0])
+            u, b = tip(gripper, now[0])
             force = k_p * 2 * u + c_p * 2 * b * rate + k * (2 * u - now[-1])
             found.append((now[0], force))
         state, start = solved.y[:, -1], end

@@ -87,24 +87,3 @@ def rise_with_held(
     found = scipy_fit(likelihood.problem, start, more, likelihood.noise_sd, tolerance)
     shares = likelihood.misfit / likelihood.noise_sd
     return found.square_sum - residuals.samples * shares**2, found.log_parameters
-
-
-def lowest_rise(
-    likelihood: Likelihood, quantity: Quantity, limit: float, rng: np.random.Generator, count: int
-) -> float:
-    """Rise at a limit: lowest over random starts, from the best fit, and from the other basin.
-
-    In the other basin the parallel damper is the large one, beside a branch of any stiffness.
-    """
-    k, k_p, c, c_p = likelihood.best
-    total = np.logaddexp(c, c_p)
-    others = [
-        np.array((k - softer, k_p, total - small, total))
-        for softer in (0.0, 3.0, 6.0)
-        for small in (1.0, 2.5, 5.0)
-    ]
-    low, high = likelihood.problem.low, likelihood.problem.high
-    starts = (likelihood.best, *others, *rng.uniform(low, high, (count, len(low))))
-    found = [rise_with_held(likelihood, quantity, limit, start, ROUGH) for start in starts]
-    best = sorted(found, key=lambda fit: fit[0])[:3]
-    return min(rise_with_held(likelihood, quantity, limit, x)[0] for _, x in best)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from biogrip.library import TraceResult
 from tests.helpers.identified import identify, told, write_trace
 
 SECONDS = np.geomspace(0.1, 100.0, 150)
@@ -20,9 +21,15 @@ AT_3_S = 50 + 60 * np.exp(-6) + 40 * np.exp(-0.6) + 30 * np.exp(-0.06)
 RELAXATION = {"reads": "modulus", "model": "zener_maxwell"}
 
 
-def test_a_rejected_model_is_told_from_what_no_linear_sample_does() -> None:
+@pytest.fixture(scope="module")
+def inadequate() -> TraceResult:
+    return told(SECONDS, SOFTENING + SCATTER, **RELAXATION)
+
+
+def test_a_rejected_model_is_told_from_what_no_linear_sample_does(
+    inadequate: TraceResult,
+) -> None:
     """Noise of 0.2 Pa, of which a second difference tells the scatter to a tenth."""
-    inadequate = told(SECONDS, SOFTENING + SCATTER, **RELAXATION)
     text = str(inadequate)
     assert inadequate.status == "rejected"
     _, found, rest = text.partition("linear sample of another kind fits to ")
@@ -38,7 +45,7 @@ def test_a_rejected_model_is_told_from_what_no_linear_sample_does() -> None:
     assert hopeless.data["without_model"]["quantities"] == []
 
 
-def test_five_lines_follow_a_model_that_fits() -> None:
+def test_five_lines_follow_a_model_that_fits(inadequate: TraceResult) -> None:
     """And where times are asked for, all that is told at these, with the truth within limits."""
     fitted = told(SECONDS, 50 + 60 * np.exp(-SECONDS / 5) + SCATTER, **RELAXATION)
     assert fitted.status == "ok"
@@ -48,13 +55,13 @@ def test_five_lines_follow_a_model_that_fits() -> None:
     names = [line.split("  ")[1] for line in lines[start + 1 : start + 6]]
     assert names == ["G(0.1 s)", "G(10 s)", "G(100 s)", "exponent(10 s)", "G''(0.1 rad/s)"]
     assert not lines[start + 6].startswith("  ")
-    asked = told(SECONDS, SOFTENING + SCATTER, **RELAXATION).without_model(at=[3.0])
+    asked = inadequate.without_model(at=[3.0])
     level = asked.set_index("quantity").loc["G(3 s)"]
     assert level["low"] < AT_3_S < level["high"] < 1.01 * level["low"]
 
 
 def test_table_and_page_have_it(tmp_path: Path) -> None:
-    """Of a rejected model, too; what was asked for at one time, and all kinds of it."""
+    """Of a rejected model, too; all kinds of what was asked for at a time."""
     trace = write_trace(tmp_path / "a.csv", SECONDS, SOFTENING + SCATTER, "time_s,modulus_Pa")
     files = "--csv", tmp_path / "found.csv", "--report", tmp_path / "page.html"
     given = (
@@ -74,10 +81,6 @@ def test_table_and_page_have_it(tmp_path: Path) -> None:
     assert float(row["G(3 s) low (Pa)"]) < AT_3_S < float(row["G(3 s) high (Pa)"])
     assert row["exponent(3 s) verdict"] == "determined"
     assert "tan delta(0.333 rad/s) value" in row
-    assert identify(trace, *files, *given)[0] == 0
-    header = (tmp_path / "found.csv").read_text().splitlines()[0]
-    assert "exponent(10 s) value" in header
-    assert "tan delta" not in header
     page = (tmp_path / "page.html").read_text()
     assert page.index("Whatever the model") < page.index("Quantity</th>")
     assert page.count("limits over all linear samples") == 1

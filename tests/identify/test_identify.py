@@ -62,11 +62,12 @@ cases:
 
 
 # A fitted start takes half a minute.
-TERMS = "", "offset: true", "noise_share: 0.02"
-ALSO = pytest.param("fit_start: true", marks=pytest.mark.nightly)
+ALSO = "offset: true, noise_share: 0.02", "fit_start: true"
 
 
-@pytest.mark.parametrize("terms", [*TERMS, ALSO])
+@pytest.mark.parametrize(
+    "terms", ["", *(pytest.param(each, marks=pytest.mark.nightly) for each in ALSO)]
+)
 def test_a_study_gives_the_answer_of_the_command(tmp_path: Path, terms: str) -> None:
     """Of the same file: to the last bit, since both do the same."""
     file = write_trace(tmp_path / "creep.csv", SECONDS, STRAIN, "time_s,strain")

@@ -28,7 +28,7 @@ from tests.helpers.problems import (
     problem,
     run,
 )
-from tests.helpers.scipy_fits import lowest_rise, rise_with_held
+from tests.helpers.scipy_fits import rise_with_held
 
 QUANTITIES = parameters_and_sum(MODEL)
 
@@ -36,20 +36,6 @@ QUANTITIES = parameters_and_sum(MODEL)
 def likelihood_for(case: str, seed: int) -> Likelihood:
     """What the limits of a simulated trace are measured against."""
     return likelihood_of(problem(case, seed, rate_Hz=10.0), seed)
-
-
-@pytest.mark.parametrize(
-    ("case", "seed"), [("endothelial_cell", 0), ("liquid_drop_1", 4), ("liquid_drop_2", 0)]
-)
-@pytest.mark.nightly
-def test_the_rise_at_a_limit_is_the_threshold(case: str, seed: int) -> None:
-    """The lowest from anywhere, to a hundredth of the threshold."""
-    likelihood, rng = likelihood_for(case, seed), np.random.default_rng(0)
-    (profiles,) = compute_profiles([likelihood], QUANTITIES)
-    for quantity, found in zip(QUANTITIES, profiles, strict=True):
-        for limit in (each for each in (found.low, found.high) if each is not None):
-            lowest = lowest_rise(likelihood, quantity, limit, rng, 20)
-            assert lowest == pytest.approx(likelihood.threshold, rel=0.01), quantity.label
 
 
 def test_an_optimum_that_was_missed_is_judged_again() -> None:

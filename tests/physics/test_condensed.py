@@ -73,7 +73,7 @@ def test_of_no_model_it_sees_a_difference(gripper: Gripper, name: str, protocol:
     condensed = condensed_of(torque, time_s, offset=True)
     residuals = posed(gripper, MODELS[name], condensed, noise(len(time_s)))
     middle, rng = np.log(MODEL_PARAMETERS[name]), np.random.default_rng(5)
-    x = np.clip(middle + rng.normal(size=(10, len(middle))), *log_range(MODELS[name]))
+    x = np.clip(middle + rng.normal(size=(4, len(middle))), *log_range(MODELS[name]))
     for each in x:
         assert_alike(residuals, each)
     found = residuals.condensed_responses(x)[:, :1]

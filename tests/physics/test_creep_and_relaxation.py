@@ -17,6 +17,7 @@ from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
 from biogrip.physics.simulation import simulated_response
 from tests.helpers.laplace import IMPEDANCES, Impedance, drawn, inverted
+from tests.physics.test_condensed import assert_alike
 
 DRIVEN = pytest.mark.parametrize("deforms", [False, True], ids=["creep", "relaxation"])
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
@@ -88,7 +89,7 @@ def test_derivatives_are_those_of_finite_differences(model: SampleModel, deforms
 
 
 HELD = {"mixed": PHASES, "steps": (hold(5.0, 1.0), hold(2.5, 0.3))}
-READ_S = np.linspace(0.004, 7.5, 1801)
+READ_S = np.linspace(0.004, 7.5, 601)
 
 
 @functools.cache
@@ -110,17 +111,12 @@ def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
     residuals = Residuals(NO_ARMS, model, rows.course, given, instrument=GRIPPER)
     # Exponents stay below one.
     moved = [parameter.kind != "exponent" for parameter in model.parameters]
-    logs = np.log([model.example]) + np.linspace(-0.3, 0.4, 5)[:, None] * moved
+    logs = np.log([model.example]) + np.array([[-0.3], [0.4]]) * moved
     found = residuals.misfit(np.exp(logs))
     expected = [np.sqrt(np.mean(residuals(at)[0] ** 2)) for at in logs]
     assert found == pytest.approx(expected, rel=1e-10)
-    responses = residuals.condensed_responses(logs)
-    residual = responses[:, 0] - residuals.trace.rows
-    gradient = np.einsum("npr,nr->np", responses[:, 1:], residual)
-    for at, own in zip(logs, gradient, strict=True):
-        left, slopes = residuals(at)
-        scale = float(np.linalg.norm(slopes) * np.linalg.norm(left))
-        assert np.abs(own - slopes @ left) == pytest.approx(0, abs=1e-9 * scale + 1e-15)
+    for at in logs:
+        assert_alike(residuals, at)
 
 
 def test_a_reading_at_the_instant_of_a_step_is_taken_before_it() -> None:
@@ -137,7 +133,7 @@ TIMES = np.geomspace(1e-3, 1e3, 13)
 OMEGA = np.geomspace(2 * np.pi / LONGEST_S, 1 / SHORTEST_S, 60)
 POWER_LAWS = [name for name, model in MODELS.items() if model.power_law]
 EVERY_SAMPLE = pytest.mark.parametrize(
-    ("model", "seed"), [(model, seed) for model in POWER_LAWS for seed in range(4)]
+    ("model", "seed"), [(model, seed) for model in POWER_LAWS for seed in range(2)]
 )
 
 

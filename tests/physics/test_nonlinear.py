@@ -81,7 +81,7 @@ def unequal_arms(gripper: Gripper, sample: Array, torques: list[tuple[float, flo
 
 
 @pytest.mark.parametrize(
-    "case", [*range(20), *(pytest.param(n, marks=pytest.mark.nightly) for n in range(20, 50))]
+    "case", [*range(8), *(pytest.param(n, marks=pytest.mark.nightly) for n in range(8, 50))]
 )
 def test_against_radau(case: int) -> None:
     """50 random samples, hat-theta_2 from 40 to 90 degrees, up to 20 times the paper's torque."""

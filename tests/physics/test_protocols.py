@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 
 from biogrip.arrays import Array
 from biogrip.library import set_up
-from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.gripper import Gripper
 from biogrip.physics.gripper import torque as torque_of_voltage
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.misfit import SeriesMisfit, make_misfit
@@ -30,7 +30,6 @@ from biogrip.physics.response import phi_functions, step_response, superpose
 from biogrip.physics.roots import SMALLEST_GAP, separate
 from biogrip.physics.simulation import jaw_force
 from biogrip.study.experiment_blocks import PhaseBlock, ProtocolBlock
-from tests.helpers.radau import equal_arms
 from tests.helpers.responses import exact_50_digits, random_samples
 from tests.physics.test_contact import TABLE_2
 
@@ -62,20 +61,6 @@ def test_torque_and_voltage_become_the_torque_they_say() -> None:
     expected = [next(torque(t) for end, torque in WRITTEN_OUT if t < end) for t in time_s]
     np.testing.assert_allclose(evaluate(TORQUE, time_s), expected, rtol=0, atol=1e-22)
     assert evaluate(TORQUE, -1.0) == 0
-
-
-@pytest.mark.parametrize("inertia", [False, True])
-def test_every_phase_against_radau(inertia: bool) -> None:
-    arm = Arm(1e-9, 2e-8, 4.4e-7) if inertia else Arm(1e-14, 3.3e-10, 4.4e-7)
-    gripper, sample = Gripper(1.5e-3, 75.0, arm, arm), np.array([0.3, 0.05, 0.5, 0.02])
-    time_s = np.linspace(0, 29, 117)[1:]
-    response = step_response(gripper, generalized_maxwell(sample), inertia=inertia)
-    ours = superpose(response, TORQUE, time_s)[0]
-    expected = equal_arms(
-        gripper, sample, WRITTEN_OUT, time_s, ours.max(), linear=True, inertia=inertia
-    )[0]
-    # The integrator's tolerance; 3e-9 is left of it, 3e-10 of a tenth of it.
-    assert np.max(np.abs(ours - expected)) < 1e-7 * np.abs(ours).max()
 
 
 def test_phi_functions_against_50_digits() -> None:

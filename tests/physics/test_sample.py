@@ -71,7 +71,7 @@ def test_fixing_a_parameter_leaves_the_others() -> None:
 
 
 TORQUE = join_phases((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
-TIME_S = np.linspace(0.0, 400.0, 801)
+TIME_S = np.linspace(0.0, 400.0, 101)
 DECADES = {"stiffness": (0, 2), "damping": (0, 3), "springpot": (0, 2), "exponent": (-0.6, -0.2)}
 TRIED = [name for name in CANDIDATES if name[-1] not in "5678"]
 PAIRS = [(richer, simpler) for richer in TRIED for simpler in contained(richer)]

@@ -105,7 +105,7 @@ def overlays(draw: st.DrawFn) -> dict[str, Any]:
 
 
 @settings(
-    max_examples=40,
+    max_examples=15,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
@@ -126,7 +126,7 @@ def test_any_config_is_used_or_ends_in_one_message(overlay: dict[str, Any]) -> N
         assert built(StudyConfig, plain(study.config)) == study.config
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.sampled_from(sorted(SINGLE)), st.data())
 def test_a_value_out_of_bounds_is_refused_with_its_key(path: str, data: st.DataObject) -> None:
     if (high := SINGLE[path].get("maximum")) is None:

@@ -22,14 +22,17 @@ CASES = {
     },
 }
 CONFIG = TINY | {"seeds": 1, "only": list(CASES), "cases": CASES}
+FIRST = ["calibrations/sized_in_volts.yaml", "measurements/crept/seeds_0-0.npz"]
+LATER = [f"identifications/{case}/genetic/seeds_0-0.csv" for case in CASES]
 
 
-def test_every_kind_of_case_is_identified(tmp_path: Path) -> None:
+@pytest.mark.parametrize("made", [FIRST, pytest.param(LATER, marks=pytest.mark.nightly)])
+def test_every_kind_of_case_is_made(tmp_path: Path, made: list[str]) -> None:
     """What a simulated case is told is enough for its first jobs."""
-    files = [f"results/identifications/{case}/genetic/seeds_0-0.csv" for case in CASES]
+    files = [f"results/{file}" for file in made]
     run = snakemake(tmp_path, "--", *files, config=CONFIG)
     assert run.status == 0, run.output
-    assert (tmp_path / "results/calibrations/sized_in_volts.yaml").is_file()
+    assert [file for file in files if not (tmp_path / file).is_file()] == []
 
 
 def test_a_study_writes_in_its_folder_alone(tmp_path: Path) -> None:

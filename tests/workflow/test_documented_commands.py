@@ -56,8 +56,8 @@ TAKES_LONG = {
     "groups.md",
     "tutorial.md",
 }
-# What module.md, modulus.md and groups.md do, other tests do quickly.
-LONG_HOWTOS = ("case", "trace", "noise", "figure", "noise_kind", "posterior", "module", "modulus")
+# What module.md and groups.md do, other tests do quickly.
+LONG_HOWTOS = ("case", "trace", "noise", "figure", "noise_kind", "posterior", "module", "doubts")
 TAKES_LONG |= {f"howto/{name}.md" for name in LONG_HOWTOS}
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],

@@ -108,19 +108,6 @@ def test_an_older_trace_in_the_place_of_another_is_read(tiny_copy: Path) -> None
     assert planned(tiny_copy, config=TINY) == {}
 
 
-@pytest.mark.nightly
-def test_five_seeds_more_keep_what_there_is(tiny_copy: Path) -> None:
-    """And the rows of the seeds that were there have the same bytes."""
-    file = tiny_copy / "results/identifications/liquid_drop_2.csv"
-    few = set(file.read_text().splitlines())
-    more = overlaid(TINY, {"seeds": 3, "batch_size": 2})
-    run = snakemake(tiny_copy, "--", str(file.relative_to(tiny_copy)), config=more)
-    assert run.status == 0, run.output
-    many = file.read_text().splitlines()
-    assert few < set(many)
-    assert len(many) == 1 + 3 * 2
-
-
 def test_an_edit_of_the_library_runs_everything_again_and_is_named(
     tiny: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -65,8 +65,9 @@ def test_a_recorded_trace_has_verdicts_and_no_errors(tiny: Path) -> None:
     identified = pd.read_csv(results / "identifications" / "mine.csv")
     assert identified["noise_rms"].isna().all()
     verdicts = pd.read_csv(results / "tables" / "verdicts_mine.csv").set_index("quantity")
-    k = verdicts.loc["k"]
-    assert k["low"] < identified["k_N_per_m"].iloc[-1] < k["high"]
+    total = verdicts.loc["c + c_p"]
+    found = identified[["c_Ns_per_m", "c_p_Ns_per_m"]].iloc[-1].sum()
+    assert total["low"] < found < total["high"]
 
 
 def test_every_figure_comes_as_a_picture(tiny: Path) -> None:
