@@ -12,29 +12,54 @@ from biogrip.study.study import Case
 from biogrip.traces.columns import held_unit
 from biogrip.traces.reader import Recording
 
+# Share of the largest load so far below which a contact shrinks, not only scatters.
+_STAYS = 0.9
+
 
 def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
     """Return what was held or loaded; nothing where a config has the protocol.
 
     Given are the blocks of the config that the user has set.
     """
-    (recording, experiment), controlled = trace, case.instrument.controlled
+    (recording, experiment), controlled = trace, case.columns.controlled
     form, start_s = recording.form, case.columns.start_s or 0.0
     if recording.load is not None and experiment.record is not None:
         column, loads = form["columns"]["load"], experiment.record[:, 1]
         if case.instrument.relative:
             loads = loads * getattr(case.block.protocol.phases[0], controlled.column)
         ends = loads.min(), loads.max()
-        low, high = (plain(end / controlled.units[column["unit"]]) for end in ends)
+        low, high = (plain(controlled.in_unit(end, column["unit"])) for end in ends)
         what = _with_unit(high if low == high else f"{low} to {high}", column["unit"])
         count = np.count_nonzero(recording.load[:, 0] >= start_s)
         rows = f"column {column['column']}, {count:,} rows"
-        return f"Load: {what} from {start_s:g} s ({rows})."
+        return f"Load: {what} from {start_s:g} s ({rows}){_contact(case)}."
     if HOLD[0] not in given:
         return ""
     number, unit = held_unit(given[HOLD[0]], controlled)
     start = "its start, as fitted," if experiment.fit_start else f"{start_s:g} s"
-    return f"Held: {_with_unit(f'{number:g}', unit)} from {start} to {form['last_s']:g} s."
+    what = f"{_with_unit(f'{number:g}', unit)} from {start} to {form['last_s']:g} s"
+    return f"Held: {what}{_contact(case)}."
+
+
+def _contact(case: Case) -> str:
+    """Return what turns a force and an indentation into a stress and a strain."""
+    sphere = case.block.measurement.sphere
+    return f", by Hertz's contact with a sphere of radius {sphere}" if sphere else ""
+
+
+def _shrinks(recording: Recording, case: Case) -> tuple[str, ...]:
+    """Return a sentence if a sphere was drawn back, where Hertz's contact has no such sum."""
+    if recording.load is None or case.columns.sphere_m is None:
+        return ()
+    time_s, loads = recording.load[recording.load[:, 0] <= recording.form["last_s"]].T
+    most = np.maximum.accumulate(loads)
+    falls = time_s[(most > 0.1 * most[-1]) & (loads < _STAYS * most)]
+    if not len(falls):
+        return ()
+    return (
+        f"The contact shrinks from {falls[0]:g} s on: what is said holds while it grows or stays. "
+        f"Leave these readings out: --until {falls[0]:g}.",
+    )
 
 
 def _with_unit(number: str, unit: str) -> str:
@@ -42,7 +67,12 @@ def _with_unit(number: str, unit: str) -> str:
 
 
 def remarks_on_hold(recording: Recording, case: Case, given: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a sentence if readings have a unit with a prefix, and what was held is a number."""
+    """Return a sentence if a sphere was drawn back, or what was held may be in another unit.
+
+    That is if readings have a unit with a prefix, and what was held is a number.
+    """
+    if shrinks := _shrinks(recording, case):
+        return shrinks
     read, controlled = case.instrument.read, case.instrument.controlled
     unit, held = recording.units[1], given.get(HOLD[0])
     prefix = unit.removesuffix(read.unit)

@@ -65,6 +65,8 @@ LOAD = ("measurement", "load")
 _OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 _PRONY = re.compile(r"prony_?([1-8])")
+# What a sphere's force and indentation count as.
+_BY_SPHERE = {"force": "stress", "displacement": "strain"}
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
@@ -123,7 +125,7 @@ class Asked:
         blocks = read_configs([self.config] if self.config else [])
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
-        return blocks
+        return _by_sphere(blocks)
 
     def read(self, columns: Columns) -> Recording:
         """Read the trace; a `BiogripError` has file, line and column, or array and index."""
@@ -150,6 +152,15 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
         value = {part: value}
     found: dict[str, Any] = overlaid(blocks, value)
     return found
+
+
+def _by_sphere(blocks: dict[str, Any]) -> dict[str, Any]:
+    """Return the blocks with a sphere's force and indentation as what they count as."""
+    measured = blocks.get("measurement")
+    if not isinstance(measured, dict) or measured.get("sphere") is None:
+        return blocks
+    renamed = {_BY_SPHERE.get(key, key): value for key, value in measured.items()}
+    return {**blocks, "measurement": renamed}
 
 
 def read_trace(asked: Asked) -> tuple[Recording, Case]:
@@ -181,7 +192,7 @@ def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
         of_config = [*keys_in(read_configs([asked.config] if asked.config else []))]
         said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in found]
         raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
-    merged, recording, record = _with_instrument(overlaid(below, given), given, asked)
+    merged, recording, record = _with_instrument(_by_sphere(overlaid(below, given)), given, asked)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
         merged.pop(name, None)
@@ -204,6 +215,8 @@ def _source(
     path: KeyPath = setting.path
     if path[0] == "sample":
         path = ("cases", case, *path)
+    if path[0] == "measurement" and "sphere" in merged["measurement"]:
+        path = (path[0], *(_BY_SPHERE.get(str(key), key) for key in path[1:]))
     held = {"protocol": merged["protocol"]}
     own = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
     known = set(keys_in(below))
@@ -228,7 +241,9 @@ def _with_instrument(
     file = ARRAYS if asked.arrays else str(asked.trace)
     measurement = usual | merged["measurement"] | {"file": file}
     measurement = schema_of(MeasurementBlock).with_numbers(measurement)
-    kind, controlled = given.get("instrument", instrument.kind), instrument.controlled
+    kind = given.get("instrument", instrument.kind)
+    block = checked(MeasurementBlock, measurement)[0]
+    controlled = instrument.controlled if block is None else block.columns.controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
     of_column = measurement.get(LOAD[-1]) is not None
     if instrument.sweeps:
@@ -245,17 +260,20 @@ def _with_instrument(
                 f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, a "
                 "column of it by --load, or a protocol in --config."
             )
-    if level is not None:
-        level, unit = held_unit(level, controlled)
-        level *= controlled.units[unit]
-    own = _recording(asked, measurement)
+    if block is None:
+        # The study will say why.
+        level = None
+    elif level is not None:
+        level = controlled.in_si(*held_unit(level, controlled))
+    own = _recording(asked, block)
     phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
     record, start_s = None, measurement.get("start_s")
     if own is not None and own.load is not None:
         first_s, first = own.load[0].tolist()
         # A load that is there in the first row came before it: at 0, as one that is held.
-        start_s = (min(first_s, 0.0) if first else first_s) if start_s is None else start_s
-        measurement["start_s"] = start_s or None
+        if start_s is None:
+            start_s = min(first_s, 0.0) if first else first_s
+            measurement["start_s"] = start_s or None
         record = _from(own.load, start_s)
         largest = max(record[:, 1], key=abs)
         if instrument.relative:
@@ -292,9 +310,8 @@ def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrume
     return next((each for each in some if each.controlled.column in keys), some[0])
 
 
-def _recording(asked: Asked, measurement: Mapping[str, Any]) -> Recording | None:
+def _recording(asked: Asked, block: MeasurementBlock | None) -> Recording | None:
     """Read a trace; return None if whoever uses it will say what is wrong."""
-    block = checked(MeasurementBlock, measurement)[0]
     with suppress(BiogripError):
         return None if block is None else asked.read(block.columns)
     return None
