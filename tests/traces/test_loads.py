@@ -132,7 +132,9 @@ def test_a_load_that_is_there_in_the_first_row_came_before_it(
     np.savetxt(path, rows, delimiter=",", header="time_s,strain,stress_Pa", comments="")
     given = {"strain": "strain", "load": "stress_Pa"}
     settings = [Setting("--set", ("measurement", key), value) for key, value in given.items()]
-    experiment = case_of(Asked(path, None, tuple(settings))).judged_experiment
+    case = case_of(Asked(path, None, tuple(settings)))
+    assert case.block.protocol.phases[0].duration_s == pytest.approx(clock[-1])
+    experiment = case.judged_experiment
     assert not experiment.start_given
     assert evaluate(experiment.torque, [0.0, first_s, 9.0]).tolist() == [5.0, 5.0, 5.0]
 
