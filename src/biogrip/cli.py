@@ -154,6 +154,11 @@ _SETTINGS: dict[str, list[tuple[str, str, str]]] = {
             "compliance or a modulus",
         ),
         ("--load", "COLUMN", "of what was held, as recorded, instead"),
+        (
+            *("--sphere", "RADIUS"),
+            "of a sphere that indents the sample, as in '2.5 um': readings are its force, and what "
+            "was held its indentation, or the reverse",
+        ),
         ("--start", "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
         ("--from", "PLACE", "first time, s, or frequency as written, to use [all]"),
         ("--until", "PLACE", "last time, s, or frequency as written, to use [all]"),

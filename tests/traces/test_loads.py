@@ -128,8 +128,9 @@ def test_a_load_that_is_there_in_the_first_row_came_before_it(
     tmp_path: Path, first_s: float
 ) -> None:
     clock = first_s + CLOCK
-    asked = loaded(tmp_path / "late.csv", clock, clock, np.full(len(clock), 5.0))
-    experiment = case_of(asked).judged_experiment
+    case = case_of(loaded(tmp_path / "late.csv", clock, clock, np.full(len(clock), 5.0)))
+    assert case.block.protocol.phases[0].duration_s == pytest.approx(clock[-1])
+    experiment = case.judged_experiment
     assert not experiment.start_given
     assert evaluate(experiment.torque, [0.0, first_s, 9.0]).tolist() == [5.0, 5.0, 5.0]
 

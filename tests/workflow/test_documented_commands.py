@@ -35,7 +35,7 @@ LEFT = {
     "howto/creep.md": ["mucus.json", "hl60.json"],
     "howto/relaxation.md": ["fish.json", "dwell.json"],
     "howto/sweep.md": ["sweep.json", "sweep.png"],
-    "howto/modulus.md": ["pipette.json"],
+    "howto/modulus.md": ["pipette.json", "afm.json"],
     "howto/noise.md": [
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),
         "results/tables/robustness_levels.md",

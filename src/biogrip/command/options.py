@@ -63,6 +63,7 @@ OPTIONS: dict[str, str | Callable[[str], tuple[Path, Any]]] = {
     "sd": "measurement.sd",
     "hold": _hold,
     "load": "measurement.load",
+    "sphere": "measurement.sphere",
     "start": _start,
     "from": "measurement.from_s",
     "until": "measurement.until_s",

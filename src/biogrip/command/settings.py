@@ -67,6 +67,10 @@ LOAD = ("measurement", "load")
 _OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 _PRONY = re.compile(r"prony_?([1-8])")
+# Share of the largest load so far below which a contact shrinks, not only scatters.
+_STAYS = 0.9
+# What a sphere's force and indentation count as.
+_BY_SPHERE = {"force": "stress", "displacement": "strain"}
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
@@ -125,7 +129,7 @@ class Asked:
         blocks = read_configs([self.config] if self.config else [])
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
-        return blocks
+        return _by_sphere(blocks)
 
     def read(self, columns: Columns) -> Recording:
         """Read the trace; a `BiogripError` has file, line and column, or array and index."""
@@ -152,6 +156,15 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
         value = {part: value}
     found: dict[str, Any] = overlaid(blocks, value)
     return found
+
+
+def _by_sphere(blocks: dict[str, Any]) -> dict[str, Any]:
+    """Return the blocks with a sphere's force and indentation as what they count as."""
+    measured = blocks.get("measurement")
+    if not isinstance(measured, dict) or measured.get("sphere") is None:
+        return blocks
+    renamed = {_BY_SPHERE.get(key, key): value for key, value in measured.items()}
+    return {**blocks, "measurement": renamed}
 
 
 def read_trace(asked: Asked) -> tuple[Recording, Case]:
@@ -183,7 +196,7 @@ def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
         of_config = [*keys_in(read_configs([asked.config] if asked.config else []))]
         said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in found]
         raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
-    merged, recording, record = _with_instrument(overlaid(below, given), given, asked)
+    merged, recording, record = _with_instrument(_by_sphere(overlaid(below, given)), given, asked)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
         merged.pop(name, None)
@@ -206,6 +219,8 @@ def _source(
     path: KeyPath = setting.path
     if path[0] == "sample":
         path = ("cases", case, *path)
+    if path[0] == "measurement" and "sphere" in merged["measurement"]:
+        path = (path[0], *(_BY_SPHERE.get(str(key), key) for key in path[1:]))
     held = {"protocol": merged["protocol"]}
     own = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
     known = set(keys_in(below))
@@ -232,7 +247,9 @@ def _with_instrument(
     file = ARRAYS if asked.arrays else str(asked.trace)
     measurement = usual | merged["measurement"] | {"file": file}
     measurement = schema_of(MeasurementBlock).with_numbers(measurement)
-    kind, controlled = given.get("instrument", instrument.kind), instrument.controlled
+    kind = given.get("instrument", instrument.kind)
+    block = checked(MeasurementBlock, measurement)[0]
+    controlled = instrument.controlled if block is None else block.columns.controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
     of_column = measurement.get(LOAD[-1]) is not None
     if instrument.sweeps:
@@ -249,17 +266,20 @@ def _with_instrument(
                 f"{by}: is missing; allowed is the {controlled.name}{unit} that was held, a "
                 "column of it by --load, or a protocol in --config."
             )
-    if level is not None:
-        level, unit = held_unit(level, controlled, by)
-        level *= controlled.units[unit]
-    own = _recording(asked, measurement)
+    if block is None:
+        # The study will say why.
+        level = None
+    elif level is not None:
+        level = controlled.in_si(*held_unit(level, controlled, by))
+    own = _recording(asked, block)
     phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
     record, start_s = None, measurement.get("start_s")
     if own is not None and own.load is not None:
         first_s, first = own.load[0].tolist()
         # A load that is there in the first row came before it: at 0, as one that is held.
-        start_s = (min(first_s, 0.0) if first else first_s) if start_s is None else start_s
-        measurement["start_s"] = start_s or None
+        if start_s is None:
+            start_s = min(first_s, 0.0) if first else first_s
+            measurement["start_s"] = start_s or None
         record = _from(own.load, start_s)
         largest = max(record[:, 1], key=abs)
         if instrument.relative:
@@ -296,9 +316,8 @@ def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrume
     return next((each for each in some if each.controlled.column in keys), some[0])
 
 
-def _recording(asked: Asked, measurement: Mapping[str, Any]) -> Recording | None:
+def _recording(asked: Asked, block: MeasurementBlock | None) -> Recording | None:
     """Read a trace; return None if whoever uses it will say what is wrong."""
-    block = checked(MeasurementBlock, measurement)[0]
     with suppress(BiogripError):
         return None if block is None else asked.read(block.columns)
     return None
@@ -514,23 +533,45 @@ def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
 
     Given are the blocks of the config that the user has set.
     """
-    (recording, experiment), controlled = trace, case.instrument.controlled
+    (recording, experiment), controlled = trace, case.columns.controlled
     form, start_s = recording.form, case.columns.start_s or 0.0
     if recording.load is not None and experiment.record is not None:
         column, loads = form["columns"]["load"], experiment.record[:, 1]
         if case.instrument.relative:
             loads = loads * getattr(case.block.protocol.phases[0], controlled.column)
         ends = loads.min(), loads.max()
-        low, high = (plain(end / controlled.units[column["unit"]]) for end in ends)
+        low, high = (plain(controlled.in_unit(end, column["unit"])) for end in ends)
         what = _with_unit(high if low == high else f"{low} to {high}", column["unit"])
         count = np.count_nonzero(recording.load[:, 0] >= start_s)
         rows = f"column {column['column']}, {count:,} rows"
-        return f"Load: {what} from {start_s:g} s ({rows})."
+        return f"Load: {what} from {start_s:g} s ({rows}){_contact(case)}."
     if HOLD[0] not in given:
         return ""
     number, unit = held_unit(given[HOLD[0]], controlled)
     start = "its start, as fitted," if experiment.fit_start else f"{start_s:g} s"
-    return f"Held: {_with_unit(f'{number:g}', unit)} from {start} to {form['last_s']:g} s."
+    what = f"{_with_unit(f'{number:g}', unit)} from {start} to {form['last_s']:g} s"
+    return f"Held: {what}{_contact(case)}."
+
+
+def _contact(case: Case) -> str:
+    """Return what turns a force and an indentation into a stress and a strain."""
+    sphere = case.block.measurement.sphere
+    return f", by Hertz's contact with a sphere of radius {sphere}" if sphere else ""
+
+
+def _shrinks(recording: Recording, case: Case) -> tuple[str, ...]:
+    """Return a sentence if a sphere was drawn back, where Hertz's contact has no such sum."""
+    if recording.load is None or case.columns.sphere_m is None:
+        return ()
+    time_s, loads = recording.load[recording.load[:, 0] <= recording.form["last_s"]].T
+    most = np.maximum.accumulate(loads)
+    falls = time_s[(most > 0.1 * most[-1]) & (loads < _STAYS * most)]
+    if not len(falls):
+        return ()
+    return (
+        f"The contact shrinks from {falls[0]:g} s on: what is said holds while it grows or stays. "
+        f"Leave these readings out: --until {falls[0]:g}.",
+    )
 
 
 def _with_unit(number: str, unit: str) -> str:
@@ -538,7 +579,12 @@ def _with_unit(number: str, unit: str) -> str:
 
 
 def remarks_on_hold(recording: Recording, case: Case, given: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a sentence if readings have a unit with a prefix, and what was held is a number."""
+    """Return a sentence if a sphere was drawn back, or what was held may be in another unit.
+
+    That is if readings have a unit with a prefix, and what was held is a number.
+    """
+    if shrinks := _shrinks(recording, case):
+        return shrinks
     read, controlled = case.instrument.read, case.instrument.controlled
     unit, held = recording.units[1], given.get(HOLD[0])
     prefix = unit.removesuffix(read.unit)

@@ -345,6 +345,11 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     under = "" if INSTRUMENTS[reads].sweeps else f" under {_protocol(found)}"
     what = _INSTRUMENTS[found["instrument"]].format(reads.replace("_", " "))
     said = [f"{what}{under}."]
+    if sphere := assumed["measurement"].get("sphere"):
+        said.append(
+            f"By Hertz's contact with a sphere of radius R = {sphere}, a force F is the stress "
+            "9F/(16R²) and an indentation d the strain (d/R)^1.5; moduli are Young's."
+        )
     if "gripper" in assumed:
         own = assumed["gripper"]
         arms = (f"{own[arm]['stiffness_Nm_per_rad']:g}" for arm in ("left", "right"))

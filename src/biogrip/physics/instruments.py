@@ -9,7 +9,8 @@ by sines, one frequency after the other, and reads two moduli: rheometers, micro
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,20 @@ class Channel:
     """Units of a file's column, as multiples of the SI unit."""
     label: str = ""
     """Name on axes, where it says more."""
+    power: float = field(default=1.0, compare=False)
+    """Exponent of a number in such a unit, as 1.5 of the indentation by a sphere."""
+
+    def in_si(self, sizes: Any, unit: str, scale: float = 1.0) -> Any:
+        """Return numbers in one of the units, times a scale, in the SI unit."""
+        return _raised(sizes * (self.units[unit] * scale), self.power)
+
+    def slope(self, sizes: Any) -> Any:
+        """Return the slope of the SI value over sizes, which are numbers times their unit."""
+        return self.power * abs(sizes) ** (self.power - 1)
+
+    def in_unit(self, values: Any, unit: str) -> Any:
+        """Return values in the SI unit as numbers in one of the units."""
+        return _raised(values, 1 / self.power) / self.units[unit]
 
     @property
     def title(self) -> str:
@@ -40,6 +55,13 @@ class Channel:
     def column(self) -> str:
         """Usual name of a column or key: the name with the unit."""
         return self.name + self.suffix
+
+
+def _raised(sizes: Any, power: float) -> Any:
+    """Return a power of each size, with its sign."""
+    if power == 1:
+        return sizes
+    return (1.0 * (sizes > 0) - (sizes < 0)) * abs(sizes) ** power
 
 
 @dataclass(frozen=True)
@@ -141,6 +163,23 @@ KINDS = tuple(dict.fromkeys(instrument.kind for instrument in INSTRUMENTS.values
 
 CONTROLLED = tuple(dict.fromkeys(instrument.controlled for instrument in INSTRUMENTS.values()))
 """Quantities that protocols set."""
+
+
+def under_sphere(instrument: Instrument, radius_m: float) -> Instrument:
+    """Return an instrument of stress and strain that has the force and indentation of a sphere.
+
+    On a half-space, incompressible and with Young's modulus E, a sphere of radius R that is
+    indented by d has the force F = 16/9 E sqrt(R) d^1.5 (Hertz). So 9 F/(16 R^2) is a stress under
+    the strain (d/R)^1.5, of a viscoelastic sample, too, while the contact does not shrink (Lee and
+    Radok, J. Appl. Mech. 27 (1960), 438-444). A `KeyError` has a quantity that is neither.
+    """
+    forces = {unit: 9 * size / (16 * radius_m**2) for unit, size in FORCE.units.items()}
+    depths = {unit: size / radius_m for unit, size in DISPLACEMENT.units.items()}
+    of = {
+        STRESS: replace(STRESS, units=forces, label="force"),
+        STRAIN: replace(STRAIN, units=depths, label="indentation", power=1.5),
+    }
+    return replace(instrument, controlled=of[instrument.controlled], read=of[instrument.read])
 
 
 def of_kind(kind: str) -> list[Instrument]:

@@ -12,9 +12,24 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field, Tag
 
 from biogrip.keys import BY_KIND, Block, Complaint, OneOf
-from biogrip.physics.instruments import INSTRUMENTS, PARTNERS, ROTATION
+from biogrip.physics.instruments import (
+    INSTRUMENTS,
+    PARTNERS,
+    ROTATION,
+    STRAIN,
+    STRESS,
+    Instrument,
+    under_sphere,
+)
 from biogrip.physics.noise import Noise
-from biogrip.traces.columns import AXES, TIME_UNITS, Columns, known_unit, trace_file_problem
+from biogrip.traces.columns import (
+    AXES,
+    TIME_UNITS,
+    Columns,
+    known_unit,
+    length_m,
+    trace_file_problem,
+)
 
 COLOURED = "coloured"
 NOISE_MODELS = ("white", COLOURED)
@@ -33,7 +48,7 @@ _OF_SWEEPS = ("frequency", "frequency_unit", *PARTNERS, "partner_unit", "loss_sd
 _OF_FILE = (
     *("time", *READINGS, *_OF_SWEEPS, "time_unit", "rotation_unit", "reading_unit", "scale"),
     *("block", "rows", "load", "load_unit", "average_repeated", "from_s", "until_s"),
-    *(*KNOWN_NOISE, "start_s", "fit_start"),
+    *("sphere", *KNOWN_NOISE, "start_s", "fit_start"),
 )
 
 
@@ -118,6 +133,10 @@ class MeasurementBlock(Block):
     Only for `biogrip identify`."""
     load_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
     """Unit of that column, where its name does not end in it."""
+    sphere: Annotated[str | None, Field(min_length=1, max_length=40)] = None
+    """Radius of a sphere that indents the sample, with its unit, as `2.5 um`. The column of the
+    stress then has its force, and that of the strain its indentation, and moduli are Young's, by
+    Hertz's contact with an incompressible sample."""
     average_repeated: bool = False
     """If true, average the readings of equal times, as a rounded clock writes them."""
     from_s: Annotated[float | None, Field(ge=-1e12, le=1e12)] = None
@@ -182,9 +201,16 @@ class MeasurementBlock(Block):
             partner_column=getattr(self, partner.name) if partner else "",
             reading_unit=self.rotation_unit or self.reading_unit,
             scale=1.0 if self.scale is None else self.scale,
-            quantity=INSTRUMENTS[name].read,
+            quantity=self.instrument.read,
+            sphere_m=length_m(self.sphere or ""),
             **{key: getattr(self, key) for key in same},
         )
+
+    @property
+    def instrument(self) -> Instrument:
+        """The instrument of a recorded trace, with the units that its columns may have."""
+        instrument, radius_m = INSTRUMENTS[self.readings[0]], length_m(self.sphere or "")
+        return under_sphere(instrument, radius_m) if radius_m else instrument
 
     @property
     def readings(self) -> list[str]:
@@ -265,7 +291,15 @@ class MeasurementBlock(Block):
             right, wrong = wrong, right
         if getattr(self, wrong) is not None:
             yield (wrong,), f"does not go with {name}; allowed is {right}."
-        instrument = INSTRUMENTS[name]
+        if self.sphere is not None:
+            if length_m(self.sphere) is None:
+                text = f"found '{self.sphere}', allowed is a radius with its unit, as in '2.5 um'."
+                yield ("sphere",), text
+                return
+            if name not in (STRESS.name, STRAIN.name):
+                yield ("sphere",), f"goes with a force or an indentation, not with {name}."
+                return
+        instrument = self.instrument
         for key, of in (("reading_unit", instrument.read), ("load_unit", instrument.controlled)):
             unit = getattr(self, key)
             if unit is not None and known_unit(unit, of.units) is None:

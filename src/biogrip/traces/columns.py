@@ -6,13 +6,22 @@ A unit is stated, stands at the end of the column's name, as in ``rotation_urad`
 
 import re
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
 from unicodedata import normalize
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS, MODULUS, PARTNERS, ROTATION, Channel
+from biogrip.physics.instruments import (
+    DISPLACEMENT,
+    INSTRUMENTS,
+    MODULUS,
+    PARTNERS,
+    ROTATION,
+    Channel,
+    under_sphere,
+)
 from biogrip.terminal import visible
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86_400.0}
@@ -127,6 +136,8 @@ class Columns:
     """Key of its units; None if the file has the unit."""
     loss_sd: str | None = None
     """Name of the column of standard deviations of the loss modulus."""
+    sphere_m: float | None = None
+    """Radius of the sphere whose force and indentation are read, if there is one."""
 
     @property
     def axis(self) -> str:
@@ -149,7 +160,8 @@ class Columns:
     @property
     def controlled(self) -> Channel:
         """What was controlled."""
-        return INSTRUMENTS[self.quantity.name].controlled
+        instrument = INSTRUMENTS[self.quantity.name]
+        return (under_sphere(instrument, self.sphere_m) if self.sphere_m else instrument).controlled
 
     def said_by(self, *keys: str) -> str:
         """Return the options or config keys that say something, for messages."""
@@ -252,6 +264,15 @@ def number_and_unit(text: str) -> tuple[float, str]:
     return float(found[1]), found[2]
 
 
+def length_m(text: str) -> float | None:
+    """Return a length with its unit, as in ``2.5 um``, in m; None if it is none above 0."""
+    with suppress(ValueError):
+        number, written = number_and_unit(text)
+        unit = known_unit(written, DISPLACEMENT.units)
+        return number * DISPLACEMENT.units[unit] if unit and number > 0 else None
+    return None
+
+
 def held_unit(value: float | str, controlled: Channel, by: str = "--hold") -> tuple[float, str]:
     """Return the number and the unit of what was held, a key of its units; a number is in SI units.
 
@@ -262,9 +283,10 @@ def held_unit(value: float | str, controlled: Channel, by: str = "--hold") -> tu
     except ValueError as error:
         raise BiogripError(f"{by}: {error}.") from error
     unit = known_unit(written, controlled.units) if written else controlled.unit or "1"
-    if unit is None:
+    if unit is None or unit not in controlled.units:
         allowed = ", ".join(controlled.units)
-        found = f"found the unit '{shortened(written)}' of a {controlled.name}"
+        found = f"found the unit '{shortened(written)}' of a {controlled.title}"
+        found = found if written else "found no unit"
         others = [
             name for name, it in INSTRUMENTS.items() if known_unit(written, it.controlled.units)
         ]

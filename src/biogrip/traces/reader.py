@@ -293,7 +293,7 @@ def _checked(
         used &= clock <= columns.until_s
     values, lines, time_s = values[used], lines[used], time_s[used]
     _check_count(path, columns, len(values), without_number, f"usable {columns.axis}")
-    unit, end = columns.quantity.units[units[1]], "rad_per_s" if columns.partner else "s"
+    quantity, end = columns.quantity, "rad_per_s" if columns.partner else "s"
     form = {
         "gaps": without_number,
         "averaged": averaged or None,
@@ -301,9 +301,10 @@ def _checked(
         f"first_{end}": float(time_s[0]),
         f"last_{end}": float(time_s[-1]),
     }
-    readings, sd = values[:, 1] * (unit * columns.scale), None
+    readings, sd = quantity.in_si(values[:, 1], units[1], columns.scale), None
+    unit = quantity.units[units[1]]
     if columns.sd is not None:
-        sd = values[:, 2] * (unit * abs(columns.scale))
+        sd = values[:, 2] * (unit * abs(columns.scale)) * quantity.slope(values[:, 1] * unit)
     if columns.partner:
         moduli = _both_moduli(path, columns, units, values, lines)
         sd = (
@@ -498,8 +499,10 @@ def _load(path: Path, columns: Columns, history: Array, lines: IntArray, units: 
     if columns.average_repeated:
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
-    sizes: Array = history * [AXES[columns.axis][units[0]], columns.controlled.units[units[-1]]]
-    return sizes
+    time_s = history[:, 0] * AXES[columns.axis][units[0]]
+    sizes = columns.controlled.in_si(history[:, 1], units[-1])
+    # Before its contact a sphere neither presses nor indents.
+    return np.column_stack((time_s, np.maximum(sizes, 0.0) if columns.sphere_m else sizes))
 
 
 def _averaged(values: Array, lines: IntArray, first_sd: int = 2) -> tuple[Array, IntArray, int]:
