@@ -28,6 +28,7 @@ from biogrip.page.answers import (
     say_what_traces_tell,
     say_which_method_finds_it,
 )
+from biogrip.physics.models import ALIASES, MAXWELL_MODELS
 from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.rows import read_table
@@ -66,6 +67,16 @@ _MEASURED = {
 def config_keys() -> str:
     """Tables of every config key."""
     return reference(ROOT / "config" / "config.yaml")
+
+
+def sample_models() -> str:
+    """Models of springs and dampers: parameters, titles, and usual names."""
+    return _table(
+        {"model": f"`{model.name}`", "is": model.title}
+        | {"parameters": ", ".join(parameter.name for parameter in model.parameters)}
+        | {"usual names": ", ".join(name for name, of in ALIASES.items() if of == model.name)}
+        for model in MAXWELL_MODELS
+    )
 
 
 # N s/m
@@ -207,7 +218,6 @@ def answer() -> str:
     sentences = (
         say_what_the_study_gives(methods, own, titles, "Run again, the paper's", 1.0),
         say_which_method_finds_it(methods, own),
-        claims_counted().replace("claims", "[claims](docs/claims.md)", 1),
     )
     return "\n".join(f"- {sentence}" for sentence in sentences)
 
@@ -381,10 +391,11 @@ def _table(rows: Iterator[dict[str, str]]) -> str:
 
 
 PARTS: dict[Path, dict[str, Callable[[], str]]] = {
-    ROOT / "config" / "README.md": {"keys": config_keys},
+    ROOT / "docs" / "reference" / "config.md": {"keys": config_keys},
     ROOT / "README.md": {"answer": answer, "example": identified_example},
     ROOT / "docs" / "tutorial.md": {"printed": printed_example, "shorter": shorter_arms},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
+    ROOT / "docs" / "models.md": {"models": sample_models},
     ROOT / "docs" / "identifiability.md": {"slow": slow_branch, "methods": methods_compared},
     ROOT / "docs" / "measured.md": {"measured": measured},
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},

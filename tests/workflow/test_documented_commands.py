@@ -22,8 +22,8 @@ BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re
 # Of each document, what there is when the reader is through.
 LEFT = {
     "tutorial.md": [
-        *("first.json", "second.json", "results/summaries/mine.html"),
-        "results/tables/verdicts_longer.md",
+        *("first.json", "second.json", "my_study/results/summaries/mine.html"),
+        "my_study/results/tables/verdicts_longer.md",
     ],
     "groups.md": ["found.csv", "cells.png"],
     "design.md": ["my_designed.yaml"],

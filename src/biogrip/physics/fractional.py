@@ -24,7 +24,7 @@ A springpot has a modulus k_alpha (N/m, at 1 rad/s) and an exponent
 alpha; with a second one, k_beta and beta < alpha. All models are represented by Maxwell branches,
 as a `Network` like all other models. J is the creep compliance, G the relaxation modulus (N/m), t
 in seconds, E_(a,b) the Mittag-Leffler function, a = alpha - beta [1]_. What they are for, and their
-names in other programs, is in `docs/model.md`.
+names in other programs, is in `docs/models.md`.
 
 `springpot`, the power law of creeping cells: --<>--
     J = t^alpha/(k_alpha Gamma(1+alpha)), G = k_alpha t^-alpha/Gamma(1-alpha)
