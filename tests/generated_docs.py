@@ -84,13 +84,13 @@ _SLOW = 1000
 
 
 def paper_against_study() -> str:
-    """Tables 5 to 7 beside this study, of the published runs under readings."""
+    """Tables 5 to 7 beside this study, of the published runs under interpretations."""
     beside = read_table(PUBLISHED / "readings" / "tables" / "tables_5_to_7.csv")
     return _table(iter(rows_beside_the_paper(beside, _CASES)))
 
 
 def readings_compared() -> str:
-    """What each reading can print, how likely it prints it, and when it last improves."""
+    """What each interpretation can print, how likely it does, and when it last improves."""
     table = read_table(PUBLISHED / "readings" / "tables" / "readings.csv")
 
     def likelihood(row: dict[str, str], end: str) -> str:
@@ -102,7 +102,7 @@ def readings_compared() -> str:
     said += f"{len(table) - len(lost)} are not told apart.**"
     rows = _table(
         {
-            "reading": row["reading"],
+            "interpretation": row["reading"],
             "values held": f"{row['with_error']} of {row['values']}",
             "log₁₀ likelihood": likelihood(row, ""),
             "half the width": likelihood(row, "_half"),
@@ -118,7 +118,7 @@ def readings_compared() -> str:
 
 
 def choices() -> str:
-    """What each reading does to the headlines."""
+    """What each interpretation does to the headlines."""
     table = pd.read_csv(PUBLISHED / "readings" / "tables" / "readings_found.csv")
 
     def percent(rows: pd.DataFrame, case: str, name: str) -> str:
@@ -130,7 +130,7 @@ def choices() -> str:
         (cell,) = mine[mine["case"] == "endothelial_cell"].to_dict("records")
         shares = (100 * cell[f"near_noise_{end}"] for end in ("share", "from", "to"))
         rows.append(
-            {"reading": str(reading), "runs": str(cell["seeds"])}
+            {"interpretation": str(reading), "runs": str(cell["seeds"])}
             | {"cell near the noise": "{:.0f} % ({:.0f} to {:.0f} %)".format(*shares)}
             | {"error of k, cell": percent(mine, "endothelial_cell", "error_percent k")}
             | {"of k, drop 2": percent(mine, "liquid_drop_2", "error_percent k")}

@@ -130,6 +130,16 @@ def test_what_is_said_can_be_done(document: str, place: Path) -> None:
     assert [name for name in LEFT[document] if not (place / name).is_file()] == []
 
 
+@pytest.mark.nightly
+def test_what_the_readme_types_runs(place: Path) -> None:
+    (place / "tiny_fit.yaml").write_text(TINY_FIT)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for line in re.findall(r"^    (biogrip .*)$", text, re.MULTILINE):
+        run = ran(place, *_typed(shlex.split(line)), PYTHONPATH=str(place / "src"))
+        assert run.status == 0, run.output
+    assert all((place / name).is_file() for name in ("page.html", "found.csv", "cells.png"))
+
+
 def _typed(command: list[str]) -> list[str]:
     """Return a command such that a run is small."""
     program, *arguments = command

@@ -56,8 +56,7 @@ class MeasurementBlock(Block):
     rate_Hz: Annotated[float, Field(ge=1e-9, le=1e9)]
     """Sampling rate; the first sample is at t = 0."""
     file: _Name = None
-    """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. See
-    "Your own measurement"."""
+    """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs."""
     time: _Name = None
     """Name of the file's column of times; its clock starts with the protocol, or before."""
     rotation: _Name = None
