@@ -1,5 +1,6 @@
 """Parts of the documentation that are written from code and results; `make docs` renews them."""
 
+import ast
 import json
 import re
 import textwrap
@@ -368,6 +369,15 @@ def _quantities(text: str) -> str:
     return "\n".join(f"    {line.removeprefix('  ')}" for line in told)
 
 
+def folders() -> str:
+    """Packages of the library, by what they say of themselves."""
+    told = {
+        file.parent.name: str(ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))))
+        for file in sorted((ROOT / "src" / "biogrip").glob("*/__init__.py"))
+    }
+    return _table({"folder of `src/biogrip/`": name, "has": has} for name, has in told.items())
+
+
 def command_help() -> str:
     """What the command and each of its subcommands say of themselves."""
     overview = _help()
@@ -392,6 +402,7 @@ def _table(rows: Iterator[dict[str, str]]) -> str:
 PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "docs" / "reference" / "config.md": {"keys": config_keys},
     ROOT / "README.md": {"answer": answer, "example": identified_example},
+    ROOT / "CONTRIBUTING.md": {"folders": folders},
     ROOT / "docs" / "tutorial.md": {"printed": printed_example, "shorter": shorter_arms},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
     ROOT / "docs" / "models.md": {"models": sample_models},
@@ -413,8 +424,7 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
 SCHEMA = ROOT / "config" / "schema.json"
 GENERATED = (
     SCHEMA,
-    ROOT / "config" / "README.md",
-    ROOT / "README.md",
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "config/README.md")),
     *sorted((ROOT / "docs").rglob("*.md")),
 )
 
