@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from tests.generated_docs import GENERATED, renewed
+from tests.helpers.default import study_of
 from tests.helpers.places import ROOT
 
 # Its tables and their text are written by benchmarks.levels.
@@ -35,6 +36,15 @@ def test_what_is_written_by_hand_is_short() -> None:
 def test_generated_parts_are_up_to_date(document: Path) -> None:
     """If this fails: make docs."""
     assert renewed(document) == document.read_text(encoding="utf-8")
+
+
+def test_the_guides_configs_are_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    text = (ROOT / "config" / "README.md").read_text(encoding="utf-8")
+    configs = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    assert len(configs) > 5
+    for config in configs:
+        study_of(config)
 
 
 def test_promises_are_kept_by_tests_that_there_are() -> None:
