@@ -1,5 +1,6 @@
 """Parts of the documentation that are written from code and results; `make docs` renews them."""
 
+import ast
 import json
 import re
 import textwrap
@@ -28,6 +29,7 @@ from biogrip.page.answers import (
     say_what_traces_tell,
     say_which_method_finds_it,
 )
+from biogrip.physics.models import ALIASES, MAXWELL_MODELS
 from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import share_in_words
@@ -68,18 +70,28 @@ def config_keys() -> str:
     return reference(ROOT / "config" / "config.yaml")
 
 
+def sample_models() -> str:
+    """Models of springs and dampers: parameters, titles, and usual names."""
+    return _table(
+        {"model": f"`{model.name}`", "is": model.title}
+        | {"parameters": ", ".join(parameter.name for parameter in model.parameters)}
+        | {"usual names": ", ".join(name for name, of in ALIASES.items() if of == model.name)}
+        for model in MAXWELL_MODELS
+    )
+
+
 # N s/m
 _SLOW = 1000
 
 
 def paper_against_study() -> str:
-    """Tables 5 to 7 beside this study, of the published runs under readings."""
+    """Tables 5 to 7 beside this study, of the published runs under interpretations."""
     beside = read_table(PUBLISHED / "readings" / "tables" / "tables_5_to_7.csv")
     return _table(iter(rows_beside_the_paper(beside, _CASES)))
 
 
 def readings_compared() -> str:
-    """What each reading can print, how likely it prints it, and when it last improves."""
+    """What each interpretation can print, how likely it does, and when it last improves."""
     table = read_table(PUBLISHED / "readings" / "tables" / "readings.csv")
 
     def likelihood(row: dict[str, str], end: str) -> str:
@@ -91,7 +103,7 @@ def readings_compared() -> str:
     said += f"{len(table) - len(lost)} are not told apart.**"
     rows = _table(
         {
-            "reading": row["reading"],
+            "interpretation": row["reading"],
             "values held": f"{row['with_error']} of {row['values']}",
             "log₁₀ likelihood": likelihood(row, ""),
             "half the width": likelihood(row, "_half"),
@@ -107,7 +119,7 @@ def readings_compared() -> str:
 
 
 def choices() -> str:
-    """What each reading does to the headlines."""
+    """What each interpretation does to the headlines."""
     table = pd.read_csv(PUBLISHED / "readings" / "tables" / "readings_found.csv")
 
     def percent(rows: pd.DataFrame, case: str, name: str) -> str:
@@ -119,7 +131,7 @@ def choices() -> str:
         (cell,) = mine[mine["case"] == "endothelial_cell"].to_dict("records")
         shares = (100 * cell[f"near_noise_{end}"] for end in ("share", "from", "to"))
         rows.append(
-            {"reading": str(reading), "runs": str(cell["seeds"])}
+            {"interpretation": str(reading), "runs": str(cell["seeds"])}
             | {"cell near the noise": "{:.0f} % ({:.0f} to {:.0f} %)".format(*shares)}
             | {"error of k, cell": percent(mine, "endothelial_cell", "error_percent k")}
             | {"of k, drop 2": percent(mine, "liquid_drop_2", "error_percent k")}
@@ -207,7 +219,6 @@ def answer() -> str:
     sentences = (
         say_what_the_study_gives(methods, own, titles, "Run again, the paper's", 1.0),
         say_which_method_finds_it(methods, own),
-        claims_counted().replace("claims", "[claims](docs/claims.md)", 1),
     )
     return "\n".join(f"- {sentence}" for sentence in sentences)
 
@@ -338,15 +349,14 @@ def identified_example() -> str:
     truth = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]["sample"]
     del truth["model"]
     made = ", ".join(f"{name} = {in_digits(value)}" for name, value in truth.items())
-    missed = []
+    missed = ""
     for q in found["quantities"]:
         low, high = q["low"] or 0.0, q["high"] or np.inf
         if not low <= (true := truth.get(q["quantity"], low)) <= high:
-            off = in_digits(100 * abs((high if true > high else low) / true - 1), 1)
-            missed.append(f"{q['quantity']}, missed by {off} %")
+            side, limit = ("upper", high) if true > high else ("lower", low)
+            missed += f", but for {q['quantity']}: its {side} limit is {in_digits(limit, 4)}"
     told = _quantities(text).partition("    Any linear sample")[0].rstrip()
-    held = f"all but {' and '.join(missed)}" if missed else "all"
-    return f"{told}\n\nSimulated with {made}: the limits hold {held}."
+    return f"{told}\n\nThe limits hold the true values, {made}{missed}."
 
 
 def shorter_arms() -> str:
@@ -358,6 +368,15 @@ def _quantities(text: str) -> str:
     lines = [line.removeprefix("    ") for line in text.splitlines()]
     told = (line for line in lines if line.startswith(("  ", "Any linear sample")))
     return "\n".join(f"    {line.removeprefix('  ')}" for line in told)
+
+
+def folders() -> str:
+    """Packages of the library, by what they say of themselves."""
+    told = {
+        file.parent.name: str(ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))))
+        for file in sorted((ROOT / "src" / "biogrip").glob("*/__init__.py"))
+    }
+    return _table({"folder of `src/biogrip/`": name, "has": has} for name, has in told.items())
 
 
 def command_help() -> str:
@@ -382,10 +401,12 @@ def _table(rows: Iterator[dict[str, str]]) -> str:
 
 
 PARTS: dict[Path, dict[str, Callable[[], str]]] = {
-    ROOT / "config" / "README.md": {"keys": config_keys},
+    ROOT / "docs" / "reference" / "config.md": {"keys": config_keys},
     ROOT / "README.md": {"answer": answer, "example": identified_example},
+    ROOT / "CONTRIBUTING.md": {"folders": folders},
     ROOT / "docs" / "tutorial.md": {"printed": printed_example, "shorter": shorter_arms},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
+    ROOT / "docs" / "models.md": {"models": sample_models},
     ROOT / "docs" / "identifiability.md": {"slow": slow_branch, "methods": methods_compared},
     ROOT / "docs" / "measured.md": {"measured": measured},
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
@@ -404,8 +425,7 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
 SCHEMA = ROOT / "config" / "schema.json"
 GENERATED = (
     SCHEMA,
-    ROOT / "config" / "README.md",
-    ROOT / "README.md",
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "config/README.md")),
     *sorted((ROOT / "docs").rglob("*.md")),
 )
 

@@ -4,13 +4,47 @@ from pathlib import Path
 import pytest
 
 from tests.generated_docs import GENERATED, renewed
+from tests.helpers.default import study_of
 from tests.helpers.places import ROOT
+
+# Its tables and their text are written by benchmarks.levels.
+WRITTEN = ROOT / "docs" / "levels.md"
+DOCUMENTS = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "config/README.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
+NOT_PROSE = re.compile(
+    r"<!-- (\w+): begin.*?<!-- \1: end -->|<!--.*?-->|^ *```.*?^ *```$|^    [^\n]*$", re.S | re.M
+)
+"""Generated parts, marks of generated numbers, files and commands."""
+
+
+def words(text: str) -> int:
+    """How many words there are: what blanks part, with a letter or a digit."""
+    return sum(any(map(str.isalnum, word)) for word in text.split())
+
+
+def test_what_is_written_by_hand_is_short() -> None:
+    by_hand = {path: words(NOT_PROSE.sub("", path.read_text("utf-8"))) for path in DOCUMENTS}
+    del by_hand[WRITTEN]
+    assert sum(by_hand.values()) <= 11_000
+    assert len((ROOT / "config" / "README.md").read_text("utf-8").split()) <= 1000
+    assert len((ROOT / "README.md").read_text("utf-8").split()) <= 450
 
 
 @pytest.mark.parametrize("document", GENERATED, ids=lambda path: str(path.relative_to(ROOT)))
 def test_generated_parts_are_up_to_date(document: Path) -> None:
     """If this fails: make docs."""
     assert renewed(document) == document.read_text(encoding="utf-8")
+
+
+def test_the_guides_configs_are_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    text = (ROOT / "config" / "README.md").read_text(encoding="utf-8")
+    configs = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    assert len(configs) > 5
+    for config in configs:
+        study_of(config)
 
 
 def test_promises_are_kept_by_tests_that_there_are() -> None:
@@ -20,18 +54,9 @@ def test_promises_are_kept_by_tests_that_there_are() -> None:
     assert [name for name in promised if f"def {name}(" not in tests] == []
 
 
-@pytest.mark.parametrize(
-    "document",
-    [
-        "README.md",
-        "CONTRIBUTING.md",
-        "config/README.md",
-        *sorted(path.relative_to(ROOT) for path in (ROOT / "docs").rglob("*.md")),
-    ],
-)
-def test_links_lead_somewhere(document: str | Path) -> None:
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_lead_somewhere(path: Path) -> None:
     """To a file: the site has no page of a folder, and is not built where one is linked."""
-    path = ROOT / document
     text = path.read_text(encoding="utf-8")
     links = re.findall(r"\]\(([^)#]*)(?:#[^)]*)?\)", text)
     # What is above the first # of a link is empty where it leads to another part of the text.

@@ -17,6 +17,7 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.terminal import visible, visible_lines
 
 _SHOWN = 200
+_USUAL = ("sls", "zener_kelvin", "kelvin_voigt", "maxwell", "burgers", "power_law")
 
 # Imports are inside the commands, so that jobs import only what they use.
 
@@ -75,14 +76,17 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _models() -> str:
-    """Return the names and titles of the sample models."""
+    """Return the names and titles of the sample models, usual ones first."""
     from biogrip.physics.models import ALIASES, MODELS
 
     width = max(map(len, MODELS))
-    lines = ["\nsample models (usual names; prony3: generalized_maxwell_3 without c_p):"]
-    for name, model in MODELS.items():
-        usual = ", ".join(alias for alias, of in ALIASES.items() if of == name)
-        lines.append(f"  {name:<{width}}  {model.title}" + (f" ({usual})" if usual else ""))
+    lines = ["\nsample models (other names; prony3: generalized_maxwell_3 without c_p):"]
+    shown = {ALIASES.get(name, name): name for name in _USUAL}
+    shown |= {name: name for name in MODELS if name not in shown}
+    for name, usual in shown.items():
+        others = [other for other in (*ALIASES, *MODELS) if ALIASES.get(other, other) == name]
+        also = ", ".join(other for other in others if other != usual)
+        lines.append(f"  {usual:<{width}}  {MODELS[name].title}" + (f" ({also})" if also else ""))
     return "\n".join([*lines, ""])
 
 
@@ -136,15 +140,14 @@ def _read(reader: Callable[[str], Any]) -> Callable[[str], Any]:
 
 _SETTINGS: dict[str, list[tuple[str, str, str]]] = {
     "the file's columns": [
-        ("--time", "COLUMN", "of times [time_s]"),
-        ("--frequency", "COLUMN", "of frequencies, of a sweep"),
         (
             *("--reading", "[QUANTITY=]COLUMN"),
             "of readings [rotation=rotation_rad]; or displacement, strain, compliance (creep), "
             "force, stress, modulus, relative_modulus (relaxation); of a sweep storage, "
             "complex_modulus or storage_stiffness, and loss, phase or loss_factor by a second one",
         ),
-        ("--sd", "COLUMN", "of the readings' standard deviations"),
+        ("--time", "COLUMN", "of times [time_s]"),
+        ("--frequency", "COLUMN", "of frequencies, of a sweep"),
     ],
     "what was done": [
         (
@@ -163,21 +166,18 @@ _SETTINGS: dict[str, list[tuple[str, str, str]]] = {
         ("--from", "PLACE", "first time, s, or frequency as written, to use [all]"),
         ("--until", "PLACE", "last time, s, or frequency as written, to use [all]"),
     ],
-    "the noise and the instrument": [
-        ("--noise", "SD", "known noise, in the readings' SI unit"),
-        ("--noise-model", "NAME", "white, or coloured: autocorrelated"),
-        (
-            "--noise-share",
-            "SHARE",
-            "known noise, as a share of the readings",
-        ),
-        ("--offset", "", "fit an offset along, or not"),
-        ("--drift", "", "fit a linear drift along, or not"),
-    ],
     "the sample": [
-        ("--model", "NAME", "sample model [generalized_maxwell]"),
+        ("--model", "NAME", "sample model, see below [generalized_maxwell]"),
         ("--fix", "NAME=VALUE", "known parameter, SI units; 0 for no element; repeatable"),
         ("--at", "SECONDS,...", "times after a step at which to tell what any model would"),
+    ],
+    "the noise and the instrument": [
+        ("--noise", "SD", "known noise, in the readings' SI unit"),
+        ("--noise-share", "SHARE", "known noise, as a share of the readings"),
+        ("--sd", "COLUMN", "column of the readings' standard deviations"),
+        ("--noise-model", "NAME", "white, or coloured: autocorrelated"),
+        ("--offset", "", "fit an offset along, or not"),
+        ("--drift", "", "fit a linear drift along, or not"),
     ],
     "any other key of the config": [
         (
@@ -212,6 +212,11 @@ def _identify_parser(stages: Any) -> None:
     identify.lists_models = True
     identify.examples = _examples(
         "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
+        "identify creep.csv --reading 'strain=Strain [%]' --time 'Time [s]' --hold 5Pa --model sls",
+        "identify dwell.txt --reading 'force=Load (uN)' --time 'Time (s)' "
+        "--load 'Indentation (nm)' --model sls",
+        """identify sweep.csv --reading "storage=G' (Pa)" --reading "loss=G'' (Pa)" """
+        "--frequency 'f (Hz)' --model power_law",
         "identify cells.tsv --config my_gripper.yaml --csv found.csv",
         cost="A trace takes seconds, most of them for comparing the sample models: --no-compare.",
     )
@@ -239,11 +244,14 @@ def _identify_parser(stages: Any) -> None:
             of_key = {"dest": "model_selection.models", "nargs": 0, "const": []}
             text = "do not try other models, which takes most of the time"
             group.add_argument("--no-compare", action=_Set, help=text, **of_key)
-    output = identify.add_argument_group("output")
-    output.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row per trace")
-    output.add_argument("--report", type=Path, metavar="PAGE", help="HTML page with pictures")
+            _add_outputs(identify.add_argument_group("output"))
+
+
+def _add_outputs(group: Any) -> None:
+    group.add_argument("--report", type=Path, metavar="PAGE", help="HTML page with pictures")
+    group.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row per trace")
     text = "JSON file, of one trace [TRACE.identified.json]"
-    output.add_argument("--output", type=Path, metavar="FILE", help=text)
+    group.add_argument("--output", type=Path, metavar="FILE", help=text)
 
 
 def _groups_parser(stages: Any) -> None:

@@ -22,8 +22,8 @@ BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re
 # Of each document, what there is when the reader is through.
 LEFT = {
     "tutorial.md": [
-        *("first.json", "second.json", "results/summaries/mine.html"),
-        "results/tables/verdicts_longer.md",
+        *("first.json", "second.json", "my_study/results/summaries/mine.html"),
+        "my_study/results/tables/verdicts_longer.md",
     ],
     "groups.md": ["found.csv", "cells.png"],
     "design.md": ["my_designed.yaml"],
@@ -128,6 +128,16 @@ def test_what_is_said_can_be_done(document: str, place: Path) -> None:
             run = ran(place, *command, PYTHONPATH=str(place / "src"))
             assert run.status == 0, run.output
     assert [name for name in LEFT[document] if not (place / name).is_file()] == []
+
+
+@pytest.mark.nightly
+def test_what_the_readme_types_runs(place: Path) -> None:
+    (place / "tiny_fit.yaml").write_text(TINY_FIT)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for line in re.findall(r"^    (biogrip .*)$", text, re.MULTILINE):
+        run = ran(place, *_typed(shlex.split(line)), PYTHONPATH=str(place / "src"))
+        assert run.status == 0, run.output
+    assert all((place / name).is_file() for name in ("page.html", "found.csv", "cells.png"))
 
 
 def _typed(command: list[str]) -> list[str]:

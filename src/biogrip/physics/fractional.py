@@ -19,7 +19,7 @@ H = L_1 + L_2. It has branches at the zeros -x of H, with the springs L_1(-x)^2/
 both ladders have branches, at the shared rates p_j, with the springs W_1j W_2j/(W_1j + W_2j).
 
 J is the creep compliance, G the relaxation modulus (N/m), t in seconds, E_(a,b) the Mittag-Leffler
-function, a = alpha - beta [1]_; `docs/model.md` has what the models are for.
+function, a = alpha - beta [1]_; `docs/models.md` has what the models are for.
 
 `springpot`, the power law of creeping cells: --<>--
     J = t^alpha/(k_alpha Gamma(1+alpha)), G = k_alpha t^-alpha/Gamma(1-alpha)

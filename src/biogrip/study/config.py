@@ -60,7 +60,7 @@ class Evaluation(Block):
 
 @dataclass(frozen=True)
 class ReadingBlock(Block):
-    """A reading of what the paper leaves open: changes to every simulated case."""
+    """An interpretation of what the paper leaves open: changes to every simulated case."""
 
     title: Printed
     """Name in print."""
@@ -151,8 +151,8 @@ class StudyConfig(Shared):
     readings: Annotated[Mapping[_Name, ReadingBlock], Field(max_length=100)] = field(
         default_factory=dict
     )
-    """Readings of the paper, by name, each tried with the genetic algorithm on the noisy
-    traces of every simulated case, for a table."""
+    """Interpretations of the paper's text, by name, each tried with the genetic algorithm on the
+    noisy traces of every simulated case, for a table."""
 
     def complaints(self) -> Iterator[Complaint]:
         """Find too many jobs, samples that do not fit, and names of nothing that there is."""

@@ -71,49 +71,48 @@ class MeasurementBlock(Block):
     rate_Hz: Annotated[float, Field(ge=1e-9, le=1e9)]
     """Sampling rate; the first sample is at t = 0."""
     file: _Name = None
-    """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. See
-    "Your own measurement"."""
+    """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs."""
     time: _Name = None
     """Name of the file's column of times; its clock starts with the protocol, or before."""
     rotation: _Name = None
     """Name of the file's column of the left arm's closing rotation."""
     displacement: _Name = None
-    """Name of the file's column of displacements under a force that is held (`instrument:
-    creep`)."""
+    """Name of the column of displacements under a held force (`instrument: creep`)."""
     strain: _Name = None
-    """Name of that of strains under a stress that is held (creep)."""
+    """Name of the column of strains under a held stress (creep)."""
     compliance: _Name = None
-    """Name of that of creep compliances: strains over the largest stress that is held (creep)."""
+    """Name of the column of creep compliances, strains over the largest held stress (creep)."""
     force: _Name = None
-    """Name of that of forces at a displacement that is held (`instrument: relaxation`)."""
+    """Name of the column of forces at a held displacement (`instrument: relaxation`)."""
     stress: _Name = None
-    """Name of that of stresses at a strain that is held (relaxation)."""
+    """Name of the column of stresses at a held strain (relaxation)."""
     modulus: _Name = None
-    """Name of that of relaxation moduli: stresses over the largest strain that is held
+    """Name of the column of relaxation moduli, stresses over the largest held strain
     (relaxation)."""
     relative_modulus: _Name = None
-    """Name of that of relaxation moduli over another one, as G/G0, which have no unit
+    """Name of the column of relaxation moduli over another one, as G/G0, without a unit
     (relaxation)."""
     storage: _Name = None
-    """Name of that of storage moduli of a frequency sweep (`instrument: oscillation`)."""
+    """Name of the column of storage moduli of a frequency sweep (`instrument: oscillation`)."""
     complex_modulus: _Name = None
-    """Name of that of absolute values of the complex modulus (oscillation)."""
+    """Name of the column of absolute values of the complex modulus (oscillation)."""
     storage_stiffness: _Name = None
-    """Name of that of storage moduli in N/m (oscillation)."""
+    """Name of the column of storage stiffnesses, in N/m (oscillation)."""
     frequency: _Name = None
-    """Name of the file's column of frequencies of a sweep, in any order."""
+    """Name of the column of frequencies of a sweep, in any order."""
     loss: _Name = None
-    """Name of that of loss moduli; a sweep has this, phase or loss_factor."""
+    """Name of the column of loss moduli; a sweep has this, `phase` or `loss_factor`."""
     phase: _Name = None
-    """Name of that of phases between strain and stress."""
+    """Name of the column of phases between strain and stress."""
     loss_factor: _Name = None
-    """Name of that of loss factors, loss over storage modulus (tan delta)."""
+    """Name of the column of loss factors, loss over storage modulus (tan delta)."""
     frequency_unit: Annotated[str | None, OneOf(_FREQUENCIES), _unit(_FREQUENCIES)] = None
     """Unit of the frequencies, where the column's name does not end in it."""
     partner_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
-    """Unit of loss moduli or phases, likewise; of loss moduli by default that of the readings."""
+    """Unit of loss moduli or phases, where the column's name does not end in it; of loss moduli by
+    default that of the storage moduli."""
     loss_sd: _Name = None
-    """Name of that of standard deviations of the loss moduli, where sd has those of the others."""
+    """Name of the column of the loss moduli's standard deviations; `sd` has those of the others."""
     time_unit: Annotated[str | None, OneOf(TIME_UNITS), _unit(TIME_UNITS)] = None
     """Unit of the times, where the column's name does not end in it."""
     rotation_unit: Annotated[str | None, OneOf(ROTATION.units), _unit(ROTATION.units)] = None
@@ -132,7 +131,7 @@ class MeasurementBlock(Block):
     to row, from start_s on; without that from its first row or, if there it is not zero, from 0.
     Only for `biogrip identify`."""
     load_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
-    """Unit of that column, where its name does not end in it."""
+    """Unit of the column `load`, where its name does not end in it."""
     sphere: Annotated[str | None, Field(min_length=1, max_length=40)] = None
     """Radius of a sphere that indents the sample, with its unit, as `2.5 um`. The column of the
     stress then has its force, and that of the strain its indentation, and moduli are Young's, by
@@ -153,7 +152,7 @@ class MeasurementBlock(Block):
     """Time of the file's clock at which the protocol starts. Readings before it tell of the zero
     only. By default 0, before which there may be none."""
     fit_start: bool = False
-    """If true, fit that time along; the limits allow for its uncertainty. By default false."""
+    """If true, fit the start along; the limits allow for its uncertainty. By default false."""
     noise_rad: Annotated[float | None, Field(ge=1e-15, le=1e12)] = None
     """Standard deviation of the recorded noise, if it is known; by default it is estimated from the
     residuals."""
