@@ -64,7 +64,7 @@ _NONE = 1e-9
 
 # Share of a value below which a lower limit says no more than that it is positive.
 _LITTLE = 0.01
-# Ratio beyond which an upper limit hangs on the fastest lag that is tried; no ratio is sought there.
+# Ratio beyond which an upper limit hangs on the fastest lag that is tried, and is not sought.
 _MOST = 1e4
 # Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
 _UNITS = {
