@@ -10,7 +10,7 @@ the trace without noise, and whether it is there; its level is that of each of o
     python -m benchmarks.levels                        every set-up, and docs/levels.md
     python -m benchmarks.levels recorded --traces 20   of a group, or by their first words
 
-Rows are kept in `results/levels`, a file a set-up; what is there is not measured again.
+Traces are added to those that docs/levels.csv has counted; remove rows to count anew.
 """
 
 import argparse
@@ -290,7 +290,7 @@ def _set_ups() -> list[SetUp]:
         ("2,000 readings", "relaxation", {"time_s": even(2000)}, told),
         ("60 readings over 3 decades", "creep", {"time_s": log(3)}, told),
         ("60 readings over 6 decades", "relaxation", {"time_s": log(6)}, told),
-        ("short: 5 to 50 % of tau", "creep", {"time_s": even(100), "lasts": 0.025}, told),
+        ("short: 5 to 50 % of tau", "creep", {"time_s": even(100), "lasts": 0.01}, told),
         ("long: 50 to 500 tau", "relaxation", {"time_s": even(400), "lasts": 10.0}, told),
         (
             "noise of 10 %, told",
@@ -356,12 +356,12 @@ def _times(decades: int, n: int) -> Array:
     return (np.geomspace if decades else np.linspace)(first, _LASTS_S, n)
 
 
-def measure(set_up: SetUp, traces: int) -> dict[str, Any]:
-    """Identify traces of a set-up by the command, and count what it says."""
+def measure(set_up: SetUp, traces: int, first: int = 0) -> dict[str, Any]:
+    """Identify traces of a set-up by the command, from a number on, and count what it says."""
     from biogrip.cli import main as command
 
     numbers = [_SEED, *set_up.name.encode()]
-    made = [set_up.make(np.random.default_rng([*numbers, n])) for n in range(traces)]
+    made = [set_up.make(np.random.default_rng([*numbers, n])) for n in range(first, first + traces)]
     with TemporaryDirectory() as folder:
         files = [Path(folder) / f"{n:04}.csv" for n in range(traces)]
         for file, trace in zip(files, made, strict=True):
@@ -376,15 +376,9 @@ def measure(set_up: SetUp, traces: int) -> dict[str, Any]:
         for name, value in trace.truth.items():
             low, high = (_end(row, name, end) for end in ("low", "high"))
             if low == low or high == high:
-                limits.append(
-                    (
-                        name,
-                        not (value < low or value > high),
-                        row["fit"] == "ok",
-                        low == low and high == high,
-                    )
-                )
-    told = pd.DataFrame(limits, columns=["quantity", "holds", "ok", "both"])
+                holds = not (value < low or value > high)
+                limits.append((name, holds, row["fit"] == "ok"))
+    told = pd.DataFrame(limits, columns=["quantity", "holds", "ok"])
     reasons = found["reasons"].fillna("")
     return {
         "group": set_up.group,
@@ -396,15 +390,13 @@ def measure(set_up: SetUp, traces: int) -> dict[str, Any]:
         "limits_of_ok": int(told["ok"].sum()),
         "hold_of_ok": int((told["holds"] & told["ok"]).sum()),
         "best_test": float(np.mean([trace.best for trace in made])),
-        "each_quantity": "; ".join(
-            f"{name} {int(its['holds'].sum())} of {len(its)}"
-            for name, its in told.groupby("quantity", sort=False)
+        **{test: int(reasons.str.contains(words).sum()) for test, words in ALARMS.items()},
+        "held_by_quantity": json.dumps(
+            {
+                name: [int(its["holds"].sum()), len(its)]
+                for name, its in told.groupby("quantity", sort=False)
+            }
         ),
-        **{
-            test: int(reasons.str.contains(words).sum())
-            for test, words in ALARMS.items()
-        },
-        "reasons": json.dumps(dict(Counter(filter(None, reasons.str[:60])).most_common(5))),
     }
 
 
@@ -516,22 +508,42 @@ def main() -> None:
     every = _set_ups()
     for set_up in every:
         if not asked.names or f"{set_up.group} {set_up.name}".startswith(tuple(asked.names)):
-            row = measure(set_up, asked.traces)
+            rows = pd.read_csv(asked.table) if asked.table.is_file() else pd.DataFrame()
+            before = [it for it in rows.to_dict("records") if it["set_up"] == set_up.name]
+            first = before[0]["traces"] if before else 0
+            row = added(*before, measure(set_up, asked.traces, first))
             print(*(f"{name}: {value}" for name, value in row.items()), sep="; ", flush=True)
-            add(row, asked.table)
+            write({it["set_up"]: it for it in (*rows.to_dict("records"), row)}, asked.table)
 
 
-def add(row: dict[str, Any], table: Path) -> None:
-    """Write a row in the place of that of the same set-up, and the page if all are there."""
-    keys, names = ["group", "set_up"], [[each.group, each.name] for each in _set_ups()]
-    rows = pd.DataFrame([row])
-    if table.is_file():
-        rows = pd.concat([pd.read_csv(table), rows]).drop_duplicates(keys, keep="last")
-    place = {tuple(pair): number for number, pair in enumerate(names)}
-    rows = rows.iloc[np.argsort([place.get(tuple(it), 10**6) for it in rows[keys].to_numpy()])]
-    write_text(table, rows.to_csv(index=False, float_format="%.4g"))
-    if place.keys() <= {*map(tuple, rows[keys].to_numpy())}:
-        write_text(table.with_suffix(".md"), _page(rows))
+def added(row: dict[str, Any], *more: dict[str, Any]) -> dict[str, Any]:
+    """Return the counts of rows of one set-up together."""
+    for other in more:
+        counts = [name for name, value in row.items() if isinstance(value, int)]
+        quantities, others = (json.loads(it["held_by_quantity"]) for it in (row, other))
+        for name, pair in others.items():
+            quantities[name] = [
+                a + b for a, b in zip(pair, quantities.get(name, (0, 0)), strict=True)
+            ]
+        best = np.average(
+            [it["best_test"] for it in (row, other)], weights=[it["traces"] for it in (row, other)]
+        )
+        row = {
+            **row,
+            **{name: row[name] + other[name] for name in counts},
+            "best_test": float(best),
+            "held_by_quantity": json.dumps(quantities),
+        }
+    return row
+
+
+def write(rows: dict[str, dict[str, Any]], table: Path) -> None:
+    """Write rows in the order of their set-ups, and the page if all are there."""
+    names = [set_up.name for set_up in _set_ups()]
+    found = pd.DataFrame([rows[name] for name in names if name in rows])
+    write_text(table, found.to_csv(index=False, float_format="%.4g"))
+    if len(found) == len(names):
+        write_text(table.with_suffix(".md"), _page(found))
 
 
 if __name__ == "__main__":
