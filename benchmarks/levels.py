@@ -421,7 +421,7 @@ All should be ok, and 95 % of limits should hold the truth.
 
 {right}
 
-Tests, and how many of these {n} traces and {more} more below each blamed. The level of each is
+Tests, and how many of these traces and of those below, {n}, each blamed. The level of each is
 0.3 %, or 0.1 % if it may reject a fit:
 
 {tests}
@@ -448,23 +448,18 @@ knows the shape that the right model's best fit leaves: more than anybody knows.
 
 
 def _table(rows: pd.DataFrame, *, wrong: bool = False) -> str:
-    lines = [
-        {
-            "set-up": row["set_up"],
-            "traces": row["traces"],
-            "ok": share_in_words(row["ok"], row["traces"]),
-            "rejected": share_in_words(row["rejected"], row["traces"]),
-        }
-        | (
-            {
-                "limits of ok ones that hold": f"{row['hold_of_ok']} of {row['limits_of_ok']}",
-                "best test": f"{100 * row['best_test']:.0f} %",
-            }
-            if wrong
-            else {"limits that hold": _held(row)}
-        )
-        for row in rows.to_dict("records")
-    ]
+    """Return a line a set-up, of wrong ones with the power of the best possible test."""
+    lines = []
+    for row in rows.to_dict("records"):
+        line = {each: row[each] for each in ("set_up", "traces")}
+        line["ok"] = share_in_words(row["ok"], row["traces"])
+        if wrong:
+            line["limits of these that hold"] = f"{row['hold_of_ok']} of {row['limits_of_ok']}"
+            line["rejected"] = row["rejected"]
+            line["best test"] = f"{100 * row['best_test']:.0f} %"
+        else:
+            line["limits that hold"] = _held(row)
+        lines.append(line)
     return str(pd.DataFrame(lines).to_markdown(index=False, disable_numparse=True))
 
 
@@ -481,15 +476,15 @@ def _page(rows: pd.DataFrame) -> str:
     def share(rows: pd.DataFrame, of: str, among: str = "traces") -> str:
         return share_in_words(int(rows[of].sum()), int(rows[among].sum()))
 
-    tests = [{"test": test, "blamed": share(right, test)} for test in ALARMS]
+    in_time = pd.concat([of[RIGHT], of[LOAD]])
+    tests = [{"test": test, "blamed": share(in_time, test)} for test in ALARMS]
     return _PAGE.format(
         answer=(
             f"**Of {right['traces'].sum()} traces whose set-up is right {share(right, 'ok')} are "
             f"ok, and {share(right, 'hold', 'limits')} of their limits hold the truth. Of "
             f"{wrong['traces'].sum()} with an error {share(wrong, 'ok')} pass as ok.**"
         ),
-        n=of[RIGHT]["traces"].sum(),
-        more=right["traces"].sum() - of[RIGHT]["traces"].sum(),
+        n=in_time["traces"].sum(),
         right=_table(of[RIGHT]),
         tests=pd.DataFrame(tests).to_markdown(index=False, disable_numparse=True),
         load=_table(of[LOAD]),
