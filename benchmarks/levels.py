@@ -1,23 +1,28 @@
-"""How often verdicts are right: on traces of right set-ups, and of wrong ones.
+"""How often verdicts and limits are right: simulated traces, identified by the command.
 
-A cell of the table is an instrument, a number of readings, their times, and what is read. The
-relaxation time of each trace's sample is drawn between 1 and 20 % of the trace. Every trace is
-fitted from random starts and judged as a user's is, but for what needs other models' fits.
+Responses are closed forms written here, courses that are recorded are followed in small steps, and
+sweeps are complex moduli; each trace draws its own parameters and noise. A set-up is right, or what
+is read is of another than the command is told.
 
-    python -m benchmarks.levels                      every cell that is not there, and the page
-    python -m benchmarks.levels creep 10 --traces 5  one cell
+The best possible test of a wrong set-up knows the shape that the right model's best fit leaves of
+the trace without noise, and whether it is there; its level is that of each of our tests.
 
-Cells are kept in `results/levels`; remove those that are to be measured again.
+    python -m benchmarks.levels                        every set-up, and docs/levels.md
+    python -m benchmarks.levels recorded --traces 20   of a group, or by their first words
+
+Traces are added to those that docs/levels.csv has counted; remove rows to count anew.
 """
 
 import argparse
+import json
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
 from functools import partial
-from itertools import product
-from multiprocessing import get_context
+from io import StringIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -26,286 +31,519 @@ import pandas as pd
 from benchmarks.one_thread import keep_to_one_thread
 from biogrip.arrays import Array
 from biogrip.files import write_text
-from biogrip.fit.experiment import Experiment
-from biogrip.fit.genome import GeneRange
-from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
-from biogrip.fit.problem import Fit, TraceProblem, silent
-from biogrip.judging.diagnosis import Diagnosis, diagnose_all
-from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED, compute_status, examine_residuals
-from biogrip.judging.likelihood import make_likelihood
-from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
-from biogrip.physics.instruments import GRIPPER, INSTRUMENTS
-from biogrip.physics.models import Sample
-from biogrip.physics.noise import stream
-from biogrip.physics.protocol import Phase, hold, ramp
-from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import share_in_words
 
-INSTRUMENTS_JUDGED = ("creep", "relaxation", "gripper")
-READINGS = (10, 20, 40, 80, 400, 4000)
-"""Numbers of readings of a trace."""
+Rng = np.random.Generator
+Course = Callable[[Array], Array]
+Values = dict[str, float]
+_SEED, _NOISE, _LASTS_S, _LEVEL = 20261128, 0.02, 100.0, 0.003
+# A set-up of which nobody knows the start.
+_UNKNOWN = "late clock"
+# Steps of a recorded course between two rows.
+_FINE = 200
+RIGHT, WRONG, LOAD, SWEEP, _TAKEN = "right", "wrong", "recorded load", "sweep", " taken for "
 
-_SEED, _LASTS_S, _CONFIDENCE = 2019, 100.0, 0.95
-_DECADES = (0, 3, 6)
-# Standard deviation of the noise, an outlier's distance, and a step of rounding in units of it.
-_NOISE, _OUTLIER, _STEP = 0.02, 15.0, 2.0
-_LATE_S, _RAMP_S, _MINUTE_S = 5.0, 10.0, 60.0
-_BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
-# Traces that are fitted together; and those whose misfit is computed without noise.
-_TOGETHER, _SOME = 50, 10
-_RANGES = dict.fromkeys(("k", "k_p", "c", "c_p"), GeneRange((-6, 8), (1, 9)))
-# Without inertia, as fits are: its ringing would be read where times begin within milliseconds.
-_ARM = Arm(inertia_kgm2=0.0, damping_Nms_per_rad=3.3e-12, stiffness_Nm_per_rad=4.4e-7)
-_GRIPPER = Gripper(arm_length_m=1.5e-3, reference_angle_deg=75.0, left=_ARM, right=_ARM)
-_TORQUES = (1.6e-9, 0.32e-9)
-_TOLD, _UNTOLD, _ROUNDED = "noise that grows, told", "noise that grows", "white noise, rounded"
-RIGHT = ("white noise", _TOLD, _UNTOLD, _ROUNDED)
-"""What is read with the right set-up."""
-WRONG = (
-    "another model",
-    "late start",
-    "one outlier",
-    "wrong protocol",
-    "missing ramp",
-    "wrong unit of time",
-)
-"""What is wrong, with white noise."""
+ALARMS = {
+    "neighbours are correlated": "Neighbouring residuals",
+    "uneven spectrum": "more of some frequencies",
+    "means of stretches": "residual wanders",
+    "line in the spectrum": "line in its spectrum",
+    "step at any time": "readings change at",
+    "halves differ": "each fitted by itself",
+    "outliers": "further from the fit than noise",
+    "growing noise": "The noise grows",
+    "misfit": "the noise of ",
+    "offset or drift": "fitted along",
+    "another start, or a ramp": "readings begin|protocol starts there|no step but a ramp",
+}
+"""Tests, by what their sentences have."""
 
-_MODELS = {"creep": "kelvin_voigt", "relaxation": "zener_maxwell", "gripper": "liquid_drop"}
+
+@dataclass(frozen=True)
+class Trace:
+    """A simulated trace."""
+
+    columns: dict[str, Array]
+    truth: Values
+    best: float = np.nan
+    """Power of the best possible test of what is wrong."""
+
+
+@dataclass(frozen=True)
+class SetUp:
+    """What is simulated, and what the command is told."""
+
+    group: str
+    name: str
+    make: Callable[[Rng], Trace]
+    options: tuple[str, ...]
+
+
+def zener(t: Array, k: float, k_p: float, c: float) -> Array:
+    """Relaxation modulus of a Zener solid."""
+    found: Array = k_p + k * np.exp(-t * k / c)
+    return found
+
+
+def compliance(t: Array, k_s: float, k_v: float, c_v: float) -> Array:
+    """Creep compliance of a Zener solid."""
+    found: Array = 1 / k_s - np.expm1(-t * k_v / c_v) / k_v
+    return found
+
+
+def _zener(rng: Rng, last_s: float) -> Values:
+    """Draw a relaxation time between 2 and 20 % of a trace, and springs."""
+    k, k_p = 80 * 2 ** rng.uniform(-1, 1, 2)
+    return {"k": k, "k_p": k_p, "c": k * last_s * 10 ** rng.uniform(-1.7, -0.7)}
+
+
+def _kelvin(rng: Rng, last_s: float) -> Values:
+    k_s, k_v, c_v = _zener(rng, last_s).values()
+    return {"k_s": k_s, "k_v": k_v, "c_v": c_v * k_v / k_s}
+
+
+_RESPONSES = {
+    "relaxation": (zener, _zener, ("modulus_Pa", "--reading=modulus", "--model=zener_maxwell")),
+    "creep": (
+        compliance,
+        _kelvin,
+        ("J (1/Pa)", "--reading=compliance=J (1/Pa)", "--model=zener_kelvin"),
+    ),
+}
+Change = Callable[[Array, Course, Rng, float], Array]
+"""What is read at times of a response, and with noise of which size, if something is wrong."""
+
+
+def held(
+    rng: Rng,
+    kind: str,
+    time_s: Array,
+    lasts: float = 1.0,
+    change: Change | None = None,
+    rounded: float = 0.0,
+    share: float = 0.0,
+) -> Trace:
+    """Return a trace of what is held from 0; `lasts` are its times over those of its sample."""
+    response, draw, (column, *_) = _RESPONSES[kind]
+    truth = draw(rng, time_s[-1] / lasts)
+    clean = response(time_s, *truth.values())
+    sd, best = _NOISE * float(np.max(clean)), np.nan
+    if change:
+        of = partial(_of, response, truth)
+        clean = change(time_s, of, rng, sd)
+        best = _best(response, truth, time_s, clean / sd, sd)
+    read = clean + (share * clean if share else sd) * rng.standard_normal(len(clean))
+    if rounded:
+        read = np.round(read / (rounded * sd)) * rounded * sd
+    return Trace({"time_s": time_s, column: read}, truth, best)
+
+
+def _of(response: Any, truth: Values, time_s: Array) -> Array:
+    return np.where(time_s > 0, response(np.maximum(time_s, 0.0), *truth.values()), 0.0)
+
+
+def _best(response: Any, truth: Values, time_s: Array, in_noise: Array, sd: float) -> float:
+    """Return the power of an F test of the shape that the best fit leaves of a trace."""
+    from scipy.optimize import least_squares
+    from scipy.stats import f, ncf
+
+    def left(logs: Array) -> Array:
+        found: Array = response(time_s, *np.exp(logs)) / sd - in_noise
+        return found
+
+    start = np.log([*truth.values()])
+    rest = least_squares(left, start, bounds=(start - 9, start + 9)).fun
+    free = len(time_s) - len(start) - 1
+    return float(ncf.sf(f.isf(_LEVEL, 1, free), 1, free, max(float(rest @ rest), 1e-9)))
+
+
+def _late(time_s: Array, of: Course, _rng: Rng, _sd: float) -> Array:
+    return of(time_s - 0.02 * time_s[-1])
+
+
+def _ramp(time_s: Array, of: Course, _rng: Rng, _sd: float) -> Array:
+    shares = (np.arange(100) + 0.5) / 100
+    return np.mean([of(time_s - share * 0.1 * time_s[-1]) for share in shares], axis=0)
+
+
+def _two_branches(time_s: Array, of: Course, _rng: Rng, _sd: float) -> Array:
+    return 0.5 * (of(time_s) + of(time_s / 10))
+
+
+CHANGES: dict[str, Change] = {
+    "jump of 2 noises halfway": lambda t, of, _, sd: of(t) + 2 * sd * (t > t[-1] / 2),
+    "gain 10 % lower after half": lambda t, of, *_: of(t) * np.where(t > t[-1] / 2, 0.9, 1.0),
+    "start 2 % of the trace late": _late,
+    "ramp of 10 % taken for a step": _ramp,
+    "first two readings 5 noises high": lambda t, of, _, sd: of(t) + 5 * sd * (t <= t[1]),
+    "drift of 3 noises": lambda t, of, _, sd: of(t) + 3 * sd * t / t[-1],
+    "two branches, ten times apart": _two_branches,
+}
+"""What may be wrong with what is read."""
+
+
+def _rows(rng: Rng, last_s: float, interval_s: float) -> Array:
+    """Return times from 0 or later on, at an interval of its own."""
+    interval_s = interval_s * float(rng.uniform(0.7, 1.4))
+    first, rows = int(rng.integers(0, 2)), int(last_s / interval_s)
+    return np.linspace(first * interval_s, (rows - 1) * interval_s, rows - first)
+
+
+def _sine(rng: Rng) -> tuple[Array, Course]:
+    """Return 25 to 60 rows a period of 2 s."""
+    return np.arange(rng.integers(0, 2), 500) * 2 / rng.integers(25, 61), lambda t: np.sin(
+        np.pi * t
+    )
+
+
+def _smooth(rng: Rng) -> tuple[Array, Course]:
+    """Return a load that comes without a step, and three sinusoids."""
+    rates, sizes = rng.uniform(0.3, 3.0, (3, 1)), rng.uniform(0.2, 1.0, 3)
+    return _rows(rng, 12.0, 0.04), lambda t: sizes @ (1 - np.cos(rates * t))
+
+
+def _steps(rng: Rng) -> tuple[Array, Course]:
+    """Return steps up and down, each at any time between two rows."""
+    at_s, sizes = 1.0 + 3.5 * np.arange(3) + rng.uniform(0, 1.5, 3), rng.uniform(0.5, 1.5, 3)
+    heights = sizes * [1, -0.7, 1]
+    return _rows(rng, 12.0, 0.1), lambda t: heights @ (np.asarray(t) >= at_s[:, None])
+
+
+def _late_clock(rng: Rng) -> tuple[Array, Course]:
+    """Return a hold from 0 whose first row comes late."""
+    first_s = float(rng.uniform(0.1, 1.0))
+    return np.linspace(first_s, first_s + 10, 201), lambda t: np.ones_like(t)
+
+
+def creeps(rng: Rng, course: Callable[[Rng], tuple[Array, Course]], sensor: float = 0.0) -> Trace:
+    """Return the strain of a Zener solid under a course that is recorded with it."""
+    from scipy.signal import lfilter
+
+    (time_s, load), truth = course(rng), {"k_s": 500.0, "k_v": 300.0, "c_v": 150.0}
+    k_s, k_v, c_v = truth.values()
+    fine_s = np.linspace(0.0, time_s[-1], _FINE * len(time_s))
+    # Exact for a load that is linear from one fine time to the next.
+    stride = fine_s[1] * k_v / c_v
+    left, share = np.exp(-stride), -np.expm1(-stride) / stride
+    taken = np.array([1 - share, share - left]) / k_v
+    yielded = lfilter(taken, [1.0, -left], load(fine_s), zi=[-taken[0] * load(fine_s)[0]])[0]
+    strain = load(time_s) / k_s + np.interp(time_s, fine_s, yielded)
+    return _recorded(rng, time_s, load(time_s), strain, truth, "strain", sensor)
+
+
+def resists(rng: Rng, course: Callable[[Rng], tuple[Array, Course]], sensor: float = 0.0) -> Trace:
+    """Return the stress on a Kelvin-Voigt solid under a strain that is recorded with it."""
+    (time_s, strain), truth = course(rng), {"k_p": 180.0, "c_p": 25.0}
+    rate = (strain(time_s + 1e-6) - strain(time_s)) / 1e-6
+    stress = truth["k_p"] * strain(time_s) + truth["c_p"] * rate
+    return _recorded(rng, time_s, strain(time_s), stress, truth, "stress", sensor)
+
+
+def _recorded(
+    rng: Rng, time_s: Array, load: Array, read: Array, truth: Values, name: str, sensor: float
+) -> Trace:
+    read = read + 0.01 * np.max(np.abs(read)) * rng.standard_normal(len(read))
+    load = load + sensor * np.max(np.abs(load)) * rng.standard_normal(len(read))
+    names = ("strain", "stress_Pa") if name == "strain" else ("stress_Pa", "strain")
+    return Trace({"time_s": time_s, names[0]: read, names[1]: load}, truth)
+
+
+MODULI: dict[str, tuple[Callable[..., Any], Values]] = {
+    "zener_maxwell": (
+        lambda s, k, k_p, c: k_p + k * c * s / (k + c * s),
+        {"k": 3000.0, "k_p": 500.0, "c": 2000.0},
+    ),
+    "maxwell": (lambda s, k, c: k * c * s / (k + c * s), {"k": 2000.0, "c": 1000.0}),
+    "burgers": (
+        lambda s, k_s, c_s, k_v, c_v: 1 / (1 / k_s + 1 / (c_s * s) + 1 / (k_v + c_v * s)),
+        {"k_s": 3000.0, "c_s": 9000.0, "k_v": 2000.0, "c_v": 1500.0},
+    ),
+    "kelvin_voigt": (lambda s, k_p, c_p: k_p + c_p * s, {"k_p": 500.0, "c_p": 100.0}),
+    "springpot_beside_damper": (
+        lambda s, k_alpha, alpha, c_p: k_alpha * s**alpha + c_p * s,
+        {"k_alpha": 600.0, "alpha": 0.2, "c_p": 3.0},
+    ),
+}
+"""Complex moduli at s = i omega, and parameters."""
+
+
+def swept(rng: Rng, model: str) -> Trace:
+    """Return a sweep of 25 frequencies over three decades, with noise of 2 and 3 %."""
+    omega, (modulus, truth) = np.geomspace(0.1, 100.0, 25), MODULI[model]
+    truth = {
+        name: it * (1 if name == "alpha" else 2 ** rng.uniform(-1, 1)) for name, it in truth.items()
+    }
+    clean = modulus(1j * omega, **truth)
+    storage, loss = (
+        part * (1 + share * rng.standard_normal(len(omega)))
+        for part, share in ((clean.real, 0.02), (clean.imag, 0.03))
+    )
+    return Trace({"omega_rad_per_s": omega, "storage_Pa": storage, "loss_Pa": loss}, truth)
+
+
+def _set_ups() -> list[SetUp]:
+    even, log = partial(_times, 0), partial(_times, n=60)
+    told = ("--start=0",)
+    right: tuple[tuple[str, str, dict[str, Any], tuple[str, ...]], ...] = (
+        ("12 readings", "relaxation", {"time_s": even(12)}, told),
+        ("40 readings", "creep", {"time_s": even(40)}, told),
+        ("200 readings, start not told", "relaxation", {"time_s": even(200)}, ()),
+        ("200 readings, start not told", "creep", {"time_s": even(200)}, ()),
+        ("2,000 readings", "relaxation", {"time_s": even(2000)}, told),
+        ("60 readings over 3 decades", "creep", {"time_s": log(3)}, told),
+        ("60 readings over 6 decades", "relaxation", {"time_s": log(6)}, told),
+        ("short: 5 to 50 % of tau", "creep", {"time_s": even(100), "lasts": 0.01}, told),
+        ("long: 50 to 500 tau", "relaxation", {"time_s": even(400), "lasts": 10.0}, told),
+        (
+            "noise of 10 %, told",
+            "creep",
+            {"time_s": even(100), "share": 0.1},
+            (*told, "--noise-share=0.1"),
+        ),
+        ("rounded to 2 noises", "relaxation", {"time_s": even(200), "rounded": 2.0}, told),
+    )
+    found = [
+        SetUp(
+            RIGHT,
+            f"{name}, {kind}",
+            partial(held, kind=kind, **given),
+            (*_RESPONSES[kind][2][1:], *options),
+        )
+        for name, kind, given, options in right
+    ]
+    relaxes = _RESPONSES["relaxation"][2][1:]
+    found += [
+        SetUp(
+            WRONG,
+            name,
+            partial(held, kind="relaxation", time_s=even(200), change=change),
+            relaxes if change is _late else (*relaxes, *told),
+        )
+        for name, change in CHANGES.items()
+    ]
+    creep = "--reading=strain=strain", "--load=stress_Pa", "--model=zener_kelvin"
+    resist = "--reading=stress=stress_Pa", "--load=strain", "--model=kelvin_voigt"
+    found += [
+        SetUp(LOAD, name, partial(make, course=course, sensor=sensor), options)
+        for name, make, course, sensor, options in (
+            ("sine", creeps, _sine, 0.0, creep),
+            ("sine, Kelvin-Voigt", resists, _sine, 0.0, resist),
+            ("steps between rows", creeps, _steps, 0.0, creep),
+            (_UNKNOWN, creeps, _late_clock, 0.0, creep),
+            ("smooth", creeps, _smooth, 0.0, creep),
+            ("smooth, Kelvin-Voigt", resists, _smooth, 0.0, resist),
+            ("smooth, noisy sensor", creeps, _smooth, 0.002, creep),
+        )
+    ]
+    read = "--frequency=omega_rad_per_s", "--reading=storage=storage_Pa", "--reading=loss=loss_Pa"
+    taken = (
+        ("maxwell", "kelvin_voigt"),
+        ("burgers", "zener_maxwell"),
+        ("springpot_beside_damper", "zener_maxwell"),
+    )
+    return found + [
+        SetUp(
+            SWEEP,
+            name if name == model else f"{name}{_TAKEN}{model}",
+            partial(swept, model=name),
+            (*read, f"--model={model}"),
+        )
+        for name, model in (*((name, name) for name in MODULI), *taken)
+    ]
+
+
+def _times(decades: int, n: int) -> Array:
+    """Return even times, or logarithmic ones over decades, to the end of a trace."""
+    first = _LASTS_S * (10.0**-decades if decades else 1 / n)
+    return (np.geomspace if decades else np.linspace)(first, _LASTS_S, n)
+
+
+def measure(set_up: SetUp, traces: int, first: int = 0) -> dict[str, Any]:
+    """Identify traces of a set-up by the command, from a number on, and count what it says."""
+    from biogrip.cli import main as command
+
+    numbers = [_SEED, *set_up.name.encode()]
+    made = [set_up.make(np.random.default_rng([*numbers, n])) for n in range(first, first + traces)]
+    with TemporaryDirectory() as folder:
+        files = [Path(folder) / f"{n:04}.csv" for n in range(traces)]
+        for file, trace in zip(files, made, strict=True):
+            pd.DataFrame(trace.columns).to_csv(file, index=False, float_format="%.10g")
+        table = Path(folder) / "found.csv"
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+            given = (*set_up.options, "--no-compare", "--csv", table)
+            command(["identify", *map(str, (*files, *given))])
+        found = pd.read_csv(table)
+    limits, status = [], Counter(found["fit"])
+    for trace, (_, row) in zip(made, found.iterrows(), strict=True):
+        for name, value in trace.truth.items():
+            low, high = (_end(row, name, end) for end in ("low", "high"))
+            if low == low or high == high:
+                holds = not (value < low or value > high)
+                limits.append((name, holds, row["fit"] == "ok"))
+    told = pd.DataFrame(limits, columns=["quantity", "holds", "ok"])
+    reasons = found["reasons"].fillna("")
+    return {
+        "group": set_up.group,
+        "set_up": set_up.name,
+        "traces": traces,
+        **{each: status[each] for each in ("ok", "doubtful", "rejected", "failed")},
+        "limits": len(told),
+        "hold": int(told["holds"].sum()),
+        "limits_of_ok": int(told["ok"].sum()),
+        "hold_of_ok": int((told["holds"] & told["ok"]).sum()),
+        "best_test": float(np.mean([trace.best for trace in made])),
+        **{test: int(reasons.str.contains(words).sum()) for test, words in ALARMS.items()},
+        "held_by_quantity": json.dumps(
+            {
+                name: [int(its["holds"].sum()), len(its)]
+                for name, its in told.groupby("quantity", sort=False)
+            }
+        ),
+    }
+
+
+def _end(row: Any, name: str, end: str) -> float:
+    """Return a limit of a quantity, NaN if there is none."""
+    return float(next((row[it] for it in row.index if it.startswith(f"{name} {end}")), np.nan))
+
 
 _PAGE = """# How often a verdict is right
 
-Simulated traces of creep, relaxation and the gripper, at times that are even or spread over three
-or six decades, with noise of 2 % of the peak: {traces} of each row, with the 95 % interval of a
-share (Wilson's). `levels.csv` has every instrument and spacing.
+{answer}
+
+Traces are simulated by closed forms that share nothing with biogrip, with noise of 2 % of the
+largest reading where nothing else is said, and identified by `biogrip identify --no-compare`.
+Shares have 95 % intervals (Wilson's); those of limits count limits of one trace as independent, and
+are up to twice as wide. [levels.csv](levels.csv) has all counts, by quantity and by test;
 `python -m benchmarks.levels` makes this page.
 
-**The set-up is right.** All should be ok, none rejected, and 95 % of limits should hold the truth.
-Noise that grows with what is read is to be told: if it is not, traces are doubtful once there are
-readings enough to see it, and limits hold too rarely where it grows over decades.
+## The set-up is right
+
+All should be ok, and 95 % of limits should hold the truth.
 
 {right}
 
-**The set-up is wrong.** None should be ok. What fails are few readings: the noise is not known but
-from them, and ten tell hardly any misfit, be it several times the noise, from a few noisy readings
-of another sample; twenty tell most. With more, what is called ok is another model that fits as well
-as noise allows. The last column has the misfit of the best fit to a trace without noise. An outlier
-is 15 standard deviations off; a start is late by 5 % of the trace, a ramp that is taken for a step
-lasts 10 % of it; another model has a second relaxation time, ten times as long; the load changes at
-60 % of the trace in a wrong protocol, and minutes are taken for seconds in a wrong unit: after a
-step that only changes the times found.
+Of these traces and of those with a recorded load below, {n}, tests blamed {tests};
+each other one of {all_tests} blamed none, {none}. The level of each is 0.3 %, or 0.1 % if it may
+reject a fit.
+
+## The load or the strain was recorded
+
+Rows have both; steps come between rows. A late clock begins after the step: no reading tells when
+that was, and doubt is right.
+
+{load}
+
+## A frequency sweep
+
+25 frequencies over three decades, noise of 2 and 3 % of storage and loss modulus.
+
+{sweep}
+
+## The set-up is wrong
+
+200 readings of relaxation. None should be ok. The best test is the F test at the level of ours that
+knows the shape that the right model's best fit leaves: more than anybody knows.
 
 {wrong}
 """
 
 
-def _experiment(instrument: str, protocol: tuple[Phase, ...], model: str) -> Experiment:
-    """Return the experiment of an instrument with a protocol and a model."""
-    of = {"creep": INSTRUMENTS["strain"], "relaxation": INSTRUMENTS["modulus"]}
-    its = of.get(instrument, GRIPPER)
-    arms = _GRIPPER if its is GRIPPER else NO_ARMS
-    sample = Sample(model, stiffness=its.stiffness)
-    return Experiment(arms, protocol, _RANGES, sample, {}, its)
-
-
-def _protocol(instrument: str, late_s: float = 0.0, ramp_s: float = 0.0) -> tuple[Phase, ...]:
-    """Return a step of what is controlled, of a gripper one to and fro, later or as a ramp."""
-    levels = _TORQUES if instrument == "gripper" else (1.0,)
-    waits = [hold(late_s, 0.0)] if late_s else []
-    ramps = [ramp(ramp_s, 0.0, levels[0])] if ramp_s else []
-    rests = [_LASTS_S / len(levels)] * len(levels)
-    rests[0] -= ramp_s
-    return (*waits, *ramps, *(hold(s, level) for s, level in zip(rests, levels, strict=True)))
-
-
-def _parameters(instrument: str, tau_s: float) -> dict[str, float]:
-    """Return parameters of the sample, for a relaxation time of its branch."""
-    if instrument == "gripper":
-        return {"k": 20.0, "k_p": 5.0, "c": 20.0 * tau_s, "c_p": 20.0 * tau_s}
-    return {"k": 1.0, "k_p": 0.5, "c": tau_s, "c_p": 0.5 * tau_s}
-
-
-def _times(readings: int, decades: int) -> Array:
-    """Return evenly spaced times, or logarithmically over some decades, to the end of the trace."""
-    if not decades:
-        return np.linspace(_LASTS_S / readings, _LASTS_S, readings)
-    return np.geomspace(_LASTS_S * 10.0**-decades, _LASTS_S, readings)
-
-
-def _one(instrument: str, protocol: tuple[Phase, ...], tau_s: float, time_s: Array) -> Array:
-    """Simulate what is read of a sample with one relaxation time."""
-    experiment = _experiment(instrument, protocol, _MODELS[instrument])
-    network = experiment.model.sample(_parameters(instrument, tau_s))
-    return simulated_response(
-        experiment.gripper, network, experiment.torque, time_s, nonlinear=False
-    )[0]
-
-
-def _read(instrument: str, set_up: str, tau_s: float, time_s: Array) -> Array:
-    """Simulate a trace without noise, whose set-up may be another than the fit's."""
-    one, protocol = partial(_one, instrument), _protocol(instrument)
-    if set_up == "another model":
-        return 0.5 * (one(protocol, tau_s, time_s) + one(protocol, 10 * tau_s, time_s))
-    if set_up == "late start":
-        return one(_protocol(instrument, late_s=_LATE_S), tau_s, time_s)
-    if set_up == "missing ramp":
-        return one(_protocol(instrument, ramp_s=_RAMP_S), tau_s, time_s)
-    if set_up == "wrong protocol":
-        first, last = _TORQUES if instrument == "gripper" else (1.0, 0.0)
-        return one((hold(0.6 * _LASTS_S, first), hold(0.4 * _LASTS_S, last)), tau_s, time_s)
-    return one(protocol, tau_s, time_s)
-
-
-def _noisy(clean: Array, set_up: str, rng: np.random.Generator) -> Array:
-    """Add noise to a trace, or whatever else is read."""
-    sd = _NOISE * float(np.max(np.abs(clean)))
-    if set_up in (_TOLD, _UNTOLD):
-        return clean * (1 + _NOISE * rng.standard_normal(len(clean)))
-    found: Array = clean + sd * rng.standard_normal(len(clean))
-    if set_up == _ROUNDED:
-        found = np.round(found / (_STEP * sd)) * (_STEP * sd)
-    if set_up == "one outlier":
-        found[rng.integers(len(clean))] += _OUTLIER * sd
-    return found
-
-
-def judge_cells(instrument: str, readings: int, traces: int, output: Path) -> None:
-    """Write the rows of an instrument with a number of readings, each of so many traces."""
-    rows = [
-        _cell(instrument, readings, decades, set_up, traces)
-        for decades in _DECADES
-        for set_up in (*RIGHT, *WRONG)
-    ]
-    pd.DataFrame(rows).to_csv(output, index=False, float_format="%.4g")
-
-
-def summarise(files: Sequence[Path], table: Path, summary: Path) -> None:
-    """Write the rows of all files, and a page with shares over instruments and times."""
-    rows = pd.concat([pd.read_csv(file) for file in files], ignore_index=True)
-    rows.to_csv(table, index=False)
-    rows["set_up"] = pd.Categorical(rows["set_up"], [*RIGHT, *WRONG])
-    shown = []
-    for (set_up, readings), cells in rows.groupby(["set_up", "readings"], observed=True):
-        traces = int(cells["traces"].sum())
-        counts = {
-            status: round((cells[f"{status}_percent"] * cells["traces"]).sum() / 100)
-            for status in (OK, DOUBTFUL, REJECTED)
-        }
-        held = (cells["held_percent"] * cells["limits"]).sum() / max(cells["limits"].sum(), 1)
-        shown.append(
-            {"set-up": set_up, "readings": readings}
-            | {status: share_in_words(count, traces) for status, count in counts.items()}
-            | ({"limits that hold": f"{held:.1f} %"} if set_up in RIGHT else {})
-            | (
-                {"misfit / noise": f"{cells['misfit_over_noise'].median():.1f}"}
-                if set_up in WRONG
-                else {}
-            )
-        )
-    right, wrong = (
-        pd.DataFrame([row for row in shown if row["set-up"] in own]).to_markdown(index=False)
-        for own in (RIGHT, WRONG)
-    )
-    write_text(summary, _PAGE.format(traces=traces, right=right, wrong=wrong))
-
-
-def _cell(instrument: str, readings: int, decades: int, set_up: str, traces: int) -> dict[str, Any]:
-    experiment = _experiment(instrument, _protocol(instrument), _MODELS[instrument])
-    time_s = _times(readings, decades)
-    # A clock in minutes that is taken for one in seconds.
-    told_s = time_s / _MINUTE_S if set_up == "wrong unit of time" else time_s
-    status: Counter[str] = Counter()
-    held: list[bool] = []
-    misfits: list[float] = []
-    name = f"{instrument} {readings} {decades} {set_up}"
-    for first in range(0, traces, _TOGETHER):
-        seeds = range(first, min(first + _TOGETHER, traces))
-        rngs = [stream(_SEED, name, seed, "noise") for seed in seeds]
-        taus = [_LASTS_S * 10 ** rng.uniform(-2, -0.7) for rng in rngs]
-        cleans = [_read(instrument, set_up, tau, time_s) for tau in taus]
-        given = [
-            experiment.weighted(_NOISE * np.abs(clean)) if set_up == _TOLD else experiment
-            for clean in cleans
-        ]
-        read = [_noisy(clean, set_up, rng) for clean, rng in zip(cleans, rngs, strict=True)]
-        problems = [it.of(told_s, each) for it, each in zip(given, read, strict=True)]
-        found = identify_many(problems, _BUDGET, rngs, silent)
-        if set_up in RIGHT:
-            judged = diagnose_all(
-                problems,
-                experiment.searched,
-                found,
-                confidence=_CONFIDENCE,
-                noise_sd=[it.noise_sd for it in given],
-            )
-            status.update(each.status for each in judged)
-            for each, tau in zip(judged, taus, strict=True):
-                held += _held(each, experiment, _parameters(instrument, tau))
+def _table(rows: pd.DataFrame, *, wrong: bool = False) -> str:
+    """Return a line a set-up, of wrong ones with the power of the best possible test."""
+    lines = []
+    for row in rows.to_dict("records"):
+        line = {"set-up": row["set_up"], "traces": row["traces"]}
+        line["ok"] = share_in_words(row["ok"], row["traces"])
+        if wrong:
+            line["limits of these that hold"] = f"{row['hold_of_ok']} of {row['limits_of_ok']}"
+            line["rejected"] = row["rejected"]
+            line["best test"] = f"{100 * row['best_test']:.0f} %"
         else:
-            status.update(map(_status_of, problems, found))
-            some = cleans[: _SOME if not first else 0]
-            exact = [experiment.of(told_s, clean) for clean in some]
-            fits = identify_many(exact, _BUDGET, rngs[: len(exact)], silent) if exact else []
-            sds = [_NOISE * float(np.max(np.abs(clean))) for clean in some]
-            misfits += [fit.misfit / sd for fit, sd in zip(fits, sds, strict=True)]
-    row: dict[str, Any] = {
-        "instrument": instrument,
-        "readings": readings,
-        "times": f"log, {decades} decades" if decades else "even",
-        "set_up": set_up,
-        "traces": traces,
-    }
-    row |= {f"{each}_percent": 100 * status[each] / traces for each in (OK, DOUBTFUL, REJECTED)}
-    if held:
-        row |= {"limits": len(held), "held_percent": 100 * float(np.mean(held))}
-    if misfits:
-        typical = float(np.median(misfits))
-        row |= {"misfit_over_noise": typical, "chi_squared": readings * typical**2}
-    return row
+            line["limits that hold"] = _held(row)
+        lines.append(line)
+    return str(pd.DataFrame(lines).to_markdown(index=False, disable_numparse=True))
 
 
-def _held(judged: Diagnosis, experiment: Experiment, truth: dict[str, float]) -> Iterator[bool]:
-    """Yield of the limits of every quantity that is determined whether they hold the truth."""
-    names = experiment.searched.names
-    for finding in judged.findings:
-        if finding.low is not None and finding.high is not None:
-            value = sum(truth[names[member]] for member in finding.quantity.members)
-            yield finding.low <= value <= finding.high
+def _held(row: Any) -> str:
+    return share_in_words(row["hold"], row["limits"]) if row["limits"] else ""
 
 
-def _status_of(problem: TraceProblem, found: Fit) -> str:
-    """Return the status of a fit by what it leaves, without limits."""
-    best = np.log(found.parameters)
-    likelihood = make_likelihood(problem, best, found.misfit, confidence=_CONFIDENCE)
-    return compute_status(examine_residuals(likelihood).notes)
+def _page(rows: pd.DataFrame) -> str:
+    """Return the page of all set-ups."""
+    of = {group: rows[rows["group"] == group] for group in (RIGHT, LOAD, SWEEP, WRONG)}
+    own = of[SWEEP][~of[SWEEP]["set_up"].str.contains(_TAKEN)]
+    told = of[LOAD][of[LOAD]["set_up"] != _UNKNOWN]
+    right, wrong = pd.concat([of[RIGHT], told, own]), of[WRONG]
+
+    def share(rows: pd.DataFrame, of: str, among: str = "traces") -> str:
+        return share_in_words(int(rows[of].sum()), int(rows[among].sum()))
+
+    in_time = pd.concat([of[RIGHT], told])
+    blamed = {test: int(in_time[test].sum()) for test in ALARMS}
+    return _PAGE.format(
+        answer=(
+            f"**Of {right['traces'].sum()} traces whose set-up is right {share(right, 'ok')} are "
+            f"ok, and {share(right, 'hold', 'limits')} of their limits hold the truth. Of "
+            f"{wrong['traces'].sum()} with an error {share(wrong, 'ok')} pass as ok.**"
+        ),
+        n=in_time["traces"].sum(),
+        right=_table(of[RIGHT]),
+        tests=", ".join(f"{n} ({test})" for test, n in blamed.items() if n),
+        all_tests=len(ALARMS),
+        none=share_in_words(0, int(in_time["traces"].sum())),
+        load=_table(of[LOAD]),
+        sweep=_table(of[SWEEP]),
+        wrong=_table(wrong, wrong=True),
+    )
 
 
 def main() -> None:
-    """Judge the cells that are asked for, and count verdicts if there are all of them."""
+    """Measure the set-ups that are asked for, and write all rows and the page."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("instrument", nargs="?", choices=INSTRUMENTS_JUDGED, help="default: all")
-    parser.add_argument("readings", nargs="?", type=int, choices=READINGS, help="default: all")
-    parser.add_argument("--traces", type=int, default=20, help="traces of each row (20)")
-    parser.add_argument("--jobs", type=int, default=2, help="processes (2)")
-    parser.add_argument("--folder", type=Path, default=Path("results/levels"), help="of cells")
-    parser.add_argument("--docs", type=Path, default=Path("docs"), help="of the page")
+    parser.add_argument("names", nargs="*", help="first words of groups or set-ups; default: all")
+    parser.add_argument("--traces", type=int, default=200, help="of each set-up (200)")
+    parser.add_argument("--table", type=Path, default=Path("docs/levels.csv"))
     asked = parser.parse_args()
-    asked.folder.mkdir(parents=True, exist_ok=True)
-    cells = {
-        asked.folder / f"{instrument}_{readings}.csv": (instrument, readings)
-        for instrument, readings in product(INSTRUMENTS_JUDGED, READINGS)
-    }
-    with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as workers:
-        running = [
-            workers.submit(judge_cells, instrument, readings, asked.traces, file)
-            for file, (instrument, readings) in cells.items()
-            if asked.instrument in (None, instrument) and asked.readings in (None, readings)
-            if not file.is_file()
-        ]
-        for job in running:
-            job.result()
-    if all(file.is_file() for file in cells):
-        summarise(list(cells), asked.docs / "levels.csv", asked.docs / "levels.md")
+    every = _set_ups()
+    for set_up in every:
+        if not asked.names or f"{set_up.group} {set_up.name}".startswith(tuple(asked.names)):
+            rows = pd.read_csv(asked.table) if asked.table.is_file() else pd.DataFrame()
+            before = [it for it in rows.to_dict("records") if it["set_up"] == set_up.name]
+            first = before[0]["traces"] if before else 0
+            row = added(*before, measure(set_up, asked.traces, first))
+            print(*(f"{name}: {value}" for name, value in row.items()), sep="; ", flush=True)
+            write({it["set_up"]: it for it in (*rows.to_dict("records"), row)}, asked.table)
+
+
+def added(row: dict[str, Any], *more: dict[str, Any]) -> dict[str, Any]:
+    """Return the counts of rows of one set-up together."""
+    for other in more:
+        counts = [name for name, value in row.items() if isinstance(value, int)]
+        quantities, others = (json.loads(it["held_by_quantity"]) for it in (row, other))
+        for name, pair in others.items():
+            quantities[name] = [
+                a + b for a, b in zip(pair, quantities.get(name, (0, 0)), strict=True)
+            ]
+        best = np.average(
+            [it["best_test"] for it in (row, other)], weights=[it["traces"] for it in (row, other)]
+        )
+        row = {
+            **row,
+            **{name: row[name] + other[name] for name in counts},
+            "best_test": float(best),
+            "held_by_quantity": json.dumps(quantities),
+        }
+    return row
+
+
+def write(rows: dict[str, dict[str, Any]], table: Path) -> None:
+    """Write rows in the order of their set-ups, and the page if all are there."""
+    names = [set_up.name for set_up in _set_ups()]
+    found = pd.DataFrame([rows[name] for name in names if name in rows])
+    write_text(table, found.to_csv(index=False, float_format="%.4g"))
+    if len(found) == len(names):
+        write_text(table.with_suffix(".md"), _page(found))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,8 @@ which biogrip is told nothing. The right model's limits are those of first order
 
     python -m benchmarks.without_model [--traces 100]
 
-Written are `results/without_model.csv`, a row per set-up, model and quantity, and `.md`.
+Written are `results/without_model.csv`, a row per set-up, model and quantity, and `.md`. lmfit is
+in the environment of `make bench`.
 """
 
 import argparse
@@ -46,11 +47,30 @@ _SPREAD_S, _EVEN_S = np.geomspace(0.1, 100.0, 80), np.arange(0.25, 100.0, 0.5)
 
 _PAGE = """# Limits without a model
 
-{traces} traces of each of the sample models, with noise of 2 % of the largest reading; shares with
-95 % intervals (Wilson's). The right model's limits are those of first order. A single limit holds
-with 97.5 %. `python -m benchmarks.without_model` makes this page.
+**Over all sample models, the 95 % limits of each quantity hold in {least:.0f} to {most:.0f} %.**
+
+They hold less often for samples at an edge of what is possible, such as a Maxwell liquid or a bare
+damper, of whose spectrum all but one time is zero: in 92 %. There the quantile of chi-squared is
+too small (P. Batlle et al., Optimization-based frequentist confidence intervals for functionals in
+constrained inverse problems: resolving the Burrus conjecture, arXiv:2310.02461, 2023). Plain fits
+on a fixed grid show the same: of 1,200 Maxwell liquids under a ramp, chi-squared of the loss
+tangent at 0.1 rad/s rises by more than 3.84 in 8.1 % (6.7 to 9.8). Of few traces a share scatters
+further.
+
+Traces of each of the sample models have noise of 2 % of the largest reading; shares have 95 %
+intervals (Wilson's), and each model's stand in `without_model.csv`. The right model's limits are
+those of first order. A single limit holds with 97.5 %. `python -m benchmarks.without_model` makes
+this page.
 
 {table}
+
+## Beside lmfit
+
+Relaxation of three branches, 50 + 60 exp(-t/0.5 s) + 40 exp(-t/5 s) + 30 exp(-t/50 s): {lmfit}
+traces as above. lmfit fits a constant and exponentials, and is told how many; its limits are those
+of `eval_uncertainty`. Widths are over the value.
+
+{beside}
 """
 
 
@@ -251,6 +271,50 @@ def measure(name: str, model: str, traces: int) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+# Modulus at rest, and moduli and times of three branches; times of a trace at which it is told.
+_PRONY, _AT_S = np.array([50.0, 60.0, 40.0, 30.0, 0.5, 5.0, 50.0]), (1.0, 10.0, 100.0)
+
+
+def prony(time_s: Any, parameters: Array) -> Any:
+    """Relaxation modulus of Maxwell branches: modulus at rest, moduli, relaxation times."""
+    moduli, times_s = np.split(parameters[1:], 2)
+    return parameters[0] + np.exp(-np.divide.outer(np.asarray(time_s), times_s)) @ moduli
+
+
+def beside_lmfit(traces: int) -> pd.DataFrame:
+    """Return whether limits of a Prony series' moduli hold, and their widths, and so of lmfit's.
+
+    lmfit is told of one branch too few, of as many as there are, and of one too many.
+    """
+    from lmfit import create_params
+    from lmfit.models import ConstantModel, ExponentialModel
+
+    name, truth, rows = "strain held", prony(_AT_S, _PRONY), []
+    clean = prony(SET_UPS[name].time_s, _PRONY)
+    for seed in range(traces):
+        noise = np.random.default_rng([_SEED, seed]).standard_normal(len(clean))
+        readings = clean + _NOISE * clean.max() * noise
+        told = tell_without_model(residuals(name, readings), confidence=_CONFIDENCE, at_s=_AT_S)
+        levels = [each for each in told.told if each.quantity.startswith("G(")]
+        found = {"biogrip, no model": [(each.low or 0.0, each.high or np.inf) for each in levels]}
+        for branches in (2, 3, 4):
+            series: Any = ConstantModel()
+            given = {"c": {"value": 1.0, "min": 0.0}}
+            for n, time_s in enumerate(np.geomspace(0.3, 100.0, branches)):
+                series += ExponentialModel(prefix=f"b{n}_")
+                given[f"b{n}_amplitude"] = {"value": 30.0, "min": 0.0}
+                given[f"b{n}_decay"] = {"value": time_s, "min": 1e-3}
+            fit = series.fit(readings, create_params(**given), x=SET_UPS[name].time_s)
+            middle, half = fit.eval(x=np.array(_AT_S)), np.inf
+            if fit.errorbars:
+                half = fit.eval_uncertainty(x=np.array(_AT_S), sigma=_CONFIDENCE)
+            found[f"lmfit, {branches} branches"] = [*zip(middle - half, middle + half, strict=True)]
+        for program, limits in found.items():
+            for at_s, value, (low, high) in zip(_AT_S, truth, limits, strict=True):
+                rows.append((program, at_s, low <= value <= high, (high - low) / value))
+    return pd.DataFrame(rows, columns=["program", "at_s", "holds", "width"])
+
+
 def table(rows: pd.DataFrame) -> str:
     """Return a line per set-up and quantity, over all models, as Markdown."""
     lines = []
@@ -272,13 +336,37 @@ def table(rows: pd.DataFrame) -> str:
     return str(pd.DataFrame(lines).to_markdown(index=False, disable_numparse=True))
 
 
-_KEPT = {
-    "truth": "first",
-    "holds": "sum",
-    "limits": "mean",
-    "width": "median",
-    "of the model": "first",
-}
+def _write(rows: pd.DataFrame, lmfits: pd.DataFrame) -> None:
+    """Write what has been measured."""
+    kept = rows.groupby(["set-up", "model", "quantity"], sort=False).agg(
+        truth=("truth", "first"),
+        traces=("holds", "size"),
+        holds=("holds", "sum"),
+        limits=("limits", "mean"),
+        width=("width", "median"),
+        of_the_model=("of the model", "first"),
+    )
+    write_text(_RESULTS, kept.to_csv(float_format="%.4g"))
+    holds = 100 * rows.groupby(["set-up", "quantity"])["holds"].mean()
+    beside = [
+        {
+            "program": program,
+            **{
+                f"G({at_s:g} s)": f"{share_in_words(int(its['holds'].sum()), len(its))}, width "
+                f"{its['width'].median():.2g}"
+                for at_s, its in own.groupby("at_s")
+            },
+        }
+        for program, own in lmfits.groupby("program")
+    ]
+    page = _PAGE.format(
+        least=holds.min(),
+        most=holds.max(),
+        table=table(rows),
+        lmfit=len(lmfits) // lmfits.groupby(["program", "at_s"]).ngroups,
+        beside=pd.DataFrame(beside).to_markdown(index=False, disable_numparse=True),
+    )
+    write_text(_RESULTS.with_suffix(".md"), page)
 
 
 def main() -> None:
@@ -286,21 +374,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--traces", type=int, default=100, help="of each set-up and model")
     traces = parser.parse_args().traces
-    parts = []
-    for name, set_up in SET_UPS.items():
-        for model in IMPEDANCES:
-            if model not in set_up.hidden:
-                parts.append(measure(name, model, traces))
-                print(name, model, flush=True)
-        _write(pd.concat(parts), traces)
-
-
-def _write(rows: pd.DataFrame, traces: int) -> None:
-    """Write what has been measured."""
-    keys = ["set-up", "model", "quantity"]
-    kept = rows.groupby(keys, sort=False).agg(_KEPT)
-    write_text(_RESULTS, kept.to_csv(float_format="%.4g"))
-    write_text(_RESULTS.with_suffix(".md"), _PAGE.format(traces=traces, table=table(rows)))
+    parts = [
+        measure(name, model, traces)
+        for name, set_up in SET_UPS.items()
+        for model in IMPEDANCES
+        if model not in set_up.hidden
+    ]
+    _write(pd.concat(parts), beside_lmfit(traces))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 import pytest
 
-from biogrip.digits import legible, plain, rounded, with_limits
+from biogrip.digits import legible, p_value, plain, rounded, with_limits
 
 
 @pytest.mark.parametrize(
@@ -42,6 +42,7 @@ def test_numbers_are_as_fine_as_the_width_of_their_limits(
 def test_decimals_are_plain_where_a_person_reads_them() -> None:
     numbers = [1500.4, 123456, 2.5e6, 1.04e-4, 1.04e-5, -1500, 0]
     assert " ".join(map(plain, numbers)) == "1500 123000 2.5e+06 0.000104 1.04e-05 -1500 0"
+    assert [*map(p_value, (0.0018, 3e-5, 1e-9))] == ["p = 0.002", "p = 3e-05", "p < 1e-6"]
 
 
 @pytest.mark.parametrize(

@@ -134,12 +134,6 @@ def legible(text: str) -> str:
     return _BEFORE_UNIT.sub("\u00a0", _MINUS.sub("−", _POWER.sub(power, text)))
 
 
-# Smaller chances are not told apart.
-_NEVER = 1e-6
-
-
-def one_in(chance: float) -> str:
-    """Return a probability in words, e.g. ``"once in 2000"``."""
-    if chance < _NEVER:
-        return "less than once in a million"
-    return f"once in {plain(1 / chance, 1)}"
+def p_value(chance: float) -> str:
+    """Return the chance of as much in what is right; smaller ones are not told apart."""
+    return "p < 1e-6" if chance < 1e-6 else f"p = {plain(chance, 1)}"

@@ -109,6 +109,13 @@ def test_a_limit_is_where_chi_squared_has_risen(seed: int) -> None:
                 assert risen / 3.6**2 == pytest.approx(3.841, abs=0.05), quantity
 
 
+def test_a_liquid_under_a_ramp_has_no_exponent() -> None:
+    """Its modulus at 1 s, which the slope is divided by, is zero but for the noise."""
+    readings = np.where(EVEN < 5, 0.2, 0.0) + noise(0.004, 1, len(EVEN))
+    found = by_name(tell(EVEN, readings, (ramp(5.0, 0.0, 1.0), hold(95.0, 1.0))))
+    assert found["exponent(1 s)"].verdict == NOT_DETERMINED
+
+
 def test_limits_of_creep_with_an_offset() -> None:
     """A constant of either sign is two columns; increments do not feel it."""
     clean = 2 + 1 / 3 + 0.5 * (1 - np.exp(-TIMES / 20)) + TIMES / 200

@@ -54,6 +54,13 @@ def test_a_sinusoid_is_followed_between_its_rows(clock: str) -> None:
     np.testing.assert_array_equal(course.jumps_s, [0.0])
 
 
+def test_a_damper_is_not_read_at_a_first_row_that_comes_late() -> None:
+    """What was there before it is held from 0, and the rate at it is that of neither side."""
+    rows_s = np.r_[0.0, EVEN[1:]]
+    course = follow_rows(rows_s, np.sin(OMEGA * np.maximum(rows_s, EVEN[1])), deforms=True)
+    np.testing.assert_array_equal(course.jumps_s, rows_s[:2])
+
+
 @pytest.mark.parametrize("clock", CLOCKS)
 def test_rows_are_followed_whatever_they_are(clock: str) -> None:
     rows_s, values = CLOCKS[clock], RNG.standard_normal(251)

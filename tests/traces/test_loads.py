@@ -135,6 +135,23 @@ def test_a_load_that_is_there_in_the_first_row_came_before_it(
     assert evaluate(experiment.torque, [0.0, first_s, 9.0]).tolist() == [5.0, 5.0, 5.0]
 
 
+@pytest.mark.parametrize("begins", ["smoothly", "by a step"])
+def test_a_load_whose_first_row_is_missing_goes_on_in_a_line(tmp_path: Path, begins: str) -> None:
+    """A sine of 25 rows a period, held up to its first row, moves limits by two of their widths."""
+    clock = CLOCK[1:]
+    load = np.sin(0.8 * np.pi * clock) if begins == "smoothly" else np.where(clock < 0.15, 5.0, 2.0)
+    path = tmp_path / "sine.csv"
+    rows = np.column_stack((clock, clock, load))
+    np.savetxt(path, rows, delimiter=",", header="time_s,strain,stress_Pa", comments="")
+    given = {"strain": "strain", "load": "stress_Pa"}
+    settings = [Setting("--set", ("measurement", key), value) for key, value in given.items()]
+    record = case_of(Asked(path, None, tuple(settings))).judged_experiment.record
+    assert record is not None
+    # A line from row to row is off by (omega h)^3 = 0.016.
+    expected = 0.0 if begins == "smoothly" else 5.0
+    assert record[0].tolist() == [0.0, pytest.approx(expected, abs=0.016)]
+
+
 def test_of_a_clean_course_nothing_is_smoothed_out() -> None:
     """Of a sinusoid with 25 rows a period 3e-4, and nothing of a constant or of steps."""
     course = np.sin(2 * np.pi * np.arange(500) / 25)

@@ -299,10 +299,18 @@ def _with_instrument(
 
 
 def _from(load: Array, start_s: float) -> Array:
-    """Return rows of times and loads, (n, 2), from a time on, counted from it."""
+    """Return rows of times and loads, (n, 2), from a time on, counted from it.
+
+    Up to a first row that comes later, it goes on in a line if one row is missing and three go on
+    in nearly one, as of a sine; else it was held.
+    """
     after = load[load[:, 0] > start_s]
-    first = start_s, np.interp(start_s, *load.T)
-    return np.vstack((first, after)) - (start_s, 0.0)
+    first, times_s = np.interp(start_s, *load.T), load[:3, 0]
+    rate, next_rate = np.diff(load[:3, 1]) / np.diff(times_s)
+    earlier_s = times_s[0] - start_s
+    if earlier_s < 1.5 * (times_s[1] - times_s[0]) and abs(next_rate - rate) < 0.5 * abs(rate):
+        first -= rate * max(earlier_s, 0.0)
+    return np.vstack(((start_s, first), after)) - (start_s, 0.0)
 
 
 def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrument:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from biogrip.digits import one_in, plain
+from biogrip.digits import p_value, plain
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.nested_fits import (
     FittedModels,
@@ -346,7 +346,7 @@ def _note(trace: Trace, diagnosis: Diagnosis, other: _Other, judged: Diagnosis) 
     # A constant and a line, if not both are declared already.
     many = drifts and not experiment.offset
     better = f"{'explain' if many else 'explains'} the trace far better (χ² falls by "
-    better += f"{plain(other.fall)}; by chance it would {one_in(other.chance)} traces)"
+    better += f"{plain(other.fall)}, {p_value(other.chance)})"
     instrument, torque = experiment.instrument, experiment.torque
     controlled = instrument.controlled.name
     if drifts and drift_is_flow(torque, recording.time_s):

@@ -20,7 +20,7 @@ from functools import partial
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.digits import counted, one_in, plain
+from biogrip.digits import counted, p_value, plain
 from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
@@ -277,15 +277,15 @@ def _about_colour(
         )
     elif (chance := uneven(residual, basis)) < levels.FALSE_ALARM:
         yield (
-            "The residual has more of some frequencies than of others, as white noise has only "
-            f"{one_in(chance)} traces: the intervals are wrong, or {suspects()}."
+            "The residual has more of some frequencies than of others, unlike white noise "
+            f"({p_value(chance)}): the intervals are wrong, or {suspects()}."
         )
     chance = wandering(residual, basis)
     if chance < levels.FALSE_ALARM:
         yield (
-            "The residual wanders: its means over stretches of the trace scatter as much as those "
-            f"of white noise do only {one_in(chance)} traces. It contains something slow that the "
-            "model lacks, perhaps a drift of the instrument: the intervals are too narrow."
+            "The residual wanders: its means over stretches of the trace scatter more than those "
+            f"of white noise ({p_value(chance)}). It contains something slow that the model "
+            "lacks, perhaps a drift of the instrument: the intervals are too narrow."
         )
 
 
@@ -325,8 +325,8 @@ def _about_changes(
         unit = f" {residuals.instrument.read.unit}".rstrip()
         return [
             f"The readings change at about {plain(0.5 * (before_s + after_s))} s, as by a step of "
-            f"{size}{unit}, which white noise shows only {one_in(step.chance)} traces: the values "
-            "may be far off. Leave out what is before or after (--from, --until)."
+            f"{size}{unit}, which is not white noise ({p_value(step.chance)}): the values may be "
+            "far off. Leave out what is before or after (--from, --until)."
         ]
     split = middle_of(residuals)
     chance = 1.0 if coloured else compare_halves(residual, basis, split)
@@ -334,8 +334,8 @@ def _about_changes(
         return []
     return [
         f"The readings up to {plain(trace.time_s[split - 1])} s and those after it, each fitted "
-        f"by itself, differ as those with white noise do only {one_in(chance)} traces: the "
-        "sample, the instrument or the protocol changed, and the values may be far off."
+        f"by itself, differ by more than white noise ({p_value(chance)}): the sample, the "
+        "instrument or the protocol changed, and the values may be far off."
     ]
 
 

@@ -36,7 +36,7 @@ from functools import cached_property
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.digits import one_in, plain
+from biogrip.digits import p_value, plain
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.judging import levels
 from biogrip.physics.noise import without
@@ -420,8 +420,8 @@ def about_moduli(
         yield f"The fit leaves what is of {cause}."
     elif (chance := compare_halves(residual, basis, int(np.sum(~storage)))) < levels.FALSE_ALARM:
         yield (
-            "The storage and the loss modulus, each fitted by itself, differ as those with white "
-            f"noise do only {one_in(chance)} sweeps: {cause}."
+            "The storage and the loss modulus, each fitted by itself, differ by more than white "
+            f"noise ({p_value(chance)}): {cause}."
         )
     if residuals.freedom < np.inf:
         # Their weights are how they scatter.

@@ -59,7 +59,7 @@ _NONE = 1e-9
 
 # Share of a value below which a lower limit says no more than that it is positive.
 _LITTLE = 0.01
-# Ratio beyond which an upper limit hangs on the fastest lag that is tried.
+# Ratio beyond which an upper limit hangs on the fastest lag that is tried, and is not sought.
 _MOST = 1e4
 # Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
 _UNITS = {
@@ -269,7 +269,9 @@ class _Profile:
         clearly = float(np.abs(row[~faint]).max())
         deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[own], row[own])[0]))
         deviation = deviation if deviation > _LEAST * clearly else clearly
-        self._stride = root * deviation / (divisor or 1.0)
+        stride = root * deviation / (divisor or 1.0)
+        # Of a liquid the modulus that another is divided by may vanish.
+        self._stride = min(stride, _MOST) if quantity.below else stride
         held = min(deviation, max(0.1 * self.best * divisor, _NONE * clearly))
         self._weight = _WEIGHT / held if held else 0.0
         self._open = [it for it in (-1, 1) if np.any(it * row[faint] > _HANGS * clearly)]

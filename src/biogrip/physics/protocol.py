@@ -11,7 +11,8 @@ the cubic that has the readings and the rates at both rows. The rate at a row is
   each on its own, the rate jumps there;
 - else that of the quartic through five rows, where these are smooth: of a sinusoid with 25 rows a
   period it is off by 1e-4, where the mean of the rates on both sides is off by 1e-2;
-- the mean of both sides elsewhere, as in noise.
+- the mean of both sides elsewhere, as in noise;
+- at the second row it jumps if nothing changed up to there.
 """
 
 from collections.abc import Iterable
@@ -322,6 +323,9 @@ def _rates(time_s: Array, values: Array) -> tuple[Array, Array]:
         np.select([one[0], other[0]], [one[1], other[1]], rates)
         for one, other in (lines, lines[::-1])
     )
+    if chords[0] == 0:
+        # It was not recorded, or has just begun to change.
+        left[1], right[1] = 0.0, chords[1]
     return left, right
 
 
