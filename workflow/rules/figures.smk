@@ -93,10 +93,8 @@ rule page:
         figures=made("figures", ".png"),
         tables=made("tables", ".html"),
         downloads=made("tables", ".csv"),
-        identifications=files("results/identifications/{case}.csv", STUDY.cases),
         verdicts=files("results/identifiability/{case}.json", STUDY.cases),
         measurements=first_traces(STUDY.cases),
-        calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
     output:
         page=shown("results/report.html", "pages", "report", ""),
     log:

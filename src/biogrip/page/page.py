@@ -17,7 +17,7 @@ from biogrip.digits import legible
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.page import answers
-from biogrip.page.explorer import explorer, fits_of
+from biogrip.page.sliders import has_sliders, slid
 from biogrip.records.identifications import read_verdicts
 from biogrip.records.rows import read_table, whole
 from biogrip.stages.judgement import TRACE
@@ -26,7 +26,7 @@ from biogrip.tables.cases import target_of
 
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
-_LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
+_LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake")
 # Tables, or beginnings of their names, that answers are written from.
 _ANSWERING = (
     *("errors.csv", "verdicts_", "coverage.csv"),
@@ -47,7 +47,10 @@ _TEMPLATES = jinja2.Environment(
 )
 _TEMPLATES.filters["legible"] = legible
 _TEMPLATES.filters["symbols"] = lambda text: _SYMBOL.sub(r"<i>\1</i><sub>\2</sub>", escape(text))
-_TEMPLATES.globals["style"] = Path(__file__).with_name("report.css").read_text(encoding="utf-8")
+_TEMPLATES.globals |= {
+    name: Path(__file__).with_name(file).read_text(encoding="utf-8")
+    for name, file in (("style", "report.css"), ("script", "sliders.js"))
+}
 _NUMBER = re.compile(r"(?:&[gl]t;|[≤≥−])*\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\u00a0%)?")
 
 
@@ -75,8 +78,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
 
     Files are, by what they have: `figures`, PNG; `tables`, HTML, and in their order their
     `downloads`, CSV; `captions`, text, named like what they are of; of all cases in their order
-    `identifications`, `verdicts` and `measurements` with the judged trace; `calibrated` grippers of
-    the cases that have them, which the file names tell.
+    `verdicts` and `measurements` with the judged trace.
     """
     texts = {
         (path.parent.name, path.stem): " ".join(path.read_text(encoding="utf-8").split())
@@ -84,11 +86,11 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
     }
     titles = {case.name: case.title for case in study.cases.values()}
     owners = titles | {name: sweep.title or name for name, sweep in study.config.sweeps.items()}
-    cases, methods = list(study.cases.values()), list(study.identifiers.values())
-    traces, of_cases = [], (cases, files["identifications"], files["measurements"])
-    for case, found, measured in zip(*of_cases, strict=True):
-        calibrated = [path for path in files["calibrated"] if path.stem == case.name]
-        traces.append((case.title, fits_of(case, methods, found, measured, calibrated)))
+    cases = list(study.cases.values())
+    measured = zip(cases, files["measurements"], strict=True)
+    movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
+    # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
+    movable.sort(key=lambda it: it[0].parameters["c"] / it[0].parameters["k"])
     errors, judged, covered, compared, claimed, beside = (
         [row for csv in files["downloads"] if csv.name.startswith(name) for row in read_table(csv)]
         for name in _ANSWERING
@@ -104,8 +106,8 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
         for path, (image, size) in zip(files["figures"], _images(files["figures"]), strict=True)
     ]
     story = _as_in_paper(figures, [study.cases[name] for name in study.published])
-    hero = [replace(it, title="What a trace tells") for it in figures if it.name == "answer"]
-    placed = {entry.file for entry in hero + story}
+    told = [replace(it, title="What a trace tells") for it in figures if it.name == "answer"]
+    placed = {entry.file for entry in told + story}
     folded: dict[str, list[Entry]] = {}
     for entry in figures:
         if entry.file not in placed:
@@ -115,7 +117,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
     write_text(
         page,
         _TEMPLATES.get_template("report.html.j2").render(
-            explorer=explorer(traces),
+            sliders=slid(*movable[0]) if movable else None,
             answers=[
                 answers.say_what_traces_tell(covered, titles),
                 answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
@@ -126,7 +128,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
             or answers.compared_rows(errors, judged, titles),
             cases=list(zip(cases, map(read_verdicts, files["verdicts"]), strict=True)),
             target_of=target_of,
-            hero=hero,
+            told=told,
             story=story,
             folded=folded,
             evidence_tables=[it for it in tables if it.name in _EVIDENCE],
