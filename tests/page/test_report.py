@@ -16,13 +16,17 @@ from biogrip.page.answers import (
     say_what_traces_tell,
     say_which_method_finds_it,
 )
-from biogrip.page.page import entry_of
+from biogrip.page.page import entry_of, write_report
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import Course
 from biogrip.physics.simulation import simulated_response
+from biogrip.records.identifications import read_verdicts
 from biogrip.records.rows import read_table
+from biogrip.study.load import load_given_study
 from tests.helpers.browser import Opened
+from tests.helpers.places import ROOT
+from tests.helpers.runs import TINY
 
 MOST_BYTES = 8_000_000
 PHONE = {"width": 400, "height": 800}
@@ -251,3 +255,37 @@ def test_summaries_are_whole_and_legible(browser: Any, tiny: Path) -> None:
         assert opened.problems == []
         assert opened.asked == []
         opened.context.close()
+
+
+def test_a_study_of_one_s_own_has_a_page_without_the_paper(
+    browser: Any, tiny: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With its title, what its trace determines, and fit and profiles unfolded."""
+    monkeypatch.chdir(tiny)
+    study, results = load_given_study(TINY, []).of(["mine"]), tiny / "results"
+    names = ("errors_mine", "verdicts_mine", "models", "gene_ranges", "left_out")
+    tables = [results / "tables" / f"{name}.html" for name in names]
+    files = {
+        "figures": [*results.glob("figures/*_mine.png"), results / "figures" / "comb.png"],
+        "tables": tables,
+        "downloads": [path.with_suffix(".csv") for path in tables],
+        "captions": sorted((ROOT / "workflow" / "report").glob("*/*.rst")),
+        "verdicts": [results / "identifiability" / "mine.json"],
+        "measurements": [results / "measurements" / "mine" / "seeds_0-0.npz"],
+    }
+    write_report(study, "", files, tmp_path / "page.html")
+    assert not re.search("of the paper|[Pp]aper's", (tmp_path / "page.html").read_text("utf-8"))
+    opened = Opened(browser, tmp_path / "page.html", viewport=PHONE)
+    page = opened.page
+    assert page.locator("h1").inner_text() == page.title() == "A trace of mine"
+    answer = page.locator(".answers p").bounding_box()
+    assert answer
+    assert answer["y"] + answer["height"] < PHONE["height"]
+    told = read_verdicts(files["verdicts"][0])
+    said = page.locator("dd:visible").all_inner_texts()
+    assert [legible(item["in_words"]) for item in told["quantities"]] == said
+    shown_figures = page.locator("figure:visible").evaluate_all("all => all.map(f => f.id)")
+    assert shown_figures == ["figure-judged_fit_mine", "figure-profiles_mine"]
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    assert opened.problems == []
+    opened.context.close()

@@ -20,7 +20,6 @@ from biogrip.page import answers
 from biogrip.page.sliders import has_sliders, slid
 from biogrip.records.identifications import read_verdicts
 from biogrip.records.rows import read_table, whole
-from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import target_of
 
@@ -30,10 +29,19 @@ _LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake")
 # Tables, or beginnings of their names, that answers are written from.
 _ANSWERING = (
     *("errors.csv", "verdicts_", "coverage.csv"),
-    *("methods.csv", "claims.csv", "tables_5_to_7.csv"),
+    *("methods.csv", "claims.csv", "tables_5_to_7.csv", "models.csv"),
 )
 # Tables under what is reconstructed; the others are under their heading.
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
+# What only the paper's page shows of the gripper and the default search ranges.
+_OF_THE_PAPER = (
+    *("comb", "linkage", "torque", "gripper", "actuator", "left_out"),
+    *("gene_ranges", "parameter_ranges"),
+)
+# What is unfolded of a case on a page of one's own.
+_UNFOLDED = "judged_fit", "profiles"
+_QUESTION = "How well can a MEMS microgripper identify the viscoelastic parameters of a cell?"
+_MOST_TITLES = 3
 # The paper's figure of its first fit, between those of its convergence and of its evolution.
 _FIRST_FIT = 9
 _SYMBOL = re.compile(r"\b([kc])_(\w)\b")
@@ -47,7 +55,7 @@ _TEMPLATES = jinja2.Environment(
 )
 _TEMPLATES.filters["legible"] = legible
 _TEMPLATES.filters["symbols"] = lambda text: _SYMBOL.sub(r"<i>\1</i><sub>\2</sub>", escape(text))
-_TEMPLATES.globals |= {
+_TEMPLATES.globals |= {"target_of": target_of} | {
     name: Path(__file__).with_name(file).read_text(encoding="utf-8")
     for name, file in (("style", "report.css"), ("script", "sliders.js"))
 }
@@ -91,7 +99,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
     movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
     # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
     movable.sort(key=lambda it: it[0].parameters["c"] / it[0].parameters["k"])
-    errors, judged, covered, compared, claimed, beside = (
+    errors, judged, covered, compared, claimed, beside, models = (
         [row for csv in files["downloads"] if csv.name.startswith(name) for row in read_table(csv)]
         for name in _ANSWERING
     )
@@ -105,13 +113,20 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
         replace(entry_of(path, owners, texts), content=image, size=size)
         for path, (image, size) in zip(files["figures"], _images(files["figures"]), strict=True)
     ]
-    story = _as_in_paper(figures, [study.cases[name] for name in study.published])
+    if study.published:
+        story = _as_in_paper(figures, [study.cases[name] for name in study.published])
+    else:
+        figures, tables = ([it for it in own if _is_own(it, study)] for own in (figures, tables))
+        story = [it for it in figures if it.name in _UNFOLDED]
     told = [replace(it, title="What a trace tells") for it in figures if it.name == "answer"]
     placed = {entry.file for entry in told + story}
     folded: dict[str, list[Entry]] = {}
     for entry in figures:
         if entry.file not in placed:
             folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
+    found = [read_verdicts(path) for path in files["verdicts"]]
+    by_case = zip(cases, found, strict=True)
+    own = [it for case, it in by_case if case.recorded and not study.published]
     asked = compared, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
     write_text(
@@ -119,6 +134,7 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
         _TEMPLATES.get_template("report.html.j2").render(
             sliders=slid(*movable[0]) if movable else None,
             answers=[
+                answers.say_what_recordings_tell(own),
                 answers.say_what_traces_tell(covered, titles),
                 answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
                 answers.say_which_method_finds_it(*asked),
@@ -126,15 +142,21 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
             ],
             compared=answers.rows_beside_the_paper(beside, titles)
             or answers.compared_rows(errors, judged, titles),
-            cases=list(zip(cases, map(read_verdicts, files["verdicts"]), strict=True)),
-            target_of=target_of,
+            cases=list(zip(cases, found, strict=True)),
+            better={
+                case.name: answers.say_which_model_is_better(
+                    models, case.name, case.sample.model.title
+                )
+                for case in cases
+            },
             told=told,
             story=story,
             folded=folded,
             evidence_tables=[it for it in tables if it.name in _EVIDENCE],
             tables=[it for it in tables if it.name not in _EVIDENCE],
             config=config,
-            grips=study.has_gripper,
+            title=_title(study),
+            paper=bool(study.published),
             versions={"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
         ),
     )
@@ -144,11 +166,24 @@ def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -
     """Write what the judged trace of a case tells, with figures, PNG."""
     text = _TEMPLATES.get_template("summary.html.j2").render(
         case=case,
-        trace=case.block.measurement.file or f"seed {TRACE} of the simulated traces",
         found=read_verdicts(verdicts),
         figures=[(path.stem, _url("image/png", path.read_bytes())) for path in figures],
     )
     write_text(page, text)
+
+
+def _title(study: Study) -> str:
+    """Return the paper's question, or the titles of the cases of another study."""
+    titles = [case.title for case in study.cases.values()]
+    named = ", ".join(titles) if len(titles) <= _MOST_TITLES else f"{len(titles)} samples"
+    return _QUESTION if study.published else named
+
+
+def _is_own(entry: Entry, study: Study) -> bool:
+    """Tell whether a page without the paper shows it: errors are of simulated traces."""
+    of = [study.cases[entry.whose]] if entry.whose in study.cases else study.cases.values()
+    untold = entry.name == "errors" and all(case.recorded for case in of)
+    return entry.name not in _OF_THE_PAPER and not untold
 
 
 def entry_of(file: Path, owners: Mapping[str, str], texts: Mapping[tuple[str, str], str]) -> Entry:
