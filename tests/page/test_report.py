@@ -266,7 +266,7 @@ def test_a_study_of_one_s_own_has_a_page_without_the_paper(
     names = ("errors_mine", "verdicts_mine", "models", "gene_ranges", "left_out")
     tables = [results / "tables" / f"{name}.html" for name in names]
     files = {
-        "figures": [*results.glob("figures/*_mine.png"), results / "figures" / "comb.png"],
+        "figures": [*sorted(results.glob("figures/*_mine.png")), results / "figures" / "comb.png"],
         "tables": tables,
         "downloads": [path.with_suffix(".csv") for path in tables],
         "captions": sorted((ROOT / "workflow" / "report").glob("*/*.rst")),
