@@ -129,6 +129,14 @@ def test_print_shows_what_is_unfolded_on_a_few_sheets(browser: Any, report: Path
     assert 2 <= sheets <= 20
     opened.page.evaluate("document.querySelectorAll('details').forEach(e => e.open = true)")
     assert len(re.findall(rb"/Type /Page\b", opened.page.pdf(format="A4"))) > sheets + 2
+    # Wide tables fit a landscape sheet within margins of a centimetre, no word broken.
+    opened.page.emulate_media(media="print")
+    opened.page.set_viewport_size({"width": 1047, "height": 718})
+    widths = "[...document.querySelectorAll('.wide table')].map(table => table.scrollWidth)"
+    assert 0 < max(opened.page.evaluate(widths)) <= 1047
+    broken = "[...document.querySelectorAll('th')].map(e => getComputedStyle(e).overflowWrap)"
+    assert set(opened.page.evaluate(broken)) == {"normal"}
+    assert not opened.page.locator(".config").is_visible()
     opened.context.close()
 
 
@@ -273,7 +281,7 @@ def test_a_study_of_one_s_own_has_a_page_without_the_paper(
         "verdicts": [results / "identifiability" / "mine.json"],
         "measurements": [results / "measurements" / "mine" / "seeds_0-0.npz"],
     }
-    write_report(study, "", files, tmp_path / "page.html")
+    write_report(study, "", files, tmp_path / "page.html", tmp_path / "front.html")
     assert not re.search("of the paper|[Pp]aper's", (tmp_path / "page.html").read_text("utf-8"))
     opened = Opened(browser, tmp_path / "page.html", viewport=PHONE)
     page = opened.page

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from importlib.metadata import version
-from io import BytesIO
 from pathlib import Path
 
 import jinja2
@@ -81,8 +80,10 @@ class Entry:
     """Data URL of a table's CSV."""
 
 
-def write_report(study: Study, config: str, files: Mapping[str, list[Path]], page: Path) -> None:
-    """Write the report of a study, with its config, YAML, as HTML.
+def write_report(
+    study: Study, config: str, files: Mapping[str, list[Path]], page: Path, front: Path
+) -> None:
+    """Write the report of a study, with its config, YAML, as HTML, and its answers alone.
 
     Files are, by what they have: `figures`, PNG; `tables`, HTML, and in their order their
     `downloads`, CSV; `captions`, text, named like what they are of; of all cases in their order
@@ -129,37 +130,34 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
     own = [it for case, it in by_case if case.recorded and not study.published]
     asked = compared, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
-    write_text(
-        page,
-        _TEMPLATES.get_template("report.html.j2").render(
-            sliders=slid(*movable[0]) if movable else None,
-            answers=[
-                answers.say_what_recordings_tell(own),
-                answers.say_what_traces_tell(covered, titles),
-                answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
-                answers.say_which_method_finds_it(*asked),
-                answers.say_what_claims_are(claimed),
-            ],
-            compared=answers.rows_beside_the_paper(beside, titles)
-            or answers.compared_rows(errors, judged, titles),
-            cases=list(zip(cases, found, strict=True)),
-            better={
-                case.name: answers.say_which_model_is_better(
-                    models, case.name, case.sample.model.title
-                )
-                for case in cases
-            },
-            told=told,
-            story=story,
-            folded=folded,
-            evidence_tables=[it for it in tables if it.name in _EVIDENCE],
-            tables=[it for it in tables if it.name not in _EVIDENCE],
-            config=config,
-            title=_title(study),
-            paper=bool(study.published),
-            versions={"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
-        ),
-    )
+    shown = {
+        "sliders": slid(*movable[0]) if movable else None,
+        "answers": [
+            answers.say_what_recordings_tell(own),
+            answers.say_what_traces_tell(covered, titles),
+            answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
+            answers.say_which_method_finds_it(*asked),
+            answers.say_what_claims_are(claimed),
+        ],
+        "compared": answers.rows_beside_the_paper(beside, titles)
+        or answers.compared_rows(errors, judged, titles),
+        "cases": list(zip(cases, found, strict=True)),
+        "better": {
+            case.name: answers.say_which_model_is_better(models, case.name, case.sample.model.title)
+            for case in cases
+        },
+        "told": told,
+        "story": story,
+        "folded": folded,
+        "evidence_tables": [it for it in tables if it.name in _EVIDENCE],
+        "tables": [it for it in tables if it.name not in _EVIDENCE],
+        "config": config,
+        "title": _title(study),
+        "paper": bool(study.published),
+        "versions": {"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
+    }
+    for file, template in ((page, "report"), (front, "answers")):
+        write_text(file, _TEMPLATES.get_template(f"{template}.html.j2").render(shown))
 
 
 def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -> None:
@@ -214,20 +212,18 @@ def _as_in_paper(figures: Sequence[Entry], published: Sequence[Case]) -> list[En
 
 
 def _images(paths: Sequence[Path]) -> Iterator[tuple[str | None, tuple[int, int]]]:
-    """Yield images of at most 256 colours, None when there is no more room, and their sizes."""
+    """Yield images, None when there is no more room, and their sizes."""
     room = _MOST_PICTURE_LETTERS
     for path in paths:
-        packed = BytesIO()
         try:
             with PIL.Image.open(path) as image:
-                few = image.convert("RGB").quantize(256, dither=PIL.Image.Dither.NONE)
+                size = image.size
         # The latter, too, is Pillow's for what is no PNG.
         except (OSError, SyntaxError) as error:
             raise BiogripError(f"{path}: cannot be read: {error}.") from error
-        few.save(packed, "png")
-        url = _url("image/png", packed.getvalue())
+        url = _url("image/png", path.read_bytes())
         room -= len(url)
-        yield url if room >= 0 else None, few.size
+        yield url if room >= 0 else None, size
 
 
 def _url(kind: str, content: bytes) -> str:

@@ -39,7 +39,7 @@ def slid(case: Case, measurements: Path) -> dict[str, Any]:
     values = case.parameters.values()
     return {
         "title": case.title,
-        "noise": f"{factor * rms(readings - target):.4g}",
+        "noise": f"{factor * rms((readings - target)[::stride]):.4g}",
         "times": recorded.time_s[::stride].tolist(),
         "readings": significant(readings[::stride], _DIGITS).tolist(),
         "factor": factor,
