@@ -95,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _identify_parser(commands)
+    _study_parser(commands)
     _groups_parser(commands)
     _design_parser(commands)
     return parser
@@ -205,22 +206,9 @@ class _Set(argparse.Action):
         namespace.settings = [*namespace.settings, (str(option), path, value)]
 
 
-def _identify_parser(stages: Any) -> None:
-    text = "identify the sample in recorded traces, without a workflow"
-    identify = stages.add_parser("identify", help=text, description=text)
-    identify.set_defaults(command=_identify, settings=[])
-    identify.lists_models = True
-    identify.examples = _examples(
-        "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
-        "identify creep.csv --reading 'strain=Strain [%]' --time 'Time [s]' --hold 5Pa --model sls",
-        "identify dwell.txt --reading 'force=Load (uN)' --time 'Time (s)' "
-        "--load 'Indentation (nm)' --model sls",
-        """identify sweep.csv --reading "storage=G' (Pa)" --reading "loss=G'' (Pa)" """
-        "--frequency 'f (Hz)' --model power_law",
-        "identify cells.tsv --config my_gripper.yaml --csv found.csv",
-        cost="A trace takes seconds, most of them for comparing the sample models: --no-compare.",
-    )
-    identify.add_argument(
+def _add_settings(parser: Any, outputs: Callable[[Any], None] | None = None) -> None:
+    """Add traces, and options that say what they are of."""
+    parser.add_argument(
         "traces",
         type=Path,
         nargs="+",
@@ -228,9 +216,8 @@ def _identify_parser(stages: Any) -> None:
         help="CSV file with a header, or a table of traces: its header has the column file, and "
         "others that are keys of the config, with dots, or copied to the CSV",
     )
-
     for title, options in _SETTINGS.items():
-        group = identify.add_argument_group(title)
+        group = parser.add_argument_group(title)
         for name, metavar, text in options:
             names = [name] if metavar else [name, name.replace("--", "--no-")]
             key = OPTIONS.get(name[2:].replace("-", "_"), _any_key)
@@ -244,7 +231,26 @@ def _identify_parser(stages: Any) -> None:
             of_key = {"dest": "model_selection.models", "nargs": 0, "const": []}
             text = "do not try other models, which takes most of the time"
             group.add_argument("--no-compare", action=_Set, help=text, **of_key)
-            _add_outputs(identify.add_argument_group("output"))
+            if outputs:
+                outputs(parser.add_argument_group("output"))
+
+
+def _identify_parser(stages: Any) -> None:
+    text = "identify the sample in recorded traces, without a workflow"
+    identify = stages.add_parser("identify", help=text, description=text)
+    identify.set_defaults(command=_identify, settings=[])
+    identify.lists_models = True
+    identify.examples = _examples(
+        "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
+        "identify creep.csv --reading 'strain=Strain [%]' --time 'Time [s]' --hold 5Pa --model sls",
+        "identify afm.txt --reading 'force=Load (uN)' --time 'Time (s)' "
+        "--load 'Indentation (nm)' --sphere '25 um' --model sls",
+        """identify sweep.csv --reading "storage=G' (Pa)" --reading "loss=G'' (Pa)" """
+        "--frequency 'f (Hz)' --model power_law",
+        "identify cells.tsv --config my_gripper.yaml --csv found.csv",
+        cost="A trace takes seconds, most of them for comparing the sample models: --no-compare.",
+    )
+    _add_settings(identify, _add_outputs)
 
 
 def _add_outputs(group: Any) -> None:
@@ -252,6 +258,17 @@ def _add_outputs(group: Any) -> None:
     group.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row per trace")
     text = "JSON file, of one trace [TRACE.identified.json]"
     group.add_argument("--output", type=Path, metavar="FILE", help=text)
+
+
+def _study_parser(stages: Any) -> None:
+    text = "write the config of a study of recorded traces, from the options of identify"
+    study = stages.add_parser("study", help=text, description=text)
+    study.set_defaults(command=_study, settings=[])
+    study.lists_models = True
+    study.examples = _examples("study cell.csv --config my_gripper.yaml --model liquid_drop")
+    _add_settings(study)
+    text = "new folder for the study [TRACE_study]"
+    study.add_argument("--output", type=Path, metavar="FOLDER", help=text)
 
 
 def _groups_parser(stages: Any) -> None:
@@ -302,6 +319,15 @@ def _identify(options: argparse.Namespace) -> int:
         report=options.report,
         table=options.csv,
     )
+
+
+def _study(options: argparse.Namespace) -> int:
+    from biogrip.command.settings import Setting
+    from biogrip.command.study import write_study
+
+    settings = [Setting(*each) for each in options.settings]
+    write_study(options.traces, options.config, settings, options.output)
+    return 0
 
 
 def _groups(options: argparse.Namespace) -> int:

@@ -1,12 +1,16 @@
 """The answers on the page: what its tables say, and no more."""
 
+from typing import Any
+
 from biogrip.page.answers import (
     compared_rows,
     rows_beside_the_paper,
     say_what_claims_are,
+    say_what_recordings_tell,
     say_what_the_study_gives,
     say_what_traces_tell,
     say_which_method_finds_it,
+    say_which_model_is_better,
 )
 
 TITLES = {"cell": "A cell", "drop": "A drop"}
@@ -112,3 +116,52 @@ def test_verdicts_on_claims_are_counted() -> None:
         "in part, 1 not, 0 too few runs to tell, 1 cannot be told."
     )
     assert say_what_claims_are([]) == ""
+
+
+def recorded(fit: str, **verdicts: str) -> dict[str, Any]:
+    found = verdicts.items()
+    provided = {"c_p": "it relaxes"}
+    return {
+        "fit": fit,
+        "quantities": [
+            {"quantity": name, "verdict": verdict, "provided": provided.get(name)}
+            for name, verdict in found
+        ],
+    }
+
+
+def test_a_recorded_trace_has_a_sentence_and_several_have_shares() -> None:
+    one = recorded(
+        "doubtful", k="determined", k_p="bounded above", c="determined", c_p="determined"
+    )
+    assert say_what_recordings_tell([one]) == (
+        "This trace determines k, c and c_p (provided it relaxes); it bounds only above k_p. Of "
+        "the fits, 1 doubtful."
+    )
+    other = recorded("rejected", k="fit rejected", k_p="fit rejected")
+    assert say_what_recordings_tell([one, recorded("ok", k="determined"), other]) == (
+        "Of 3 traces, k is determined in 2, k_p is determined in 0, c is determined in 1 and c_p "
+        "is determined in 1. Of the fits, 1 doubtful and 1 rejected."
+    )
+    assert say_what_recordings_tell([other]).startswith("The model cannot give this trace")
+    assert say_what_recordings_tell([]) == ""
+
+
+def test_a_better_model_is_named_with_what_it_gains() -> None:
+    rows = [
+        {"case": case, "model": model, "parameters": number, "median_delta_bic": bic}
+        for case, model, number, bic in (
+            *(("a", "solid", "4", "6.69"), ("a", "liquid", "3", "0")),
+            *(("b", "solid", "4", "0"), ("b", "liquid", "3", "80")),
+            *(("d", "solid", "4", "0"), ("d", "liquid", "3", "5.9")),
+        )
+    ]
+    simpler = (
+        "Another model, liquid, fits as well, with fewer parameters: its BIC is lower by 6.69."
+    )
+    assert say_which_model_is_better(rows, "a", "solid") == simpler
+    assert say_which_model_is_better(rows, "b", "solid") == ""
+    better = "Another model, solid, fits better: its BIC is lower by 80."
+    assert say_which_model_is_better(rows, "b", "liquid") == better
+    assert say_which_model_is_better(rows, "d", "liquid") == ""
+    assert say_which_model_is_better(rows, "c", "solid") == ""

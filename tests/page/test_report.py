@@ -1,28 +1,32 @@
-"""The page of a study in a real browser: whole, legible, and its explorer right."""
+"""The page of a study in a real browser: whole, legible, and its sliders right."""
 
 import re
 from base64 import b64decode
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from biogrip.digits import legible
-from biogrip.figures.fit import Fit
-from biogrip.fit.problem import METHODS
 from biogrip.page.answers import (
     say_what_claims_are,
     say_what_the_study_gives,
     say_what_traces_tell,
     say_which_method_finds_it,
 )
-from biogrip.page.explorer import explorer
-from biogrip.page.page import entry_of
+from biogrip.page.page import entry_of, write_report
+from biogrip.physics.gripper import Gripper
+from biogrip.physics.models import MODELS
+from biogrip.physics.protocol import Course
+from biogrip.physics.simulation import simulated_response
+from biogrip.records.identifications import read_verdicts
 from biogrip.records.rows import read_table
-from biogrip.records.traces import read_measurements
+from biogrip.study.study import load_given_study
 from tests.helpers.browser import Opened
+from tests.helpers.places import ROOT
+from tests.helpers.runs import TINY
 
 MOST_BYTES = 8_000_000
 PHONE = {"width": 400, "height": 800}
@@ -35,14 +39,7 @@ def report(tiny: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def opened(browser: Any, report: Path) -> Opened:
-    return explored(browser, report)
-
-
-def explored(browser: Any, report: Path, **context: Any) -> Opened:
-    """The page when its explorer is there."""
-    found = Opened(browser, report, **context)
-    found.page.wait_for_selector("#explorer .main-svg", state="attached")
-    return found
+    return Opened(browser, report)
 
 
 def test_the_page_needs_nothing_else(opened: Opened, report: Path) -> None:
@@ -78,7 +75,7 @@ def test_the_page_is_legible_and_no_column_of_the_first_table_is_clipped(
     browser: Any, report: Path, medium: Any, width: int
 ) -> None:
     """Also on a phone, and in print on A4 within margins of a centimetre."""
-    opened = explored(browser, report, viewport={"width": width, "height": 900})
+    opened = Opened(browser, report, viewport={"width": width, "height": 900})
     page = opened.page
     page.emulate_media(media=medium)
     assert page.locator(".compared thead th").count() == 7
@@ -107,14 +104,14 @@ def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path
     told = page.locator("#tables summary").all_text_contents()
     captions = [text.split(". ", 1)[1] for text in map(str.strip, told) if ". " in text]
     assert len(captions) == len(set(captions)) > 5
-    # Then the picture's quantities, and figures of the paper, before all that is folded.
+    # Sliders, what a trace tells, and the paper's figures come before all that is folded.
     shown = page.locator("figure:visible").evaluate_all("all => all.map(f => f.id)")
-    assert shown == ["figure-answer", "figure-fit_liquid_drop_2"]
+    assert shown == ["sliders", "figure-answer", "figure-fit_liquid_drop_2"]
 
 
 def test_menu_links_land_where_they_say(browser: Any, report: Path) -> None:
     """On the first click, and in what was folded."""
-    opened = explored(browser, report)
+    opened = Opened(browser, report)
     for link in opened.page.locator("nav a").all():
         link.click()
         target = opened.page.locator(str(link.get_attribute("href")))
@@ -127,11 +124,19 @@ def test_menu_links_land_where_they_say(browser: Any, report: Path) -> None:
 
 
 def test_print_shows_what_is_unfolded_on_a_few_sheets(browser: Any, report: Path) -> None:
-    opened = explored(browser, report)
+    opened = Opened(browser, report)
     sheets = len(re.findall(rb"/Type /Page\b", opened.page.pdf(format="A4")))
     assert 2 <= sheets <= 20
     opened.page.evaluate("document.querySelectorAll('details').forEach(e => e.open = true)")
     assert len(re.findall(rb"/Type /Page\b", opened.page.pdf(format="A4"))) > sheets + 2
+    # Wide tables fit a landscape sheet within margins of a centimetre, no word broken.
+    opened.page.emulate_media(media="print")
+    opened.page.set_viewport_size({"width": 1047, "height": 718})
+    widths = "[...document.querySelectorAll('.wide table')].map(table => table.scrollWidth)"
+    assert 0 < max(opened.page.evaluate(widths)) <= 1047
+    broken = "[...document.querySelectorAll('th')].map(e => getComputedStyle(e).overflowWrap)"
+    assert set(opened.page.evaluate(broken)) == {"normal"}
+    assert not opened.page.locator(".config").is_visible()
     opened.context.close()
 
 
@@ -165,7 +170,7 @@ def test_anybody_can_use_the_page(
     browser: Any, report: Path, scheme: Any, rules: list[str]
 ) -> None:
     """Axe finds nothing serious, all unfolded; in dark colours none that is too faint."""
-    opened = explored(browser, report, color_scheme=scheme)
+    opened = Opened(browser, report, color_scheme=scheme)
     opened.page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
     assert opened.barriers(*rules) == []
     paper = opened.page.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -173,39 +178,69 @@ def test_anybody_can_use_the_page(
     opened.context.close()
 
 
-DRAWN = """document.getElementById('explorer')._fullData.filter(line => line.visible === true)
-    .map(line => ({name: line.name, y: Array.from(line.y)}))"""
-
-
-@pytest.mark.parametrize(
-    ("case", "title", "prefix"),
-    [("liquid_drop_2", "Liquid drop, case 2", "m"), ("mine", "A trace of mine", "µ")],
+SAMPLES = (
+    (20.0, 5.0, 80.0, 1e-3),
+    (1.0, 1e-4, 5.0, 5.0),
+    (1e-3, 50.0, 1e4, 1e-6),
+    (9.0, 9.0, 1.0, 90.0),
 )
-def test_the_explorer_shows_the_judged_trace_and_its_fits(
-    opened: Opened, tiny: Path, case: str, title: str, prefix: str
+
+
+@pytest.mark.parametrize("values", SAMPLES)
+def test_sliders_show_the_response_of_the_sample(
+    opened: Opened, values: tuple[float, ...], gripper: Gripper, steps: Course
 ) -> None:
-    """Of the case that is chosen, as SVG, which needs no graphics processor."""
-    page, results = opened.page, tiny / "results"
-    page.locator("details.explorer").evaluate("e => { e.open = true; }")
-    page.locator("#explorer .updatemenu-header").click()
-    page.locator("#explorer .updatemenu-dropdown-button", has_text=title).click()
-    label = f"closing rotation ({prefix}rad)"
-    page.locator("#explorer .ytitle", has_text=label).wait_for()
-    scale = {"m": 1e3, "µ": 1e6}[prefix]
-    drawn = {line["name"]: np.array(line["y"]) / scale for line in page.evaluate(DRAWN)}
-    (batch,) = (results / "measurements" / case).glob("seeds_0-*.npz")
-    measured = read_measurements(batch, [0])
-    noisy = drawn.pop("noisy trace" if case != "mine" else "recorded trace")
-    assert np.allclose(noisy, measured.readings[0], rtol=1e-5, atol=0)
-    if case != "mine":
-        assert measured.target is not None
-        assert np.allclose(drawn.pop("target"), measured.target, rtol=1e-5, atol=0)
-    assert set(drawn) == {"genetic algorithm", "multi-start least squares"}
-    found = pd.read_csv(results / "identifications" / f"{case}.csv").set_index("seed")
-    for misfit, method in found.loc[0, ["misfit", "method"]].itertuples(index=False):
-        residual = measured.readings[0] - drawn[METHODS[method].title]
-        assert np.sqrt(np.mean(residual**2)) == pytest.approx(misfit, rel=1e-4)
-    assert page.locator("canvas").count() == 0
+    """That of Python, which has it by other modes; digits are lost where a branch is weak."""
+    times = np.linspace(0.0, 400.0, 1601)
+    network = MODELS["generalized_maxwell"].network([values])
+    arms = {arm: replace(getattr(gripper, arm), inertia_kgm2=0.0) for arm in ("left", "right")}
+    wanted = simulated_response(replace(gripper, **arms), network, steps, times, nonlinear=False)[0]
+    sample = dict(zip(("k", "k_p", "c", "c_p"), values, strict=True))
+    lever = 2 * (1.5e-3 * np.sin(np.radians(75.0))) ** 2
+    arm = {"stiffness": 4.4e-7, "damping": 3.3e-12, "lever": lever}
+    given = [sample, arm, [[0.0, 1.6e-9], [200.0, -1.28e-9]], times.tolist()]
+    drawn = opened.page.evaluate("given => response(...given)", given)
+    assert np.allclose(drawn, wanted, rtol=0, atol=1e-9 * float(np.max(wanted)))
+
+
+def test_c_moves_against_c_p_and_nothing_is_seen(opened: Opened) -> None:
+    """While k moves the curve, and so does c_p alone."""
+    page = opened.page
+
+    def seen() -> tuple[dict[str, float], float, str]:
+        told = page.locator("#sliders input[type=range] + output").all_text_contents()
+        values = dict(
+            zip(("k", "k_p", "c", "c_p"), (float(t.split()[0]) for t in told), strict=True)
+        )
+        curve = str(page.locator("#sliders .curve").get_attribute("d"))
+        return values, float(str(page.locator("#sliders p > output").text_content())), curve
+
+    def moved(name: str, value: float) -> tuple[dict[str, float], float, float]:
+        page.get_by_role("button", name="True values").click()
+        _, before, curve = seen()
+        slide = "(e, at) => { e.value = at; e.dispatchEvent(new Event('input')); }"
+        page.locator(f"#sliders input[name={name}]").evaluate(slide, float(np.log10(value)))
+        values, after, now = seen()
+        heights = (np.array(re.findall(r",(-?[\d.]+)", it), float) for it in (curve, now))
+        return values, after / before, float(np.median(np.abs(np.subtract(*heights))))
+
+    true, misfit, _ = seen()
+    assert true == {"k": 1.0, "k_p": 1e-4, "c": 10.0, "c_p": 1e-3}
+    noise = re.search(r"the noise alone is ([\d.]+)", page.locator("#sliders").inner_text())
+    assert noise
+    assert float(noise[1]) == pytest.approx(misfit, rel=1e-3)
+    values, ratio, pixels = moved("c_p", 1.0)
+    assert (values["c"], values["c_p"]) == (9.0, 1.0)
+    assert ratio == pytest.approx(1, abs=0.02)
+    assert pixels < 1
+    assert moved("c", 100.0)[0]["c"] == pytest.approx(10.0)
+    page.locator("#sliders input[type=checkbox]").uncheck()
+    for name, value in (("c_p", 10.0), ("k", 0.05)):
+        values, ratio, pixels = moved(name, value)
+        assert values == true | {name: value}
+        assert ratio > 1.2
+        assert pixels > 5
+    page.locator("#sliders input[type=checkbox]").check()
     assert opened.problems == []
 
 
@@ -219,12 +254,6 @@ def test_a_table_is_of_the_case_that_its_name_ends_with() -> None:
         assert entry.title == name.capitalize().replace("_", " ") + (whose and f": {titles[whose]}")
 
 
-def test_a_title_cannot_end_the_script() -> None:
-    time_s = np.linspace(0.0, 9.0, 10)
-    fits = [(METHODS["genetic"], Fit(time_s, None, time_s, time_s))]
-    assert "<b>mine" not in explorer([("</script><b>mine</b>", fits)])
-
-
 def test_summaries_are_whole_and_legible(browser: Any, tiny: Path) -> None:
     for name in ("liquid_drop_2", "mine"):
         opened = Opened(browser, tiny / f"results/summaries/{name}.html", viewport=PHONE)
@@ -234,3 +263,37 @@ def test_summaries_are_whole_and_legible(browser: Any, tiny: Path) -> None:
         assert opened.problems == []
         assert opened.asked == []
         opened.context.close()
+
+
+def test_a_study_of_one_s_own_has_a_page_without_the_paper(
+    browser: Any, tiny: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With its title, what its trace determines, and fit and profiles unfolded."""
+    monkeypatch.chdir(tiny)
+    study, results = load_given_study(TINY, []).of(["mine"]), tiny / "results"
+    names = ("errors_mine", "verdicts_mine", "models", "gene_ranges", "left_out")
+    tables = [results / "tables" / f"{name}.html" for name in names]
+    files = {
+        "figures": [*sorted(results.glob("figures/*_mine.png")), results / "figures" / "comb.png"],
+        "tables": tables,
+        "downloads": [path.with_suffix(".csv") for path in tables],
+        "captions": sorted((ROOT / "workflow" / "report").glob("*/*.rst")),
+        "verdicts": [results / "identifiability" / "mine.json"],
+        "measurements": [results / "measurements" / "mine" / "seeds_0-0.npz"],
+    }
+    write_report(study, "", files, tmp_path / "page.html", tmp_path / "front.html")
+    assert not re.search("of the paper|[Pp]aper's", (tmp_path / "page.html").read_text("utf-8"))
+    opened = Opened(browser, tmp_path / "page.html", viewport=PHONE)
+    page = opened.page
+    assert page.locator("h1").inner_text() == page.title() == "A trace of mine"
+    answer = page.locator(".answers p").bounding_box()
+    assert answer
+    assert answer["y"] + answer["height"] < PHONE["height"]
+    told = read_verdicts(files["verdicts"][0])
+    said = page.locator("dd:visible").all_inner_texts()
+    assert [legible(item["in_words"]) for item in told["quantities"]] == said
+    shown_figures = page.locator("figure:visible").evaluate_all("all => all.map(f => f.id)")
+    assert shown_figures == ["figure-judged_fit_mine", "figure-profiles_mine"]
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    assert opened.problems == []
+    opened.context.close()

@@ -1,7 +1,5 @@
 """Write the study on one page."""
 
-from pathlib import Path
-
 import yaml
 
 from biogrip.page.page import write_report
@@ -11,4 +9,4 @@ with logged(snakemake):
     study = job_study(snakemake)
     config = yaml.safe_dump(study.plain, allow_unicode=True)
     files = {name: paths(each) for name, each in snakemake.input.items()}
-    write_report(study, config, files, Path(snakemake.output.page))
+    write_report(study, config, files, *paths(snakemake.output))

@@ -82,15 +82,8 @@ def identify_files(
     Return 1 if any of several traces could not be used. A `BiogripError` says that an option, the
     config or the only trace cannot.
     """
-    alone = len(files) == 1
-    asked: list[Asked] = []
-    for file in dict.fromkeys(files):
-        own = Asked(file, config, tuple(settings))
-        if trace_file_problem(file) is None and is_table(own):
-            asked += read_table(file, config, settings)
-            alone = False
-        else:
-            asked.append(own)
+    asked = traces_of(files, config, settings)
+    alone = len(files) == 1 and asked[0].place == Asked.place
     if rows is not None:
         # The last may be beyond the end.
         asked = asked[rows[0] : rows[1] + 1]
@@ -132,6 +125,18 @@ def identify_files(
     if said := [visible(path) for path in (*made, report, table) if path]:
         print(f"Written to {', '.join(said)}.")
     return 1 if outcome.refused else 0
+
+
+def traces_of(
+    files: Sequence[Path], config: Path | None, settings: Sequence[Setting]
+) -> list[Asked]:
+    """Return the traces of files, of which some may be tables of traces."""
+    asked: list[Asked] = []
+    for file in dict.fromkeys(files):
+        own = Asked(file, config, tuple(settings))
+        table = trace_file_problem(file) is None and is_table(own)
+        asked += read_table(file, config, settings) if table else [own]
+    return asked
 
 
 def _identify_traces(

@@ -12,7 +12,6 @@ from typing import Any
 
 import jinja2
 import numpy as np
-import PIL.Image
 import yaml
 from matplotlib.figure import Figure
 
@@ -37,6 +36,7 @@ from biogrip.figures.style import (
     PAGE_IN,
     SHADE,
     figure,
+    in_few_colours,
     is_over_decades,
     save_png,
     styled,
@@ -127,12 +127,9 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
 
 
 def _address(drawn: Figure) -> str:
-    png, few = BytesIO(), BytesIO()
+    png = BytesIO()
     save_png(drawn, png)
-    # With few colours a picture is a third as large.
-    with PIL.Image.open(png) as image:
-        image.convert("RGB").quantize(64, dither=PIL.Image.Dither.NONE).save(few, "png")
-    return f"data:image/png;base64,{base64.b64encode(few.getvalue()).decode()}"
+    return f"data:image/png;base64,{base64.b64encode(in_few_colours(png, 64)).decode()}"
 
 
 def draw_traces(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, str]:

@@ -187,8 +187,12 @@ def case_of(asked: Asked) -> Case:
     return _case_of(asked)[0]
 
 
-def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
-    """Return the case that a trace is, and the trace if its protocol follows from it."""
+def study_of(asked: Asked) -> tuple[str, dict[str, Any], Recording | None, Array | None]:
+    """Return the study of one case that a trace is, not checked, and the name of the case.
+
+    The trace comes along if its protocol follows from it, and what was controlled if it was
+    recorded.
+    """
     files = [default_config(), *([asked.config] if asked.config else [])]
     below = read_configs(files)
     given = asked.given
@@ -203,6 +207,14 @@ def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
     name = re.sub(r"[^A-Za-z0-9_-]", "_", asked.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
     merged["cases"] = {case: {"sample": overlaid({"model": MODEL}, merged.pop("sample", {}))}}
+    return case, merged, recording, record
+
+
+def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
+    """Return the case that a trace is, and the trace if its protocol follows from it."""
+    case, merged, recording, record = study_of(asked)
+    files = [default_config(), *([asked.config] if asked.config else [])]
+    below = read_configs(files)
     sources = [_source(setting, below, merged, case) for setting in asked.settings]
     try:
         study = load_study(merged, files, over=sources)

@@ -6,11 +6,13 @@ Ticks of logarithmic axes are plain text, as math text would take a tenth of a f
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import matplotlib as mpl
 import numpy as np
+import PIL.Image
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation
@@ -142,11 +144,22 @@ def points_within(
 
 def save(drawn: Figure, output: Path, *prints: Path) -> None:
     """Write a figure as PNG, and as PDF for print; without dates, so that both are reproducible."""
+    png = BytesIO()
+    save_png(drawn, png)
     with atomic_write(output) as scratch:
-        save_png(drawn, scratch)
+        scratch.write_bytes(in_few_colours(png, 256))
     for file in prints:
         with atomic_write(file) as scratch:
             drawn.savefig(scratch, format="pdf", metadata={"CreationDate": None, "Creator": None})
+
+
+def in_few_colours(png: BinaryIO, colours: int) -> bytes:
+    """Return a PNG with at most so many colours: it is half as large, or less."""
+    few = BytesIO()
+    with PIL.Image.open(png) as image:
+        flat = image.convert("RGB").quantize(colours, dither=PIL.Image.Dither.NONE)
+        flat.save(few, "png", dpi=image.info["dpi"])
+    return few.getvalue()
 
 
 def save_png(drawn: Figure, output: Path | BinaryIO) -> None:

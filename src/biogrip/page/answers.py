@@ -2,10 +2,13 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from biogrip.digits import legible, plain, with_unit
+from biogrip.fit.nested_fits import STRONG, WORTH_A_MENTION
+from biogrip.judging.doubts import DOUBTFUL, REJECTED
 from biogrip.judging.quantities import PROVIDED
-from biogrip.judging.verdicts import DETERMINED
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.records.identifications import ALL, share_with_limits
 
 Row = Mapping[str, str]
@@ -26,6 +29,60 @@ def say_what_the_study_gives(
     shares[0] = shares[0].replace("(", f"of {rows[0]['seeds']} runs (95 % interval: ", 1)
     fit = f"the best fit known that its digits can express, or one within {tolerance:g} of its χ²,"
     return f"{who} {shown} finds {fit} in {_listed(shares)}."
+
+
+def say_what_recordings_tell(judged: Sequence[Mapping[str, Any]]) -> str:
+    """Say what a recorded trace determines, or in how many of several each quantity is determined.
+
+    Each is what a file of verdicts has; "" if there are none.
+    """
+    if not judged:
+        return ""
+    every = [quantity for own in judged for quantity in own["quantities"]]
+    fits = Counter(own["fit"] for own in judged)
+    if len(judged) > 1:
+        counts = Counter(it["quantity"] for it in every if it["verdict"] == DETERMINED)
+        shares = [
+            f"{it} is determined in {counts[it]}"
+            for it in dict.fromkeys(q["quantity"] for q in every)
+        ]
+        told = f"Of {len(judged)} traces, {_listed(shares)}."
+    elif fits[REJECTED]:
+        told = "The model cannot give this trace, so that the trace determines nothing."
+    else:
+        named = defaultdict[str, list[str]](list)
+        for it in every:
+            provided = f" (provided {it['provided']})" if it["provided"] else ""
+            named[it["verdict"]].append(it["quantity"] + provided)
+        said = [f"{words} {_listed(named[it])}" for it, words in _TOLD.items() if named[it]]
+        told = f"This trace {'; it '.join(said)}."
+    unsure = [f"{fits[fit]} {fit}" for fit in (DOUBTFUL, REJECTED) if fits[fit]]
+    return told + (f" Of the fits, {_listed(unsure)}." if unsure else "")
+
+
+def say_which_model_is_better(models: Iterable[Row], case: str, model: str) -> str:
+    """Say which model has a lower BIC in a case's trace than its own, by title; "" if none has.
+
+    Rows are those of the table of models.
+    """
+    by_title = {row["model"]: row for row in models if row["case"] == case}
+    best = min(by_title.values(), key=lambda row: float(row["median_delta_bic"]), default=None)
+    if best is None or model not in by_title or best["model"] == model:
+        return ""
+    few = int(best["parameters"]) < int(by_title[model]["parameters"])
+    lower = float(by_title[model]["median_delta_bic"]) - float(best["median_delta_bic"])
+    if lower < (WORTH_A_MENTION if few else STRONG):
+        return ""
+    well = "as well, with fewer parameters" if few else "better"
+    return f"Another model, {best['model']}, fits {well}: its BIC is lower by {lower:.3g}."
+
+
+_TOLD = {
+    DETERMINED: "determines",
+    BOUNDED_BELOW: "bounds only below",
+    BOUNDED_ABOVE: "bounds only above",
+    NOT_DETERMINED: "tells nothing of",
+}
 
 
 def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> str:
@@ -159,7 +216,7 @@ def compared_rows(
             "quartiles": _ends(row, "p25_identified", "p75_identified"),
         }
         for row in errors
-        if row["parameter"] in decided and row["basin"] == ALL
+        if row["parameter"] in decided and row["basin"] == ALL and row["target"]
     ]
 
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from importlib.metadata import version
-from io import BytesIO
 from pathlib import Path
 
 import jinja2
@@ -17,23 +16,31 @@ from biogrip.digits import legible
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.page import answers
-from biogrip.page.explorer import explorer, fits_of
+from biogrip.page.sliders import has_sliders, slid
 from biogrip.records.identifications import read_verdicts
 from biogrip.records.rows import read_table, whole
-from biogrip.stages.identification import TRACE
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import target_of
 
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
-_LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
+_LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake")
 # Tables, or beginnings of their names, that answers are written from.
 _ANSWERING = (
     *("errors.csv", "verdicts_", "coverage.csv"),
-    *("methods.csv", "claims.csv", "tables_5_to_7.csv"),
+    *("methods.csv", "claims.csv", "tables_5_to_7.csv", "models.csv"),
 )
 # Tables under what is reconstructed; the others are under their heading.
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
+# What only the paper's page shows of the gripper and the default search ranges.
+_OF_THE_PAPER = (
+    *("comb", "linkage", "torque", "gripper", "actuator", "left_out"),
+    *("gene_ranges", "parameter_ranges"),
+)
+# What is unfolded of a case on a page of one's own.
+_UNFOLDED = "judged_fit", "profiles"
+_QUESTION = "How well can a MEMS microgripper identify the viscoelastic parameters of a cell?"
+_MOST_TITLES = 3
 # The paper's figure of its first fit, between those of its convergence and of its evolution.
 _FIRST_FIT = 9
 _SYMBOL = re.compile(r"\b([kc])_(\w)\b")
@@ -47,7 +54,10 @@ _TEMPLATES = jinja2.Environment(
 )
 _TEMPLATES.filters["legible"] = legible
 _TEMPLATES.filters["symbols"] = lambda text: _SYMBOL.sub(r"<i>\1</i><sub>\2</sub>", escape(text))
-_TEMPLATES.globals["style"] = Path(__file__).with_name("report.css").read_text(encoding="utf-8")
+_TEMPLATES.globals |= {"target_of": target_of} | {
+    name: Path(__file__).with_name(file).read_text(encoding="utf-8")
+    for name, file in (("style", "report.css"), ("script", "sliders.js"))
+}
 _NUMBER = re.compile(r"(?:&[gl]t;|[≤≥−])*\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\u00a0%)?")
 
 
@@ -70,13 +80,14 @@ class Entry:
     """Data URL of a table's CSV."""
 
 
-def write_report(study: Study, config: str, files: Mapping[str, list[Path]], page: Path) -> None:
-    """Write the report of a study, with its config, YAML, as HTML.
+def write_report(
+    study: Study, config: str, files: Mapping[str, list[Path]], page: Path, front: Path
+) -> None:
+    """Write the report of a study, with its config, YAML, as HTML, and its answers alone.
 
     Files are, by what they have: `figures`, PNG; `tables`, HTML, and in their order their
     `downloads`, CSV; `captions`, text, named like what they are of; of all cases in their order
-    `identifications`, `verdicts` and `measurements` with the judged trace; `calibrated` grippers of
-    the cases that have them, which the file names tell.
+    `verdicts` and `measurements` with the judged trace.
     """
     texts = {
         (path.parent.name, path.stem): " ".join(path.read_text(encoding="utf-8").split())
@@ -84,12 +95,12 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
     }
     titles = {case.name: case.title for case in study.cases.values()}
     owners = titles | {name: sweep.title or name for name, sweep in study.config.sweeps.items()}
-    cases, methods = list(study.cases.values()), list(study.identifiers.values())
-    traces, of_cases = [], (cases, files["identifications"], files["measurements"])
-    for case, found, measured in zip(*of_cases, strict=True):
-        calibrated = [path for path in files["calibrated"] if path.stem == case.name]
-        traces.append((case.title, fits_of(case, methods, found, measured, calibrated)))
-    errors, judged, covered, compared, claimed, beside = (
+    cases = list(study.cases.values())
+    measured = zip(cases, files["measurements"], strict=True)
+    movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
+    # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
+    movable.sort(key=lambda it: it[0].parameters["c"] / it[0].parameters["k"])
+    errors, judged, covered, compared, claimed, beside, models = (
         [row for csv in files["downloads"] if csv.name.startswith(name) for row in read_table(csv)]
         for name in _ANSWERING
     )
@@ -103,50 +114,74 @@ def write_report(study: Study, config: str, files: Mapping[str, list[Path]], pag
         replace(entry_of(path, owners, texts), content=image, size=size)
         for path, (image, size) in zip(files["figures"], _images(files["figures"]), strict=True)
     ]
-    story = _as_in_paper(figures, [study.cases[name] for name in study.published])
-    hero = [replace(it, title="What a trace tells") for it in figures if it.name == "answer"]
-    placed = {entry.file for entry in hero + story}
+    if study.published:
+        story = _as_in_paper(figures, [study.cases[name] for name in study.published])
+    else:
+        figures, tables = ([it for it in own if _is_own(it, study)] for own in (figures, tables))
+        story = [it for it in figures if it.name in _UNFOLDED]
+    told = [replace(it, title="What a trace tells") for it in figures if it.name == "answer"]
+    placed = {entry.file for entry in told + story}
     folded: dict[str, list[Entry]] = {}
     for entry in figures:
         if entry.file not in placed:
             folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
+    found = [read_verdicts(path) for path in files["verdicts"]]
+    by_case = zip(cases, found, strict=True)
+    own = [it for case, it in by_case if case.recorded and not study.published]
     asked = compared, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
-    write_text(
-        page,
-        _TEMPLATES.get_template("report.html.j2").render(
-            explorer=explorer(traces),
-            answers=[
-                answers.say_what_traces_tell(covered, titles),
-                answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
-                answers.say_which_method_finds_it(*asked),
-                answers.say_what_claims_are(claimed),
-            ],
-            compared=answers.rows_beside_the_paper(beside, titles)
-            or answers.compared_rows(errors, judged, titles),
-            cases=list(zip(cases, map(read_verdicts, files["verdicts"]), strict=True)),
-            target_of=target_of,
-            hero=hero,
-            story=story,
-            folded=folded,
-            evidence_tables=[it for it in tables if it.name in _EVIDENCE],
-            tables=[it for it in tables if it.name not in _EVIDENCE],
-            config=config,
-            grips=study.has_gripper,
-            versions={"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
-        ),
-    )
+    shown = {
+        "sliders": slid(*movable[0]) if movable else None,
+        "answers": [
+            answers.say_what_recordings_tell(own),
+            answers.say_what_traces_tell(covered, titles),
+            answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
+            answers.say_which_method_finds_it(*asked),
+            answers.say_what_claims_are(claimed),
+        ],
+        "compared": answers.rows_beside_the_paper(beside, titles)
+        or answers.compared_rows(errors, judged, titles),
+        "cases": list(zip(cases, found, strict=True)),
+        "better": {
+            case.name: answers.say_which_model_is_better(models, case.name, case.sample.model.title)
+            for case in cases
+        },
+        "told": told,
+        "story": story,
+        "folded": folded,
+        "evidence_tables": [it for it in tables if it.name in _EVIDENCE],
+        "tables": [it for it in tables if it.name not in _EVIDENCE],
+        "config": config,
+        "title": _title(study),
+        "paper": bool(study.published),
+        "versions": {"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
+    }
+    for file, template in ((page, "report"), (front, "answers")):
+        write_text(file, _TEMPLATES.get_template(f"{template}.html.j2").render(shown))
 
 
 def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -> None:
     """Write what the judged trace of a case tells, with figures, PNG."""
     text = _TEMPLATES.get_template("summary.html.j2").render(
         case=case,
-        trace=case.block.measurement.file or f"seed {TRACE} of the simulated traces",
         found=read_verdicts(verdicts),
         figures=[(path.stem, _url("image/png", path.read_bytes())) for path in figures],
     )
     write_text(page, text)
+
+
+def _title(study: Study) -> str:
+    """Return the paper's question, or the titles of the cases of another study."""
+    titles = [case.title for case in study.cases.values()]
+    named = ", ".join(titles) if len(titles) <= _MOST_TITLES else f"{len(titles)} samples"
+    return _QUESTION if study.published else named
+
+
+def _is_own(entry: Entry, study: Study) -> bool:
+    """Tell whether a page without the paper shows it: errors are of simulated traces."""
+    of = [study.cases[entry.whose]] if entry.whose in study.cases else study.cases.values()
+    untold = entry.name == "errors" and all(case.recorded for case in of)
+    return entry.name not in _OF_THE_PAPER and not untold
 
 
 def entry_of(file: Path, owners: Mapping[str, str], texts: Mapping[tuple[str, str], str]) -> Entry:
@@ -177,20 +212,18 @@ def _as_in_paper(figures: Sequence[Entry], published: Sequence[Case]) -> list[En
 
 
 def _images(paths: Sequence[Path]) -> Iterator[tuple[str | None, tuple[int, int]]]:
-    """Yield images of at most 256 colours, None when there is no more room, and their sizes."""
+    """Yield images, None when there is no more room, and their sizes."""
     room = _MOST_PICTURE_LETTERS
     for path in paths:
-        packed = BytesIO()
         try:
             with PIL.Image.open(path) as image:
-                few = image.convert("RGB").quantize(256, dither=PIL.Image.Dither.NONE)
+                size = image.size
         # The latter, too, is Pillow's for what is no PNG.
         except (OSError, SyntaxError) as error:
             raise BiogripError(f"{path}: cannot be read: {error}.") from error
-        few.save(packed, "png")
-        url = _url("image/png", packed.getvalue())
+        url = _url("image/png", path.read_bytes())
         room -= len(url)
-        yield url if room >= 0 else None, few.size
+        yield url if room >= 0 else None, size
 
 
 def _url(kind: str, content: bytes) -> str:
