@@ -35,6 +35,7 @@ from biogrip.command.settings import (
     read_table,
     read_trace,
 )
+from biogrip.command.side_by_side import side_by_side
 from biogrip.command.words import in_columns, in_words
 from biogrip.errors import BiogripError
 from biogrip.files import digest_of, refuse_inputs, software
@@ -45,7 +46,6 @@ from biogrip.identify.other_fits import Trace
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
-from biogrip.processes import side_by_side
 from biogrip.study.source import default_config
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
