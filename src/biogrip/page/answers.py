@@ -101,24 +101,36 @@ def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> 
     always = [q for q, each in ends.items() if all(low >= 0.9 or at == 1 for at, low, _ in each)]
     never = [q for q, each in ends.items() if all(high <= 0.1 or at == 0 for at, _, high in each)]
     runs = max(runs for each in shares.values() for *_, runs in each)
-    said, first = [], f"Of {runs} traces of each sample "
-    for names, words, worst in (
-        (always, "all or nearly all determine", min),
-        (never, "none or hardly any determines", max),
-    ):
+    all_of, none_of = (share_with_limits(count, runs) for count in (runs, 0))
+
+    def determine(share: tuple[float, float, float], names: Sequence[str]) -> str:
+        rounded = round(share[0], 2)
+        if rounded == 0:
+            return f"{'hardly any' if share[0] else 'none'} determines {_listed(names)}"
+        nearly = "nearly " * (share[0] < 1)
+        return f"{nearly + 'all' if rounded == 1 else _percent(*share)} determine {_listed(names)}"
+
+    told = [f"Of {runs} traces of each sample"]
+    for names, worst in ((always, min), (never, max)):
         if names:
-            provided = f", {PROVIDED}" * any(" + " in name for name in names)
-            share = _percent(*worst(of for name in names for of in ends[name]))
-            said.append(f"{words} {_listed(names)}{provided}: {share}")
-    told = f"{first}{'; '.join(said)}." if said else ""
-    of_title: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
+            share = worst(of for name in names for of in ends[name])
+            about = {min: "at least ", max: "at most "}[worst] * (0.005 < share[0] < 0.995)
+            provided = f", {PROVIDED}," * any(" + " in name for name in names)
+            told.append(f"{about}{determine(share, names)}{provided}")
+    first = f"{told[0]} {' and '.join(told[1:])}".rstrip(",") + "." if told[1:] else ""
+    of_title: dict[str, dict[tuple[float, float, float], list[str]]]
+    of_title = defaultdict(lambda: defaultdict(list))
     for name in (name for name in shares if name not in (*always, *never)):
         for (title, *_), limits in zip(shares[name], ends[name], strict=True):
-            of_title[title][_percent(*limits)].append(name)
-    for title, by_share in of_title.items():
-        parts = [f"{share} determine {_listed(names)}" for share, names in by_share.items()]
-        told += f" {'On' if told else f'{first}on'} “{title}” {', '.join(parts)}."
-    return told
+            of_title[title][limits].append(name)
+    said = [
+        f"On “{title}” {_listed([determine(*each) for each in by_share.items()])}."
+        for title, by_share in of_title.items()
+    ]
+    if not first:
+        said[0] = f"{told[0]}, on{said[0].removeprefix('On')}"
+    sure = legible(f"All is {100 * all_of[1]:.0f} to 100 %, none 0 to {100 * none_of[2]:.0f} %")
+    return " ".join(filter(None, [first, *said, f"({sure}, in 95 % intervals.)"]))
 
 
 def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
@@ -155,14 +167,16 @@ def say_what_claims_are(claims: Iterable[Row]) -> str:
     judged = {verdict: count for verdict, count in counts.items() if verdict not in UNJUDGED}
     if not judged:
         return ""
-    listed = [f"{counts[verdict]} {verdict}" for verdict in _CLAIMED]
+    listed = [f"{counts[verdict]} {verdict}" for verdict in _CLAIMED if counts[verdict]]
+    others = f"; {counts[_ELSEWHERE]} more take another config" if counts[_ELSEWHERE] else ""
     return (
-        f"Of the paper's {sum(judged.values())} claims, each counted once for every sample and "
-        f"quantity: {', '.join(listed)}."
+        f"Of the paper's claims, each counted once for every sample and quantity, "
+        f"{sum(judged.values())} are judged: {', '.join(listed)}{others}."
     )
 
 
-UNJUDGED = "not judged", "judged elsewhere"
+_ELSEWHERE = "judged elsewhere"
+UNJUDGED = "not judged", _ELSEWHERE
 """Verdicts of claims that do not count: nothing can contradict them, or another config judges."""
 _CLAIMED = "replicated", "in part", "not", "too few runs to tell", "cannot be told"
 
