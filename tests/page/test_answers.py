@@ -160,6 +160,7 @@ def test_a_better_model_is_named_with_what_it_gains() -> None:
         "Another model, liquid, fits as well, with fewer parameters: its BIC is lower by 6.69."
     )
     assert say_which_model_is_better(rows, "a", "solid") == simpler
+    assert say_which_model_is_better(rows, "a", "solid", "rejected") == ""
     assert say_which_model_is_better(rows, "b", "solid") == ""
     better = "Another model, solid, fits better: its BIC is lower by 80."
     assert say_which_model_is_better(rows, "b", "liquid") == better

@@ -6,7 +6,7 @@ from typing import Any
 
 from biogrip.digits import legible, plain, with_unit
 from biogrip.fit.nested_fits import STRONG, WORTH_A_MENTION
-from biogrip.judging.doubts import DOUBTFUL, REJECTED
+from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.quantities import PROVIDED
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.records.identifications import ALL, share_with_limits
@@ -60,10 +60,10 @@ def say_what_recordings_tell(judged: Sequence[Mapping[str, Any]]) -> str:
     return told + (f" Of the fits, {_listed(unsure)}." if unsure else "")
 
 
-def say_which_model_is_better(models: Iterable[Row], case: str, model: str) -> str:
+def say_which_model_is_better(models: Iterable[Row], case: str, model: str, fit: str = OK) -> str:
     """Say which model has a lower BIC in a case's trace than its own, by title; "" if none has.
 
-    Rows are those of the table of models.
+    Rows are those of the table of models. No model fits as well as one whose fit is rejected.
     """
     by_title = {row["model"]: row for row in models if row["case"] == case}
     best = min(by_title.values(), key=lambda row: float(row["median_delta_bic"]), default=None)
@@ -71,7 +71,7 @@ def say_which_model_is_better(models: Iterable[Row], case: str, model: str) -> s
         return ""
     few = int(best["parameters"]) < int(by_title[model]["parameters"])
     lower = float(by_title[model]["median_delta_bic"]) - float(best["median_delta_bic"])
-    if lower < (WORTH_A_MENTION if few else STRONG):
+    if lower < (WORTH_A_MENTION if few else STRONG) or (few and fit == REJECTED):
         return ""
     well = "as well, with fewer parameters" if few else "better"
     return f"Another model, {best['model']}, fits {well}: its BIC is lower by {lower:.3g}."

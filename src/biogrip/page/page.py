@@ -143,8 +143,10 @@ def write_report(
         or answers.compared_rows(errors, judged, titles),
         "cases": list(zip(cases, found, strict=True)),
         "better": {
-            case.name: answers.say_which_model_is_better(models, case.name, case.sample.model.title)
-            for case in cases
+            case.name: answers.say_which_model_is_better(
+                models, case.name, case.sample.model.title, own["fit"]
+            )
+            for case, own in zip(cases, found, strict=True)
         },
         "told": told,
         "story": story,
