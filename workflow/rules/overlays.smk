@@ -1,7 +1,5 @@
 """What only some configs have: sweeps, and tables of recorded traces."""
 
-from biogrip.command.settings import Setting, check_settings, read_table
-
 
 def points(sweep):
     """The names of the points of a sweep, cases of their own that the rules of the study identify."""
@@ -40,6 +38,9 @@ rule sweep:
 
 
 if STUDY.config.traces:
+    # Imported here, for it loads much that a study without a table needs not.
+    from biogrip.command.settings import Setting, check_settings, read_table
+
     MODEL = Setting("traces.model", ("sample", "model"), STUDY.config.traces.model)
     CONFIG = Path(STUDY.config.traces.config) if STUDY.config.traces.config else None
     ROWS = usable(read_table, Path(STUDY.config.traces.table), CONFIG, [MODEL])
