@@ -4,7 +4,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from biogrip.digits import legible, plain, with_unit
+from biogrip.digits import counted, legible, plain, with_unit
 from biogrip.fit.nested_fits import STRONG, WORTH_A_MENTION
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.quantities import PROVIDED
@@ -110,7 +110,7 @@ def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> 
         nearly = "nearly " * (share[0] < 1)
         return f"{nearly + 'all' if rounded == 1 else _percent(*share)} determine {_listed(names)}"
 
-    told = [f"Of {runs} traces of each sample"]
+    told = [f"Of {counted(runs, 'trace')} of each sample"]
     for names, worst in ((always, min), (never, max)):
         if names:
             share = worst(of for name in names for of in ends[name])
