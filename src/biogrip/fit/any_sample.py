@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import nnls
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
@@ -163,6 +162,9 @@ def fit_any_sample(residuals: Residuals) -> AnySampleFit:
 
     The grid of rates is divided next to those that are needed until that changes the fit no more.
     """
+    # Imported here: loading it takes longer than a short job.
+    from scipy.optimize import nnls
+
     covered_s = residuals.course.covered_s(residuals.trace.time_s)
     measured = residuals.trace.rows / residuals.noise_scale
     lags, least = show_lags(residuals, covered_s, np.zeros(0)), np.inf
@@ -201,6 +203,8 @@ def spread_lags(course: Course, time_s: Array, a_decade: int) -> list[float]:
 
 def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:
     """Fit amplitudes >= 0 of responses, (n, n_rows), to a trace; return the square sum, too."""
+    from scipy.optimize import nnls
+
     # As many rows as functions have the same inner products.
     rows = np.asarray(np.linalg.qr(np.vstack((responses, trace)).T, mode="r"))
     sizes = np.linalg.norm(responses, axis=1)

@@ -20,7 +20,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq, least_squares
 from scipy.special import chdtri, stdtrit
 
 from biogrip.arrays import Array, IntArray
@@ -192,6 +191,9 @@ class OnsetFits:
         """Fit sample and onset within an interval, from the values of another fit."""
         inside_s = _INSIDE * (high_s - low_s)
         problem = self.posed(start.onset_s)
+        # Imported here: loading it takes longer than a short job.
+        from scipy.optimize import least_squares
+
         low, high = (
             np.append(ends, onset_s)
             for ends, onset_s in (
@@ -477,6 +479,8 @@ def _at(best: Likelihood, change_s: float) -> Likelihood:
 
 def _end(best: Likelihood, step_s: float) -> float:
     """Return the end of the onset's confidence interval on the side of a first step."""
+    from scipy.optimize import brentq
+
     inside, outside = 0.0, step_s
     most_s = _MOST * best.problem.residuals.duration_s
     while _at(best, outside).threshold > 0:

@@ -28,7 +28,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.optimize import nnls
 from scipy.special import chdtrc
 
 from biogrip.arrays import Array, BoolArray
@@ -293,6 +292,8 @@ class _Profile:
         self, lags: Lags, side: int, value: float, accuracy: float
     ) -> tuple[float | None, BoolArray]:
         """Return the limit with certain lags, and which it needs, beginning with a value."""
+        from scipy.optimize import nnls
+
         above, below = self._quantity.added(lags)
         seen: BoolArray = np.any(lags.rows, axis=1)
         ratio = self._quantity.below is not None
