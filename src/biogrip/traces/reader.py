@@ -302,16 +302,12 @@ def _checked(
         f"last_{end}": float(time_s[-1]),
     }
     readings, sd = quantity.in_si(values[:, 1], units[1], columns.scale), None
-    unit = quantity.units[units[1]]
+    unit = quantity.units[units[1]] * columns.scale
     if columns.sd is not None:
-        sd = values[:, 2] * (unit * abs(columns.scale)) * quantity.slope(values[:, 1] * unit)
+        sd = values[:, 2] * abs(unit) * quantity.slope(values[:, 1] * unit)
     if columns.partner:
         moduli = _both_moduli(path, columns, units, values, lines)
-        sd = (
-            None
-            if sd is None
-            else joined(time_s, *(unit * abs(columns.scale) * values[:, 3:].T))[1]
-        )
+        sd = None if sd is None else joined(time_s, *(abs(unit) * values[:, 3:].T))[1]
         time_s, readings = joined(time_s, *moduli)
         lines = np.append(lines[::-1], lines)
     return Recording(
