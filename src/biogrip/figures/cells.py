@@ -130,7 +130,7 @@ def _draw_unit(
     """Draw cells side by side around a place; doubtful ones hollow. Return their levels."""
     shown = [cell for cell in cells if name in cell.known or _bound(cell, name)]
     shifts = _FILLED * slot * (np.arange(len(shown)) * _GOLDEN % 1 - 0.5)
-    levels = []
+    levels, bars = [], []
     for cell, x in zip(shown, (middle + shifts).tolist(), strict=True):
         mark, level = _bound(cell, name) or ("o", no_longer_log(cell.known[name][0]))
         face = "white" if cell.doubtful else color
@@ -138,8 +138,9 @@ def _draw_unit(
         levels.append(level)
         if name in cell.known:
             value, error = cell.known[name]
-            low, high = (no_longer_log(value + side * _NORMAL * error) for side in (-1, 1))
-            axes.vlines(x, low, high, color=GREY, linewidth=0.4, zorder=1)
+            bars.append((x, *(no_longer_log(value + side * _NORMAL * error) for side in (-1, 1))))
+    if bars:
+        axes.vlines(*np.transpose(bars), color=GREY, linewidth=0.4, zorder=1)
     return levels
 
 
