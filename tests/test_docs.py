@@ -32,7 +32,14 @@ def test_what_is_written_by_hand_is_short() -> None:
     assert len((ROOT / "README.md").read_text("utf-8").split()) <= 450
 
 
-@pytest.mark.parametrize("document", GENERATED, ids=lambda path: str(path.relative_to(ROOT)))
+@pytest.mark.parametrize(
+    "document",
+    [
+        pytest.param(path, marks=[pytest.mark.nightly] if path.name == "tutorial.md" else [])
+        for path in GENERATED
+    ],
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
 def test_generated_parts_are_up_to_date(document: Path) -> None:
     """If this fails: make docs."""
     assert renewed(document) == document.read_text(encoding="utf-8")

@@ -94,6 +94,7 @@ def test_an_offset_is_not_told_from_what_yields_at_once_under_a_constant_torque(
     assert "would be" not in said
 
 
+@pytest.mark.nightly
 def test_an_offset_alone_is_advised_if_it_explains_as_much() -> None:
     """And the fit that is advised is what is made of the trace if it is declared."""
     (said,) = suspected(gripped(0, OFFSET))

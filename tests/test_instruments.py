@@ -39,6 +39,8 @@ CONTROLLED = {
     "modulus": 0.02,
     "relative_modulus": 0.02,
 }
+# One of each instrument, one over what is held, and one without a unit.
+QUICK = "displacement", "stress", "compliance", "relative_modulus"
 # Moduli and compliances are over what is held; a relative one is taken as over 1 Pa.
 WHOLE = {"modulus": "stress", "relative_modulus": "stress", "compliance": "strain"}
 
@@ -54,7 +56,13 @@ def noisy(clean: Array, share: float = 0.01, seed: int = 0) -> Array:
     return clean + share * np.max(np.abs(clean)) * scatter
 
 
-@pytest.mark.parametrize("reading", CONTROLLED)
+@pytest.mark.parametrize(
+    "reading",
+    [
+        pytest.param(name, marks=[] if name in QUICK else [pytest.mark.nightly])
+        for name in CONTROLLED
+    ],
+)
 def test_every_reading_is_identified_in_its_own_units_and_words(
     tmp_path: Path, reading: str
 ) -> None:

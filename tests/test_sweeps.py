@@ -121,20 +121,22 @@ def test_files_of_instruments_tell_the_same(tmp_path: Path, written: Any) -> Non
         assert abs(found[name]["value"] - truth) < found[name]["high"] - found[name]["low"]
 
 
-def test_sweeps_alone_and_together_have_a_page_a_table_and_methods(tmp_path: Path) -> None:
+@pytest.mark.parametrize("count", [2, pytest.param(1, marks=pytest.mark.nightly)])
+def test_sweeps_alone_and_together_have_a_page_a_table_and_methods(
+    tmp_path: Path, count: int
+) -> None:
     header, config = "w (rad/s),G' (Pa),G'' (Pa)", tmp_path / "few.yaml"
     config.write_text("model_selection: {models: []}")
-    traces = [tmp_path / f"{seed}.csv" for seed in range(2)]
+    traces = [tmp_path / f"{seed}.csv" for seed in range(count)]
     for seed, trace in enumerate(traces):
         np.savetxt(trace, np.c_[OMEGA, solid(seed).T], "%.6g", ",", header=header, comments="")
     given = ["--frequency", "w (rad/s)", "--reading", "storage=G' (Pa)", "--model", "sls"]
     given += ["--reading", "loss=G'' (Pa)", "--config", str(config)]
     page, table = tmp_path / "page.html", tmp_path / "found.csv"
-    for some in (traces[:1], traces):
-        status, printed, said = identify(*some, *given, "--csv", table, "--report", page)
-        assert status == 0, printed + said
-        for text in (table.read_text(), page.read_text()):
-            assert "In oscillation storage and loss moduli were recorded over frequency." in text
+    status, printed, said = identify(*traces, *given, "--csv", table, "--report", page)
+    assert status == 0, printed + said
+    for text in (table.read_text(), page.read_text()):
+        assert "In oscillation storage and loss moduli were recorded over frequency." in text
 
 
 def test_a_study_says_of_a_recorded_sweep_what_the_command_says(tmp_path: Path) -> None:

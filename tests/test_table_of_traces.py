@@ -306,8 +306,11 @@ def test_a_killed_process_costs_a_batch_its_trace_alone(
 @pytest.mark.parametrize(
     "change",
     [
-        *("trace", "result"),
-        *(pytest.param(it, marks=pytest.mark.nightly) for it in ("option", "config", "page")),
+        "trace",
+        *(
+            pytest.param(it, marks=pytest.mark.nightly)
+            for it in ("result", "option", "config", "page")
+        ),
     ],
 )
 def test_a_result_of_anything_else_is_not_taken(here: Path, change: str) -> None:
@@ -362,13 +365,8 @@ def test_what_a_row_says_goes_before_options(here: Path) -> None:
 
 
 def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None:
-    """In one batch, or in several: noise, gripper, known and unknown parameters, model."""
-    settings = {
-        "measurement.noise_model": "coloured",
-        "gripper.arm_length_m": "2e-3",
-        "fixed.c_p": "250",
-        "sample.model": "maxwell",
-    }
+    """In one batch, or in several: gripper, known and unknown parameters."""
+    settings = {"gripper.arm_length_m": "2e-3", "fixed.c_p": "250"}
     # Half of the readings are enough.
     first, *lines = (here / "usual.csv").read_text().splitlines(keepends=True)
     header, rows = ["file", *settings], [["usual.csv", *[""] * len(settings)]]

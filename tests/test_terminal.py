@@ -11,7 +11,7 @@ import pytest
 from biogrip import terminal
 from biogrip.cli import _parser, main
 from biogrip.terminal import visible, visible_lines
-from tests.helpers.identified import identify
+from tests.helpers.identified import FEW, identify
 from tests.helpers.places import EXAMPLE
 
 # A colour, the title of a window, a line that is cleared, text that runs from right to left.
@@ -62,7 +62,8 @@ def test_names_of_traces_are_shown_wherever_they_are_said(tmp_path: Path) -> Non
     good, bad, absent = (tmp_path / f"{name}{HOSTILE}\n.csv" for name in ("good", "bad", "absent"))
     shutil.copy(EXAMPLE, good)
     bad.write_text("time_s,rotation_rad\n1,high\n")
-    options = ("--no-compare", "--model", "maxwell")
+    (tmp_path / "few.yaml").write_text(FEW)
+    options = ("--config", tmp_path / "few.yaml", "--model", "maxwell")
     several = identify(good, bad, absent, *options, "--report", page)
     alone = identify(good, *options)
     assert (several[0], alone[0]) == (1, 0)

@@ -40,6 +40,7 @@ LEFT = {
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),
         "results/tables/robustness_levels.md",
     ],
+    # Its code runs in test_library.py, with a shorter chain.
     "howto/posterior.md": [],
     "howto/doubts.md": ["found.json", "page.html", "coloured.json"],
     "howto/module.md": ["lab/mine.csv", "lab/results/tables/errors_my_cell.csv"],
@@ -47,18 +48,6 @@ LEFT = {
     "howto/noise_kind.md": ["results/tables/verdicts_laplace_drop.md"],
     "howto/figure.md": ["results/figures/heights.png"],
 }
-# The code of posterior.md runs in test_library.py, with a shorter chain.
-TAKES_LONG = {
-    "howto/relaxation.md",
-    "howto/sweep.md",
-    "howto/creep.md",
-    "design.md",
-    "groups.md",
-    "tutorial.md",
-}
-# What module.md and groups.md do, other tests do quickly.
-LONG_HOWTOS = ("case", "trace", "noise", "figure", "noise_kind", "posterior", "module", "doubts")
-TAKES_LONG |= {f"howto/{name}.md" for name in LONG_HOWTOS}
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
     "my.yaml": ["results/tables/errors_my_cell.html", "results/summaries/my_cell.html"],
@@ -92,13 +81,8 @@ def test_every_howto_is_followed() -> None:
     assert howtos | {"tutorial.md", "groups.md", "design.md"} == set(LEFT)
 
 
-@pytest.mark.parametrize(
-    "document",
-    [
-        pytest.param(name, marks=[pytest.mark.nightly] if name in TAKES_LONG else [])
-        for name in LEFT
-    ],
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("document", LEFT)
 def test_what_is_said_can_be_done(document: str, place: Path) -> None:
     shutil.rmtree(place / "results" / "tables", ignore_errors=True)
     text = (ROOT / "docs" / document).read_text(encoding="utf-8")
