@@ -38,12 +38,13 @@ rule publish:
     input:
         tables=published("tables", ".csv", ".html"),
         figures=published("figures", ".png", *[".pdf"] * STUDY.config.pdf),
+        page=[] if OVERLAY else "results/report.html",
     log:
         "results/logs/publish.log",
     localrule: True
     params:
         published=PUBLISHED,
     message:
-        "Publishing the tables and figures"
+        "Publishing the tables, the figures and the page"
     script:
         "../scripts/publish.py"

@@ -1,4 +1,4 @@
-"""Put tables and figures in the place of those that are published."""
+"""Put tables, figures and the page in the place of those that are published."""
 
 import shutil
 from pathlib import Path
@@ -18,3 +18,5 @@ with logged(snakemake):
         write_text(published / "tables" / name, text)
     for figure in figures:
         shutil.copy(figure, published / "figures" / figure.name)
+    for page in paths(snakemake.input.page):
+        shutil.copy(page, published / page.name)
