@@ -59,7 +59,7 @@ def test_what_a_trace_without_noise_tells_may_outweigh_every_prior() -> None:
     given = seen(residuals=residuals), np.zeros(2), 1.0
     likelihood = make_likelihood(*given, confidence=0.95, noise_sd=1.0)
     total = seen(gradient=lambda best: np.ones(2))
-    assert likelihood.deviation(total) == pytest.approx(1e-12)
+    assert likelihood.deviation(total) == pytest.approx(1e-12, rel=1e-6, abs=0)
 
 
 def test_noise_that_grows_has_the_covariance_of_unweighted_fits() -> None:
