@@ -323,3 +323,4 @@ def test_an_onset_leaves_readings_to_fit(readings: int) -> None:
     best = fits.best(float(times[-1]))
     assert best.onset_s <= times[-5]
     assert np.isfinite(best.misfit)
+    assert OnsetFits(experiment, times[:4], values[:4])._latest_s == times[0]
