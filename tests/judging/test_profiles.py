@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import norm, t
 
 from biogrip.arrays import Array, IntArray
+from biogrip.fit.levenberg_marquardt import Normal
 from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
@@ -76,6 +77,20 @@ def test_points_are_moved_to_where_quantities_are_held(form: str) -> None:
         QuantityConstraint(
             quantities, which, targets + 20, *bounds, 400.0, np.ones(len(x))
         ).started(x)
+
+
+def test_along_a_constraint_the_eliminated_parameter_follows() -> None:
+    """Of c = 3 and c_p = 1 with a held sum: log c falls by a third of what log c_p rises."""
+    sums, ends, none = labelled("c + c_p"), np.full((1, 4), 9.0), np.zeros(1, dtype=np.int64)
+    held = QuantityConstraint(sums, none, np.log([4.0]), -ends, ends, 400.0, np.ones(1))
+    information = np.array([[2.0, 0, 6, 0], [0, 3, 0, 0], [6, 0, 9, 3], [0, 0, 3, 4]])
+    gradient = np.array([[1.0, 2.0, 6.0, 5.0]])
+    normal = Normal(np.zeros(1), gradient, information[None], np.zeros(1))
+    found, eliminated = held.eliminated(normal, np.log([[5.0, 7.0, 3.0, 1.0]]), none)
+    assert eliminated.tolist() == [[False, False, True, False]]
+    np.testing.assert_allclose(found.gradient, [[1, 2, 0, 5 - 6 / 3]])
+    expected = [[2.0, 0, 0, -6 / 3], [0, 3, 0, 0], [0, 0, 1, 0], [-6 / 3, 0, 0, 4 - 2 * 3 / 3 + 1]]
+    np.testing.assert_allclose(found.information[0], np.array(expected), atol=1e-12)
 
 
 def test_limits_do_not_depend_on_the_batch() -> None:
