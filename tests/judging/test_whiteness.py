@@ -11,6 +11,7 @@ from biogrip.fit.noise_model_fit import absorbed, outliers_of
 from biogrip.judging.whiteness import (
     _restricted,
     as_correlated,
+    averaged,
     by_leverage,
     correlated,
     far_out,
@@ -77,6 +78,13 @@ def test_chances_are_of_beta_distributions_with_moments_of_dense_matrices() -> N
         found.append((1 - ratio / mean, of_beta.cdf(ratio)))
     assert correlated(residual, basis) == pytest.approx(found[0])
     assert wandering(residual, basis) == pytest.approx(1 - found[1][1])
+
+
+def test_of_two_means_a_fit_of_the_constant_leaves_their_difference() -> None:
+    (row,) = averaged(np.full((1, 10), 10**-0.5))
+    halves = np.repeat([1.0, -1.0], 5)
+    np.testing.assert_allclose(np.outer(row, row), np.outer(halves, halves) / 10)
+    assert len(averaged(np.full((1, 9), 1 / 3))) == 0
 
 
 def test_the_cumulative_periodogram_is_kolmogorovs() -> None:
