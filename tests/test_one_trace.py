@@ -21,7 +21,7 @@ from biogrip.arrays import Array
 from biogrip.cli import _parser, main
 from biogrip.command.outputs import WRITTEN_BY, check_output
 from biogrip.command.settings import Asked, Setting, case_of
-from biogrip.command.words import for_a_paper, in_columns
+from biogrip.command.words import for_a_paper, in_columns, noise_in_words
 from biogrip.errors import BiogripError
 from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES
@@ -486,3 +486,15 @@ def test_only_what_can_be_published_is_said_for_a_paper(
         "c + c_p < 40 N s/m (97.5 % one-sided limit, n = 1 trace)",
         "c + c_p > 1e-09 N s/m (97.5 % one-sided limit, n = 1 trace)",
     ] * bool(lines)
+
+
+def test_noise_is_named_by_who_says_what_it_is() -> None:
+    for fit, modelled, given, said in (
+        ("ok", False, {"sd": None}, "scatter of neighbours"),
+        ("rejected", False, {}, "scatter of neighbours"),
+        ("ok", True, {}, "noise as modelled"),
+        ("rejected", True, {}, "noise that cannot be told from misfit"),
+        ("ok", False, {"noise_rad": 1e-6}, "noise as given"),
+    ):
+        found = {"fit": fit, "noise_model": modelled, "assumed": {"measurement": given}}
+        assert noise_in_words(found) == said

@@ -198,6 +198,14 @@ def test_only_readings_on_another_clock_seem_cut_off(spacing: str, unit_s: float
     assert is_cut_off(times + 20 * (times[-1] - times[0]))
 
 
+def test_readings_are_planned_whose_spacing_grows_by_a_power_of_time_near_one() -> None:
+    """25 times as late they are 5 to 125 times as far apart; the first ones ten intervals late."""
+    for apart_s, cut in ((4.9, True), (5.1, False), (124, False), (126, True)):
+        assert is_cut_off(np.r_[16:20, 40, 100, 400 + apart_s * np.arange(4)]) == cut
+    assert not is_cut_off(np.arange(10.0, 30.0))
+    assert is_cut_off(np.arange(10.1, 30.1))
+
+
 def test_a_late_start_is_advised_with_its_limits_and_with_the_tare() -> None:
     """A ramp from 8.4 to 8.7 s, and a preload: a start without the offset would be biased."""
     times = np.arange(0, 60, 0.5)
@@ -323,3 +331,4 @@ def test_an_onset_leaves_readings_to_fit(readings: int) -> None:
     best = fits.best(float(times[-1]))
     assert best.onset_s <= times[-5]
     assert np.isfinite(best.misfit)
+    assert OnsetFits(experiment, times[:4], values[:4])._latest_s == times[0]

@@ -10,6 +10,8 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
 from biogrip.fit.nested_fits import (
     _is_noticeably_lower,
+    _of_contained,
+    _worse,
     advice,
     deepen,
     fit_models,
@@ -82,6 +84,23 @@ def test_a_model_fits_no_worse_than_one_in_it(
         for problem, answer, own in zip(problems[name], answers, rotations, strict=True):
             misfit = np.sqrt(np.mean((own - problem.residuals.trace.cleared) ** 2))
             assert answer.misfit == pytest.approx(misfit, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("inner", "expected"),
+    [("kelvin_voigt", [[18, 6, 30], [600, 6, 30]]), ("maxwell", [[6, 2, 30], [6, 0.06, 30]])],
+)
+def test_what_has_vanished_starts_from_its_like(inner: str, expected: list[list[float]]) -> None:
+    """A spring in front that was rigid is 3 and 100 times the other, one that was none is less."""
+    found = {inner: [seen(parameters=np.array([6.0, 30.0]))]}
+    starts = [*_of_contained("zener_kelvin", found, 0, 400.0)]
+    np.testing.assert_allclose(starts, expected)
+
+
+def test_a_simpler_model_fits_better_if_nine_digits_say_so() -> None:
+    for lower, expected in ((0.0, []), (4e-10, []), (2e-9, [("liquid_drop", "maxwell", 0)])):
+        found = {"maxwell": [seen(misfit=1 - lower)], "liquid_drop": [seen(misfit=1.0)]}
+        assert [*_worse(found)] == expected
 
 
 def test_elements_vanish_where_the_range_does_not_reach() -> None:

@@ -104,6 +104,18 @@ def test_degrees_of_freedom_are_those_of_satterthwaite() -> None:
     assert found == pytest.approx(2 / spread.max(), rel=0.05)
 
 
+def test_information_is_half_of_what_curves_the_deviance_and_the_prior(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of a quadratic form all of it; along what curves the other way there is the prior alone."""
+    form = np.array([[2.0, 1, 0, 0], [1, 2, 0, 0], [0, 0, 4, 0], [0, 0, 0, -1]])
+    likelihood = NoiseModelLikelihood(TIMES, np.ones(200), DIRECTIONS)
+    monkeypatch.setattr(likelihood, "_deviance", lambda x: 7 + x @ form @ x)
+    expected = np.maximum(form, 0) + np.eye(4) / 9
+    found = likelihood._information(np.array([0.3, -0.2, 0.1, 0.5]))
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
 ROTATION = np.geomspace(0.004, 1.0, 400)
 
 

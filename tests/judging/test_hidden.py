@@ -94,6 +94,7 @@ def test_a_second_branch_moves_what_is_said() -> None:
     (branch,) = (each for each in JUDGED.hidden if "second branch" in each.words())
     tau, share = map(float, re.findall(r"branch of (\S+) s with (\S+) %", branch.words())[0])
     k, k_p, c = np.exp(best := JUDGED.likelihood.best)
+    assert tau == pytest.approx(10 * c / k, rel=0.05)
     response = k_p + k * np.exp(-TIMES * k / c) + share / 100 * k * np.exp(-TIMES / tau)
     moved = fit_from([EXPERIMENT.of(TIMES, response)], best).x[0] - best
     for label, move in zip(SAMPLE, moved, strict=True):

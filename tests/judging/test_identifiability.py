@@ -2,13 +2,14 @@
 
 import functools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.likelihood import Likelihood, bound, covariance
-from biogrip.judging.profiles import compute_valley
+from biogrip.judging.profiles import _increases, compute_valley
 from biogrip.judging.quantities import (
     characteristic_times,
     find_combinations,
@@ -180,6 +181,11 @@ def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:
     assert max(lowest) < likelihood.certainty
     assert np.ptp(lowest) < 0.5
     assert compute_valley(likelihood, MODELS["maxwell"]) == (None, None)
+    # A point of the valley that lies below what was taken for the best fit is told.
+    c, c_p = np.exp(likelihood.best[2:, None, None])
+    for times, expected in ((1.0, None), (1.01, pytest.approx(likelihood.best, abs=1e-3))):
+        above = replace(likelihood, misfit=times * likelihood.misfit)
+        assert _increases(above, [2, 3], c * [[0.9, 1.0, 1.1]], c_p * np.ones(3))[1] == expected
 
 
 def test_the_larger_exponent_is_that_of_the_first_springpot() -> None:

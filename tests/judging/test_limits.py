@@ -85,8 +85,9 @@ def test_a_set_in_two_parts_has_a_gap_that_its_verdict_names() -> None:
     (gap,) = find_gaps(values, parabolas(values), 1.0)
     assert gap == pytest.approx((-1.0, 1.0))
     assert find_gaps(values, parabolas(values), 4.5) == ()
-    # What is above the threshold by no more than fits are good to is none.
+    # What is above the threshold by no more than fits are good to, a hundredth of it, is none.
     assert find_gaps(values, np.minimum(parabolas(values), 1.005), 1.0) == ()
+    assert len(find_gaps(values, np.minimum(parabolas(values), 1.02), 1.0)) == 1
     whole = Profile(values, parabolas(values), 2.0, -3.0, 3.0, np.zeros(4))
     parts = replace(whole, gaps=(gap,))
     words = [Finding(QUANTITIES[0], profile, 0.1).words() for profile in (whole, parts)]

@@ -7,11 +7,12 @@ import pytest
 from scipy.stats import norm, t
 
 from biogrip.arrays import Array, IntArray
+from biogrip.fit.levenberg_marquardt import Normal
 from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.onset import _at, profile_over_onset
-from biogrip.judging.profiles import Points, _limits, compute_profiles, find_gaps
+from biogrip.judging.profiles import Points, _limits, compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
 from biogrip.library import set_up, simulate
 from biogrip.physics.models import MODELS, Sample
@@ -76,6 +77,20 @@ def test_points_are_moved_to_where_quantities_are_held(form: str) -> None:
         QuantityConstraint(
             quantities, which, targets + 20, *bounds, 400.0, np.ones(len(x))
         ).started(x)
+
+
+def test_along_a_constraint_the_eliminated_parameter_follows() -> None:
+    """Of c = 3 and c_p = 1 with a held sum: log c falls by a third of what log c_p rises."""
+    sums, ends, none = labelled("c + c_p"), np.full((1, 4), 9.0), np.zeros(1, dtype=np.int64)
+    held = QuantityConstraint(sums, none, np.log([4.0]), -ends, ends, 400.0, np.ones(1))
+    information = np.array([[2.0, 0, 6, 0], [0, 3, 0, 0], [6, 0, 9, 3], [0, 0, 3, 4]])
+    gradient = np.array([[1.0, 2.0, 6.0, 5.0]])
+    normal = Normal(np.zeros(1), gradient, information[None], np.zeros(1))
+    found, eliminated = held.eliminated(normal, np.log([[5.0, 7.0, 3.0, 1.0]]), none)
+    assert eliminated.tolist() == [[False, False, True, False]]
+    np.testing.assert_allclose(found.gradient, [[1, 2, 0, 5 - 6 / 3]])
+    expected = [[2.0, 0, 0, -6 / 3], [0, 3, 0, 0], [0, 0, 1, 0], [-6 / 3, 0, 0, 4 - 2 * 3 / 3 + 1]]
+    np.testing.assert_allclose(found.information[0], np.array(expected), atol=1e-12)
 
 
 def test_limits_do_not_depend_on_the_batch() -> None:
@@ -146,7 +161,7 @@ def test_noise_and_threshold_are_those_of_a_regression(taken_out: dict[str, bool
     (problem,) = pose_noisy(times, 1e-6 * times, 1, MODELS["maxwell"], **taken_out)
     left = len(times) - 2 - len(taken_out)
     found = make_likelihood(problem, np.zeros(2), 1e-6, confidence=0.95)
-    assert found.noise_sd**2 == pytest.approx(len(times) * 1e-12 / left)
+    assert found.noise_sd == pytest.approx(1e-6 * np.sqrt(len(times) / left))
     assert found.threshold == pytest.approx(t.ppf(0.975, left) ** 2)
     known = make_likelihood(problem, np.zeros(2), 1e-6, confidence=0.95, noise_sd=1e-6)
     assert known.threshold == pytest.approx(norm.ppf(0.975) ** 2)
@@ -200,10 +215,3 @@ def test_a_limit_is_in_the_deepest_basin_that_any_profile_knows() -> None:
     points.from_optimum()
     points.from_neighbours(points.profile == 0)
     assert _limits(points)[:, 0] == pytest.approx([np.nan, 3.0], abs=1e-6, nan_ok=True)
-
-
-def test_a_gap_is_clear_by_a_hundredth_of_the_threshold() -> None:
-    values = np.linspace(-3.0, 3.0, 61)
-    for bump, gaps in ((1.1, 1), (1.005, 0)):
-        rises = np.where(np.abs(values) < 1, bump, 0.5)
-        assert len(find_gaps(values, rises, 1.0)) == gaps

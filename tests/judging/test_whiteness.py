@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from scipy.stats import kstest
+from scipy.stats import beta, kstest
 from scipy.stats import t as student
 
 from biogrip.arrays import Array
@@ -11,6 +11,7 @@ from biogrip.fit.noise_model_fit import absorbed, outliers_of
 from biogrip.judging.whiteness import (
     _restricted,
     as_correlated,
+    averaged,
     by_leverage,
     correlated,
     far_out,
@@ -56,6 +57,34 @@ def test_of_white_noise_each_test_fails_as_many_as_its_level_says(
     assert np.all(shares < LEVEL + margin)
     exact = [0] if readings < 20 else [0, 1]
     assert np.all(shares[exact] > LEVEL - margin)
+
+
+def test_chances_are_of_beta_distributions_with_moments_of_dense_matrices() -> None:
+    """Of neighbours' differences and of means of four stretches, for a fit of three parameters."""
+    basis = absorbed(directions(np.arange(1, 24) / 23))
+    leaves = np.eye(23) - basis.T @ basis
+    residual = leaves @ np.random.default_rng(0).standard_normal(23)
+    differences = np.diff(np.eye(23), axis=0)
+    parts = np.array_split(np.eye(23), 4)
+    means = np.array([part.sum(axis=0) / len(part) ** 0.5 for part in parts])
+    found = []
+    for rows, most in ((differences, 4.0), (means, 1.0)):
+        of_noise = leaves @ rows.T @ rows
+        mean = np.trace(of_noise) / 20
+        variance = 2 * (np.trace(of_noise @ of_noise) - 20 * mean**2) / (20 * 22)
+        weight = mean * (most - mean) / variance - 1
+        ratio = np.sum((rows @ residual) ** 2) / np.sum(residual**2)
+        of_beta = beta(mean / most * weight, (1 - mean / most) * weight, 0, most)
+        found.append((1 - ratio / mean, of_beta.cdf(ratio)))
+    assert correlated(residual, basis) == pytest.approx(found[0])
+    assert wandering(residual, basis) == pytest.approx(1 - found[1][1])
+
+
+def test_of_two_means_a_fit_of_the_constant_leaves_their_difference() -> None:
+    (row,) = averaged(np.full((1, 10), 10**-0.5))
+    halves = np.repeat([1.0, -1.0], 5)
+    np.testing.assert_allclose(np.outer(row, row), np.outer(halves, halves) / 10)
+    assert len(averaged(np.full((1, 9), 1 / 3))) == 0
 
 
 def test_the_cumulative_periodogram_is_kolmogorovs() -> None:

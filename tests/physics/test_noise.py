@@ -108,8 +108,9 @@ def test_shares_leave_the_variance_as_it_is() -> None:
 
 
 def test_a_drift_goes_either_way() -> None:
-    plain, drifting = noises(40), noises(40, drift=Drift(3.0))
-    course = drifting - plain
+    """From nothing at the first reading, whatever the clock is then."""
+    late = TIMES + 7.0
+    course = noises(40, late, drift=Drift(3.0)) - noises(40, late)
     np.testing.assert_allclose(course[:, 0], 0, atol=1e-12)
     np.testing.assert_allclose(np.abs(course[:, -1]), 3.0, rtol=1e-12)
     np.testing.assert_allclose(np.diff(course, 2), 0, atol=1e-12)

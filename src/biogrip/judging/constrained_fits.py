@@ -18,7 +18,6 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit.least_squares import LocalFits
 from biogrip.fit.levenberg_marquardt import Minima, Normal
-from biogrip.judging.levels import MISSED
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
 
@@ -194,8 +193,7 @@ class ConstrainedFits:
     Each profile belongs to a trace and a quantity; those of the first trace come first. Of each
     there are the index of its `trace`, the optimum `best`, (n_profiles, n_parameters), the
     logarithm of the quantity `at_best`, and `threshold` and `certainty`, no less, as in
-    `Likelihood`. `missed` has, by trace, the lowest increase of chi^2 and its log-parameters, if
-    the optimum was missed.
+    `Likelihood`.
     """
 
     def __init__(self, likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> None:
@@ -209,7 +207,6 @@ class ConstrainedFits:
         threshold, certainty, self._misfit, self._noise_sd = np.array(settings).T
         self.threshold = threshold[self.trace]
         self.certainty = np.maximum(certainty, threshold)[self.trace]
-        self.missed: dict[int, tuple[float, Array]] = {}
         self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
         scale = np.array([problem.residuals.trace.scatter for problem in problems])
@@ -261,11 +258,7 @@ class ConstrainedFits:
 
     def _increases(self, found: Minima, trace: IntArray) -> Array:
         excess = found.misfit**2 - self._misfit[trace] ** 2
-        increases = self._residuals.samples * excess / self._noise_sd[trace] ** 2
-        for index in np.flatnonzero(increases < -MISSED):
-            of_trace = int(trace[index])
-            if of_trace not in self.missed or increases[index] < self.missed[of_trace][0]:
-                self.missed[of_trace] = float(increases[index]), found.x[index].copy()
+        increases: Array = self._residuals.samples * excess / self._noise_sd[trace] ** 2
         return increases
 
     def slowest(self, profile: int) -> float | None:

@@ -29,6 +29,7 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import round_increase, rounded
 from biogrip.fit.least_squares import FAIR, FINE, alike
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
+from biogrip.judging.levels import MISSED
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
 from biogrip.physics.sample_model import SampleModel
@@ -421,5 +422,6 @@ def _increases(
         start = x[origin].copy()
         start[:, pair] = x[points][:, pair]
         tolerance = CLOSE
-    missed = fits.missed.get(0)
-    return increases.reshape(rows, columns), None if missed is None else missed[1]
+    lowest = int(np.argmin(increases))
+    missed = x[lowest] if increases[lowest] < -MISSED else None
+    return increases.reshape(rows, columns), missed

@@ -108,10 +108,10 @@ def averaged(basis: Array) -> Array:
     """Return orthonormal rows of means over stretches that a fit does not absorb."""
     n = basis.shape[1]
     count = min(_STRETCHES, n // _SHORTEST)
-    rows = np.zeros((max(count, 0), n))
-    for row, part in zip(
-        rows, np.array_split(np.arange(n), count) if count > 1 else (), strict=False
-    ):
+    if count < 2:
+        return np.zeros((0, n))
+    rows = np.zeros((count, n))
+    for row, part in zip(rows, np.array_split(np.arange(n), count), strict=True):
         row[part] = len(part) ** -0.5
     rest = without(basis, rows)
     _, shares, found = np.linalg.svd(rest, full_matrices=False)

@@ -157,8 +157,7 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
             raise BiogripError("calibration: no arm fits the records; is the rate high enough?")
         logarithms = found.x
         scale = np.maximum(differences(logarithms).std(axis=1), 1e-12 * np.ptp(measured, axis=1))
-    freedom = max(len(found.fun) - 3, 1)
-    variance = np.linalg.inv(found.jac.T @ found.jac) * (2 * found.cost / freedom)
+    variance = np.linalg.inv(found.jac.T @ found.jac) * (2 * found.cost / (len(found.fun) - 3))
     values = np.exp(found.x)
     return CalibratedArm(Arm(*values), Arm(*(values * np.sqrt(np.diag(variance)))))
 

@@ -87,8 +87,8 @@ def unilateral_response(
             grid = _grid(stretch.fastest_per_s, length - done)
             lasts = _first_below(stretch.margin, grid, least[touching])
             begin, end = start + done, start + (length if lasts is None else done + lasts)
-            final = lasts is None and start + length >= torque.end_s
-            here = (time_s >= begin) & ((time_s <= end) if final else (time_s < end))
+            # A reading at its end is also the first of the next stretch, which takes its place.
+            here = (time_s >= begin) & (time_s <= end)
             elapsed = time_s[here] - begin
             if len(elapsed):
                 states[:, here] = stretch.state(elapsed)
