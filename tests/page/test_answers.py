@@ -37,8 +37,8 @@ def test_what_traces_tell_is_told_by_shares_of_traces() -> None:
     assert say_what_traces_tell(rows, TITLES).replace("\xa0", " ") == (
         "Of 20 traces of each sample all determine c + c_p, provided that the branch, k and c in "
         "series, relaxes within the experiment, and none determines c_p. On “A cell” all determine "
-        "k. On “A drop” 15 % (5 to 36 %) determine k. (All is 84 to 100 %, none 0 to 16 %, in "
-        "95 % intervals.)"
+        "k. On “A drop” 15 % (5 to 36 %) determine k. (95 % intervals: all is 84 to 100 %, none 0 "
+        "to 16 %.)"
     )
     one = say_what_traces_tell([covered("cell", "c_p", "1", "500")], TITLES)
     assert one.startswith("Of 500 traces of each sample hardly any determines c_p.")

@@ -134,8 +134,8 @@ def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> 
     ]
     if not first:
         said[0] = f"{told[0]}, on{said[0].removeprefix('On')}"
-    sure = f"(All is {100 * all_of[1]:.0f} to 100 %, none 0 to {100 * none_of[2]:.0f} %, in 95 % "
-    return " ".join(filter(None, [first, *said, legible(f"{sure}intervals.)")]))
+    sure = f"all is {100 * all_of[1]:.0f} to 100 %, none 0 to {100 * none_of[2]:.0f} %"
+    return " ".join(filter(None, [first, *said, legible(f"(95 % intervals: {sure}.)")]))
 
 
 def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
