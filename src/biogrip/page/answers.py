@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from biogrip.digits import counted, legible, plain, with_unit
-from biogrip.fit.nested_fits import FittedModel, advice, preferred, preferred_simpler
+from biogrip.fit.nested_fits import FittedModel, advice, fits_far_better, preferred
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.quantities import PROVIDED
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
@@ -75,10 +75,9 @@ def say_which_model_is_better(
         for row in models
         if row["case"] == case and row["model"] in names
     ]
-    if candidate not in (each.candidate for each in tried) or not preferred(tried, candidate):
-        return ""
-    simpler = preferred_simpler(tried, candidate)
-    return "" if simpler and fit == REJECTED else advice(tried, candidate)
+    judge = fits_far_better if fit == REJECTED else preferred
+    known = any(each.candidate == candidate for each in tried)
+    return advice(tried, candidate) if known and judge(tried, candidate) else ""
 
 
 _CRITERIA = "aic", "bic"
