@@ -354,9 +354,9 @@ def identified_example() -> str:
         low, high = q["low"] or 0.0, q["high"] or np.inf
         if not low <= (true := truth.get(q["quantity"], low)) <= high:
             side, limit = ("upper", high) if true > high else ("lower", low)
-            missed += f", but for {q['quantity']}: its {side} limit is {in_digits(limit, 4)}"
+            missed += f", but for {q['quantity']}, whose {side} limit is {in_digits(limit, 4)}"
     told = _quantities(text).partition("    Any linear sample")[0].rstrip()
-    return f"{told}\n\nThe limits hold the true values, {made}{missed}."
+    return f"{told}\n\nTrue are {made}. The limits hold these{missed}."
 
 
 def shorter_arms() -> str:
@@ -380,11 +380,13 @@ def folders() -> str:
 
 
 def command_help() -> str:
-    """What the command and each of its subcommands say of themselves."""
+    """What the command and each of its subcommands say of themselves, each paragraph once."""
     overview = _help()
-    names = re.findall(r"^    (\w+) ", overview, re.MULTILINE)
-    parts = [f"```text\n{overview}```"]
-    parts += [f"## biogrip {name}\n\n```text\n{_help(name)}```" for name in names]
+    parts, said = [f"```text\n{overview}```"], set[str]()
+    for name in re.findall(r"^    (\w+) ", overview, re.MULTILINE):
+        new = [each for each in _help(name).rstrip().split("\n\n") if each not in said]
+        said.update(new)
+        parts.append(f"## biogrip {name}\n\n```text\n" + "\n\n".join(new) + "\n```")
     return "\n\n".join(parts)
 
 

@@ -228,7 +228,7 @@ def test_the_shortest_protocol_is_found_and_what_noise_a_better_one_takes(
     products = [float(row[3]) * float(row[4]) for row in rows if row[3] != "none"]
     assert products == pytest.approx([products[0]] * len(products), rel=0.01)
     said = within(tmp_path, "k_s=0.001", (tmp_path / "my.yaml").read_text(), capsys)
-    assert "No protocol tells it within 0.001 %; designed is the most precise" in said
+    assert "No protocol reaches 0.001 %; designed is the most precise" in said
 
 
 @pytest.mark.nightly

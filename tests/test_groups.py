@@ -177,7 +177,7 @@ def test_a_rejected_model_leaves_what_any_linear_sample_shows(
     assert [line for line in lines if line.startswith("k (N/m)") and "3 of 3" in line]
     assert [line for line in lines if line.startswith("G(1 s) (N/m)") and "4 of 4" in line]
     assert "Left out, the fit is rejected: left1.csv." in found
-    assert "Of the model left out, whose fit is rejected: left0.csv." in found
+    assert "Used only whatever the model, as their fits are rejected: left0.csv." in found
 
 
 def test_cells_that_are_only_bounded_are_named_with_what_follows(
@@ -193,16 +193,16 @@ def test_cells_that_are_only_bounded_are_named_with_what_follows(
     logs = [float(row["k value (N/m)"]) for row in rows[2:5]]
     with_one_at_30 = f"{np.exp(np.mean(np.log([*logs, 30]))):.3g}"
     assert (
-        "k of left: only bounded in left0.csv (at least 30), which the mean leaves out. With "
-        f"them at these bounds it is {with_one_at_30}, and of all cells it is higher."
+        "k of left: only bounded in left0.csv (at least 30), so in no mean; with them at these "
+        f"bounds it is {with_one_at_30}, that of all cells is higher."
     ) in found
     assert "k of left: nothing is told by left1.csv." in found
-    assert "right0.csv (at most 9), which the mean leaves out. With them" in found
-    assert "of all cells it is lower." in found
+    assert "right0.csv (at most 9), so in no mean; with them at these bounds" in found
+    assert "that of all cells is lower." in found
     rows[2] |= {**none, "k verdict": "not determined"}
     assert "too few" in said(rows)
     rows[3] |= {**none, "k verdict": "not determined"}
-    assert "(at least 30), which the mean leaves out. That of all cells is higher." in said(rows)
+    assert "(at least 30), so in no mean; that of all cells is higher." in said(rows)
 
 
 def test_a_median_takes_cells_enough_and_half_of_all() -> None:
@@ -415,8 +415,8 @@ def test_a_column_that_nests_tells_cells_apart_and_is_named(said: Said) -> None:
     assert "In several groups" not in with_unit
     p, here = (text.splitlines()[4].split()[-1] for text in (with_unit, found))
     assert (
-        "Column day puts 30 cells into 6 units: if these are what was repeated, cells are not "
-        f"independent, and with --unit day p is {p} for k (here {here})."
+        "Column day puts 30 cells into 6 units. If these are what was repeated, cells are not "
+        f"independent: with --unit day p is {p} for k (here {here})."
     ) in found
 
 

@@ -122,7 +122,7 @@ def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
         for number, name in enumerate(names)
     }
     drawn, said = draw_traces(replace(dish, copied=words), columns_of(dish.found))
-    assert said == "Groups: drug. Units, of which the large marks are means: day."
+    assert said == "Groups: drug. Large marks: means of each day."
     axes = drawn.axes[0]
     assert [label.get_text() for label in axes.get_xticklabels()] == ["a", "b"]
     points = [line for line in axes.lines if line.get_markersize() == 3]
@@ -133,7 +133,7 @@ def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
     words[names[0]] = {"other": "of another table"}
     assert draw_traces(replace(dish, copied=words), columns_of(dish.found))[0].axes
     drawn, said = draw_traces(dish, columns_of(dish.found))
-    assert said == "Every cell is taken for independent."
+    assert said == "Cells are taken for independent."
     assert [label.get_text() for label in drawn.axes[0].get_xticklabels()] == ["all traces"]
 
 
@@ -185,7 +185,7 @@ def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(
     assert command.identify_files(traces, few, model, report=tmp_path / "page.html") == 0
     text = (tmp_path / "page.html").read_text()
     assert text.count("<img") == 1
-    assert "too many traces for pictures" in text
+    assert "Too many traces for pictures" in text
     assert 'href="#trace-' not in text
 
 

@@ -143,9 +143,10 @@ _SETTINGS: dict[str, list[tuple[str, str, str]]] = {
     "the file's columns": [
         (
             *("--reading", "[QUANTITY=]COLUMN"),
-            "of readings [rotation=rotation_rad]; or displacement, strain, compliance (creep), "
-            "force, stress, modulus, relative_modulus (relaxation); of a sweep storage, "
-            "complex_modulus or storage_stiffness, and loss, phase or loss_factor by a second one",
+            "of readings, and their quantity [rotation=rotation_rad]; in creep displacement, "
+            "strain, compliance; in relaxation force, stress, modulus, relative_modulus; of a "
+            "sweep storage, complex_modulus or storage_stiffness, and, by a second --reading, "
+            "loss, phase or loss_factor",
         ),
         ("--time", "COLUMN", "of times [time_s]"),
         ("--frequency", "COLUMN", "of frequencies, of a sweep"),
@@ -153,32 +154,32 @@ _SETTINGS: dict[str, list[tuple[str, str, str]]] = {
     "what was done": [
         (
             *("--hold", "VALUE"),
-            "what was held from 0 to the end, without a config: a stress for a strain, a force for "
-            "a displacement, and the reverse, as in '20 pN', 5mbar or 5%%, or in SI units; 1 for a "
-            "compliance or a modulus",
+            "what was held from 0 to the end: the stress if strain was read, the force if "
+            "displacement, and the reverse; as in '20 pN', 5mbar or 5%%, or in SI units "
+            "[1 for a compliance or a modulus]",
         ),
-        ("--load", "COLUMN", "of what was held, as recorded, instead"),
+        ("--load", "COLUMN", "instead of --hold: column of the same, as recorded"),
         (
             *("--sphere", "RADIUS"),
-            "of a sphere that indents the sample, as in '2.5 um': readings are its force, and what "
-            "was held its indentation, or the reverse",
+            "of a sphere that indents the sample, as in '2.5 um': force or "
+            "indentation is read, the other is of --hold or --load",
         ),
         ("--start", "SECONDS", "the protocol's start on the clock, or fit to fit it [0]"),
-        ("--from", "PLACE", "first time, s, or frequency as written, to use [all]"),
-        ("--until", "PLACE", "last time, s, or frequency as written, to use [all]"),
+        ("--from", "PLACE", "use nothing before this time (s), or below this frequency"),
+        ("--until", "PLACE", "use nothing after or above it"),
     ],
     "the sample": [
         ("--model", "NAME", "sample model, see below [generalized_maxwell]"),
         ("--fix", "NAME=VALUE", "known parameter, SI units; 0 for no element; repeatable"),
-        ("--at", "SECONDS,...", "times after a step at which to tell what any model would"),
+        ("--at", "SECONDS,...", "times after a step at which to print G, K or J, of any model"),
     ],
     "the noise and the instrument": [
         ("--noise", "SD", "known noise, in the readings' SI unit"),
         ("--noise-share", "SHARE", "known noise, as a share of the readings"),
         ("--sd", "COLUMN", "column of the readings' standard deviations"),
         ("--noise-model", "NAME", "white, or coloured: autocorrelated"),
-        ("--offset", "", "fit an offset along, or not"),
-        ("--drift", "", "fit a linear drift along, or not"),
+        ("--offset", "", "fit an offset of the readings, too, or not"),
+        ("--drift", "", "fit a linear drift, too, or not"),
     ],
     "any other key of the config": [
         (
@@ -213,8 +214,8 @@ def _add_settings(parser: Any, outputs: Callable[[Any], None] | None = None) -> 
         type=Path,
         nargs="+",
         metavar="TRACE",
-        help="CSV file with a header, or a table of traces: its header has the column file, and "
-        "others that are keys of the config, with dots, or copied to the CSV",
+        help="CSV file with a header; or a table of traces: column file has their names, columns "
+        "named like keys of the config set these, others are copied to --csv",
     )
     for title, options in _SETTINGS.items():
         group = parser.add_argument_group(title)
@@ -281,7 +282,7 @@ def _groups_parser(stages: Any) -> None:
     )
     groups.add_argument("found", type=Path, help="CSV file that identify --csv wrote")
     groups.add_argument("--by", required=True, metavar="COLUMN", help="column that makes groups")
-    text = "column of what was repeated: dishes, animals, days [cells]"
+    text = "column of the independent repeats: dishes, animals, days [every cell is one]"
     groups.add_argument("--unit", metavar="COLUMN", help=text)
     groups.add_argument(
         "--csv", type=Path, metavar="TABLE", help="CSV file, a row for a quantity of a group"
@@ -291,7 +292,7 @@ def _groups_parser(stages: Any) -> None:
 
 
 def _design_parser(stages: Any) -> None:
-    text = "search for a train of steps that determines the samples of a config better"
+    text = "search a protocol of steps that determines the samples of a config better"
     design = stages.add_parser("design", help=text, description=text)
     design.set_defaults(command=_design)
     design.examples = _examples(
@@ -303,7 +304,7 @@ def _design_parser(stages: Any) -> None:
     design.add_argument("config", type=Path, help=text)
     text = "config of the designed study, YAML [CONFIG_designed.yaml]"
     design.add_argument("--output", type=Path, help=text)
-    text = "the shortest protocol that tells a parameter, or all, within PERCENT (95 %% limits)"
+    text = "the shortest protocol whose 95 %% limits of a parameter, or of all, are within PERCENT"
     design.add_argument("--within", type=_read(_within), metavar="[NAME=]PERCENT", help=text)
 
 

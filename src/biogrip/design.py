@@ -1,4 +1,4 @@
-"""The command ``biogrip design``: a train of steps that tells the samples of a config better.
+"""The command ``biogrip design``: a train of steps that determines samples of a config better.
 
 A train controls a torque, a load or a deformation in steps, and is read at one rate. What is read
 is the sum of the responses to its steps, all of which are the response to a unit step, later and
@@ -253,11 +253,11 @@ def cheapest(cases: Sequence[Case], block: DesignBlock, percent: float) -> tuple
         for each in sorted({*found, best}, key=lambda it: (it.duration_s, it.rate_Hz))
     ]
     read = specimens[0].case.instrument.read
-    header = ["duration (s)", "rate (Hz)", "readings", "known within (%)"]
+    header = ["duration (s)", "rate (Hz)", "readings", "95 % limits (± %)"]
     header += [with_unit(f"noise for {percent:g} %", read.unit)]
     words = "Designed is the shortest"
     if not good:
-        words = f"No protocol tells it within {percent:g} %; designed is the most precise"
+        words = f"No protocol reaches {percent:g} %; designed is the most precise"
     return best, [
         aligned(rows, header),
         f"{words}, {best.duration_s:.3g} s at {best.rate_Hz:.4g} Hz.",
@@ -348,7 +348,7 @@ def search(
         for one in specimens
     ]
     if not np.any(np.concatenate(reached)):
-        text = "no train of steps tells any parameter asked for; allowed are less noise, a higher "
+        text = "no protocol determines a parameter asked for; allowed are less noise, a higher "
         raise BiogripError(f"design: {text}`largest`, a longer duration_s or a higher rate_Hz.")
 
     def score(each: Array) -> float:
@@ -447,7 +447,7 @@ def _said(
             percents = (_percent(each.bounds[index]) for each in both)
             rows.append((name, f"{parameter}: bound (%)", *percents))
             if one.required[index] and not within[index]:
-                notes.append(f"No train that was tried tells {parameter} of {name}.")
+                notes.append(f"No protocol that was tried determines {parameter} of {name}.")
         values = {
             with_unit(f"noise of the {read.name}", read.unit): [one.noise, one.noise],
             with_unit(f"largest {controlled.name}", controlled.unit): [
@@ -462,9 +462,8 @@ def _said(
     yield aligned(rows, ("sample", "", "config's protocol", "designed"))
     yield from notes
     yield (
-        "The noise is taken for white, and for the instrument's: the same under both protocols. "
-        "Bounds are standard deviations of logarithms, with all parameters unknown that are not "
-        "fixed."
+        "A bound is the least standard deviation (Cramér-Rao) in percent of the value, with all "
+        "parameters unknown that are not fixed. The noise is white, and the same under both."
     )
 
 

@@ -262,7 +262,7 @@ def _left_out(
         if names := [it["trace"] for it in traces if it["fit"] == status and not _is_used(it)]:
             yield f"Left out, {why}: {', '.join(names)}."
     if names := [own["trace"] for own in traces if own["fit"] == REJECTED and _is_used(own)]:
-        yield f"Of the model left out, whose fit is rejected: {', '.join(names)}."
+        yield f"Used only whatever the model, as their fits are rejected: {', '.join(names)}."
     for column in made_by:
         if names := [own["trace"] for own in traces if not own[column]]:
             yield f"Left out, nothing under {column}: {', '.join(names)}."
@@ -317,12 +317,11 @@ def _of_group(
         for said in _bounds(name, own, _FEW):
             placed = at_bounds(cells, name, verdict)
             row = compare(placed, [group], confidence, units=unit is not None)[name, group]
-            what = f"{name} of {group}: only bounded {said.removeprefix(verdict).strip()}, which"
-            moves = f"That of all cells is {moved}."
+            what = f"{name} of {group}: only bounded {said.removeprefix(verdict).strip()}, so in no"
+            moves = f"that of all cells is {moved}"
             if "median" in row:
-                at = f"With them at these bounds it is {plain(row['median'])}"
-                moves = f"{at}, and of all cells it is {moved}."
-            yield f"{what} the mean leaves out. {moves}"
+                moves = f"with them at these bounds it is {plain(row['median'])}, {moves}"
+            yield f"{what} mean; {moves}."
     told = {*_ONE_SIDED, FIT_REJECTED}
     if some := [it.name for it in cells if name in it.others and it.others[name][0] not in told]:
         yield f"{name} of {group}: nothing is told by {_few(some)}."
@@ -352,8 +351,8 @@ def _shared(
         units = len({(cell.group, cell.unit) for cell in cells})
         then = f"p is {', '.join(ps)}" if ps else "whether groups differ cannot be told"
         yield (
-            f"Column {column} puts {len(cells)} cells into {units} units: if these are what was "
-            f"repeated, cells are not independent, and with --unit {column} {then}."
+            f"Column {column} puts {len(cells)} cells into {units} units. If these are what was "
+            f"repeated, cells are not independent: with --unit {column} {then}."
         )
 
 

@@ -37,11 +37,11 @@ def test_a_rejected_model_is_told_from_what_no_linear_sample_does(
     assert float(rest.split(" ")[0]) == pytest.approx(1.0, abs=0.2)
     assert inadequate.data["without_model"]["is_linear"]
     # First what holds, then what does not.
-    assert text.index("Any linear sample, whatever its model, leaves 0.") < text.index("limits:")
+    assert text.index("Any linear sample that fits, whatever its model") < text.index("limits:")
     hopeless = told(SECONDS, LOST + SCATTER, **RELAXATION)
     assert hopeless.status == "rejected"
     assert "no linear sample gives this trace under this protocol" in str(hopeless)
-    assert "it tells nothing, either" in str(hopeless)
+    assert "No linear sample fits, whatever its model" in str(hopeless)
     assert hopeless.data["without_model"]["quantities"] == []
 
 

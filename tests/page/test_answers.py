@@ -12,6 +12,7 @@ from biogrip.page.answers import (
     say_which_method_finds_it,
     say_which_model_is_better,
 )
+from biogrip.physics.models import CANDIDATES
 
 TITLES = {"cell": "A cell", "drop": "A drop"}
 
@@ -36,8 +37,8 @@ def test_what_traces_tell_is_told_by_shares_of_traces() -> None:
     assert say_what_traces_tell(rows, TITLES).replace("\xa0", " ") == (
         "Of 20 traces of each sample all determine c + c_p, provided that the branch, k and c in "
         "series, relaxes within the experiment, and none determines c_p. On “A cell” all determine "
-        "k. On “A drop” 15 % (5 to 36 %) determine k. (All is 84 to 100 %, none 0 to 16 %, in "
-        "95 % intervals.)"
+        "k. On “A drop” 15 % (5 to 36 %) determine k. (95 % intervals: all is 84 to 100 %, none 0 "
+        "to 16 %.)"
     )
     one = say_what_traces_tell([covered("cell", "c_p", "1", "500")], TITLES)
     assert one.startswith("Of 500 traces of each sample hardly any determines c_p.")
@@ -60,8 +61,8 @@ METHODS = [
 
 def test_the_study_s_own_method_is_measured_by_what_it_can_encode() -> None:
     assert say_what_the_study_gives(METHODS, OWN, TITLES, "The", 1.0).replace("\xa0", " ") == (
-        "The genetic algorithm finds the best fit known that its digits can express, or one within "
-        "1 of its χ², in 18 % of 50 runs (95 % interval: 10 to 100 %) on “A cell” and 100 % (10 to "
+        "The genetic algorithm ends within 1 of the lowest χ² known that its encoding of values "
+        "allows, in 18 % of 50 runs (95 % interval: 10 to 100 %) on “A cell” and 100 % (10 to "
         "100 %) on “A drop”."
     )
     assert say_what_the_study_gives(METHODS, "other", TITLES, "The", 1.0) == ""
@@ -70,9 +71,8 @@ def test_the_study_s_own_method_is_measured_by_what_it_can_encode() -> None:
 def test_the_surest_method_is_named_before_the_study_s_own() -> None:
     """The cheaper of two that are as sure, by the sample of which it fits the fewest traces."""
     assert say_which_method_finds_it(METHODS, OWN).replace("\xa0", " ") == (
-        "Cheap search finds that fit, or a better one, in at least 98 % (10 to 100 %) of the runs "
-        "on each sample, with 90 to 800 simulated responses; the genetic algorithm takes 15,000 to "
-        "18,000."
+        "Cheap search comes as low, or lower, in at least 98 % (10 to 100 %) of the runs on each "
+        "sample, with 90 to 800 simulated responses; the genetic algorithm takes 15,000 to 18,000."
     )
     assert say_which_method_finds_it([], OWN) == ""
 
@@ -148,21 +148,26 @@ def test_a_recorded_trace_has_a_sentence_and_several_have_shares() -> None:
 
 
 def test_a_better_model_is_named_with_what_it_gains() -> None:
+    """By the words of `identify`; 4 and 2 parameters, and ΔAIC as of 800 readings."""
+    full, maxwell = "generalized_maxwell", "maxwell"
     rows = [
-        {"case": case, "model": model, "parameters": number, "median_delta_bic": bic}
-        for case, model, number, bic in (
-            *(("a", "solid", "4", "6.69"), ("a", "liquid", "3", "0")),
-            *(("b", "solid", "4", "0"), ("b", "liquid", "3", "80")),
-            *(("d", "solid", "4", "0"), ("d", "liquid", "3", "5.9")),
+        {
+            "case": case,
+            "model": CANDIDATES[name].model.title,
+            "median_delta_aic": aic,
+            "median_delta_bic": bic,
+        }
+        for case, name, aic, bic in (
+            *(("a", full, "4", "13.4"), ("a", maxwell, "0", "0")),
+            *(("b", full, "0", "0"), ("b", maxwell, "89", "80")),
+            *(("d", full, "0", "0"), ("d", maxwell, "15", "5.9")),
         )
     ]
-    simpler = (
-        "Another model, liquid, fits as well, with fewer parameters: its BIC is lower by 6.69."
-    )
-    assert say_which_model_is_better(rows, "a", "solid") == simpler
-    assert say_which_model_is_better(rows, "a", "solid", "rejected") == ""
-    assert say_which_model_is_better(rows, "b", "solid") == ""
-    better = "Another model, solid, fits better: its BIC is lower by 80."
-    assert say_which_model_is_better(rows, "b", "liquid") == better
-    assert say_which_model_is_better(rows, "d", "liquid") == ""
-    assert say_which_model_is_better(rows, "c", "solid") == ""
+    simpler = "A simpler model, Maxwell liquid (--model maxwell), fits as well, with a BIC lower"
+    assert say_which_model_is_better(rows, "a", full) == f"{simpler} by 13.4."
+    assert say_which_model_is_better(rows, "a", full, "rejected") == ""
+    assert say_which_model_is_better(rows, "b", full) == ""
+    better = "(--model generalized_maxwell) is preferred, with a BIC lower by 80."
+    assert say_which_model_is_better(rows, "b", maxwell).endswith(better)
+    assert say_which_model_is_better(rows, "d", maxwell) == ""
+    assert say_which_model_is_better(rows, "c", full) == ""

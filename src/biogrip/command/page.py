@@ -25,7 +25,7 @@ from biogrip.command.words import (
     set_up_in_words,
     together,
 )
-from biogrip.digits import with_unit
+from biogrip.digits import legible, with_unit
 from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
 from biogrip.figures.fit import draw_fit, fit_of
 from biogrip.figures.likelihood import draw_profiles_of
@@ -152,8 +152,7 @@ def draw_traces(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, s
     compared = compare(cells, groups, confidence, units=unit is not None)
     units = {each["quantity"]: each["unit"] for own in outcome.found for each in own["quantities"]}
     said = f"Groups: {by}. " if by != _ALL else ""
-    said += f"Units, of which the large marks are means: {unit}." if unit else "Every cell is taken"
-    said += "" if unit else " for independent."
+    said += f"Large marks: means of each {unit}." if unit else "Cells are taken for independent."
     # A panel each side by side, as many as a screen has room for.
     width_in = max(PAGE_IN, ONE_COLUMN_IN / 2 * min(len(columns), _MOST_PANELS))
     return draw_cells(cells, compared, {name: units[name] for name in columns}, width_in), said
@@ -190,7 +189,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
         lstrip_blocks=True,
         loader=jinja2.FileSystemLoader(here),
     )
-    environment.filters["visible"] = visible
+    environment.filters |= {"visible": visible, "legible": legible}
     text = environment.get_template("page.html.j2").render(
         traces=traces,
         refused={trace: visible_lines(reason) for trace, reason in outcome.refused.items()},

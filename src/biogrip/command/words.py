@@ -20,6 +20,7 @@ from biogrip.judging.verdicts import (
 )
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.models import CANDIDATES
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
 
@@ -40,7 +41,7 @@ _MOST_NAMED = 5
 _NUMBER = re.compile(r"\d[\d.e+-]*")
 # What the notes of a weight do to the fit.
 _MEANS = {
-    OK: "what the model leaves looks like noise",
+    OK: "the residuals look like noise",
     DOUBTFUL: "trust the limits only if you can rule out the reasons given",
     REJECTED: "the model cannot give this trace, so that it has no limits",
 }
@@ -77,14 +78,14 @@ def in_words(found: Mapping[str, Any]) -> str:
 def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return lines on what any linear sample would show."""
     own, told = found["without_model"], foremost(found)
-    left = counted(plain(own["times_noise"], 2), "noise")
+    left = f"{plain(own['times_noise'], 2)} times the noise"
     if found["instrument"] != _SWEEPS:
         left = f"{in_unit(own['misfit_rad'], found)}, {left}"
     if not told:
-        return [f"The nearest of all linear samples leaves {left}: it tells nothing, either."]
+        return [f"No linear sample fits, whatever its model: the least misfit is {left}."]
     width = max(len(each["quantity"]) for each in told)
     lines = (f"  {each['quantity']:<{width}}  {each['in_words']}" for each in told)
-    return [f"Any linear sample, whatever its model, leaves {left}:", *lines]
+    return [f"Any linear sample that fits, whatever its model (least misfit {left}), has:", *lines]
 
 
 def foremost(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -109,11 +110,11 @@ def foremost(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def misfit_in_words(found: Mapping[str, Any]) -> str:
-    """Return the number of samples, their noise, and the misfit of the best fit."""
-    said, noise = f"{found['samples']} samples", noise_in_words(found)
+    """Return the number of readings, their noise, and the misfit of the best fit."""
+    said, noise = f"{found['samples']} readings", noise_in_words(found)
     if found["instrument"] != _SWEEPS:
         noise = f"{noise} {in_unit(found['scatter_rad'], found)}"
-        return f"{said}, {noise}, misfit {in_unit(found['misfit_rad'], found)}"
+        return f"{said}, {noise}, misfit (RMS) {in_unit(found['misfit_rad'], found)}"
     ratio = plain(found["misfit_rad"] / found["scatter_rad"], 2)
     return f"{said}, misfit {ratio} times the {noise}"
 
@@ -123,7 +124,7 @@ def noise_in_words(found: Mapping[str, Any]) -> str:
     if found["fit"] == REJECTED and found["noise_model"]:
         return "noise that cannot be told from misfit"
     given = found["assumed"]["measurement"]
-    what = "noise as modelled" if found["noise_model"] else "scatter of neighbours"
+    what = "noise as modelled" if found["noise_model"] else "noise by the scatter of neighbours"
     if any(given.get(key) is not None for key in KNOWN_NOISE):
         what = "noise as given"
     return what
@@ -151,6 +152,16 @@ def given_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return a line on what was held or loaded, and one on fixed parameters, as far as given."""
     lines = [visible(found["load"])] if "load" in found else []
     return [*lines, f"Fixed: {', '.join(found['fixed'])}."] if "fixed" in found else lines
+
+
+def elements_in_words(found: Mapping[str, Any]) -> str:
+    """Return what the parameters of a trace's model are, and how times follow from them."""
+    title = found["model_title"]
+    model = next(it.model for it in CANDIDATES.values() if it.model.title == title)
+    every = (each["quantity"] for each in found["quantities"])
+    ends = (it.removeprefix("tau") for it in every if it.startswith("tau"))
+    said = [f"{it.name}: {it.meaning}" for it in model.parameters]
+    return "; ".join([*said, *(f"tau{end} = c{end}/k{end}" for end in ends)])
 
 
 def one_sided_in_words(
@@ -294,7 +305,7 @@ def taken_for_granted(found: Mapping[str, Any]) -> str:
         phases = found["assumed"]["protocol"]["phases"]
         held = (f"{phase['duration_s']:g} s at {phase['torque_Nm']:g} N m" for phase in phases)
         said[-1] += f" ({', '.join(held)})"
-    return f"Assumed: {' and '.join(said)}; yours are given with --config."
+    return f"Assumed: {' and '.join(said)}; give yours with --config."
 
 
 def limits_in_short(quantity: Mapping[str, Any]) -> str:
@@ -352,9 +363,9 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
         )
     if "gripper" in assumed:
         own = assumed["gripper"]
-        arms = (f"{own[arm]['stiffness_Nm_per_rad']:g}" for arm in ("left", "right"))
-        text = f"Its arms of {own['arm_length_m']:g} m have stiffnesses of {' and '.join(arms)}"
-        said.append(f"{text} N m/rad, at {own['reference_angle_deg']:g} degrees.")
+        arms = dict.fromkeys(f"{own[it]['stiffness_Nm_per_rad']:g}" for it in ("left", "right"))
+        text = f"Its arms of {own['arm_length_m']:g} m have a stiffness of {' and '.join(arms)}"
+        said.append(f"{text} N m/rad, and stand at {own['reference_angle_deg']:g} degrees.")
     fixed = f" with {', '.join(found['fixed'])}" if "fixed" in found else ""
     along = [name for name in ("offset", "drift") if f"{name}_rad" in found]
     along += ["drift"] if "drift_rad_per_s" in found else []

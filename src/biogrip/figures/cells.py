@@ -79,7 +79,7 @@ def _draw_quantity(
     axes: Axes, name: str, cells: Sequence[Cell], compared: Compared, groups: Sequence[str]
 ) -> None:
     ends: list[float] = []
-    bars: list[float] = []
+    bars: list[tuple[float, list[float]]] = []
     said = False
     for place, group in enumerate(groups):
         these = [cell for cell in cells if cell.group == group and not cell.rejects(name)]
@@ -98,11 +98,9 @@ def _draw_quantity(
         if "median" in row:
             levels = [row[it] for it in ("low", "median", "high") if it in row]
             beside = place + 0.46
-            axes.vlines(beside, levels[0], levels[-1], color=BLACK, zorder=5)
-            axes.hlines(levels, beside - 0.05, beside + 0.05, color=BLACK, zorder=5)
             left = place - _WIDE / 2
             axes.hlines(row["median"], left, beside, color=BLACK, linewidth=0.8, zorder=2)
-            bars += levels
+            bars.append((beside, levels))
         if "p" in row:
             ratio = with_limits(row["ratio"], row["ratio_low"], row["ratio_high"])
             ratio, _, limits = ratio.partition(" ")
@@ -119,8 +117,13 @@ def _draw_quantity(
     axes.set(xlim=(-0.55, len(groups) - 0.4), xticks=range(len(groups)))
     axes.set_xticklabels(names, **turned)
     if ends:
-        # Bars that reach far beyond all cells run out of the picture.
-        ends += np.clip(bars, min(ends) / _BEYOND, max(ends) * _BEYOND).tolist()
+        # Bars that reach far beyond all cells run out of the picture, dotted.
+        low, high = min(ends) / _BEYOND, max(ends) * _BEYOND
+        for x, levels in bars:
+            style = ":" if levels[0] < low or levels[-1] > high else "-"
+            axes.vlines(x, levels[0], levels[-1], color=BLACK, linestyle=style, zorder=5)
+            axes.hlines(levels, x - 0.05, x + 0.05, color=BLACK, zorder=5)
+            ends += np.clip(levels, low, high).tolist()
         _scale(axes, min(ends), max(ends))
 
 

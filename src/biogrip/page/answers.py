@@ -5,10 +5,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from biogrip.digits import counted, legible, plain, with_unit
-from biogrip.fit.nested_fits import STRONG, WORTH_A_MENTION
+from biogrip.fit.nested_fits import FittedModel, advice, fits_far_better, preferred
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.quantities import PROVIDED
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.physics.models import CANDIDATES
 from biogrip.records.identifications import ALL, share_with_limits
 
 Row = Mapping[str, str]
@@ -27,8 +28,8 @@ def say_what_the_study_gives(
     if not rows:
         return ""
     shares[0] = shares[0].replace("(", f"of {rows[0]['seeds']} runs (95 % interval: ", 1)
-    fit = f"the best fit known that its digits can express, or one within {tolerance:g} of its χ²,"
-    return f"{who} {shown} finds {fit} in {_listed(shares)}."
+    fit = f"ends within {tolerance:g} of the lowest χ² known that its encoding of values allows"
+    return f"{who} {shown} {fit}, in {_listed(shares)}."
 
 
 def say_what_recordings_tell(judged: Sequence[Mapping[str, Any]]) -> str:
@@ -60,23 +61,26 @@ def say_what_recordings_tell(judged: Sequence[Mapping[str, Any]]) -> str:
     return told + (f" Of the fits, {_listed(unsure)}." if unsure else "")
 
 
-def say_which_model_is_better(models: Iterable[Row], case: str, model: str, fit: str = OK) -> str:
-    """Say which model has a lower BIC in a case's trace than its own, by title; "" if none has.
+def say_which_model_is_better(
+    models: Iterable[Row], case: str, candidate: str, fit: str = OK
+) -> str:
+    """Say which model BIC prefers in a case's trace to its own, one of `CANDIDATES`; "" if none.
 
-    Rows are those of the table of models. No model fits as well as one whose fit is rejected.
+    Rows are those of the table of models, where the model that made simulated traces has a longer
+    title: none is better. None is simpler and as good if the own fit is rejected.
     """
-    by_title = {row["model"]: row for row in models if row["case"] == case}
-    best = min(by_title.values(), key=lambda row: float(row["median_delta_bic"]), default=None)
-    if best is None or model not in by_title or best["model"] == model:
-        return ""
-    few = int(best["parameters"]) < int(by_title[model]["parameters"])
-    lower = float(by_title[model]["median_delta_bic"]) - float(best["median_delta_bic"])
-    if lower < (WORTH_A_MENTION if few else STRONG) or (few and fit == REJECTED):
-        return ""
-    well = "as well, with fewer parameters" if few else "better"
-    return f"Another model, {best['model']}, fits {well}: its BIC is lower by {lower:.3g}."
+    names = {sample.model.title: name for name, sample in CANDIDATES.items()}
+    tried = [
+        FittedModel(names[row["model"]], *(float(row[f"median_delta_{it}"]) for it in _CRITERIA))
+        for row in models
+        if row["case"] == case and row["model"] in names
+    ]
+    judge = fits_far_better if fit == REJECTED else preferred
+    known = any(each.candidate == candidate for each in tried)
+    return advice(tried, candidate) if known and judge(tried, candidate) else ""
 
 
+_CRITERIA = "aic", "bic"
 _TOLD = {
     DETERMINED: "determines",
     BOUNDED_BELOW: "bounds only below",
@@ -129,8 +133,8 @@ def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> 
     ]
     if not first:
         said[0] = f"{told[0]}, on{said[0].removeprefix('On')}"
-    sure = f"(All is {100 * all_of[1]:.0f} to 100 %, none 0 to {100 * none_of[2]:.0f} %, in 95 % "
-    return " ".join(filter(None, [first, *said, legible(f"{sure}intervals.)")]))
+    sure = f"all is {100 * all_of[1]:.0f} to 100 %, none 0 to {100 * none_of[2]:.0f} %"
+    return " ".join(filter(None, [first, *said, legible(f"(95 % intervals: {sure}.)")]))
 
 
 def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
@@ -152,7 +156,7 @@ def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
     least, *more = sorted(found[surest], key=lambda row: float(row["reached_share"]))
     at_least = "at least " * (more != [] and share_of(least) != share_of(more[-1]))
     said = (
-        f"{surest[:1].upper()}{surest[1:]} finds that fit, or a better one, in {at_least}"
+        f"{surest[:1].upper()}{surest[1:]} comes as low, or lower, in {at_least}"
         f"{share_of(least)} of the runs on {'each' if more else 'the'} sample, with "
         f"{_responses(found[surest])} simulated responses"
     )

@@ -144,7 +144,7 @@ def write_report(
         "cases": list(zip(cases, found, strict=True)),
         "better": {
             case.name: answers.say_which_model_is_better(
-                models, case.name, case.sample.model.title, own["fit"]
+                models, case.name, case.sample.candidate, own["fit"]
             )
             for case, own in zip(cases, found, strict=True)
         },
