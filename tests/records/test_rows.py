@@ -54,6 +54,13 @@ def test_what_cannot_be_read_is_said_in_one_line(tmp_path: Path) -> None:
         read_rows(tmp_path / "a.csv")
 
 
+def test_text_in_a_column_of_numbers_is_refused(tmp_path: Path) -> None:
+    """In one, too, that not all files of its kind have."""
+    write_rows(tmp_path / "a.csv", ("name", "value", "more"), [["a", 1, "1.0.5"]])
+    with pytest.raises(BiogripError, match=r"a.csv: more: not all are numbers"):
+        read_frame(tmp_path / "a.csv", "rows", ("name", "value"), words=("name",))
+
+
 def test_a_batch_that_lost_a_trace_is_named(tmp_path: Path) -> None:
     """Of three traces, two a batch."""
     parts = [tmp_path / "0-1.csv", tmp_path / "2-3.csv"]

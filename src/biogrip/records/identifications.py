@@ -159,7 +159,7 @@ def _history(record: Record) -> dict[str, Array]:
 
 def read_identifications(path: Path, case: Case, method: str | None = None) -> "pd.DataFrame":
     """Read identifications of a case by all methods of the study, or by one, in all seeds."""
-    frame = _read(path, case, case.study.config.methods, range(case.seeds), ENCODABLE)
+    frame = _read(path, case, case.study.config.methods, range(case.seeds))
     return frame if method is None else frame[frame["method"] == method].reset_index(drop=True)
 
 
@@ -168,11 +168,8 @@ def read_batch(path: Path, case: Case) -> "pd.DataFrame":
     return _read(path, case, [path.parent.name], seeds_of(path.stem))
 
 
-def _read(
-    path: Path, case: Case, methods: Sequence[str], seeds: range, *more: str
-) -> "pd.DataFrame":
-    names = (*columns(case.sample.model), *more)
-    file = RowFile("identifications", names, ("case", "method", "stop_reason"))
+def _read(path: Path, case: Case, methods: Sequence[str], seeds: range) -> "pd.DataFrame":
+    file = RowFile("identifications", columns(case.sample.model), ("case", "method", "stop_reason"))
     return file.read(path, case=[case.name], method=methods, seed=seeds)
 
 

@@ -146,7 +146,7 @@ def read_frame(
         raise BiogripError(f"{path}: cannot be read as {what}: {error}. {AGAIN}") from error
     if not set(columns) <= set(frame.columns):
         raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(columns)}.")
-    for column in columns:
+    for column in frame.columns:
         numbers = frame.empty or pd.api.types.is_numeric_dtype(frame[column])
         if column not in words and not numbers:
             raise BiogripError(f"{path}: {column}: not all are numbers. {AGAIN}")
