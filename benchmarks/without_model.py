@@ -49,13 +49,13 @@ _PAGE = """# Limits without a model
 
 **Over all sample models, the 95 % limits of each quantity hold in {least:.0f} to {most:.0f} %.**
 
-They hold less often for samples at an edge of what is possible, such as a Maxwell liquid or a bare
-damper, of whose spectrum all but one time is zero: in 92 %. There the quantile of chi-squared is
-too small (P. Batlle et al., Optimization-based frequentist confidence intervals for functionals in
-constrained inverse problems: resolving the Burrus conjecture, arXiv:2310.02461, 2023). Plain fits
-on a fixed grid show the same: of 1,200 Maxwell liquids under a ramp, chi-squared of the loss
-tangent at 0.1 rad/s rises by more than 3.84 in 8.1 % (6.7 to 9.8). Of few traces a share scatters
-further.
+Of a sample at an edge of what is possible, such as a Maxwell liquid, of whose spectrum all but one
+time is zero, 3.84 is too small a rise of chi-squared (P. Batlle et al., Optimization-based
+frequentist confidence intervals for functionals in constrained inverse problems: resolving the
+Burrus conjecture, arXiv:2310.02461, 2023). So it has one degree of freedom more for each time by
+which a fit has fewer than the best (E. Susko, Likelihood ratio tests with boundary constraints
+using data-dependent degrees of freedom, Biometrika 100, 2013, 1019-1023). Of few traces a share
+scatters further.
 
 Traces of each of the sample models have noise of 2 % of the largest reading; shares have 95 %
 intervals (Wilson's), and each model's stand in `without_model.csv`. The right model's limits are

@@ -479,6 +479,20 @@ def test_what_identify_does_not_write_is_refused_with_its_place(
     assert error.count("\n") == 1
 
 
+@pytest.mark.parametrize("cut", [1, 10, 40])
+def test_a_table_that_lost_its_end_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], cut: int
+) -> None:
+    """A last row that is whole needs no end of its line."""
+    found = written(tmp_path, rows_of(np.array([20.0, 21.0, 22.0]), "left"))
+    whole = found.read_text()
+    found.write_text(whole.removesuffix("\n"))
+    assert main(["groups", str(found), "--by", "dish"]) == 0
+    found.write_text(whole[: whole.rindex(",") - cut])
+    assert main(["groups", str(found), "--by", "dish"]) == 1
+    assert "found.csv: found " in capsys.readouterr().err
+
+
 # The paragraph.
 
 

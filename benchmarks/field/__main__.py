@@ -1,4 +1,4 @@
-"""Runs the comparison on measured traces and writes `benchmarks/field/results`."""
+"""Runs the comparisons on measured traces and on a sweep and writes `benchmarks/field/results`."""
 
 from pathlib import Path
 
@@ -8,6 +8,7 @@ if __name__ == "__main__":
     keep_to_one_thread()
     from benchmarks.field.measured import BIOGRIP, PYRHEO, section
     from benchmarks.field.measured_peers import PEERS
+    from benchmarks.field.sweeps import REPORT
     from benchmarks.report import Report
 
     Report(
@@ -16,3 +17,4 @@ if __name__ == "__main__":
         (section((BIOGRIP, *PEERS, PYRHEO)),),
         ("lmfit", "rheojax", "nlsq", "jax"),
     ).run()
+    REPORT.run()

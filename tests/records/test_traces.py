@@ -17,6 +17,7 @@ from biogrip.records.traces import (
 )
 
 TIMES = np.arange(5.0)
+NOT_READ = "hidden", "empty", "gone"
 # Rounding is all that is in the second.
 FORCE = np.array([0.0, -3.1e-23, 1e-6 / 3, -7e-7 / 3, 1e-12 / 7])
 
@@ -79,6 +80,13 @@ def test_damaged_measurements_are_named(tmp_path: Path) -> None:
     cut.write_bytes(whole[:-9])
     another.write_text("time_s,target\n0,1\n")
     changed.write_bytes(whole.replace(TIMES.tobytes(), (TIMES + 1).tobytes()))
-    for file in (cut, another, changed, tmp_path / "gone.npz"):
+    # A comment that hides the arrays after the first; no list of arrays.
+    hidden, empty = bytearray(whole), bytearray(whole)
+    hidden[whole.index(b"PK\1\2") + 33] = 1
+    end = whole.rindex(b"PK\5\6")
+    empty[end + 4 : end + 16] = bytes(12)
+    (tmp_path / "hidden.npz").write_bytes(hidden)
+    (tmp_path / "empty.npz").write_bytes(empty)
+    for file in (cut, another, changed, *(tmp_path / f"{it}.npz" for it in NOT_READ)):
         with pytest.raises(BiogripError, match=f"{file.name}: cannot be read"):
             read_measurements(file)

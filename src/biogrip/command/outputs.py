@@ -177,10 +177,14 @@ def join_tables(parts: Sequence[Path], table: Path, rows: int) -> None:
     # Imported here: loading pandas takes long.
     import pandas as pd
 
-    texts = (StringIO(whole(part), newline="") for part in parts)
-    every = pd.concat([pd.read_csv(text, dtype=str, keep_default_na=False) for text in texts])
-    if len(every) != rows:
-        text = f"found {len(every)} traces in the tables of its batches, wanted {rows}"
-        raise BiogripError(f"{parts[0].parent}: {text}. {AGAIN}")
-    last = list(_LAST)
+    frames, last = [], list(_LAST)
+    for part in parts:
+        rows_of = StringIO(whole(part), newline="")
+        frames.append(frame := pd.read_csv(rows_of, dtype=str, keep_default_na=False))
+        first, end = map(int, part.stem.split("-"))
+        wanted = min(end + 1, rows) - first
+        if len(frame) != wanted or not {*last} <= {*frame}:
+            text = f"found {len(frame)} traces, wanted {wanted} with {', '.join(last)}"
+            raise BiogripError(f"{part}: {text}. {AGAIN}")
+    every = pd.concat(frames)
     write_text(table, every[[*every.columns.drop(last), *last]].to_csv(index=False))

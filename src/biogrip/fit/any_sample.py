@@ -123,12 +123,9 @@ class AnySampleFit:
 
     @property
     def taken(self) -> int:
-        """Degrees of freedom that it takes: a time and an amplitude each, an end's time none.
-
-        Neighbouring lags are one between them.
-        """
+        """Degrees of freedom that it takes: a time and an amplitude each, an end's time none."""
         own = self.amplitudes > 0
-        return 2 * int(np.sum(own[1:] & ~own[:-1]) + own[0]) - int(own[0]) - int(own[-1])
+        return 2 * count_lags(own) - int(own[0]) - int(own[-1])
 
     @cached_property
     def left(self) -> Array:
@@ -155,6 +152,11 @@ class AnySampleFit:
         shown = trace.condensed.cleared(shown)
         residual: Array = trace.cleared - self.amplitudes[own] @ shown
         return residual, absorbed(np.vstack((shown, trace.condensed.nuisance)))
+
+
+def count_lags(chosen: BoolArray) -> int:
+    """Count lags that are chosen, (n_rates,); neighbours are one between them."""
+    return int(np.sum(chosen[1:] & ~chosen[:-1]) + chosen[0])
 
 
 def fit_any_sample(residuals: Residuals) -> AnySampleFit:

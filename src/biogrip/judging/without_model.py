@@ -3,7 +3,9 @@
 A linear passive sample has a spectrum of relaxation times that is nowhere negative. Its relaxation
 modulus G, its compliance J and what they are at a frequency are linear functionals of it, or ratios
 of two. Their limits are the ends over all spectra whose sum of squares exceeds the least by no more
-than a quantile of F, or of chi-squared if the noise is known [1]_, [2]_. In each fit for a limit
+than a quantile of F, or of chi-squared if the noise is known [1]_, [2]_. Its degrees of freedom are
+one, and one more for each lag by which the fit that holds the quantity has fewer than the best: at
+the edge of what is not negative one is too few [3]_, [4]_. In each fit for a limit
 one more row, of great weight, holds the quantity at a value v: f at v, or the ratio f/g by f - v g
 at zero. The root of the excess is nearly linear in v: Newton's method takes two or three fits. What
 the best fit leaves tells the noise.
@@ -18,6 +20,8 @@ References
 .. [1] B. W. Rust and W. R. Burrus, Mathematical Programming and the Numerical Solution of Linear
    Equations, Elsevier, 1972: limits of linear functionals of what is not negative.
 .. [2] P. B. Stark, Journal of Geophysical Research 97 (1992), 14055-14082: duality.
+.. [3] P. Batlle et al., arXiv:2310.02461 (2023): limits of functionals under constraints.
+.. [4] E. Susko, Biometrika 100 (2013), 1019-1023: degrees of freedom that depend on the data.
 """
 
 import math
@@ -28,13 +32,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, chdtri, fdtri
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
-from biogrip.fit.any_sample import AnySampleFit, Lags, fit_any_sample
+from biogrip.fit.any_sample import AnySampleFit, Lags, count_lags, fit_any_sample
 from biogrip.judging.levels import CERTAIN_MISFIT, TOO_MUCH
-from biogrip.judging.likelihood import find_thresholds
 from biogrip.judging.verdicts import verdict_of
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
@@ -180,13 +183,19 @@ def tell_without_model(
     if not is_linear:
         independent, freedom = as_correlated(*left)
         sd = fit.sd * math.sqrt(free / independent)
-    threshold, _ = find_thresholds(confidence, freedom)
-    root = math.sqrt(threshold) * sd / residuals.noise_scale
+    root = partial(_root, confidence, freedom, float(sd / residuals.noise_scale))
     times_s = at_s or decades(*fit.lags.covered_s)
     quantities = (each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds)
     told = [_told(fit, each, root) for each in quantities]
     misfit = fit.sd * math.sqrt(free / residuals.samples)
     return WithoutModel(told, misfit, times, is_linear, fit.lags.covered_s)
+
+
+def _root(confidence: float, freedom: float, sd: float, more: int) -> float:
+    """Return the root of the excess at limits, with more degrees of freedom than one."""
+    if freedom == math.inf:
+        return sd * math.sqrt(chdtri(1 + more, 1 - confidence))
+    return sd * math.sqrt((1 + more) * fdtri(1 + more, freedom, confidence))
 
 
 def decades(first_s: float, last_s: float) -> list[float]:
@@ -238,7 +247,7 @@ class _Quantity:
         return self.above(at_s, lags.rates) * shown, below * shown
 
 
-def _told(fit: AnySampleFit, quantity: _Quantity, root: float) -> Told:
+def _told(fit: AnySampleFit, quantity: _Quantity, root: Callable[[int], float]) -> Told:
     """Find the limits of a quantity that is not negative."""
     profile = _Profile(fit, quantity, root)
     value: float | None = profile.best
@@ -257,8 +266,11 @@ def _told(fit: AnySampleFit, quantity: _Quantity, root: float) -> Told:
 class _Profile:
     """The root of the least excess of the sum of squares, as a function of a quantity."""
 
-    def __init__(self, fit: AnySampleFit, quantity: _Quantity, root: float) -> None:
-        self._fit, self._quantity, self._root = fit, quantity, root
+    def __init__(
+        self, fit: AnySampleFit, quantity: _Quantity, root: Callable[[int], float]
+    ) -> None:
+        self._fit, self._quantity, self._root_with = fit, quantity, root
+        self._root = root(0)
         self._least = float(fit.left @ fit.left)
         above, below = quantity.added(fit.lags)
         divisor = float(below @ fit.amplitudes) if quantity.below else 1.0
@@ -268,7 +280,7 @@ class _Profile:
         clearly = float(np.abs(row[~faint]).max())
         deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[own], row[own])[0]))
         deviation = deviation if deviation > _LEAST * clearly else clearly
-        stride = root * deviation / (divisor or 1.0)
+        stride = self._root * deviation / (divisor or 1.0)
         # Of a liquid the modulus that another is divided by may vanish.
         self._stride = min(stride, _MOST) if quantity.below else stride
         held = min(deviation, max(0.1 * self.best * divisor, _NONE * clearly))
@@ -276,17 +288,27 @@ class _Profile:
         self._open = [it for it in (-1, 1) if np.any(it * row[faint] > _HANGS * clearly)]
 
     def limit(self, side: int) -> float | None:
-        """Find the limit on a side, -1 or 1, if there is one: roughly, then with closer lags."""
+        """Find the limit on a side, -1 or 1, if there is one."""
         if not 0 < self._stride < math.inf or side in self._open:
             return None
-        lags, value, accuracy = self._fit.lags, self.best + side * self._stride, _ROUGH
+        self._root = self._root_with(0)
+        found, needed = self._closely(side, self.best + side * self._stride)
+        more = count_lags(self._fit.amplitudes > 0) - count_lags(needed)
+        if found is not None and more > 0:
+            self._root = self._root_with(more)
+            found, _ = self._closely(side, found)
+        # Where the excess jumps, Newton's method may end on the other side.
+        return found if found is not None and side * (found - self.best) >= 0 else None
+
+    def _closely(self, side: int, value: float) -> tuple[float | None, BoolArray]:
+        """Find a limit roughly, then with closer lags, beginning with a value; and its lags."""
+        lags, accuracy = self._fit.lags, _ROUGH
         for _ in range(_MOST_DIVISIONS):
             found, needed = self._crossing(lags, side, value, accuracy)
             if found is None or (accuracy < _ROUGH and lags.are_close(needed)):
                 break
             lags, value, accuracy = lags.divided(needed), found, _ACCURATE
-        # Where the excess jumps, Newton's method may end on the other side.
-        return found if found is not None and side * (found - self.best) >= 0 else None
+        return found, needed
 
     def _crossing(
         self, lags: Lags, side: int, value: float, accuracy: float

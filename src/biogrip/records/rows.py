@@ -146,7 +146,7 @@ def read_frame(
         raise BiogripError(f"{path}: cannot be read as {what}: {error}. {AGAIN}") from error
     if not set(columns) <= set(frame.columns):
         raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(columns)}.")
-    for column in columns:
+    for column in frame.columns:
         numbers = frame.empty or pd.api.types.is_numeric_dtype(frame[column])
         if column not in words and not numbers:
             raise BiogripError(f"{path}: {column}: not all are numbers. {AGAIN}")
@@ -165,7 +165,7 @@ def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str
     try:
         frame = pd.read_csv(path, header=None, dtype=str, na_filter=False)
     except (OSError, ValueError) as error:
-        raise BiogripError(f"{path}: cannot be read: {error}.") from error
+        raise BiogripError(f"{path}: cannot be read: {str(error).strip()}.") from error
     rows: list[list[str]] = frame.map(as_it_was).to_numpy().tolist()
     if columns is not None and rows[0] != list(columns):
         found, wanted = ",".join(rows[0]), ",".join(columns)
@@ -190,6 +190,10 @@ def read_arrays(path: Path) -> dict[str, Array]:
     """Read all arrays of an npz."""
     try:
         with path.open("rb") as stream, np.load(stream) as arrays:
+            # We write no comments: a length that has become another hides what follows.
+            members = arrays.zip.infolist()
+            if not members or any(member.comment for member in members):
+                raise ValueError("arrays are missing")
             return dict(arrays)
     except (OSError, ValueError, EOFError, RuntimeError, BadZipFile, zlib.error) as error:
         # zipfile finds methods and passwords that we do not use: RuntimeError.
