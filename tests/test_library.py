@@ -1,4 +1,5 @@
 import re
+from math import gamma
 from pathlib import Path
 from typing import Any
 
@@ -228,6 +229,23 @@ def test_times_of_pandas_are_seconds_and_masked_readings_are_gaps() -> None:
     assert (told.status, told.data["samples"]) == ("ok", 97)
     limits = told.to_frame().loc[["k_p", "c_p"]]
     assert np.all((limits["low"] < [1000, 500]) & (limits["high"] > [1000, 500]))
+
+
+@pytest.mark.parametrize("unit_s", [1e-7, 1.0, 86_400.0])
+def test_a_power_law_has_no_time_of_its_own(unit_s: float) -> None:
+    """t^alpha/(k Gamma(1 + alpha)) of 100 units of time, 700 Pa and 0.25 in that unit."""
+    times = np.linspace(0.5, 100.0, 120)
+    compliance = times**0.25 / (700 * gamma(1.25))
+    noisy = compliance + 0.004 * compliance[-1] * np.random.default_rng(3).normal(size=120)
+    told = library.identify_trace(
+        times * unit_s, noisy, reads="compliance", model="springpot", **compared()
+    )
+    frame = told.to_frame()
+    assert told.status == "ok"
+    low, high = frame.loc[["k_alpha", "alpha"], ["low", "high"]].to_numpy().T
+    truth = np.array([700 * unit_s**0.25, 0.25])
+    assert np.all((low < truth) & (truth < high))
+    assert np.all(high / low < 1.03)
 
 
 def test_all_of_the_library_can_be_had_from_the_package() -> None:
