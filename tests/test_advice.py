@@ -39,6 +39,17 @@ def test_branches_are_added_until_a_further_one_does_not_help() -> None:
     assert (again["fit"], again["preferred_model"]) == ("ok", None)
 
 
+@pytest.mark.nightly
+def test_branches_are_added_where_a_power_law_fits_better_than_three() -> None:
+    """Of five processes over eight decades two springpots in series leave 5 noises."""
+    times = np.geomspace(1e-3, 1e5, 110)
+    pairs = zip((4e8, 1e8, 6e7, 3e7, 8e6), (1e-2, 0.3, 10.0, 300.0, 1e4), strict=True)
+    clean = 1e6 + sum((k * np.exp(-times / tau) for k, tau in pairs), 0 * times)
+    noise = 1 + 0.02 * np.random.default_rng(5).normal(size=110)
+    told = identify_trace(times, clean * noise, reads="modulus", noise_share=0.02).data
+    assert (told["fit"], told["preferred_model"]) == ("rejected", "generalized_maxwell_5")
+
+
 def test_that_none_is_adequate_is_said() -> None:
     found = told("zener_maxwell", models=["zener_maxwell", "generalized_maxwell_2"])
     assert (found["fit"], found["preferred_model"]) == ("rejected", None)

@@ -1,4 +1,5 @@
 import re
+from math import gamma
 from pathlib import Path
 from typing import Any
 
@@ -194,6 +195,7 @@ def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read(
         ({"reads": ["strain"]}, r"reads: found '\['strain'\]', allowed are rotation"),
         ({"reads": None}, "reads: found 'None', allowed are rotation"),
         ({"start": np.array([1.0, 2.0])}, "start: measurement.start_s: found .*, allowed is a num"),
+        ({"hold": "5,0"}, "hold: found '5,0', a decimal comma. Allowed is a point"),
         ({"hold": [1.0]}, r"hold: found '\[1.0\]', allowed is a number, or one with its unit"),
         ({"hold": "soon"}, "hold: found 'soon', allowed is a number"),
         ({"model": 5}, "model: .*found "),
@@ -228,6 +230,35 @@ def test_times_of_pandas_are_seconds_and_masked_readings_are_gaps() -> None:
     assert (told.status, told.data["samples"]) == ("ok", 97)
     limits = told.to_frame().loc[["k_p", "c_p"]]
     assert np.all((limits["low"] < [1000, 500]) & (limits["high"] > [1000, 500]))
+
+
+@pytest.mark.parametrize("count", [5, 6, 7])
+def test_a_few_readings_that_relax_are_a_response(count: int) -> None:
+    """100 exp(-t/20 s) Pa, noise of 0.5 Pa."""
+    times = np.linspace(60 / count, 60.0, count)
+    readings = 100 * np.exp(-times / 20) + 0.5 * np.random.default_rng(2).normal(size=count)
+    told = library.identify_trace(
+        times, readings, reads="modulus", model="maxwell", start=0.0, **compared("maxwell")
+    )
+    limits = told.to_frame().loc[["k", "tau"]]
+    assert np.all((limits["low"] < [100, 20]) & (limits["high"] > [100, 20]))
+
+
+@pytest.mark.parametrize("unit_s", [1e-7, 1.0, 86_400.0])
+def test_a_power_law_has_no_time_of_its_own(unit_s: float) -> None:
+    """t^alpha/(k Gamma(1 + alpha)) of 100 units of time, 700 Pa and 0.25 in that unit."""
+    times = np.linspace(0.5, 100.0, 120)
+    compliance = times**0.25 / (700 * gamma(1.25))
+    noisy = compliance + 0.004 * compliance[-1] * np.random.default_rng(3).normal(size=120)
+    told = library.identify_trace(
+        times * unit_s, noisy, reads="compliance", model="springpot", **compared()
+    )
+    frame = told.to_frame()
+    assert told.status == "ok"
+    low, high = frame.loc[["k_alpha", "alpha"], ["low", "high"]].to_numpy().T
+    truth = np.array([700 * unit_s**0.25, 0.25])
+    assert np.all((low < truth) & (truth < high))
+    assert np.all(high / low < 1.05)
 
 
 def test_all_of_the_library_can_be_had_from_the_package() -> None:

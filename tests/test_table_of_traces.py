@@ -171,7 +171,7 @@ def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
         "2, column 'measurement.skip': found 1:30, which YAML reads in base 60; allowed is a "
         "number without colons, or text in quotes.",
         f"4, column 'file': found '{tmp_path}/a.csv' again, as on line 3; allowed is each trace "
-        "once.",
+        "once, or a column 'reading' that tells which, as in strain=COLUMN.",
     ]
     assert below == [[f"{n}, column 'measurement.skip'", " not valid YAML"] for n in (3, 4)]
     write(path, [["file", "fixed.c"], *([f"{number}.csv", "[1"] for number in range(30))])
@@ -437,6 +437,11 @@ def test_an_option_is_a_column_too(tmp_path: Path) -> None:
         ("hold_Pa", "hold"),
         ("noise (rad)", "noise"),
         ("start_s", "start"),
+        ("hodl", "hold"),
+        ("noize", "noise"),
+        ("pressure_mbar", "hold"),
+        ("Force (pN)", "hold"),
+        ("gripper_arm_length_m", "gripper.arm_length_m"),
     ],
 )
 def test_what_looks_like_a_setting_is_not_copied_beside_the_result(
@@ -449,5 +454,20 @@ def test_what_looks_like_a_setting_is_not_copied_beside_the_result(
         "for a column that sets it, in SI units, or a name unlike a setting's."
     ]
     # Words are no setting, nor are names of other things.
-    path.write_text(f"file,{name},length_um,passage,day\na.csv,low,12,3,4\n")
-    assert list(read_table(path)[0].copied) == [name, "length_um", "passage", "day"]
+    path.write_text(f"file,{name},length_um,passage,day,time_h\na.csv,low,12,3,4,5\n")
+    assert list(read_table(path)[0].copied) == [name, "length_um", "passage", "day", "time_h"]
+
+
+@pytest.mark.parametrize(
+    ("name", "cell", "meant"),
+    [
+        ("modle", "zener_kelvin", "model"),
+        ("sample type", "sls", "model"),
+        ("noise_modle", "coloured", "noise_model"),
+        ("stress", "8 Pa", "hold"),
+    ],
+)
+def test_nor_are_words_that_set_something(tmp_path: Path, name: str, cell: str, meant: str) -> None:
+    path = tmp_path / "cells.csv"
+    path.write_text(f"file,{name}\na.csv,{cell}\n")
+    assert f"allowed is '{meant}'" in refused(path)[0]

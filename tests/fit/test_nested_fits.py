@@ -16,6 +16,7 @@ from biogrip.fit.nested_fits import (
     deepen,
     fit_models,
     is_within,
+    one_branch_more,
     preferred,
     ranked,
 )
@@ -158,6 +159,15 @@ def test_a_branch_is_taken_that_lowers_chi_squared_by_a_hundredth(
     problem = seen(residuals=seen(samples=READINGS))
     before = float(np.sqrt(1 + gained / READINGS))
     assert _is_noticeably_lower(1.0, before, problem) == taken
+
+
+def test_branches_are_added_beside_a_power_law_that_is_not_adequate() -> None:
+    """Of five processes over eight decades; misfits are in noises of 110 readings."""
+    misfits = {"generalized_maxwell": 29.0, "generalized_maxwell_2": 19.0}
+    misfits |= {"generalized_maxwell_3": 11.0, "springpots_in_series": 5.2}
+    tried = ranked([*misfits], [*misfits.values()], 110)
+    assert one_branch_more(tried) is None
+    assert one_branch_more(tried, adequate=False) == "generalized_maxwell_4"
 
 
 def test_a_fit_ends_no_higher_than_with_another_seed() -> None:

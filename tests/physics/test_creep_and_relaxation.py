@@ -7,7 +7,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
+from biogrip.physics.fractional import LONGEST_S, SHORTEST_S, on_clock
 from biogrip.physics.gripper import NO_ARMS
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS
@@ -188,6 +188,15 @@ def test_creep_and_relaxation_are_inverse_laplace_transforms(
         alone = drawn("springpot", [named["k_alpha"], named["alpha"]])
         scale = np.maximum(expected, [inverted(lambda s: alone(s) / s, t) for t in TIMES])
     assert np.max(np.abs(found - expected) / scale) < 1e-6
+
+
+@pytest.mark.parametrize("model", POWER_LAWS)
+@pytest.mark.parametrize("unit_s", [1e4, 1e-5])
+def test_a_power_law_holds_on_a_clock_of_another_unit(model: str, unit_s: float) -> None:
+    sample = sample_of(model, 1)
+    storage, loss = complex_modulus(on_clock(MODELS[model], unit_s).network(sample), OMEGA / unit_s)
+    exact = IMPEDANCES[model](1j * OMEGA / unit_s, *sample)
+    np.testing.assert_allclose(storage[0] + 1j * loss[0], exact, rtol=1e-6)
 
 
 @pytest.mark.parametrize("model", POWER_LAWS)

@@ -363,6 +363,9 @@ MARKED = [
     (";", "{i}.5", "{i},85", None),
     (",", "00:01:{i}.5", "{i}", lambda i: (60.5 + i, i)),
     (";", "2026-11-25T23:59:{i}", "{i}", lambda i: (i - 11, i)),
+    (",", "2026-11-25 23:59:{i}Z", "{i}", lambda i: (i - 11, i)),
+    ("\t", "2026-11-25T23:59:{i}.5+01:30", "{i}", lambda i: (i - 11, i)),
+    (";", "25.11.2026 23:59:{i}", "{i},5", lambda i: (i - 11, i + 0.5)),
 ]
 
 
@@ -384,6 +387,29 @@ def test_a_table_has_one_decimal_mark(
     np.testing.assert_allclose(recorded.time_s, [right(i)[0] for i in rows])
     np.testing.assert_allclose(recorded.readings, [right(i)[1] for i in rows])
     assert not any("decimal mark" in remark for remark in recorded.remarks())
+
+
+def test_a_clock_goes_on_after_midnight_and_after_a_change_of_its_zone(tmp_path: Path) -> None:
+    path, columns = tmp_path / "t.csv", Columns("t", "G_Pa", quantity=MODULUS)
+    minutes = (*range(50, 60), *range(10))
+    times = [f"{23 if m > 9 else 0:02}:{m:02}:00" for m in minutes]
+    path.write_text(
+        "\n".join(["t,G_Pa", *(f"{t},{m}" for t, m in zip(times, minutes, strict=True))])
+    )
+    assert np.ptp(read_recording(path, columns).time_s) == 19 * 60
+    # An hour of a night in October is there twice.
+    hours = [("02", m, "+02:00") for m in range(50, 60)] + [("02", m, "+01:00") for m in range(10)]
+    rows = [f"2026-10-25T{h}:{m:02}:00{zone},{m}" for h, m, zone in hours]
+    path.write_text("\n".join(["t,G_Pa", *rows]))
+    assert np.ptp(read_recording(path, columns).time_s) == 19 * 60
+
+
+@pytest.mark.parametrize("cell", ["03/02/2026 11:59:31 PM", "01:30.5"])
+def test_times_of_another_form_are_named(tmp_path: Path, cell: str) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("\n".join(["t,G_Pa", *(f"{cell},{i}" for i in range(12))]))
+    said = refusal(path, Columns("t", "G_Pa", quantity=MODULUS))
+    assert f"line 2, column 't': found '{cell}'; allowed are numbers, or hh:mm:ss" in said
 
 
 @pytest.mark.parametrize(("separator", "cell"), [(";", "5,845"), (";", "5.845"), ("\t", "5,845")])

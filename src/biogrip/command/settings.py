@@ -20,7 +20,6 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from io import StringIO
 from itertools import zip_longest
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -49,9 +48,15 @@ from biogrip.study.source import (
 )
 from biogrip.study.study import Case, load_study, read_configs
 from biogrip.terminal import visible
-from biogrip.traces.columns import Columns, held_unit, listed, place, trace_file_problem
+from biogrip.traces.columns import (
+    Columns,
+    held_unit,
+    listed,
+    number_and_unit,
+    place,
+    trace_file_problem,
+)
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
-from biogrip.traces.tables import number_or_inf
 
 MODEL = "generalized_maxwell"
 """Sample model of traces of which nothing says another."""
@@ -65,6 +70,9 @@ LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
 _OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
+_OF_WORDS = ("noise_model", "offset", "drift", "reading", "sphere")
+# Other names of what is held.
+_HELD = ("held", "load", "pressure_Pa", "indentation_m")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 _PRONY = re.compile(r"prony_?([1-8])")
 # Share of the largest load so far below which a contact shrinks, not only scatters.
@@ -405,20 +413,36 @@ def _file_column(names: Sequence[str]) -> str | None:
     return next((found[name] for name in _FILES if name in found), None)
 
 
-def _meant(name: str) -> str | None:
-    """Return the option or key that a column's name is, but for its prefix, unit or spelling."""
+def _meant(name: str, cells: Sequence[str]) -> str | None:
+    """Return the option or key that a column is, but for its prefix, unit or spelling."""
+    if all(cell.lower() in {*ALIASES, *CANDIDATES} for cell in cells):
+        return "model"
+    plain = _plain(name)
+    try:
+        for cell in cells:
+            number_and_unit(cell)
+    except ValueError:
+        return next((word for word in _OF_WORDS if _misspelt(plain, word)), None)
     blocks = read_configs([default_config()])
-    known = {str(path[-1]): dotted(path) for path in keys_in(blocks) if path[0] in _INSTRUMENT}
+    keys = [path for path in keys_in(blocks) if path[0] in _INSTRUMENT]
+    known = {str(path[-1]): dotted(path) for path in keys} | dict.fromkeys(_HELD, "hold")
     known |= {each.controlled.column: "hold" for each in INSTRUMENTS.values()}
+    known |= {dotted(path).replace(".", "_"): dotted(path) for path in keys}
     known |= {name: name for name in _OF_NUMBERS}
     by_plain = {re.sub("_[^_]+$", "", key).lower(): meant for key, meant in known.items()}
     by_plain |= {key.lower(): meant for key, meant in known.items()}
-    plain = _plain(name)
     bare = re.sub(r"_?[(\[].*$|_[^_]+$", "", plain)
-    if plain in by_plain or bare in _OF_NUMBERS:
-        return by_plain.get(plain, bare)
+    if plain in by_plain or by_plain.get(bare) in _OF_NUMBERS:
+        return by_plain.get(plain, by_plain.get(bare))
     close = get_close_matches(plain, [key for key in by_plain if "_" in key], n=1, cutoff=0.9)
-    return by_plain[close[0]] if close else None
+    near = [key for key in _OF_NUMBERS if _misspelt(plain, key)]
+    return by_plain[(close or near)[0]] if close or near else None
+
+
+def _misspelt(name: str, option: str) -> bool:
+    """Return True if a name has an option's letters in another order, or nearly in theirs."""
+    close = len(name) > 3 and get_close_matches(name, [option], cutoff=0.8)
+    return bool(close) or sorted(name) == sorted(option)
 
 
 def read_table(
@@ -473,7 +497,8 @@ def read_table(
         first = before.setdefault((os.path.realpath(own.trace), part), line)
         if first != line and own.trace != path.parent:
             text = f"found '{visible(own.trace)}' again, as on line {first}; allowed is each"
-            problems.append(f"{place(path, line, file)}: {text} trace once.")
+            which = "once, or a column 'reading' that tells which, as in strain=COLUMN"
+            problems.append(f"{place(path, line, file)}: {text} trace {which}.")
         found[index] = replace(own, part=part)
     _refuse(problems)
     return found
@@ -522,13 +547,12 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
 def _unused(
     path: Path, header: Sequence[str], rows: Sequence[tuple[int, list[str]]], used: set[str]
 ) -> Iterator[str]:
-    """Find columns of numbers that look like settings, and would only be copied."""
+    """Find columns that look like settings, and would only be copied."""
     for number, name in enumerate(header):
         cells = [cell for _, row in rows for cell in row[number : number + 1] if cell]
-        numbers = cells and all(isfinite(number_or_inf(cell)) for cell in cells)
-        if not name or "." in name or name in used or not numbers:
+        if not name or "." in name or name in used or not cells:
             continue
-        meant = _meant(name)
+        meant = _meant(name, cells)
         if meant and meant not in map(_plain, header):
             yield (
                 f"{place(path, 1, name)}: looks like a setting and is none; allowed is "

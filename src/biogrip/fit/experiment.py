@@ -31,6 +31,8 @@ from biogrip.physics.sample_model import SampleModel, with_fixed
 _NOT_FITTED = "inertia_kgm2"
 # Degrees of freedom a reading, with which second differences of white noise tell its variance.
 _OF_DIFFERENCES = 18 / 35
+# Of shorter and of longer protocols power laws have units of time of their own.
+_SHORT_S, _LONG_S = 1e-3, 1e5
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,21 @@ class Experiment:
     @cached_property
     def searched(self) -> SampleModel:
         """Sample model without the fixed parameters."""
-        return with_fixed(self.model, self.fixed)
+        return with_fixed(self._on_clock(self.model), self.fixed)
+
+    @property
+    def unit_s(self) -> float:
+        """Unit of time in which power laws hold as long as the protocol lasts."""
+        lasts = 1.0 if self.instrument.sweeps else sum(phase.duration_s for phase in self.phases)
+        return lasts if lasts < _SHORT_S else max(lasts / _LONG_S, 1.0)
+
+    def _on_clock(self, model: SampleModel) -> SampleModel:
+        if self.unit_s == 1 or not model.power_law:
+            return model
+        # Imported here: few experiments have one.
+        from biogrip.physics.fractional import on_clock
+
+        return on_clock(model, self.unit_s)
 
     def to_identify(self, *others: SampleModel) -> "Experiment":
         """Leave out noise model, gripper uncertainty, and ranges neither it nor `others` use."""
@@ -220,7 +236,8 @@ class Experiment:
 
     def for_model(self, problem: TraceProblem, model: SampleModel) -> TraceProblem:
         """Return one of its problems posed for another model; both share rows of the trace."""
-        return make_problem(replace(problem.residuals, model=model), self.ranges)
+        residuals = replace(problem.residuals, model=self._on_clock(model))
+        return make_problem(residuals, self.ranges)
 
     def nuisance(self, time_s: Array) -> Array:
         """Return the nuisance functions, offset and drift, (n_functions, n_samples)."""

@@ -284,9 +284,14 @@ def fits_far_better(tried: Sequence[FittedModel], chosen: str) -> bool:
     return preferred(tried, chosen) is not None and preferred_simpler(tried, chosen) is None
 
 
-def one_branch_more(tried: Sequence[FittedModel]) -> str | None:
-    """Return the candidate with one branch more than the best, if it was not tried; else None."""
-    best = min(tried, key=lambda each: each.delta_bic).candidate
+def one_branch_more(tried: Sequence[FittedModel], *, adequate: bool = True) -> str | None:
+    """Return the candidate with one branch more than the best, if it was not tried; else None.
+
+    Where the best is not adequate, it is one more than the best Maxwell-Wiechert model.
+    """
+    rich = [it for it in tried if it.model.free_branches and not it.model.power_law]
+    among = tried if adequate else rich or tried
+    best = min(among, key=lambda each: each.delta_bic).candidate
     names = (name for name in CANDIDATES if CANDIDATES[name].model.free_branches)
     richer = (name for name in names if list(CANDIDATES[name].model.contains)[:1] == [best])
     name = next(richer, None)

@@ -119,7 +119,9 @@ _Own = tuple[Trace, TraceFit, Diagnosis]
 def _one_branch_more(own: _Own, models: FittedModels) -> str | None:
     """Return the model with one branch more than the best one, if it was not tried and may be."""
     (_, experiment), fit, _ = own
-    name = one_branch_more(models.tried) if experiment.cheap_models else None
+    if not experiment.cheap_models:
+        return None
+    name = one_branch_more(models.tried, adequate=models.adequate)
     return name if name and len(CANDIDATES[name].model.names) <= _most(experiment, fit) else None
 
 
@@ -151,8 +153,8 @@ def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
             }
         misfits = _misfits(diagnosis, posed, answers)
         tried = ranked(list(names), misfits, fit.problem.residuals.samples)
-        best = preferred(tried, chosen)
-        adequate = best is None or _leaves_noise(experiment, posed[best], answers[best])
+        best = preferred(tried, chosen) or chosen
+        adequate = _leaves_noise(experiment, posed[best], answers[best])
         every.append(FittedModels(chosen, tried, answers, adequate))
     return every
 
@@ -221,8 +223,8 @@ def _candidates(experiment: Experiment, fit: TraceFit) -> tuple[str, ...]:
     every = dict.fromkeys(names)
     # With very many samples the dozens of modes of a springpot would take gigabytes.
     shortest_s, longest_s = experiment.torque.spread_s(residuals.trace.time_s)
-    few = residuals.samples <= _MOST_SAMPLES and longest_s <= LONGEST_S
-    few &= shortest_s >= SHORTEST_S
+    few = residuals.samples <= _MOST_SAMPLES and longest_s <= LONGEST_S * experiment.unit_s
+    few &= shortest_s >= SHORTEST_S * experiment.unit_s
     if few and experiment.cheap_models:
         every |= dict.fromkeys(_POWER_LAWS)
     most = _most(experiment, fit)

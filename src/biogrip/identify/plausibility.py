@@ -32,7 +32,7 @@ from biogrip.traces.reader import Recording
 
 # Relative tolerance, since times are written with few digits.
 _TIME_SLACK = 1e-5
-_LAG_SHARES = (1e-9, 0.1, 10.0)
+_LAG_SHARES = (1e-9, 0.03, 0.1, 0.3, 1.0, 10.0)
 # Log-likelihood ratio, times two, above which a trace counts as mirrored.
 _FAR_LIKELIER = -2 * math.log(NO_RESPONSE)
 # Share of a function's norm that may be rounding error.

@@ -53,11 +53,12 @@ References
 """
 
 from dataclasses import dataclass, replace
+from functools import cache
 from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from biogrip.arrays import Array
 from biogrip.physics.roots import Zeros, interlaced_zeros
@@ -215,6 +216,23 @@ def _gel(k: Array, k_alpha: Array, alpha: Array) -> Network:
 def _beside(network: Network, k_p: Array | float = 0.0, c_p: Array | float = 0.0) -> Network:
     """Return a network with a spring or a damper beside it."""
     return replace(network, k_p=network.k_p + k_p, c_p=network.c_p + c_p)
+
+
+@cache
+def on_clock(model: SampleModel, unit_s: float) -> SampleModel:
+    """Return a power law whose ladders are springpots from 1e-5 to 1e5 of a unit of time."""
+    kinds = [parameter.kind for parameter in model.parameters]
+
+    def network(parameters: ArrayLike) -> Network:
+        columns = np.array(parameters).T
+        for place, kind in enumerate(kinds):
+            if kind in ("springpot", "damping"):
+                power = columns[place + 1] if kind == "springpot" else 1.0
+                columns[place] = columns[place] / unit_s**power
+        found = model.network(columns.T)
+        return replace(found, c_p=found.c_p * unit_s, c=found.c * unit_s)
+
+    return replace(model, network=network) if "springpot" in kinds and unit_s != 1 else model
 
 
 _K_ALPHA = Parameter("k_alpha", "springpot", "springpot, modulus at 1 rad/s", "k")

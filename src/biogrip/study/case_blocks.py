@@ -172,7 +172,7 @@ class CaseBlock(Shared):
         model = self.sample.sample.model
         yield from below(("fixed",), fixed_complaints(model, self.fixed))
         yield from self._instrument_complaints()
-        if model.power_law:
+        if model.power_law and not self.recorded:
             yield from self._band_complaints()
         # A chromosome has the digits and the exponent of every parameter.
         ranges = [getattr(self.search_range, p.range_name) for p in self.searched]

@@ -158,7 +158,8 @@ class StudyConfig(Shared):
         """Find too many jobs, samples that do not fit, and names of nothing that there is."""
         if not self.cases:
             yield ("cases",), "found none, allowed is one or more."
-        longest = max((case.protocol.end_s for case in self.cases.values()), default=0.0)
+        simulated = (case for case in self.cases.values() if not case.recorded)
+        longest = max((case.protocol.end_s for case in simulated), default=0.0)
         for index, name in enumerate(self.model_selection.models):
             if CANDIDATES[name].model.power_law and longest > LONGEST_S:
                 text = f"found {name} and a protocol of {longest:g} s, allowed are at most"

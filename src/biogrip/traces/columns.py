@@ -261,6 +261,8 @@ def number_and_unit(text: str) -> tuple[float, str]:
     found = _SIZED.fullmatch(plain_name(text))
     if found is None:
         raise ValueError(f"found '{shortened(text)}', allowed is a number, or one with its unit")
+    if found[2].startswith(","):
+        raise ValueError(f"found '{shortened(text)}', a decimal comma? Allowed is a point")
     return float(found[1]), found[2]
 
 

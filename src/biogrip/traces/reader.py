@@ -50,6 +50,7 @@ _PLURALS = {"time": "times", "frequency": "frequencies"}
 _SHORTEST_STEP = 1e-18
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
 _MARKS = {".": "point", ",": "comma"}
+_DAY_S = 86_400
 # More seconds than there are in hours, minutes and seconds without a date.
 _DATED_S = 1e10
 _THOUSANDS = {".": "points", ",": "commas", " ": "blanks or apostrophes", "": None}
@@ -209,6 +210,11 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     header_line = int(sheet.numbers[table.at]) or None
     times = [sheet.cells[table.first : table.end, i] for i in table.indices(columns.time)[:1]]
     clock = any(is_clock(cells.tolist()) for cells in times)
+    for cell in (cell for cells in times for cell in cells[:1] if ":" in cell and not clock):
+        raise BiogripError(
+            f"{place(path, sheet.numbers[table.first], columns.time)}: found '{shortened(cell)}'; "
+            "allowed are numbers, or hh:mm:ss, alone or after a date as 2026-11-25 or 25.11.2026."
+        )
     indices, units = _columns_of(path, header_line, table, columns, clock=clock)
     values, form = _numbers(path, sheet, table, indices, clock=clock)
     lines, load = sheet.numbers[table.first : table.end], None
@@ -465,6 +471,9 @@ def _numbers(
     form |= {"unclear": "".join(marks.cells) or None}
     if clock:
         form["clock"] = "hours:minutes:seconds"
+        # A clock without dates falls by a day at midnight.
+        falls = np.diff(values[:, 0], prepend=values[:1, 0]) < -_DAY_S / 2
+        values[:, 0] += _DAY_S * np.cumsum(falls)
         if (first := np.nanmin(values[:, 0])) > _DATED_S:
             form["clock"] = "dates, from the first"
             values[:, 0] -= first

@@ -59,7 +59,9 @@ _MARKED = re.compile(r"[-+]?\d*[.,][\d.,]*(?:[eE][-+]?\d+)?")
 _IN_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*")
 # Thousands with blanks or apostrophes between them.
 _GAPPED = re.compile(r"(?<![\d.,])[1-9]\d{0,2}(?:['\u2019 \u00a0\u2009\u202f]\d{3})+(?!\d)")
-_CLOCK = re.compile(r"(?:(\d{4}-\d\d-\d\d)[T ])?(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
+_DATE = r"(?:(\d{4})-(\d\d)-(\d\d)[T ]|(\d\d)\.(\d\d)\.(\d{4})[T ])?"
+_ZONE = r"(?:Z|([-+])(\d\d):?(\d\d))?"
+_CLOCK = re.compile(_DATE + r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)" + _ZONE)
 _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
 _PREAMBLE_LINES_SHOWN = 3
 _NAMES_SHOWN = 8
@@ -445,12 +447,15 @@ def seconds_or_inf(cell: str) -> float:
     """Return seconds of hours, minutes, seconds, and perhaps a date, else as `number_or_inf`."""
     if not (found := _CLOCK.fullmatch(cell)):
         return nan if cell.lower() in _GAPS else inf
-    day, hours, minutes, seconds = found.groups()
+    *days, hours, minutes, seconds, sign, zone_h, zone_min = found.groups()
+    year, month, day = days[:3] if days[0] else days[:2:-1]
     try:
-        days = date.fromisoformat(day).toordinal() if day else 0
+        count = date(int(year), int(month), int(day)).toordinal() if year else 0
     except ValueError:
         return inf
-    return 86400 * days + 3600 * int(hours) + 60 * int(minutes) + float(seconds.replace(",", "."))
+    zone_s = 3600 * int(zone_h or 0) + 60 * int(zone_min or 0)
+    passed_s = 86400 * count + 3600 * int(hours) + 60 * int(minutes)
+    return passed_s + (zone_s if sign == "-" else -zone_s) + float(seconds.replace(",", "."))
 
 
 def is_clock(cells: Sequence[str]) -> bool:
