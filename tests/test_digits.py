@@ -2,7 +2,7 @@
 
 import pytest
 
-from biogrip.digits import legible, p_value, plain, rounded, with_limits
+from biogrip.digits import instant, legible, p_value, plain, rounded, with_limits
 
 
 @pytest.mark.parametrize(
@@ -37,6 +37,21 @@ def test_numbers_are_as_fine_as_the_width_of_their_limits(
     limits: tuple[float, float, float], words: str
 ) -> None:
     assert with_limits(*limits) == words
+
+
+@pytest.mark.parametrize(
+    ("limits", "words"),
+    [
+        ((8.51, 8.4, 8.63), "8.51 s (8.40 to 8.63)"),
+        ((5.0, -17.3, 5.3), "5.00 s (-17.30 to 5.30)"),
+        ((5.0, -17.3, 5.0), "5 s (-17 to 5)"),
+        ((5.0, 5.0, 5.0), "5.0000000 s (5.0000000 to 5.0000000)"),
+    ],
+)
+def test_a_time_is_as_fine_as_its_nearer_limit(
+    limits: tuple[float, float, float], words: str
+) -> None:
+    assert instant(*limits) == words
 
 
 def test_decimals_are_plain_where_a_person_reads_them() -> None:

@@ -34,10 +34,9 @@ def _hold(text: str) -> tuple[Path, Any]:
     from biogrip.study.source import HOLD
     from biogrip.traces.columns import number_and_unit
 
-    with suppress(ValueError):
-        number, unit = number_and_unit(text)
-        if number and math.isfinite(number):
-            return HOLD, text if unit else number
+    number, unit = number_and_unit(text)
+    if number and math.isfinite(number):
+        return HOLD, text if unit else number
     form = "allowed is a number, and not 0, with its unit or in SI units"
     raise ValueError(f"found '{text}', {form}")
 

@@ -403,11 +403,10 @@ def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> It
     }
     if moved:
         said = "; or if it ends ".join(f"{end}: {values}" for end, values in moved.items())
-        yield Note(
-            HARMLESS,
-            f"If the load was no step but a ramp that ends {said}. A ramp is given by a protocol "
-            "(--config), or as recorded (--load).",
-        )
+        how = "A ramp is given by a protocol (--config), or as recorded (--load)."
+        if ramped.record is not None:
+            how = "Rows of the load before its first one would tell."
+        yield Note(HARMLESS, f"If the load was no step but a ramp that ends {said}. {how}")
 
 
 def _with_ramp(experiment: Experiment, time_s: Array) -> Experiment | None:
