@@ -55,7 +55,7 @@ def test_a_config_fixes_an_option_adds_and_it_is_said_everywhere(tmp_path: Path)
     assert "Fixed: k = 20 N/m, c_p = 50 N s/m." in said
     assert "Other models are not compared, because k and c_p were fixed." in said
     assert found["models"] == []
-    assert "Fixed: k = 20 N/m, c_p = 50 N s/m." in page.read_text()
+    assert "Fixed: k = 20 N/m, c_p = 50 N s/m." in page.read_text().replace("\xa0", " ")
     header, row = (line.split(",") for line in table.read_text().splitlines())
     assert row[header.index("fixed")] == "k = 20 N/m; c_p = 50 N s/m"
     assert not [name for name in header if name.startswith("c_p")]

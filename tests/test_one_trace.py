@@ -492,8 +492,8 @@ def test_only_what_can_be_published_is_said_for_a_paper(
 
 def test_noise_is_named_by_who_says_what_it_is() -> None:
     for fit, modelled, given, said in (
-        ("ok", False, {"sd": None}, "scatter of neighbours"),
-        ("rejected", False, {}, "scatter of neighbours"),
+        ("ok", False, {"sd": None}, "noise by the scatter of neighbours"),
+        ("rejected", False, {}, "noise by the scatter of neighbours"),
         ("ok", True, {}, "noise as modelled"),
         ("rejected", True, {}, "noise that cannot be told from misfit"),
         ("ok", False, {"noise_rad": 1e-6}, "noise as given"),

@@ -130,25 +130,25 @@ def require_rows(
 
 
 def read_frame(
-    path: Path, what: str, columns: Sequence[str], words: Sequence[str] = ()
+    path: Path, what: str, columns: Sequence[str], words: Sequence[str] | None = None
 ) -> "pd.DataFrame":
     """Read rows of a CSV file that have at least the given columns.
 
-    Those of words are text even if it looks like numbers, all others numbers; `what` says in
-    messages what the file holds.
+    Those of words are text even if it looks like numbers, all others numbers; without words, any
+    may be text. `what` says in messages what the file holds.
     """
     import pandas as pd
 
     text = whole(path, what)
     try:
-        frame = pd.read_csv(StringIO(text, newline=""), dtype=dict.fromkeys(words, str))
+        frame = pd.read_csv(StringIO(text, newline=""), dtype=dict.fromkeys(words or (), str))
     except ValueError as error:
         raise BiogripError(f"{path}: cannot be read as {what}: {error}. {AGAIN}") from error
     if not set(columns) <= set(frame.columns):
         raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(columns)}.")
     for column in frame.columns:
         numbers = frame.empty or pd.api.types.is_numeric_dtype(frame[column])
-        if column not in words and not numbers:
+        if words is not None and column not in words and not numbers:
             raise BiogripError(f"{path}: {column}: not all are numbers. {AGAIN}")
     for column in frame.columns:
         if not pd.api.types.is_numeric_dtype(frame[column]):
