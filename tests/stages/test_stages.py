@@ -14,6 +14,7 @@ from biogrip.records.traces import read_target
 from biogrip.stages import identification as identifications
 from biogrip.stages import targets as target
 from tests.helpers.default import STUDY, seen, study_of
+from tests.helpers.identified import FEW
 from tests.helpers.places import EXAMPLE
 
 
@@ -73,9 +74,8 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
 def test_all_stages_weight_the_readings(tmp_path: Path) -> None:
     """They find the same optimum, with the noise that is known."""
     file = f"{{file: {EXAMPLE}, time: time_s, rotation: rotation_rad, noise_share: 0.1}}"
-    case = study_of(
-        f"cases: {{mine: {{sample: {{model: liquid_drop}}, measurement: {file}}}}}"
-    ).cases["mine"]
+    mine = f"cases: {{mine: {{sample: {{model: liquid_drop}}, measurement: {file}}}}}"
+    case = study_of(f"{FEW}{mine}").cases["mine"]
     traces, verdicts = tmp_path / "t.npz", tmp_path / "v.json"
     target.record(case, EXAMPLE, traces)
     identifications.judge(case, traces, [], verdicts)
