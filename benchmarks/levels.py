@@ -381,7 +381,7 @@ def measure(set_up: SetUp, traces: int, first: int = 0) -> dict[str, Any]:
                 holds = not (value < low or value > high)
                 limits.append((name, holds, row["fit"] == "ok"))
     told = pd.DataFrame(limits, columns=["quantity", "holds", "ok"])
-    reasons = found["reasons"].fillna("")
+    reasons = found["reasons"].astype(str).replace("nan", "")
     return {
         "group": set_up.group,
         "set_up": set_up.name,
