@@ -72,6 +72,40 @@ def test_every_model_has_the_moduli_of_its_impedance_and_their_slopes(name: str)
         assert np.max(np.abs((ahead - behind) / (2 * step) - slope)) < 1e-7 * size.max()
 
 
+# A sweep in RHEOS's documentation, by angular frequency: storage and loss modulus.
+RHEOS = np.array(
+    [
+        [0.091160329, 0.828556819, 0.149921737],
+        [0.304963687, 0.862943457, 0.142491695],
+        [0.77022935, 0.898757203, 0.151197212],
+        [4.24686265, 0.974905392, 0.182173688],
+        [9.175279817, 1.036221356, 0.210393172],
+        [29.44212077, 1.124016346, 0.313294598],
+        [103.7540299, 1.244293227, 0.552659563],
+        [309.5187241, 1.494145654, 1.070122282],
+        [1003.289067, 3.170324762, 1.871798151],
+    ]
+).T
+
+
+def test_the_fit_that_rheos_publishes_has_its_misfit_and_lies_within_the_limits() -> None:
+    """That is of logarithms, ours of relative deviations."""
+    omega, values = RHEOS[0], RHEOS[1:]
+    names = MODELS["springpots_in_parallel"].names
+    published = dict(zip(names, (0.00921903, 0.770062, 0.913296, 0.100392), strict=True))
+    experiment = set_up(
+        INSTRUMENTS["storage"], (hold(1.0, 1.0),), Sample("springpots_in_parallel", stiffness="Pa")
+    )
+    loss, storage = np.split(simulate(experiment, published, np.append(-omega[::-1], omega)), 2)
+    logs = np.log(np.append(storage, loss[::-1]) / values.ravel())
+    assert logs @ logs == pytest.approx(0.34215629, rel=2e-5)
+    found = swept(values, omega, model="springpots_in_parallel", noise_share=0.14).to_frame()
+    for name, value in published.items():
+        assert found.loc[name, "low"] < value
+        assert not found.loc[name, "high"] < value
+    assert found.loc["beta", "value"] == pytest.approx(published["beta"], rel=0.02)
+
+
 def trios(values: Array, omega: Array) -> tuple[str, list[str]]:
     rows = np.c_[omega, values.T, values[1] / values[0]]
     lines = ["Filename\tgel.tri", "", "[step]", "Frequency sweep - 1"]
