@@ -297,15 +297,17 @@ class _Profile:
         if found is not None and more > 0:
             self._root = self._root_with(more)
             found, _ = self._closely(side, found)
-        # Where the excess jumps, Newton's method may end on the other side.
-        return found if found is not None and side * (found - self.best) >= 0 else None
+        return found
 
     def _closely(self, side: int, value: float) -> tuple[float | None, BoolArray]:
         """Find a limit roughly, then with closer lags, beginning with a value; and its lags."""
         lags, accuracy = self._fit.lags, _ROUGH
         for _ in range(_MOST_DIVISIONS):
             found, needed = self._crossing(lags, side, value, accuracy)
-            if found is None or (accuracy < _ROUGH and lags.are_close(needed)):
+            if found is None or side * (found - self.best) < 0:
+                # Where the excess jumps, Newton's method may end on the other side.
+                return None, needed
+            if accuracy < _ROUGH and lags.are_close(needed):
                 break
             lags, value, accuracy = lags.divided(needed), found, _ACCURATE
         return found, needed
@@ -337,7 +339,7 @@ class _Profile:
             steep = side * slope > 0 and reached > _FLAT * self._root
             step = -over * reached / slope if steep else side * math.inf
             if abs(over) < accuracy * self._root:
-                return value + (step if steep else 0.0), amplitudes > 0
+                return value + (step if steep and math.isfinite(step) else 0.0), amplitudes > 0
             inner, outer = (value, outer) if over < 0 else (inner, value)
             if abs(outer - inner) < _CLOSE * abs(inner - self.best):
                 return inner, amplitudes > 0
