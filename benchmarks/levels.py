@@ -372,7 +372,7 @@ def measure(set_up: SetUp, traces: int, first: int = 0) -> dict[str, Any]:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             given = (*set_up.options, "--no-compare", "--csv", table)
             command(["identify", *map(str, (*files, *given))])
-        found = pd.read_csv(table)
+        found = pd.read_csv(table, dtype={"reasons": str})
     limits, status = [], Counter(found["fit"])
     for trace, (_, row) in zip(made, found.iterrows(), strict=True):
         for name, value in trace.truth.items():
@@ -381,7 +381,7 @@ def measure(set_up: SetUp, traces: int, first: int = 0) -> dict[str, Any]:
                 holds = not (value < low or value > high)
                 limits.append((name, holds, row["fit"] == "ok"))
     told = pd.DataFrame(limits, columns=["quantity", "holds", "ok"])
-    reasons = found["reasons"].astype(str).replace("nan", "")
+    reasons = found["reasons"].fillna("")
     return {
         "group": set_up.group,
         "set_up": set_up.name,

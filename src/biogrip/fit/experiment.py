@@ -31,8 +31,8 @@ from biogrip.physics.sample_model import SampleModel, with_fixed
 _NOT_FITTED = "inertia_kgm2"
 # Degrees of freedom a reading, with which second differences of white noise tell its variance.
 _OF_DIFFERENCES = 18 / 35
-# Of shorter and of longer protocols power laws have units of time of their own.
-_SHORT_S, _LONG_S = 1e-3, 1e5
+# Of shorter protocols, and of too long ones, power laws have units of time of their own.
+_SHORT_S = 1e-3
 
 
 @dataclass(frozen=True)
@@ -120,13 +120,15 @@ class Experiment:
     @property
     def unit_s(self) -> float:
         """Unit of time in which power laws hold as long as the protocol lasts."""
+        # Imported here: few experiments have a power law.
+        from biogrip.physics.fractional import LONGEST_S
+
         lasts = 1.0 if self.instrument.sweeps else sum(phase.duration_s for phase in self.phases)
-        return lasts if lasts < _SHORT_S else max(lasts / _LONG_S, 1.0)
+        return lasts if lasts < _SHORT_S else max(lasts / LONGEST_S, 1.0)
 
     def _on_clock(self, model: SampleModel) -> SampleModel:
-        if self.unit_s == 1 or not model.power_law:
+        if not model.power_law or self.unit_s == 1:
             return model
-        # Imported here: few experiments have one.
         from biogrip.physics.fractional import on_clock
 
         return on_clock(model, self.unit_s)

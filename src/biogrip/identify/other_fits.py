@@ -154,7 +154,9 @@ def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
         misfits = _misfits(diagnosis, posed, answers)
         tried = ranked(list(names), misfits, fit.problem.residuals.samples)
         best = preferred(tried, chosen) or chosen
-        adequate = _leaves_noise(experiment, posed[best], answers[best])
+        # What a fit leaves that is not rejected has been looked at.
+        adequate = best == chosen and diagnosis.status != REJECTED
+        adequate = adequate or _leaves_noise(experiment, posed[best], answers[best])
         every.append(FittedModels(chosen, tried, answers, adequate))
     return every
 

@@ -227,18 +227,19 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     """Return what is wrong where a misfit is some times the noise, by what any sample leaves."""
     fit = fit_any_sample(residuals)
     other = fit.sd / scale
+    least = plain(other, 2)
     gives, culprits = "gives this trace under this protocol", "load, clock, contact or drift"
     left = fit.left_of_readings()
     if residuals.course.sweeps:
         gives, culprits = "has both moduli (Kramers-Kronig)", find_inertia(residuals, *left)
-    inadequate = "the model is not adequate, as a linear sample of another kind fits to "
-    inadequate += counted(plain(other, 2), "noise")
+    noises = counted(least, "noise")
+    inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
     if correlated(*left)[1] >= levels.FALSE_ALARM:
         return inadequate
     if other * levels.TOO_MUCH < times:
         return f"{inadequate}; what that leaves is of {culprits}"
-    left_at_least = f"the nearest leaves {plain(other, 2)} times the noise, and that is correlated"
-    return f"no linear sample {gives}; {left_at_least}: {culprits}"
+    nearest = f"the nearest leaves {least} times the noise, and that is correlated"
+    return f"no linear sample {gives}; {nearest}: {culprits}"
 
 
 def _about_growth(

@@ -269,8 +269,7 @@ class _Profile:
     def __init__(
         self, fit: AnySampleFit, quantity: _Quantity, root: Callable[[int], float]
     ) -> None:
-        self._fit, self._quantity, self._root_with = fit, quantity, root
-        self._root = root(0)
+        self._fit, self._quantity, self._root = fit, quantity, root
         self._least = float(fit.left @ fit.left)
         above, below = quantity.added(fit.lags)
         divisor = float(below @ fit.amplitudes) if quantity.below else 1.0
@@ -280,7 +279,7 @@ class _Profile:
         clearly = float(np.abs(row[~faint]).max())
         deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[own], row[own])[0]))
         deviation = deviation if deviation > _LEAST * clearly else clearly
-        stride = self._root * deviation / (divisor or 1.0)
+        stride = root(0) * deviation / (divisor or 1.0)
         # Of a liquid the modulus that another is divided by may vanish.
         self._stride = min(stride, _MOST) if quantity.below else stride
         held = min(deviation, max(0.1 * self.best * divisor, _NONE * clearly))
@@ -291,19 +290,17 @@ class _Profile:
         """Find the limit on a side, -1 or 1, if there is one."""
         if not 0 < self._stride < math.inf or side in self._open:
             return None
-        self._root = self._root_with(0)
-        found, needed = self._closely(side, self.best + side * self._stride)
+        found, needed = self._closely(side, self.best + side * self._stride, self._root(0))
         more = count_lags(self._fit.amplitudes > 0) - count_lags(needed)
         if found is not None and more > 0:
-            self._root = self._root_with(more)
-            found, _ = self._closely(side, found)
+            found, _ = self._closely(side, found, self._root(more))
         return found
 
-    def _closely(self, side: int, value: float) -> tuple[float | None, BoolArray]:
+    def _closely(self, side: int, value: float, root: float) -> tuple[float | None, BoolArray]:
         """Find a limit roughly, then with closer lags, beginning with a value; and its lags."""
         lags, accuracy = self._fit.lags, _ROUGH
         for _ in range(_MOST_DIVISIONS):
-            found, needed = self._crossing(lags, side, value, accuracy)
+            found, needed = self._crossing(lags, side, value, root, accuracy)
             if found is None or side * (found - self.best) < 0:
                 # Where the excess jumps, Newton's method may end on the other side.
                 return None, needed
@@ -313,7 +310,7 @@ class _Profile:
         return found, needed
 
     def _crossing(
-        self, lags: Lags, side: int, value: float, accuracy: float
+        self, lags: Lags, side: int, value: float, root: float, accuracy: float
     ) -> tuple[float | None, BoolArray]:
         """Return the limit with certain lags, and which it needs, beginning with a value."""
         from scipy.optimize import nnls
@@ -330,15 +327,15 @@ class _Profile:
             measured[-1] = 0.0 if ratio else weight * value
             amplitudes, norm = nnls(rows.T, measured, maxiter=100 * len(rows))
             reached = math.sqrt(max(norm**2 - self._least, 0.0))
-            over = reached - self._root
+            over = reached - root
             if over < 0 and value <= 0:
                 break
             force = weight * float(measured[-1] - amplitudes @ rows[:, -1])
             slope = force * (float(below @ amplitudes) if ratio else 1.0)
             # Where the excess is flat, its slope says nothing.
-            steep = side * slope > 0 and reached > _FLAT * self._root
+            steep = side * slope > 0 and reached > _FLAT * root
             step = -over * reached / slope if steep else side * math.inf
-            if abs(over) < accuracy * self._root:
+            if abs(over) < accuracy * root:
                 return value + (step if steep and math.isfinite(step) else 0.0), amplitudes > 0
             inner, outer = (value, outer) if over < 0 else (inner, value)
             if abs(outer - inner) < _CLOSE * abs(inner - self.best):

@@ -232,7 +232,7 @@ def on_clock(model: SampleModel, unit_s: float) -> SampleModel:
         found = model.network(columns.T)
         return replace(found, c_p=found.c_p * unit_s, c=found.c * unit_s)
 
-    return replace(model, network=network) if "springpot" in kinds and unit_s != 1 else model
+    return replace(model, network=network)
 
 
 _K_ALPHA = Parameter("k_alpha", "springpot", "springpot, modulus at 1 rad/s", "k")

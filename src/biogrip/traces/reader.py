@@ -25,6 +25,7 @@ from biogrip.traces.columns import (
 )
 from biogrip.traces.tables import (
     BLANKS,
+    DAY_S,
     Sheet,
     Table,
     find_marks,
@@ -50,7 +51,6 @@ _PLURALS = {"time": "times", "frequency": "frequencies"}
 _SHORTEST_STEP = 1e-18
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
 _MARKS = {".": "point", ",": "comma"}
-_DAY_S = 86_400
 # More seconds than there are in hours, minutes and seconds without a date.
 _DATED_S = 1e10
 _THOUSANDS = {".": "points", ",": "commas", " ": "blanks or apostrophes", "": None}
@@ -210,9 +210,10 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     header_line = int(sheet.numbers[table.at]) or None
     times = [sheet.cells[table.first : table.end, i] for i in table.indices(columns.time)[:1]]
     clock = any(is_clock(cells.tolist()) for cells in times)
-    for cell in (cell for cells in times for cell in cells[:1] if ":" in cell and not clock):
+    first = next((cells[0] for cells in times if len(cells)), "")
+    if ":" in first and not clock:
         raise BiogripError(
-            f"{place(path, sheet.numbers[table.first], columns.time)}: found '{shortened(cell)}'; "
+            f"{place(path, sheet.numbers[table.first], columns.time)}: found '{shortened(first)}'; "
             "allowed are numbers, or hh:mm:ss, alone or after a date as 2026-11-25 or 25.11.2026."
         )
     indices, units = _columns_of(path, header_line, table, columns, clock=clock)
@@ -472,8 +473,8 @@ def _numbers(
     if clock:
         form["clock"] = "hours:minutes:seconds"
         # A clock without dates falls by a day at midnight.
-        falls = np.diff(values[:, 0], prepend=values[:1, 0]) < -_DAY_S / 2
-        values[:, 0] += _DAY_S * np.cumsum(falls)
+        falls = np.diff(values[:, 0], prepend=values[:1, 0]) < -DAY_S / 2
+        values[:, 0] += DAY_S * np.cumsum(falls)
         if (first := np.nanmin(values[:, 0])) > _DATED_S:
             form["clock"] = "dates, from the first"
             values[:, 0] -= first

@@ -62,6 +62,8 @@ _GAPPED = re.compile(r"(?<![\d.,])[1-9]\d{0,2}(?:['\u2019 \u00a0\u2009\u202f]\d{
 _DATE = r"(?:(\d{4})-(\d\d)-(\d\d)[T ]|(\d\d)\.(\d\d)\.(\d{4})[T ])?"
 _ZONE = r"(?:Z|([-+])(\d\d):?(\d\d))?"
 _CLOCK = re.compile(_DATE + r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)" + _ZONE)
+DAY_S = 86_400
+"""Seconds of a day."""
 _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
 _PREAMBLE_LINES_SHOWN = 3
 _NAMES_SHOWN = 8
@@ -454,7 +456,7 @@ def seconds_or_inf(cell: str) -> float:
     except ValueError:
         return inf
     zone_s = 3600 * int(zone_h or 0) + 60 * int(zone_min or 0)
-    passed_s = 86400 * count + 3600 * int(hours) + 60 * int(minutes)
+    passed_s = DAY_S * count + 3600 * int(hours) + 60 * int(minutes)
     return passed_s + (zone_s if sign == "-" else -zone_s) + float(seconds.replace(",", "."))
 
 
