@@ -402,6 +402,10 @@ def test_a_clock_goes_on_after_midnight_and_after_a_change_of_its_zone(tmp_path:
     rows = [f"2026-10-25T{h}:{m:02}:00{zone},{m}" for h, m, zone in hours]
     path.write_text("\n".join(["t,G_Pa", *rows]))
     assert np.ptp(read_recording(path, columns).time_s) == 19 * 60
+    # Dates that fall, of two tests in one file, are no midnight.
+    rows = [f"2026-10-{day}T12:00:{s:02},{s}" for day in (26, 25) for s in range(20)]
+    path.write_text("\n".join(["t,G_Pa", *rows]))
+    assert "line 22, column 't': found 0 after 86419" in refusal(path, columns)
 
 
 @pytest.mark.parametrize("cell", ["03/02/2026 11:59:31 PM", "01:30.5"])

@@ -472,12 +472,13 @@ def _numbers(
     form |= {"unclear": "".join(marks.cells) or None}
     if clock:
         form["clock"] = "hours:minutes:seconds"
-        # A clock without dates falls by a day at midnight.
-        falls = np.diff(values[:, 0], prepend=values[:1, 0]) < -DAY_S / 2
-        values[:, 0] += DAY_S * np.cumsum(falls)
         if (first := np.nanmin(values[:, 0])) > _DATED_S:
             form["clock"] = "dates, from the first"
             values[:, 0] -= first
+        else:
+            # Without dates it falls by a day at midnight.
+            falls = np.diff(values[:, 0], prepend=values[:1, 0]) < -DAY_S / 2
+            values[:, 0] += DAY_S * np.cumsum(falls)
     return values, form
 
 
