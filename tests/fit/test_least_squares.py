@@ -7,10 +7,18 @@ import pytest
 
 from biogrip.arrays import Array, IntArray
 from biogrip.fit import least_squares
-from biogrip.fit.least_squares import ROUGH, LocalFits, _convex, _finished, fit_from, refine_optima
+from biogrip.fit.least_squares import (
+    ROUGH,
+    LocalFits,
+    _convex,
+    _finished,
+    fit_from,
+    identify_from,
+    refine_optima,
+)
 from biogrip.fit.levenberg_marquardt import Minima, Normal
 from tests.helpers.default import seen
-from tests.helpers.problems import problem
+from tests.helpers.problems import MODEL, clean, posed_for, problem
 
 
 def test_four_rough_fits_are_continued() -> None:
@@ -59,3 +67,18 @@ def test_what_is_pushed_against_a_bound_has_no_curvature(
     fits: Any = seen(normal=lambda x, trace, curved: normal, **bounds)
     found = _convex(fits, np.array([[x, 0.0]]), np.zeros(1, dtype=np.int64)).information[0]
     assert found.tolist() == ([[1.0, 0.0], [0.0, 2.0]] if held else [[2.0, 1.0], [1.0, 2.0]])
+
+
+def test_beside_a_parameter_at_its_bound_the_others_reach_their_optimum() -> None:
+    """From wherever they start, in a trace that is only rounded and whose k_p is below the range.
+
+    Of it c has a standard deviation of 2e-4, and c_p none that is worth the name: what stops short
+    differs, and differs between processors, in digits that are written.
+    """
+    times, response = clean("liquid_drop_2", 0.5)
+    posed = posed_for(MODEL, times, np.round(response, 8))
+    starts = [[1.0, 1e-4, 10.0, 1e-3], [0.98, 3e-4, 9.8, 0.2], [0.9, 1e-3, 9.0, 0.9]]
+    first, *others = (identify_from(posed, np.log(start)).parameters for start in starts)
+    assert np.log(first[1]) == posed.low[1]
+    for other in others:
+        np.testing.assert_allclose(other, first, rtol=1e-7)

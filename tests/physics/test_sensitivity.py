@@ -101,7 +101,7 @@ READ_S = np.arange(401.0)
 AT = np.log([2.0, 50.0])
 
 
-@pytest.mark.parametrize("count", [401, 4001])
+@pytest.mark.parametrize("count", [401, 4001, 60_001])
 def test_the_gradient_is_that_of_all_readings(gripper: Gripper, steps: Course, count: int) -> None:
     """Whatever part of an amplitude is taken out, and of many readings through their nodes."""
     times = np.linspace(0.0, 400.0, count)

@@ -7,6 +7,8 @@ from biogrip.stages.job import job_study, logged, paths
 
 with logged(snakemake):
     study = job_study(snakemake)
-    config = yaml.safe_dump(study.plain, allow_unicode=True)
+    # But for what changes no result.
+    shown = {key: value for key, value in study.plain.items() if key != "pdf"}
+    config = yaml.safe_dump(shown, allow_unicode=True)
     files = {name: paths(each) for name, each in snakemake.input.items()}
     write_report(study, config, files, *paths(snakemake.output))

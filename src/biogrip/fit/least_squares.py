@@ -328,6 +328,8 @@ _CLOSE, _DAMPING = 1e-10, 1e-6
 _MOST_STEPS = 60
 # Least damping after a rejected step, and the factor by which damping then changes.
 _LITTLE, _MORE = 1e-9, 10.0
+# Damping with which a step is short.
+_SHORT = 1.0
 # E-folds; shorter steps are rounding, and every machine decides alike whether a step is shorter.
 _STILL = 1e-9
 # Steps longer than the first, in e-folds, end on a grid of the second.
@@ -390,27 +392,33 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
         step = _newton_step(*bounds, normal, x, damping[moving])
         step = np.where(damping[moving, None] > 0, np.log1p(np.maximum(step, -0.9)), step)
         on = np.max(np.abs(plain), axis=1) >= _STILL
-        moving, step = moving[on], step[on]
+        moving, step, normal = moving[on], step[on], normal[on]
         if not len(moving):
             break
         evaluations[moving] += 2 + 2 * x.shape[1]
-        ahead = np.clip(_on_grid(state.x[moving] + step, step), low[moving], high[moving])
+        ahead = _on_grid(state.x[moving] + step, step, normal, low[moving], high[moving])
         kept = state.move(moving, ahead)
         more, less = _MORE * damping[moving], damping[moving] / _MORE
         less[less < _LITTLE] = 0.0
         damping[moving] = np.where(kept, less, np.maximum(more, _LITTLE))
-        # A converged fit whose step is rejected differs from its optimum by rounding only.
-        moving = moving[kept | ~converged[moving]]
+        # A converged fit whose short step is rejected, too, is off its optimum by rounding only.
+        moving = moving[kept | ~converged[moving] | (damping[moving] < _SHORT)]
     order = fits.problems[0].residuals.model.in_order(np.exp(state.x))
     x = np.take_along_axis(state.x, order, axis=1)
     converged = left <= np.maximum(_UNTOLD * left_of_one, rounding)
     return Minima(x, state.here.misfit, evaluations, converged)
 
 
-def _on_grid(x: Array, step: Array) -> Array:
-    """Round the ends of long steps to a grid, for the reason given in `levenberg_marquardt`."""
+def _on_grid(x: Array, step: Array, normal: Normal, low: Array, high: Array) -> Array:
+    """Round the ends of long steps to a grid, for the reason given in `levenberg_marquardt`.
+
+    Parameters at a bound stay there: off it, their gradient would outweigh what a step gains.
+    """
+    size = np.abs(np.diagonal(normal.information, axis1=1, axis2=2))
+    spacing = np.ldexp(_SPACING, -np.maximum(np.frexp(size)[1] // 2 - 8, 0))
     far = np.max(np.abs(step), axis=1, keepdims=True) > _FAR
-    return np.where(far, np.rint(x / _SPACING) * _SPACING, x)
+    rounded = far & (x > low) & (x < high)
+    return np.clip(np.where(rounded, np.rint(x / spacing) * spacing, x), low, high)
 
 
 @dataclass
