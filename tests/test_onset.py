@@ -22,7 +22,7 @@ from biogrip.library import Sample, TraceResult, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import Phase, hold, ramp
 from tests.helpers.default import STUDY
-from tests.helpers.identified import told
+from tests.helpers.identified import by_quantity, told
 
 PHASES = (hold(20.0, 1e-9), hold(20.0, 0.4e-9), hold(20.0, 1.2e-9))
 TRUTH = {"k": 29.0, "k_p": 6.0, "c": 100.0, "c_p": 20.0}
@@ -313,11 +313,28 @@ def test_a_ramp_before_the_first_reading_is_said_to_change_values(ramp_s: float)
     assert (status, "If the load was no step" in notes) == ("ok", bool(ramp_s))
     if said := re.findall("k would be (.*?) Pa; c", notes):
         assert float(said[0]) == pytest.approx(200.0, rel=0.02)
-        # Of a step at 0 it is 200 times the slope; a ramp that ends there has let some relax.
-        left = -np.expm1(-times[0] / 3.0) * 3.0 / times[0]
-        assert float(said[1]) == pytest.approx(200.0 * slope / left, rel=0.02)
     protocol = {"instrument": "relaxation", "protocol": {"phases": phases}}
-    assert "If the load was no step" not in notes_on(times, values, config=protocol, **given)[1]
+    assert "ramp" not in notes_on(times, values, config=protocol, **given)[1]
+
+
+def test_limits_hold_for_ramps_as_short_as_is_said() -> None:
+    """In a ramp before 0 a sample relaxes for half its length, over tau."""
+    times: Array = 0.01 * np.arange(1.0, 1001.0)
+    noise = 0.05 * np.random.default_rng(1).standard_normal(len(times))
+
+    def found(ramp_s: float) -> dict[str, Any]:
+        left = -np.expm1(-ramp_s) / ramp_s
+        stress = 12 + 8 * left * np.exp(-times) + noise
+        return told(times, stress, reads="stress", model="zener_maxwell", hold=0.01).data
+
+    short = found(1e-9)
+    k = by_quantity(short)["k"]
+    notes = " ".join(note["text"] for note in short["notes"])
+    longest = float(re.findall("a ramp of more than (.*) s before 0 s moves k beyond", notes)[0])
+    room = min(np.log(k["high"] / k["value"]), np.log(k["value"] / k["low"]))
+    assert longest == pytest.approx(2 * room, rel=0.05)
+    for share, inside in ((0.9, True), (1.1, False)):
+        assert (by_quantity(found(share * longest))["k"]["value"] > k["low"]) == inside
 
 
 @pytest.mark.parametrize("readings", [6, 12])

@@ -98,6 +98,9 @@ which their growth is known, and its powers of the time if someone spaced them. 
 HELD = 0.1
 """Change of a recorded load, as a share of it, that is held. Chosen."""
 
+SHORT_RAMP = 0.1
+"""Share of the trace up to which a ramp before it may pass for a step. Chosen."""
+
 WHITE = 1.5
 """Misfit over the scatter of neighbours that a right fit does not exceed. Chosen, above `TOO_MUCH`:
 it accuses a clock."""

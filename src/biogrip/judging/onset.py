@@ -235,6 +235,8 @@ _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
 # First change of the onset over how far readings are apart there, and most of it as a share of the
 # trace.
 _FIRST_STEP, _MOST = 1 / 64, 0.25
+# Start that is earlier by so much of an interval, for differences.
+_EARLIER = 0.1
 # Accuracy of an end of the onset's interval, as a share of its distance.
 _ACCURACY = 0.01
 
@@ -390,23 +392,45 @@ def _moved(
 
 
 def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> Iterator[Note]:
-    """Yield a note if a ramp up to the first reading, or one as long before, moves a value out."""
+    """Yield a note if a ramp up to the first reading moves a value out, or a short one before 0."""
     best, delay_s = diagnosis.likelihood.best, float(fits.time_s[0])
-    given, others = fits.at(0.0, best), replace(fits, experiment=ramped)
-    ends = {f"with the first reading, at {plain(delay_s)} s": 0.0}
-    if ramped.record is None and len(fits.experiment.phases) == 1:
-        ends["at 0, and was as long"] = -delay_s
-    moved = {
-        end: said
-        for end, onset_s in ends.items()
-        if (said := _moved(diagnosis, given, [others.at(onset_s, best)], 1.0))
-    }
-    if moved:
-        said = "; or if it ends ".join(f"{end}: {values}" for end, values in moved.items())
-        how = "A ramp is given by a protocol (--config), or as recorded (--load)."
-        if ramped.record is not None:
-            how = "Rows of the load before its first one would tell."
-        yield Note(HARMLESS, f"If the load was no step but a ramp that ends {said}. {how}")
+    given, other = fits.at(0.0, best), replace(fits, experiment=ramped).at(0.0, best)
+    said, how = [], "A ramp is given by a protocol (--config), or as recorded (--load)."
+    if moved := _moved(diagnosis, given, [other], 1.0):
+        ends = f"ends with the first reading, at {plain(delay_s)} s"
+        said.append(f"If the load was no step but a ramp that {ends}: {moved}.")
+    if ramped.record is not None:
+        how = "Rows of the load before its first one would tell."
+    elif longest := _longest_ramp(fits, diagnosis, given):
+        name = fits.experiment.instrument.controlled.name
+        said.append(
+            f"The {name} is taken to rise at once: a ramp of more than {plain(longest[0], 2)} s "
+            f"before 0 s moves {longest[1]} beyond its limits."
+        )
+    if said:
+        yield Note(HARMLESS, " ".join([*said, how]))
+
+
+def _longest_ramp(
+    fits: OnsetFits, diagnosis: Diagnosis, given: OnsetFit
+) -> tuple[float, str] | None:
+    """Return what length of a ramp before a step moves which quantity to a limit, if it is short.
+
+    A ramp that ends at 0 is, to first order, a step halfway of it.
+    """
+    if len(fits.experiment.phases) > 1:
+        return None
+    earlier_s = _EARLIER * spacing_at(fits.time_s, 0.0)
+    earlier = fits.at(-earlier_s, given.log_parameters).log_parameters
+    lengths = {}
+    for each in diagnosis.findings:
+        if each.low and each.high:
+            value, moved = (each.quantity.log(x) for x in (given.log_parameters, earlier))
+            room = min(abs(np.log(end) - value) for end in (each.low, each.high))
+            lengths[each.quantity.label] = 2 * earlier_s * room / max(abs(moved - value), 1e-12)
+    label = min(lengths, key=lambda label: lengths[label], default="")
+    short = label and lengths[label] < levels.SHORT_RAMP * fits.time_s[-1]
+    return (lengths[label], label) if short else None
 
 
 def _with_ramp(experiment: Experiment, time_s: Array) -> Experiment | None:
