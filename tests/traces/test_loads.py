@@ -17,7 +17,7 @@ from biogrip.identify.prepare import prepare
 from biogrip.physics.instruments import CONTROLLED, INSTRUMENTS
 from biogrip.physics.protocol import evaluate
 from biogrip.study.source import HOLD
-from biogrip.traces.columns import held_unit
+from biogrip.traces.columns import Columns, held_unit
 from biogrip.traces.reader import read_recording
 
 EVEN = np.linspace(0.0, 90.0, 2001)
@@ -56,6 +56,18 @@ def test_what_was_held_may_have_its_unit(text: str) -> None:
 def test_a_unit_of_something_else_is_refused() -> None:
     with pytest.raises(BiogripError, match="found the unit 'mV' of a stress, allowed are Pa, kPa"):
         held_unit("5 mV", INSTRUMENTS["strain"].controlled)
+
+
+def test_readings_beside_the_record_of_the_load_are_gaps(tmp_path: Path) -> None:
+    """Rows between two of the record keep their readings."""
+    path, there = tmp_path / "t.csv", {*range(3, 10), *range(12, 17)}
+    rows = [f"{i},{5 if i in there else ''},{i}" for i in range(20)]
+    path.write_text("\n".join(["time_s,stress_Pa,strain", *rows]))
+    quantity = INSTRUMENTS["strain"].read
+    recorded = read_recording(
+        path, Columns("time_s", "strain", quantity=quantity, load="stress_Pa")
+    )
+    assert (recorded.time_s.tolist(), recorded.gaps) == ([*range(3, 17)], 6)
 
 
 CLOCK = np.arange(400) / 10

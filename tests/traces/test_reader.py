@@ -393,10 +393,11 @@ def test_a_clock_goes_on_after_midnight_and_after_a_change_of_its_zone(tmp_path:
     path, columns = tmp_path / "t.csv", Columns("t", "G_Pa", quantity=MODULUS)
     minutes = (*range(50, 60), *range(10))
     times = [f"{23 if m > 9 else 0:02}:{m:02}:00" for m in minutes]
-    path.write_text(
-        "\n".join(["t,G_Pa", *(f"{t},{m}" for t, m in zip(times, minutes, strict=True))])
-    )
-    assert np.ptp(read_recording(path, columns).time_s) == 19 * 60
+    for midnight in ("00:00:00", "-"):
+        times[10] = midnight
+        rows = [f"{t},{m}" for t, m in zip(times, minutes, strict=True)]
+        path.write_text("\n".join(["t,G_Pa", *rows]))
+        assert np.ptp(read_recording(path, columns).time_s) == 19 * 60
     # An hour of a night in October is there twice.
     hours = [("02", m, "+02:00") for m in range(50, 60)] + [("02", m, "+01:00") for m in range(10)]
     rows = [f"2026-10-25T{h}:{m:02}:00{zone},{m}" for h, m, zone in hours]

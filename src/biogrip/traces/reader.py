@@ -480,8 +480,9 @@ def _numbers(
             values[:, 0] -= first
         else:
             # Without dates it falls by a day at midnight.
-            falls = np.diff(values[:, 0], prepend=values[:1, 0]) < -DAY_S / 2
-            values[:, 0] += DAY_S * np.cumsum(falls)
+            there = np.flatnonzero(~np.isnan(values[:, 0]))
+            falls = np.diff(values[there, 0], prepend=values[there[:1], 0]) < -DAY_S / 2
+            values[there, 0] += DAY_S * np.cumsum(falls)
     return values, form
 
 
