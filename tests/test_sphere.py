@@ -118,3 +118,6 @@ def test_a_rotation_has_no_sphere(afm: Path) -> None:
     status, _, message = identify(afm, "--reading", "modulus=force_nN", "--sphere", "2 um")
     assert status != 0
     assert "goes with a force or an indentation, not with modulus" in message
+    status, _, message = identify(afm, "--reading", "strain=force_nN", "--sphere", "2 um")
+    assert status != 0
+    assert "found a sphere and a reading of strain; allowed are a force and an" in message

@@ -137,6 +137,13 @@ class Asked:
         blocks = read_configs([self.config] if self.config else [])
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
+        measured = blocks.get("measurement")
+        measured = measured if isinstance(measured, dict) and measured.get("sphere") else {}
+        for name in {*measured} & {*_BY_SPHERE.values()}:
+            raise BiogripError(
+                f"{self.place}: found a sphere and a reading of {name}; allowed are a force and an "
+                "indentation, as by --reading force=COLUMN."
+            )
         return _by_sphere(blocks)
 
     def read(self, columns: Columns) -> Recording:
