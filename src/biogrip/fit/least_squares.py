@@ -332,8 +332,9 @@ _LITTLE, _MORE = 1e-9, 10.0
 _SHORT = 1.0
 # E-folds; shorter steps are rounding, and every machine decides alike whether a step is shorter.
 _STILL = 1e-9
-# Steps longer than the first, in e-folds, end on a grid of the second.
-_FAR, _SPACING = 1e-5, 2.0**-24
+# Steps longer than the first, in e-folds, end on a grid of the second; or of the third times what
+# is about the standard deviation of a parameter with all others known, if that is finer.
+_FAR, _SPACING, _OF_SD = 1e-5, 2.0**-24, 2.0**-16
 # Predicted decrease of a step, over the mean square that the fit leaves: a smaller one than the
 # first changes no digit that is written; what ends with less than the second has converged as far
 # as data can tell, as limits are at about 4.
@@ -415,7 +416,8 @@ def _on_grid(x: Array, step: Array, normal: Normal, low: Array, high: Array) -> 
     Parameters at a bound stay there: off it, their gradient would outweigh what a step gains.
     """
     size = np.abs(np.diagonal(normal.information, axis1=1, axis2=2))
-    spacing = np.ldexp(_SPACING, -np.maximum(np.frexp(size)[1] // 2 - 8, 0))
+    sd = np.ldexp(1.0, -(np.frexp(size)[1] // 2))
+    spacing = np.minimum(_SPACING, _OF_SD * sd)
     far = np.max(np.abs(step), axis=1, keepdims=True) > _FAR
     rounded = far & (x > low) & (x < high)
     return np.clip(np.where(rounded, np.rint(x / spacing) * spacing, x), low, high)
