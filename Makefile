@@ -28,10 +28,10 @@ locked = $(call installer,$(1)) && $(1)/bin/python -m uv pip install --quiet --p
   --require-hashes $(addprefix -r ,$(2)) && $(1)/bin/python -m pip uninstall --quiet --yes uv
 # Overlays whose tables are published, each under its name; see `overlaid`.
 OVERLAYS := calibration coverage measured power_law readings recorded repaired robustness soft
-# $(call overlaid,TARGET): every overlay in a folder of its own, from where traces are found, too.
+# $(call overlaid,TARGET,OPTIONS): every overlay in a folder of its own, from where traces are found, too.
 overlaid = failed=; for overlay in $(OVERLAYS); do \
   mkdir -p overlays/$$overlay && ln -sfn ../../data overlays/$$overlay/data && \
-  $(BIN)/snakemake -j$(JOBS) --configfile config/$$overlay.yaml --directory overlays/$$overlay $(1) || \
+  $(BIN)/snakemake -j$(JOBS) --configfile config/$$overlay.yaml --directory overlays/$$overlay $(2) $(1) || \
   failed="$$failed $$overlay"; \
 done; test -z "$$failed" || { echo "$(1): failed for$$failed" >&2; exit 1; }
 ourselves = $(1)/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
@@ -99,7 +99,7 @@ publish: $(READY)
 
 # What the overlays give that the documentation speaks of; takes longer than the study.
 publish-overlays: $(READY)
-	@$(call overlaid,publish)
+	@$(call overlaid,publish,--config pdf=true --)
 
 lint: $(TEST_READY)
 	$(BIN)/ruff check .
