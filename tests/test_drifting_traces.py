@@ -52,15 +52,6 @@ def test_a_drift_that_a_sample_could_have_shown_is_suspected() -> None:
 
 
 @pytest.mark.nightly
-def test_a_trace_that_does_not_drift_is_not_suspected() -> None:
-    """Each would be in three of a thousand traces, by each of the tests."""
-    for seed in range(3):
-        assert gripped(seed, 0 * DRIFT).data["notes"] == []
-    # Nor is one whose drift is declared.
-    assert suspected(gripped(0, DRIFT, offset=True, drift=True)) == []
-
-
-@pytest.mark.nightly
 def test_an_offset_beside_a_declared_drift_is_one_degree_of_freedom() -> None:
     """What is said of the fall of chi^2 is rounded to three digits, and its chance to one."""
     (said,) = suspected(gripped(0, OFFSET, drift=True))
@@ -107,50 +98,25 @@ def test_an_offset_alone_is_advised_if_it_explains_as_much() -> None:
     assert all(words[name].startswith(value) for name, value in advised)
 
 
-@pytest.mark.parametrize(
-    ("clean", "fit", "given"),
-    [
-        (1000 * CREEP**-0.15, "rejected", {"model": "kelvin_voigt", "reads": "modulus"}),
-        # Good to two per cent.
-        pytest.param(
-            *(1e-2 * CREEP**0.15, "doubtful"),
-            {"model": "zener_kelvin", "reads": "strain", "hold": 1.0, "level": 3e-3},
-            marks=pytest.mark.nightly,
-        ),
-    ],
-)
-def test_a_power_law_is_not_taken_for_an_offset_and_a_drift(
-    clean: Array, fit: str, given: dict[str, Any]
-) -> None:
+def test_a_power_law_is_not_taken_for_an_offset_and_a_drift() -> None:
     """Nor are its first readings outliers; the springpot fits far better."""
-    found = crept(clean, models=["springpot"], **given)
-    assert found.status == fit
+    found = crept(1000 * CREEP**-0.15, models=["springpot"], model="kelvin_voigt", reads="modulus")
+    assert found.status == "rejected"
     assert "springpot" in found.data["advice"]
     for word in ("offset", "drift", "outliers"):
         assert word not in str(found)
 
 
 @pytest.mark.parametrize(
-    ("model", "names"),
-    [
-        ("maxwell", "c"),
-        pytest.param("generalized_maxwell", "c + c_p", marks=pytest.mark.nightly),
-        pytest.param("burgers", "c_s", marks=pytest.mark.nightly),
-    ],
+    ("model", "name"),
+    [("maxwell", "c"), pytest.param("burgers", "c_s", marks=pytest.mark.nightly)],
 )
-@pytest.mark.parametrize(
-    "noise_model", ["white", pytest.param("coloured", marks=pytest.mark.nightly)]
-)
-def test_flow_under_a_constant_load_is_said_to_look_like_a_drift(
-    model: str, names: str, noise_model: str
-) -> None:
+def test_flow_under_a_constant_load_is_said_to_look_like_a_drift(model: str, name: str) -> None:
     """Nor is a drift fitted along by default that would take the flow away."""
     delayed = (1 - np.exp(-CREEP / 6)) / 800 if model == "burgers" else 0.0
-    given: dict[str, Any] = {"reads": "strain", "hold": 1.0, "noise_model": noise_model}
-    given |= {"fixed": {"k_p": 0.0}} if "+" in names else {}
-    found = crept(1 / 1000 + CREEP / 3e4 + delayed, model=model, **given)
-    assert f"are one line: {names} holds if the instrument does not drift" in str(found)
-    flow = found.to_frame().loc[names]
+    found = crept(1 / 1000 + CREEP / 3e4 + delayed, model=model, reads="strain", hold=1.0)
+    assert f"are one line: {name} holds if the instrument does not drift" in str(found)
+    flow = found.to_frame().loc[name]
     assert flow["value"] == pytest.approx(3e4, rel=0.1)
     assert flow["high"] < 2 * flow["low"]
 

@@ -85,13 +85,3 @@ def test_a_rejected_fit_says_only_why(noise_model: str) -> None:
     assert ("noise that cannot be told" in str(found)) == (noise_model == "coloured")
     for word in ("allow for", "richer", "suits the trace", "intervals", "Limits are"):
         assert word not in str(found)
-
-
-def test_six_readings_determine_two_parameters() -> None:
-    times = np.arange(1.0, 7.0)
-    noise = 8 * np.random.default_rng(0).standard_normal(6)
-    readings = 450 * np.exp(-times * 450 / 3800) + noise
-    found = told(times, readings, reads="modulus", model="maxwell")
-    assert found.status != REJECTED
-    k = found.to_frame().loc["k"]
-    assert k["low"] <= 450 <= k["high"] < 2 * k["low"]

@@ -252,33 +252,6 @@ def test_several_groups_are_compared_with_the_first(
     assert found["cells"].tolist() == [5, 5, 4]
 
 
-@pytest.mark.parametrize(
-    ("change", "by", "words"),
-    [
-        ({}, "dich", "Did you mean 'dish'?"),
-        ({"trace": None}, "dish", "found no column 'trace'"),
-        ({"dish": ""}, "dish", "found limits of no trace of a group"),
-        ({"confidence": "0.9"}, "dish", "found limits of 0.9 and 0.95; allowed are those of one"),
-    ],
-)
-def test_what_is_no_table_of_results_is_refused(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    change: dict[str, str | None],
-    by: str,
-    words: str,
-) -> None:
-    rows = rows_of(np.array([20.0, 21.0]), "left")
-    # A column that is missing, or nothing in it, is of both rows.
-    for row in rows[: 1 if "confidence" in change else 2]:
-        row |= {name: value for name, value in change.items() if value is not None}
-    found = written(tmp_path, rows, [name for name in HEADER if change.get(name, "") is not None])
-    assert main(["groups", str(found), "--by", by]) == 1
-    error = capsys.readouterr().err
-    assert words in error
-    assert error.count("\n") == 1
-
-
 @pytest.mark.nightly
 def test_identify_and_groups_say_the_same_of_a_cell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -295,18 +268,9 @@ def test_identify_and_groups_say_the_same_of_a_cell(
     assert status == 0
     told = {line.split()[0]: line.split()[1] for line in printed.splitlines()[2:15]}
     assert [name for name, fit in told.items() if fit != "ok"] == [str(folder / "b5.csv")]
-    table = tmp_path / "compared.csv"
-    command = [
-        "groups",
-        tmp_path / "found.csv",
-        "--by",
-        "treatment",
-        "--unit",
-        "dish",
-        "--csv",
-        table,
-    ]
-    assert main([*map(str, command)]) == 0
+    table = str(tmp_path / "compared.csv")
+    given = ["--by", "treatment", "--unit", "dish", "--csv", table]
+    assert main(["groups", str(tmp_path / "found.csv"), *given]) == 0
     found = capsys.readouterr().out
     documented = (ROOT / "docs" / "groups.md").read_text(encoding="utf-8")
     assert found.partition("\n")[2].partition("Left out")[0] in documented
@@ -458,24 +422,36 @@ def test_limits_of_traces_without_noise_may_be_equal(said: Said) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "allowed"),
+    ("by", "name", "value", "said"),
     [
-        ("k value (N/m)", "10,1", "a number of at least"),
-        ("k low (N/m)", "nan", "a number above 0"),
-        ("k high (N/m)", "inf", "a number of at least"),
-        ("k verdict", "certain", "determined, bounded below"),
-        ("fit", "good", "ok, doubtful, rejected, failed"),
-        ("confidence", "95", "a number from 0.5 to 0.99"),
+        ("dich", "", "", "Did you mean 'dish'?"),
+        ("dish", "trace", None, "found no column 'trace'"),
+        ("cell", "", "", "found limits of no trace of a group"),
+        ("dish", "confidence", "0.9", "found limits of 0.9 and 0.95; allowed are those of one"),
+        ("dish", "k value (N/m)", "10,1", "a number of at least"),
+        ("dish", "k low (N/m)", "nan", "a number above 0"),
+        ("dish", "k high (N/m)", "inf", "a number of at least"),
+        ("dish", "k verdict", "certain", "determined, bounded below"),
+        ("dish", "fit", "good", "ok, doubtful, rejected, failed"),
+        ("dish", "confidence", "95", "a number from 0.5 to 0.99"),
     ],
 )
 def test_what_identify_does_not_write_is_refused_with_its_place(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, value: str, allowed: str
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    by: str,
+    name: str,
+    value: str | None,
+    said: str,
 ) -> None:
     rows = rows_of(np.array([20.0, 21.0, 22.0]), "left")
-    rows[1][name] = value
-    assert main(["groups", str(written(tmp_path, rows)), "--by", "dish"]) == 1
+    rows[1][name] = str(value)
+    header = [column for column in HEADER if value is not None or column != name]
+    assert main(["groups", str(written(tmp_path, rows, header)), "--by", by]) == 1
     error = capsys.readouterr().err
-    assert f"found.csv, row 3 (left1.csv), {name}: found '{value}'; allowed is {allowed}" in error
+    if said[:3] not in ("Did", "fou"):
+        said = f"found.csv, row 3 (left1.csv), {name}: found '{value}'; allowed is {said}"
+    assert said in error
     assert error.count("\n") == 1
 
 
@@ -514,15 +490,14 @@ def test_the_methods_say_what_was_compared_with_its_numbers(said: Said) -> None:
     )
     assert "The unit is the day" in text
     assert "Welch's t test (Lord et al., Journal of Cell Biology 219 (2020), e202001064)" in text
-    assert text.endswith(
-        "Computed with biogrip 1.0.0 (The biogrip authors, biogrip: how well a MEMS microgripper "
-        "identifies the viscoelastic parameters of a cell, version 1.0.0, 2026)."
-    )
     assert r"95 \% confidence" in latex
-    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    for part in (citation["title"], citation["version"], citation["authors"][0]["name"]):
-        assert str(part) in text
-    assert str(citation["date-released"])[:4] in text
+    about = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    version, year = about["version"], str(about["date-released"])[:4]
+    assert text.endswith(
+        f"Computed with biogrip {version} ({about['authors'][0]['name']}, {about['title']}: how "
+        "well a MEMS microgripper identifies the viscoelastic parameters of a cell, version "
+        f"{version}, {year})."
+    )
 
 
 # The figure.
@@ -561,20 +536,15 @@ def test_points_lie_where_the_numbers_are() -> None:
 
 
 def test_an_axis_is_logarithmic_where_values_span_a_decade() -> None:
-    near = in_dishes(np.random.default_rng(1), 0.2)
-    assert drawn_of(near, units=False)[0].get_yscale() == "linear"
-    for number, cell in enumerate(near):
+    cells = in_dishes(np.random.default_rng(1), 0.2)
+    for number, cell in enumerate(cells):
         cell.known["k"] = np.log(4) + number / 30, 0.05
-    axes = drawn_of(near, units=False)[0]
-    assert axes.get_yscale() == "linear"
-    near[-1].known["k"] = np.log(50), 0.05
-    axes = drawn_of(near, units=False)[0]
+    assert drawn_of(cells, units=False)[0].get_yscale() == "linear"
+    cells[-1].known["k"] = np.log(50), 0.05
+    axes = drawn_of(cells, units=False)[0]
     assert axes.get_yscale() == "log"
     axes.figure.draw_without_rendering()
     low, high = axes.get_ylim()
-    shown = [
-        label.get_text()
-        for label, place in zip(axes.get_yticklabels(), axes.get_yticks(), strict=True)
-        if low <= place <= high
-    ]
-    assert shown == ["6", "10", "20", "30"] or shown == ["6", "10", "20", "30", "60"]
+    ticks = zip(axes.get_yticklabels(), axes.get_yticks(), strict=True)
+    shown = [label.get_text() for label, place in ticks if low <= place <= high]
+    assert shown[:4] == ["6", "10", "20", "30"]

@@ -45,13 +45,6 @@ def gripped(times: Array, values: Array, **given: Any) -> TraceResult:
     return told(times, values, config={"protocol": PROTOCOL}, **given)
 
 
-def holding(found: TraceResult) -> list[str]:
-    """Name the quantities whose limits hold the truth."""
-    truth = TRUTH | {"c + c_p": TRUTH["c"] + TRUTH["c_p"], "tau": TRUTH["c"] / TRUTH["k"]}
-    limits = found.to_frame().fillna({"low": 0.0, "high": np.inf})
-    return [name for name, own in limits.iterrows() if own["low"] <= truth[name] <= own["high"]]
-
-
 RAMP = (ramp(30.0, 0.0, 1e-9), hold(30.0, 0.3e-9))
 
 
@@ -110,15 +103,6 @@ def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("last_s", [1e3, pytest.param(1e4, marks=pytest.mark.nightly)])
-def test_a_trace_over_many_decades_of_time_has_an_answer(last_s: float) -> None:
-    """A liquid on which no reading of the first decades moves, and exact times."""
-    times = np.geomspace(1e-4, last_s, 81)
-    found = told(times, 1.0 + times, reads="strain", hold=1.0, model="maxwell").to_frame()
-    np.testing.assert_allclose(found["value"], 1.0, rtol=1e-6)
-
-
-@pytest.mark.nightly
 def test_readings_near_a_fitted_onset_are_not_said_to_show_a_ring() -> None:
     """Of milliseconds, where the onset is known to tenths of a second."""
     times, values = late(2)
@@ -136,38 +120,14 @@ def test_padding_before_the_onset_is_no_measurement() -> None:
     assert "Left out for want of a number: 40 rows of 301." in str(found)
 
 
-@pytest.mark.nightly
-def test_readings_before_the_onset_tell_the_zero() -> None:
-    """On a clock with negative times, too."""
+def test_a_clock_outside_the_protocol_is_refused() -> None:
     times, values = late(2)
-    whole, without = (
-        gripped(times[cut] - ONSET_S, values[cut] + 2e-6, offset=True, start=0.0)
-        for cut in (times >= 0, times >= ONSET_S)
-    )
-    assert len(holding(whole)) == 6
-    assert whole.data["offset_rad"] == pytest.approx(2e-6, abs=5 * NOISE_RAD / np.sqrt(40))
-    limits = (found.to_frame().loc["k_p"] for found in (whole, without))
-    wide, narrow = (own["high"] - own["low"] for own in limits)
-    assert wide < 0.9 * narrow
-
-
-@pytest.mark.parametrize(
-    ("earlier_s", "start", "message"),
-    [
-        (
-            *(ONSET_S, None),
-            "found -8.07 s, allowed is the protocol's time, 0 to 60 s. If the protocol starts at "
-            'another time of the clock than 0, start says when, or start="fit" finds it.',
-        ),
+    for earlier_s, start, message in (
+        (ONSET_S, None, 'found -8.07 s, .* start says when, or start="fit" finds it.'),
         (0.0, -5.0, "found 55.2 s, allowed is the protocol's time, -5 to 55 s."),
-    ],
-)
-def test_a_clock_outside_the_protocol_is_refused(
-    earlier_s: float, start: float | None, message: str
-) -> None:
-    times, values = late(2)
-    with pytest.raises(BiogripError, match=message):
-        gripped(times - earlier_s, values, start=start)
+    ):
+        with pytest.raises(BiogripError, match=message):
+            gripped(times - earlier_s, values, start=start)
 
 
 def notes_on(times: Array, values: Array, **given: Any) -> tuple[str, str]:
@@ -239,21 +199,6 @@ def test_models_are_compared_each_at_its_own_onset() -> None:
     found = told(times, values, models, start="fit", reads="strain", model=models[0], hold=1.0)
     misfits = {row["model"]: row["misfit_rad"] for row in found.data["models"]}
     assert misfits["springpot"] == pytest.approx(0.02, rel=0.15)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("unit_s", [1e-3, 86_400.0])
-def test_a_fitted_onset_lies_between_its_readings_on_any_clock(unit_s: float) -> None:
-    """Log-spaced over five decades on either side, most readings far further apart than there."""
-    apart = np.geomspace(1e-3, 1e2, 60)
-    times = np.r_[-apart[::-3], apart]
-    values = np.where(times > 0, 1000 * np.exp(-np.clip(times, 0, None)), 0.0)
-    values += 5.0 * np.random.default_rng(7).standard_normal(len(times))
-    given: dict[str, Any] = {"reads": "modulus", "model": "maxwell", "start": "fit"}
-    found = told(unit_s * (times + 200), values, **given)
-    ends_s = np.array([found.data["onset_s"], *found.data["onset_limits_s"]])
-    assert np.abs(ends_s / unit_s - 200).max() < 1.5e-3
-    assert found.to_frame().loc["k", "value"] == pytest.approx(1000, rel=0.02)
 
 
 HOLD = np.arange(0.4, 44, 0.4)

@@ -4,7 +4,6 @@ Samples are written down here, or in `tests.helpers.laplace`, as impedances.
 """
 
 import re
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,8 @@ import yaml
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
+from biogrip.cli import _parser
+from biogrip.command.settings import Asked, Setting, read_trace
 from biogrip.errors import BiogripError
 from biogrip.library import INSTRUMENTS, Sample, hold, set_up, simulate
 from biogrip.physics.models import MODELS
@@ -42,11 +43,6 @@ def noisy(clean: Array, share: float = 0.02, seed: int = 0) -> Array:
 def swept(values: Array, omega: Array = OMEGA, **given: Any) -> Any:
     """What a sweep tells in a notebook."""
     return told(omega, values[0], loss=values[1], **(GIVEN | given))
-
-
-@cache
-def solid_in_a_notebook() -> dict[str, dict[str, Any]]:
-    return by_quantity(swept(solid()).data)
 
 
 def solid(seed: int = 1, **given: Any) -> Array:
@@ -106,62 +102,58 @@ def test_the_fit_that_rheos_publishes_has_its_misfit_and_lies_within_the_limits(
     assert found.loc["beta", "value"] == pytest.approx(published["beta"], rel=0.02)
 
 
-def trios(values: Array, omega: Array) -> tuple[str, list[str]]:
-    rows = np.c_[omega, values.T, values[1] / values[0]]
-    lines = ["Filename\tgel.tri", "", "[step]", "Frequency sweep - 1"]
-    lines += ["Angular frequency\tStorage modulus\tLoss modulus\tTan(delta)", "rad/s\tPa\tPa\t"]
-    lines += ["\t".join(f"{value:.9g}" for value in row) for row in rows]
-    return "\n".join(lines), ["Angular frequency", "storage=Storage modulus", "loss=Loss modulus"]
+FILES: dict[str, tuple[str, str, Any, list[str]]] = {
+    "TRIOS": (
+        "Filename\tgel.tri\n\n[step]\nFrequency sweep - 1\n"
+        "Angular frequency\tStorage modulus\tLoss modulus\tTan(delta)\nrad/s\tPa\tPa\t",
+        "\t",
+        lambda w, stored, lost: (w, stored, lost, lost / stored),
+        ["Angular frequency", "storage=Storage modulus", "loss=Loss modulus"],
+    ),
+    "Anton Paar, from high to low frequencies": (
+        "Projekt:;Zellen\n\nIntervall-Daten:;Punktnr.;Kreisfrequenz;Speichermodul;Verlustmodul\n"
+        ";;;;\n;;[1/s];[kPa];[kPa]",
+        ";",
+        lambda w, *moduli: (w, w[::-1], *(it[::-1] / 1e3 for it in moduli)),
+        ["Kreisfrequenz", "storage=Speichermodul", "loss=Verlustmodul"],
+    ),
+    "size and phase": (
+        "f (Hz),|G*| (Pa),phase (deg)",
+        ",",
+        lambda w, a, b: (w / (2 * np.pi), np.hypot(a, b), np.degrees(np.arctan2(b, a))),
+        ["f (Hz)", "complex_modulus=|G*| (Pa)", "phase=phase (deg)"],
+    ),
+    "loss factor": (
+        "w in rad/s,E' in MPa,tan(delta)",
+        ",",
+        lambda w, stored, lost: (w, stored / 1e6, lost / stored),
+        ["w in rad/s", "storage=E\u2032 in MPa", "loss_factor=tan(delta)"],
+    ),
+}
 
 
-def anton_paar(values: Array, omega: Array) -> tuple[str, list[str]]:
-    """From high to low frequencies, in kPa, with decimal commas."""
-    rows = np.c_[omega, values.T / 1e3][::-1]
-    lines = [
-        "Projekt:;Zellen",
-        "",
-        "Intervall-Daten:;Punktnr.;Kreisfrequenz;Speichermodul;Verlustmodul",
-    ]
-    lines += [";;;;", ";;[1/s];[kPa];[kPa]"]
-    text = [";".join(f"{value:.9g}" for value in row) for row in rows]
-    lines += [f";{number};{row}".replace(".", ",") for number, row in enumerate(text, 1)]
-    return "\n".join(lines), ["Kreisfrequenz", "storage=Speichermodul", "loss=Verlustmodul"]
-
-
-def bare(values: Array, omega: Array) -> tuple[str, list[str]]:
-    whole = values[0] + 1j * values[1]
-    rows = np.c_[omega / (2 * np.pi), abs(whole), np.degrees(np.angle(whole))]
-    lines = ["f (Hz),|G*| (Pa),phase (deg)", *(",".join(f"{it:.9g}" for it in row) for row in rows)]
-    return "\n".join(lines), ["f (Hz)", "complex_modulus=|G*| (Pa)", "phase=phase (deg)"]
-
-
-def of_factor(values: Array, omega: Array) -> tuple[str, list[str]]:
-    rows = np.c_[omega, values[0] / 1e6, values[1] / values[0]]
-    lines = ["w in rad/s,E' in MPa,tan(delta)", *(",".join(f"{it:.9g}" for it in r) for r in rows)]
-    return "\n".join(lines), ["w in rad/s", "storage=E\u2032 in MPa", "loss_factor=tan(delta)"]
-
-
-@pytest.mark.parametrize("written", [trios, anton_paar, bare, of_factor])
-def test_files_of_instruments_tell_the_same(tmp_path: Path, written: Any) -> None:
-    trace, expected = tmp_path / "sweep.txt", solid_in_a_notebook()
-    text, (frequency, *readings) = written(solid(), OMEGA)
-    trace.write_text(text, encoding="utf-8")
+@pytest.mark.parametrize("name", FILES)
+def test_files_of_instruments_tell_the_same(tmp_path: Path, name: str) -> None:
+    """To the nine digits that are written."""
+    trace, values = tmp_path / "sweep.txt", solid()
+    head, separator, columns, (frequency, *readings) = FILES[name]
+    rows = np.transpose(columns(OMEGA, *values))
+    text = "\n".join(separator.join(f"{it:.9g}" for it in row) for row in rows)
+    if separator == ";":
+        text = f";{text}".replace("\n", "\n;").replace(".", ",")
+    trace.write_text(f"{head}\n{text}\n", encoding="utf-8")
     options = [option for each in readings for option in ("--reading", each)]
-    more = ["--frequency", frequency, *options, "--model", "zener_maxwell"]
-    found = by_quantity(identified(tmp_path, trace, *more, config="model_selection: {models: []}"))
-    for name, truth in (SOLID | {"tau": 2 / 3}).items():
-        assert found[name]["value"] == pytest.approx(expected[name]["value"], rel=1e-4)
-        # Twice the half width of 95 % limits: four standard deviations.
-        assert abs(found[name]["value"] - truth) < found[name]["high"] - found[name]["low"]
+    given = _parser().parse_args(["identify", "a", "--frequency", frequency, *options]).settings
+    recording, _ = read_trace(Asked(trace, None, tuple(Setting(*each) for each in given)))
+    loss, storage = np.split(recording.readings, 2)
+    np.testing.assert_allclose(recording.time_s, np.append(-OMEGA[::-1], OMEGA), rtol=1e-8)
+    np.testing.assert_allclose([storage, loss[::-1]], values, rtol=3e-8)
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(1, marks=pytest.mark.nightly)])
-def test_sweeps_alone_and_together_have_a_page_a_table_and_methods(
-    tmp_path: Path, count: int
-) -> None:
+def test_several_sweeps_have_a_page_a_table_and_methods(tmp_path: Path) -> None:
     header, config = "w (rad/s),G' (Pa),G'' (Pa)", tmp_path / "few.yaml"
     config.write_text("model_selection: {models: []}")
-    traces = [tmp_path / f"{seed}.csv" for seed in range(count)]
+    traces = [tmp_path / f"{seed}.csv" for seed in range(2)]
     for seed, trace in enumerate(traces):
         np.savetxt(trace, np.c_[OMEGA, solid(seed).T], "%.6g", ",", header=header, comments="")
     given = ["--frequency", "w (rad/s)", "--reading", "storage=G' (Pa)", "--model", "sls"]
@@ -262,32 +254,6 @@ def test_limits_are_those_of_scipy_and_lmfit(tmp_path: Path) -> None:
         assert (found[name]["low"], found[name]["high"]) == pytest.approx(ends, rel=5e-5)
         for end in ("low", "high"):
             assert least(name, found[name][end]) - best == pytest.approx(3.841, rel=0.02)
-
-
-@pytest.mark.nightly
-def test_creep_relaxation_and_sweep_of_a_sample_agree() -> None:
-    """Limits of differences are roots of sums of squares: each of nine is missed once in 20."""
-    times = np.geomspace(0.02, 30.0, 120)
-    solid_of = {"model": "zener_maxwell"}
-    whole, share = SOLID["k"] + SOLID["k_p"], SOLID["k"] / (SOLID["k"] + SOLID["k_p"])
-    tau = SOLID["c"] / SOLID["k"]
-    relaxing = SOLID["k_p"] + SOLID["k"] * np.exp(-times / tau)
-    creeping = (1 - share * np.exp(-times * (1 - share) / tau)) / SOLID["k_p"]
-    scatter = np.random.default_rng(4).standard_normal((2, len(times)))
-    results = [
-        swept(solid(seed=4)),
-        told(times, relaxing + 0.005 * whole * scatter[0], reads="modulus", **solid_of),
-        told(times, creeping * (1 + 0.01 * scatter[1]), reads="compliance", **solid_of),
-    ]
-    frames = [result.to_frame() for result in results]
-    for name in SOLID:
-        for one, other in ((0, 1), (0, 2), (1, 2)):
-            both = [
-                np.log(frames[i].loc[name, ["value", "low", "high"]].astype(float))
-                for i in (one, other)
-            ]
-            half = np.hypot(*(0.5 * (each["high"] - each["low"]) for each in both))
-            assert abs(both[0]["value"] - both[1]["value"]) < 1.5 * half
 
 
 def test_a_relaxation_time_beyond_the_sweep_is_only_bounded() -> None:

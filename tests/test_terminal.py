@@ -64,7 +64,7 @@ def test_names_of_traces_are_shown_wherever_they_are_said(tmp_path: Path) -> Non
     bad.write_text("time_s,rotation_rad\n1,high\n")
     (tmp_path / "few.yaml").write_text(FEW)
     options = ("--config", tmp_path / "few.yaml", "--model", "maxwell")
-    several = identify(good, bad, absent, *options, "--report", page)
+    several = identify(good, bad, good, absent, *options, "--report", page)
     alone = identify(good, *options)
     assert (several[0], alone[0]) == (1, 0)
     for _, said, error in (several, alone):
