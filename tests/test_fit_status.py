@@ -53,11 +53,6 @@ def test_the_heaviest_note_decides() -> None:
     assert find_reasons([middle, heavy, light]) == [REJECTION]
 
 
-@pytest.mark.parametrize("noise_model", NOISE_MODELS)
-def test_a_right_set_up_is_ok(noise_model: str) -> None:
-    assert identified(RIGHT, noise_model=noise_model).status == OK
-
-
 def test_a_parameter_at_the_end_of_its_range_is_named() -> None:
     """What the other parameters then are, is not what they are in truth."""
     ranges = {"k_p": {"exponent": [-3, -1], "digit": [1, 9]}}

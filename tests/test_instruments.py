@@ -97,14 +97,6 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
         assert not OF_A_GRIPPER.search(said), OF_A_GRIPPER.search(said)
 
 
-def test_readings_at_the_instant_of_a_step_are_left_out() -> None:
-    """A rheometer's first row is at 0, with the modulus that it jumped to."""
-    values = np.append(500.0, noisy(response("stress", 1.0)))
-    found = told(np.append(0.0, TIMES), values, reads="modulus", model=SOLID.name)
-    assert (found.status, found.data["samples"]) == ("ok", len(TIMES))
-    assert "they were taken: 1 reading, at " in str(found)
-
-
 @pytest.mark.nightly
 def test_the_power_law_of_a_cell_in_an_optical_stretcher() -> None:
     """The exponent is that of a published, independent fit."""

@@ -283,10 +283,6 @@ def test_moduli_that_do_not_belong_to_one_sample_are_told(wrong: Any, said: str)
         assert 0.3 * taken < percent < 1.5 * taken
 
 
-def test_another_model_is_rejected() -> None:
-    assert swept(solid(), model="kelvin_voigt").status == "rejected"
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     ("model", "truth"),
