@@ -1,5 +1,6 @@
 """Damaged files: each command gives an answer or one message, and no traceback."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from biogrip.cli import main
 from biogrip.command.settings import Asked, check_settings, is_table, read_table
 from biogrip.errors import BiogripError
-from tests.helpers.identified import FEW, identify
+from tests.helpers.identified import identify
 from tests.helpers.places import EXAMPLE
 
 pytestmark = [pytest.mark.nightly, pytest.mark.filterwarnings("error")]
@@ -51,15 +52,16 @@ def damaged(seed: int, header: list[str], rows: list[list[str]], words: list[str
 
 
 @pytest.mark.parametrize("hundred", range(3))
-def test_a_damaged_trace_gives_an_answer_or_one_message(tmp_path: Path, hundred: int) -> None:
-    (tmp_path / "few.yaml").write_text(FEW)
+def test_a_damaged_trace_gives_an_answer_or_one_message(
+    tmp_path: Path, few: Path, hundred: int
+) -> None:
     readings = np.loadtxt(EXAMPLE, delimiter=",", skiprows=1)[::10]
     for seed in range(FILES * hundred, FILES * (hundred + 1)):
         scale = 10.0 ** np.random.default_rng(seed).choice([0, 0, *range(-13, 14)], 2)
         rows = [[f"{it:.9g}" for it in row] for row in readings * scale]
         trace = damaged(seed, ["time_s", "rotation_rad"], rows, NUMBERS)
         (tmp_path / "trace.csv").write_bytes(trace)
-        status, said, text = identify(tmp_path / "trace.csv", "--config", tmp_path / "few.yaml")
+        status, said, text = identify(tmp_path / "trace.csv", "--config", few)
         assert status in (0, 1), seed
         # What is recognised in an unusual file is told before.
         assert said if status == 0 else f"\n{text}".count("\nbiogrip: ") == 1, seed
@@ -95,8 +97,8 @@ def test_a_damaged_table_of_groups_gives_numbers_or_one_message(
         said, text = capsys.readouterr()
         assert status in (0, 1), seed
         assert text.count("\n") == status, seed
-        assert "nan" not in said.replace(f"{tmp_path}", ""), seed
-        assert "inf" not in said, seed
+        # A trace or a group may have such a name.
+        assert not re.search(r"\b(nan|inf) (\(\d|to \d)|\d to (nan|inf)", said), seed
         assert "\x1b" not in said + text, seed
 
 

@@ -69,7 +69,7 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
     instrument, held = INSTRUMENTS[reading], CONTROLLED[reading]
     column = instrument.read.column
     clean = response(reading, held)
-    trace = write_trace(tmp_path / "trace.csv", TIMES, noisy(clean), f"time_s,{column}")
+    trace = write_trace(tmp_path / "trace.csv", TIMES, noisy(clean), header=f"time_s,{column}")
     page, table, few, output = (tmp_path / name for name in ("a.html", "a.csv", "a.yaml", "a.json"))
     few.write_text(FEW)
     options = ["--model", SOLID.name, "--hold", str(held), "--reading", f"{reading}={column}"]

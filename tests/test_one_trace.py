@@ -27,18 +27,12 @@ from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.source import HOLD
 from biogrip.terminal import QUIET
-from tests.helpers.identified import FEW, by_quantity, identified, identify, told
+from tests.helpers.identified import by_quantity, identified, identify, told
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
 from tests.helpers.problems import clean
 
 EXPORT = Path(__file__).parent / "traces/files/anton_paar_intervals.utf16.csv"
 TRUTH = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]
-
-
-@pytest.fixture
-def few(tmp_path: Path) -> str:
-    (tmp_path / "few.yaml").write_text(FEW)
-    return str(tmp_path / "few.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -108,10 +102,10 @@ def test_options_are_keys_of_the_config_and_the_last_one_counts(
 
 
 def test_what_is_recognised_in_an_export_is_said_unless_quiet(
-    tmp_path: Path, few: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, few: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trace = Path(shutil.copy(EXPORT, tmp_path / "gel.csv"))
-    command = [trace, "--model", "maxwell", "--config", few, "--time", "Time", "--start", "24"]
+    command = [trace, "--config", few, *["--model", "maxwell", "--time", "Time", "--start", "24"]]
     command += ["--reading", "modulus=Relaxation Modulus", "--set", "measurement.block=3"]
     status, _, said = identify(*command)
     assert status == 0
@@ -256,13 +250,13 @@ def test_text_that_is_no_value_of_an_option_is_refused(option: str, text: str, s
 
 
 @pytest.mark.nightly
-def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: str) -> None:
+def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: Path) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     said_at_once = "import sys; from biogrip import cli, terminal; terminal._EVERY_S = 0.0; "
     command = [sys.executable, "-c", f"{said_at_once}sys.exit(cli.main(sys.argv[1:]))"]
-    command += ["identify", str(EXAMPLE), "--config", few, "--output", str(tmp_path / "f.json")]
-    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    given = ["identify", EXAMPLE, "--config", few, "--output", tmp_path / "f.json"]
+    done = subprocess.run([*command, *given], stdout=writer, stderr=subprocess.PIPE, text=True)
     os.close(writer)
     assert done.returncode == 128 + signal.SIGPIPE
     assert done.stderr == ""
@@ -369,10 +363,10 @@ def test_colours_are_not_for_all_terminals(
     assert "\x1b" not in in_columns([example[1]], {})
 
 
-def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path, few: str) -> None:
+def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path, few: Path) -> None:
     screen, terminal = pty.openpty()
-    command = [sys.executable, "-m", "biogrip", "identify", str(EXAMPLE)]
-    command += ["--config", few, "--output", str(tmp_path / "found.json")]
+    command = [sys.executable, "-m", "biogrip", "identify", EXAMPLE, "--config", few]
+    command += ["--output", tmp_path / "found.json"]
     environment = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
     with subprocess.Popen(command, stdout=terminal, stderr=terminal, env=environment) as running:
         os.close(terminal)

@@ -9,7 +9,7 @@ from biogrip.arrays import Array
 from biogrip.physics.instruments import INSTRUMENTS, under_sphere
 from biogrip.traces.columns import Columns
 from biogrip.traces.reader import recording_of_arrays
-from tests.helpers.identified import by_quantity, identified, identify
+from tests.helpers.identified import by_quantity, identified, identify, write_trace
 
 RADIUS_M = 2.5e-6
 STIFF_PA, SOFT_PA, TIME_S = 1200.0, 800.0, 3.0
@@ -27,11 +27,6 @@ def _approach(time_s: Array, depth_m: float = 5e-7, lasts_s: float = 0.5) -> Arr
     return np.array(forces)
 
 
-def _write(path: Path, header: str, *columns: Array) -> Path:
-    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="")
-    return path
-
-
 @pytest.fixture(scope="module")
 def afm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Write an approach that begins before the contact, a dwell, and the way back."""
@@ -42,8 +37,8 @@ def afm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     back = 29.95 + np.arange(1, 10) * 0.05
     time_s, force = np.r_[time_s, back], np.r_[force, np.linspace(force[-1], 0, 9)]
     depth = np.r_[depth, np.linspace(5e-7, 0, 10)[1:]]
-    path = tmp_path_factory.mktemp("afm") / "afm.csv"
-    return _write(path, "time_s,force_nN,indentation_nm", time_s, 1e9 * force, 1e9 * depth)
+    path, header = tmp_path_factory.mktemp("afm") / "afm.csv", "time_s,force_nN,indentation_nm"
+    return write_trace(path, time_s, 1e9 * force, 1e9 * depth, header=header)
 
 
 def test_an_approach_and_its_dwell_tell_the_modulus_of_young(afm: Path) -> None:
@@ -75,7 +70,7 @@ def test_a_force_that_is_held_tells_compliances(tmp_path: Path) -> None:
     compliance = 1 / 500 + (1 - np.exp(-time_s / 2)) / 400
     depth = (9 * 1e-9 * compliance / (16 * np.sqrt(RADIUS_M))) ** (2 / 3)
     depth += np.random.default_rng(6).normal(0, 0.002 * depth.max(), len(time_s))
-    trace = _write(tmp_path / "held.csv", "time_s,depth_um", time_s, 1e6 * depth)
+    trace = write_trace(tmp_path / "held.csv", time_s, 1e6 * depth, header="time_s,depth_um")
     found = identified(
         *(tmp_path, trace, "--reading", "displacement=depth_um", "--hold", "1 nN", *SPHERE[:2]),
         *("--model", "zener_kelvin", "--no-compare"),

@@ -80,7 +80,7 @@ def test_what_lies_in_the_folder_and_a_name_of_marks_change_no_result(tmp_path: 
     told, named = [], "a$x$ \\frac{$ %#&<b>_\x1b[31m\n.csv"
     for folder in (tmp_path / "empty", tmp_path / "theirs"):
         folder.mkdir()
-        write_trace(folder / named, SINCE, NOISY, "time_s,modulus_Pa")
+        write_trace(folder / named, SINCE, NOISY, header="time_s,modulus_Pa")
         (folder / "sheet.csv").write_text(f'file,dose <b> &\n"{named}",<b>$\\frac{{$\n')
         if folder.name == "theirs":
             (folder / "matplotlibrc").write_text("text.usetex: True\ntext.color: red\n")

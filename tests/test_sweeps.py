@@ -22,7 +22,7 @@ from biogrip.records.identifications import read_verdicts
 from biogrip.stages.identification import judge
 from biogrip.stages.targets import record
 from tests.helpers.default import study_of
-from tests.helpers.identified import by_quantity, identified, identify, told
+from tests.helpers.identified import by_quantity, identified, identify, told, write_trace
 from tests.helpers.laplace import IMPEDANCES
 
 OMEGA: Array = np.geomspace(0.1, 100.0, 25)
@@ -155,7 +155,7 @@ def test_several_sweeps_have_a_page_a_table_and_methods(tmp_path: Path) -> None:
     config.write_text("model_selection: {models: []}")
     traces = [tmp_path / f"{seed}.csv" for seed in range(2)]
     for seed, trace in enumerate(traces):
-        np.savetxt(trace, np.c_[OMEGA, solid(seed).T], "%.6g", ",", header=header, comments="")
+        write_trace(trace, OMEGA, *solid(seed), header=header)
     given = ["--frequency", "w (rad/s)", "--reading", "storage=G' (Pa)", "--model", "sls"]
     given += ["--reading", "loss=G'' (Pa)", "--config", str(config)]
     page, table = tmp_path / "page.html", tmp_path / "found.csv"
@@ -167,9 +167,8 @@ def test_several_sweeps_have_a_page_a_table_and_methods(tmp_path: Path) -> None:
 
 def test_a_study_says_of_a_recorded_sweep_what_the_command_says(tmp_path: Path) -> None:
     """Its limits are wider where nothing tells the noise, but how it scatters."""
-    values, trace = solid(), tmp_path / "sweep.csv"
-    header = "w (rad/s),G' (Pa),G'' (Pa)"
-    np.savetxt(trace, np.c_[OMEGA, values.T], "%.9g", ",", header=header, comments="")
+    values, header = solid(), "w (rad/s),G' (Pa),G'' (Pa)"
+    trace = write_trace(tmp_path / "sweep.csv", OMEGA, *values, header=header)
     measured = {"file": str(trace), "frequency": "w (rad/s)", "loss": "G'' (Pa)"}
     block = {
         "instrument": "oscillation",
@@ -202,8 +201,8 @@ def test_a_study_says_of_a_recorded_sweep_what_the_command_says(tmp_path: Path) 
 def test_what_a_sweep_cannot_have_is_refused(
     tmp_path: Path, header: str, options: list[str], said: str
 ) -> None:
-    trace, names = tmp_path / "sweep.csv", header.split(",")
-    np.savetxt(trace, np.c_[OMEGA, solid().T], "%.6g", ",", header=header, comments="")
+    trace = write_trace(tmp_path / "sweep.csv", OMEGA, *solid(), header=header)
+    names = header.split(",")
     given = ["--frequency", names[0], "--reading", f"storage={names[1]}"]
     status, _, complained = identify(trace, *given, "--reading", f"loss={names[2]}", *options)
     assert (status, said in complained) == (1, True), complained
@@ -228,9 +227,8 @@ def test_limits_are_those_of_scipy_and_lmfit(tmp_path: Path) -> None:
     clean = moduli("zener_maxwell", OMEGA, *SOLID.values())
     sd = np.array([[0.02], [0.03]]) * clean
     scatter = np.random.default_rng(3).standard_normal(2 * len(OMEGA)).reshape(clean.shape)
-    values, trace = clean + sd * scatter, tmp_path / "sweep.csv"
-    header = "w in rad/s,stored in Pa,lost in Pa,a in Pa,b in Pa"
-    np.savetxt(trace, np.c_[OMEGA, values.T, sd.T], "%.12g", ",", header=header, comments="")
+    values, header = clean + sd * scatter, "w in rad/s,stored in Pa,lost in Pa,a in Pa,b in Pa"
+    trace = write_trace(tmp_path / "sweep.csv", OMEGA, *values, *sd, header=header)
     options = ["--frequency", "w in rad/s", "--reading", "storage=stored in Pa"]
     options += ["--reading", "loss=lost in Pa", "--sd", "a in Pa", "--model", "zener_maxwell"]
     options += ["--set", "measurement.loss_sd=b in Pa"]

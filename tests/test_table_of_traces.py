@@ -41,7 +41,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         experiment = set_up(STUDY.gripper, phases, Sample("kelvin_voigt"))
         clean = simulate(experiment, {"k_p": 10.0, "c_p": 300.0}, times)
         measured = clean + 0.05 * clean.max() * rng.standard_normal(len(times))
-        write_trace(tmp_path / f"{name}.csv", times, measured, f"{column},rotation_rad")
+        header = f"{column},rotation_rad"
+        write_trace(tmp_path / f"{name}.csv", times, measured, header=header)
     write(tmp_path / "cells.tsv", TABLE)
     (tmp_path / "few.yaml").write_text(yaml.safe_dump(FEW))
     monkeypatch.chdir(tmp_path)
@@ -138,8 +139,7 @@ def test_a_table_is_told_by_its_column_of_files(
 def test_traces_side_by_side_are_a_row_each(here: Path) -> None:
     """Each with the options of its row, and results by its column's name."""
     times, readings = np.loadtxt(here / "usual.csv", delimiter=",", skiprows=1).T
-    both = np.column_stack((times, readings, 2 * readings))
-    np.savetxt("both.csv", both, delimiter=",", header="time_s,A 1,A/2", comments="")
+    write_trace(Path("both.csv"), times, readings, 2 * readings, header="time_s,A 1,A/2")
     fixed = "k=0.001 c=0.001 c_p=150"
     write(
         here / "wells.tsv",

@@ -17,20 +17,11 @@ from biogrip.command.files import identify_batch
 from biogrip.command.outputs import Outcome
 from biogrip.command.page import beyond, common, draw_traces, write_page
 from biogrip.command.settings import Asked, Setting
-from biogrip.command.words import columns_of, set_up_in_words
-from biogrip.digits import within_limits
+from biogrip.command.words import columns_of, for_a_paper, set_up_in_words
 from tests.helpers.browser import Opened
-from tests.helpers.identified import FEW
 from tests.helpers.places import EXAMPLE
 
 HOSTILE = "</script><b onclick=x>&amp;"
-
-
-@pytest.fixture(scope="module")
-def few(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    config = tmp_path_factory.mktemp("config") / "few.yaml"
-    config.write_text(FEW)
-    return config
 
 
 @pytest.fixture(scope="module")
@@ -88,16 +79,10 @@ def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path
     assert "search_range:" not in unfolded
     assert r"95\,\%" not in unfolded
     (told,) = example.found
-    for item in told["quantities"]:
-        value, *ends = within_limits(item["value"], item["low"] or 0, item["high"] or 0)
-        line = f"<p>{item['quantity']} = {value} {item['unit']} (95 % profile-likelihood "
-        provided = f", provided {item['provided']}" if item["provided"] else ""
-        line += f"interval {' to '.join(ends)}, n = 1 trace{provided})</p>"
-        assert (line in text) == (item["verdict"] == "determined")
-        if item["verdict"] == "bounded above":
-            bound = f"<p>{item['quantity']} < {item['high']:.2g} {item['unit']} (97.5 % one-sided"
-            assert bound in text
-    assert ", provided the branch relaxes within the experiment)" in text
+    lines = for_a_paper(told)
+    assert len(lines) == 6
+    for line, _ in lines:
+        assert f"<p>{line}</p>" in text
     assert r"$k_{p} = 5.01\,\mathrm{N/m}$ (95\,\% profile-likelihood interval $" in text
 
 

@@ -62,16 +62,11 @@ def test_five_lines_follow_a_model_that_fits(inadequate: TraceResult) -> None:
 
 def test_table_and_page_have_it(tmp_path: Path) -> None:
     """Of a rejected model, too; all kinds of what was asked for at a time."""
-    trace = write_trace(tmp_path / "a.csv", SECONDS, SOFTENING + SCATTER, "time_s,modulus_Pa")
+    trace = tmp_path / "a.csv"
+    write_trace(trace, SECONDS, SOFTENING + SCATTER, header="time_s,modulus_Pa")
     files = "--csv", tmp_path / "found.csv", "--report", tmp_path / "page.html"
-    given = (
-        "--reading",
-        "modulus=modulus_Pa",
-        "--model",
-        "zener_maxwell",
-        "--set",
-        "model_selection.models=[maxwell]",
-    )
+    given = ["--reading", "modulus=modulus_Pa", "--model", "zener_maxwell"]
+    given += ["--set", "model_selection.models=[maxwell]"]
     status, _, complained = identify(trace, *files, *given, "--at", "3,30")
     assert status == 0, complained
     with (tmp_path / "found.csv").open() as stream:

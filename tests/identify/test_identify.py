@@ -70,7 +70,7 @@ ALSO = "offset: true, noise_share: 0.02", "fit_start: true"
 )
 def test_a_study_gives_the_answer_of_the_command(tmp_path: Path, terms: str) -> None:
     """Of the same file: to the last bit, since both do the same."""
-    file = write_trace(tmp_path / "creep.csv", SECONDS, STRAIN, "time_s,strain")
+    file = write_trace(tmp_path / "creep.csv", SECONDS, STRAIN, header="time_s,strain")
     measured = f"{{file: {file}, time: time_s, strain: strain, {terms}}}"
     (case,) = study_of(f"{CASE}    measurement: {measured}").cases.values()
     record(case, file, tmp_path / "trace.npz")

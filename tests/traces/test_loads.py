@@ -19,6 +19,7 @@ from biogrip.physics.protocol import evaluate
 from biogrip.study.source import HOLD
 from biogrip.traces.columns import held_unit
 from biogrip.traces.reader import read_recording
+from tests.helpers.identified import write_trace
 
 EVEN = np.linspace(0.0, 90.0, 2001)
 CORNERS = [0.0, 2.0, 8.0, 50.0, 53.0, 90.0], [0.0, 0.0, 1.0, 1.0, -0.5, -0.5]
@@ -63,8 +64,7 @@ CLOCK = np.arange(400) / 10
 
 def loaded(path: Path, *columns: Array, more: Sequence[Setting] = ()) -> Asked:
     """Times, strains and stresses in a file whose course of the stress is its load."""
-    rows = np.column_stack(columns)
-    np.savetxt(path, rows, delimiter=",", header="time_s,strain,stress_Pa", comments="")
+    write_trace(path, *columns, header="time_s,strain,stress_Pa")
     given = {"strain": "strain", "load": "stress_Pa"}
     settings = (Setting("--set", ("measurement", key), value) for key, value in given.items())
     return Asked(path, None, (*settings, *more))
@@ -155,9 +155,8 @@ def test_of_a_clean_course_nothing_is_smoothed_out() -> None:
 
 
 def test_a_bare_number_beside_readings_with_a_prefix_has_a_note(tmp_path: Path) -> None:
-    path = tmp_path / "bead.csv"
-    rows = np.column_stack((CLOCK[1:], 40.0 + 10 * np.sqrt(CLOCK[1:])))
-    np.savetxt(path, rows, delimiter=",", header="time_s,displacement_nm", comments="")
+    path, beads = tmp_path / "bead.csv", 40.0 + 10 * np.sqrt(CLOCK[1:])
+    write_trace(path, CLOCK[1:], beads, header="time_s,displacement_nm")
     reading = Setting("--reading", ("measurement", "displacement"), "displacement_nm")
     for held, shown, notes in ((20.0, "20 N", 1), ("20 pN", "20 pN", 0), ("20 N", "20 N", 0)):
         asked = Asked(path, None, (reading, Setting("--hold", HOLD, held)))
