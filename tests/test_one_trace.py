@@ -105,7 +105,8 @@ def test_what_is_recognised_in_an_export_is_said_unless_quiet(
     tmp_path: Path, few: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trace = Path(shutil.copy(EXPORT, tmp_path / "gel.csv"))
-    command = [trace, "--config", few, *["--model", "maxwell", "--time", "Time", "--start", "24"]]
+    command: list[str | Path] = [trace, "--config", few, "--time", "Time", "--start", "24"]
+    command += ["--model", "maxwell"]
     command += ["--reading", "modulus=Relaxation Modulus", "--set", "measurement.block=3"]
     status, _, said = identify(*command)
     assert status == 0
@@ -256,7 +257,8 @@ def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: Path) -> None:
     said_at_once = "import sys; from biogrip import cli, terminal; terminal._EVERY_S = 0.0; "
     command = [sys.executable, "-c", f"{said_at_once}sys.exit(cli.main(sys.argv[1:]))"]
     given = ["identify", EXAMPLE, "--config", few, "--output", tmp_path / "f.json"]
-    done = subprocess.run([*command, *given], stdout=writer, stderr=subprocess.PIPE, text=True)
+    command += map(str, given)
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writer)
     assert done.returncode == 128 + signal.SIGPIPE
     assert done.stderr == ""
@@ -365,8 +367,8 @@ def test_colours_are_not_for_all_terminals(
 
 def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path, few: Path) -> None:
     screen, terminal = pty.openpty()
-    command = [sys.executable, "-m", "biogrip", "identify", EXAMPLE, "--config", few]
-    command += ["--output", tmp_path / "found.json"]
+    command = [sys.executable, "-m", "biogrip", "identify", str(EXAMPLE), "--config", str(few)]
+    command += ["--output", str(tmp_path / "found.json")]
     environment = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
     with subprocess.Popen(command, stdout=terminal, stderr=terminal, env=environment) as running:
         os.close(terminal)
