@@ -17,7 +17,6 @@ TIMES, CLEAN = clean("endothelial_cell", 5.0)
 SIGMA = 0.1 * float(CLEAN.max())
 DRIFT = SIGMA * TIMES / TIMES[-1]
 OFFSET = np.full(len(TIMES), 0.6 * SIGMA)
-SLOW = SIGMA * np.sin(2 * np.pi * TIMES / 150)
 CREEP = np.arange(0.5, 120.5, 0.5)
 
 
@@ -35,13 +34,6 @@ def crept(clean: Array, level: float = 1e-2, **given: Any) -> TraceResult:
 def suspected(found: TraceResult) -> list[str]:
     """What is said of an offset and a drift."""
     return [note["text"] for note in found.data["notes"] if "χ² falls" in note["text"]]
-
-
-def test_what_is_slow_is_seen_where_neighbouring_samples_do_not_show_it() -> None:
-    """An eighth of the noise: neighbouring residuals are correlated by less than chance."""
-    said = str(gripped(0, 0.3 * SLOW).data["notes"])
-    assert "wanders" in said
-    assert "correlated" not in said
 
 
 def test_a_drift_that_a_sample_could_have_shown_is_suspected() -> None:

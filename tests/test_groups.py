@@ -51,17 +51,6 @@ def test_limits_are_never_closer_than_the_errors_say() -> None:
     assert (found.mean, found.error) == pytest.approx((0.3, 0.1))
 
 
-def test_without_errors_it_is_welch_s_test() -> None:
-    rng = np.random.default_rng(2)
-    one, other = rng.normal(0.5, 0.3, 6), rng.normal(0.0, 0.6, 9)
-    found = estimate(one, np.full(6, 1e-9)).over(estimate(other, np.full(9, 1e-9)))
-    known = ttest_ind(one, other, equal_var=False)
-    assert found.p_value == pytest.approx(known.pvalue, rel=1e-6)
-    assert found.freedom == pytest.approx(known.df, rel=1e-6)
-    low, high = known.confidence_interval(0.9)
-    assert found.limits(0.9)[1:] == pytest.approx(np.exp([low, high]), rel=1e-6)
-
-
 def test_p_values_are_adjusted_by_holm() -> None:
     """Wright, Biometrics 48 (1992), 1005-1013: 0.01 to 0.04 of four."""
     assert adjusted([0.04, 0.01, 0.03, 0.02]) == pytest.approx([0.06, 0.04, 0.06, 0.06])
@@ -499,15 +488,16 @@ def test_the_methods_say_what_was_compared_with_its_numbers(said: Said) -> None:
 # The figure.
 
 
-def test_the_figure_has_every_cell_every_unit_and_every_group(tmp_path: Path, said: Said) -> None:
+def test_a_figure_is_the_same_bytes_again(tmp_path: Path, said: Said) -> None:
     rows = of_dishes(np.random.default_rng(9), (3, 3))
     none = {"k value (N/m)": "", "k low (N/m)": ""}
     rows[0] |= {**none, "k verdict": "bounded above", "k high (N/m)": "90"}
     for name in ("cells.png", "cells.pdf"):
-        said(rows, "--unit", "day", "--plot", str(tmp_path / name), header=DAYS)
-        before = (tmp_path / name).read_bytes()
-        said(rows, "--unit", "day", "--plot", str(tmp_path / name), header=DAYS)
-        assert (tmp_path / name).read_bytes() == before
+        drawn = []
+        for _ in range(2):
+            said(rows, "--unit", "day", "--plot", str(tmp_path / name), header=DAYS)
+            drawn.append((tmp_path / name).read_bytes())
+        assert drawn[0] == drawn[1]
 
 
 def drawn_of(cells: Sequence[Cell], *, units: bool) -> Any:

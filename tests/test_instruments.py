@@ -64,14 +64,13 @@ def noisy(clean: Array, share: float = 0.01, seed: int = 0) -> Array:
     ],
 )
 def test_every_reading_is_identified_in_its_own_units_and_words(
-    tmp_path: Path, reading: str
+    tmp_path: Path, few: Path, reading: str
 ) -> None:
     instrument, held = INSTRUMENTS[reading], CONTROLLED[reading]
     column = instrument.read.column
     clean = response(reading, held)
     trace = write_trace(tmp_path / "trace.csv", TIMES, noisy(clean), header=f"time_s,{column}")
-    page, table, few, output = (tmp_path / name for name in ("a.html", "a.csv", "a.yaml", "a.json"))
-    few.write_text(FEW)
+    page, table, output = (tmp_path / name for name in ("a.html", "a.csv", "a.json"))
     options = ["--model", SOLID.name, "--hold", str(held), "--reading", f"{reading}={column}"]
     options += ["--csv", str(table), "--output", str(output), "--config", str(few)]
     options += ["--report", str(page)] if reading == "compliance" else ["--no-compare"]

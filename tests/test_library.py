@@ -242,14 +242,11 @@ def test_a_power_law_has_no_time_of_its_own(unit_s: float) -> None:
 
 def test_all_of_the_library_can_be_had_from_the_package() -> None:
     assert all(getattr(biogrip, name) is getattr(library, name) for name in library.__all__)
+    with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
+        _ = biogrip.nonsense
 
 
 def test_it_identifies_as_the_default_study() -> None:
     assert STUDY.ranges == library._RANGES
     budgets = [case.block.least_squares for case in STUDY.cases.values()]
     assert all(budget == CREEP.least_squares for budget in budgets)
-
-
-def test_what_is_not_there_is_said_as_everywhere() -> None:
-    with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
-        _ = biogrip.nonsense

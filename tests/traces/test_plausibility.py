@@ -105,11 +105,9 @@ def test_the_largest_reading_and_the_smoothed_one_are_told() -> None:
     ("unit", "factor", "hint"),
     [
         ("rad", 1e6, "1e-06 times (is it in urad?)."),
-        ("rad", 1e3, "0.001 times (is it in mrad?)."),
         ("rad", 180 / np.pi, "0.001 times (is it in mrad?) or 0.01745 times (is it in deg?)."),
         ("mrad", 1e-3, "1000 times (is it in rad?) or 17.45 times (is it in deg?)."),
         ("mrad", 1e3, "0.001 times (is it in urad?)."),
-        ("urad", 1e-6, "1e+06 times (is it in rad?) or 1.745e+04 times (is it in deg?)."),
         ("urad", 1e3, "0.001 times."),
     ],
 )
@@ -205,9 +203,7 @@ def test_the_free_rotation_is_that_of_the_left_arm() -> None:
         ("s", 1e3, "line 3, column 'time_s': found 1000 s", "0.001 times (is it in ms?)."),
         ("ms", 1e-3, "lines 2 to 402, column 'time_ms': found only 0 to 0.4 s", "1000 times (is"),
         ("s", 1 / 60, "lines 2 to 402, column 'time_s': found only 0 to 6.66667 s", "60 times (is"),
-        ("s", 1 / 3600, "lines 2 to 402, column 'time_s': found only 0 to 0.111111", "3600 times"),
         ("min", 60.0, "line 9, column 'time_min': found 420 s", "0.01667 times (is it in s?)."),
-        ("ms", 1e3, "line 3, column 'time_ms': found 1000 s", "0.001 times (is"),
     ],
 )
 def test_times_in_a_wrong_unit_are_refused(unit: str, factor: float, found: str, hint: str) -> None:
@@ -263,10 +259,8 @@ def test_the_sign_of_a_trace_is_told(protocol: str) -> None:
     torque, rng = join_phases(PULLING[protocol]), np.random.default_rng(10)
     mirrored = missed = passed = 0
     for trial in range(40):
-        model, gripper = (
-            list(MODELS.values())[trial % len(MODELS)],
-            (GRIPPER, UNEQUAL)[trial // 2 % 2],
-        )
+        model = [*MODELS.values()][trial % len(MODELS)]
+        gripper = (GRIPPER, UNEQUAL)[trial // 2 % 2]
         powers = rng.uniform(-2, 2.5, len(model.names))
         exponents = np.array([parameter.kind == "exponent" for parameter in model.parameters])
         network = model.network(np.where(exponents, (powers + 2.1) / 4.7, 10**powers))
