@@ -199,7 +199,6 @@ WITHIN = re.compile("designed is the (shortest|most precise), (\\S+) s at (\\S+)
 def test_the_shortest_protocol_is_found_and_what_noise_a_better_one_takes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By searches a fifth as long."""
     monkeypatch.setattr(design, "_QUICK", 5)
     monkeypatch.setattr(design, "_FEWER", 20)
     output = designed(tmp_path, KELVIN, "--within", "k_s=6")

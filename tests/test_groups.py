@@ -104,15 +104,12 @@ def rows_of(values: Array, group: str, **more: str) -> list[dict[str, str]]:
 
 
 def written(folder: Path, rows: Sequence[dict[str, str]], header: Sequence[str] = HEADER) -> Path:
-    """Write rows as `identify` does."""
     pd.DataFrame(rows, columns=header).to_csv(folder / "found.csv", index=False)
     return folder / "found.csv"
 
 
 @pytest.fixture
 def said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
-    """What the command prints of rows."""
-
     def say(
         rows: Sequence[dict[str, str]],
         *options: str,
@@ -291,7 +288,6 @@ def in_dishes(
 
 
 def differ(scatter: float, ratio: float, *, units: bool, dishes: Sequence[int] = (3, 3)) -> int:
-    """In how many of 400 tables the groups differ."""
     rng = np.random.default_rng(4)
     tables = (in_dishes(rng, scatter, ratio, dishes) for _ in range(400))
     found = (compare(cells, ["a", "b"], 0.95, units=units)["k", "b"]["p"] for cells in tables)

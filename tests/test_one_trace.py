@@ -23,6 +23,7 @@ from biogrip.command.outputs import WRITTEN_BY, check_output
 from biogrip.command.settings import Asked, Setting, case_of
 from biogrip.command.words import for_a_paper, in_columns, noise_in_words
 from biogrip.errors import BiogripError
+from biogrip.judging.doubts import REJECTION
 from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.source import HOLD
@@ -37,7 +38,6 @@ TRUTH = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, Any]]:
-    """What is said and what is written of the example, with the default study."""
     output = tmp_path_factory.mktemp("example") / "found.json"
     status, said, complained = identify(EXAMPLE, "--output", output)
     assert status == 0, complained
@@ -118,7 +118,6 @@ def test_what_is_recognised_in_an_export_is_said_unless_quiet(
 
 
 def test_what_was_held_is_stated_once(tmp_path: Path) -> None:
-    """In a row, in any order, or beside a config."""
     (ramp := tmp_path / "ramp.yaml").write_text("protocol: {phases: []}")
     held = Setting("--hold", HOLD, 3e-9)
     load = Setting("t.tsv", ("measurement", "load"), "torque_Nm")
@@ -342,18 +341,12 @@ def test_models_that_are_named_are_held_against_the_chosen_one(
     assert "Bare damper is not adequate" in found["advice"]
 
 
-def test_a_rejected_fit_names_a_better_model_though_it_is_simpler() -> None:
-    """The creep of cells, a power law, read at times in a geometric series."""
-    times = np.geomspace(1e-3, 1e3, 120)
-    noise = 1e-4 * np.random.default_rng(1).standard_normal(len(times))
-    models = ["springpot", "maxwell"]
-    given: dict[str, Any] = {"reads": "strain", "hold": 1.0, "model": "kelvin_voigt"}
-    found = told(times, 0.01 * times**0.3 + noise, models, **given).data
-    assert found["fit"] == "rejected"
-    assert '(model="springpot") is preferred' in found["advice"]
-    lines = in_columns([found, found | {"fit": "ok", "notes": []}], {}).splitlines()
-    assert [line for line in lines if "springpot" in line] == [f"trace: {found['advice']}"]
-    assert f"trace: rejected: {found['reasons'][0]}" in lines
+def test_advice_is_given_of_a_rejected_fit_alone(example: tuple[str, dict[str, Any]]) -> None:
+    rejected = {"fit": "rejected", "notes": [{"weight": REJECTION, "text": "It is wrong."}]}
+    found = example[1] | {"advice": "Try another."}
+    lines = in_columns([found | rejected, found], {}).splitlines()
+    assert [line for line in lines if "Try" in line] == [f"{EXAMPLE}: Try another."]
+    assert f"{EXAMPLE}: rejected: It is wrong." in lines
 
 
 def test_colours_are_not_for_all_terminals(

@@ -131,7 +131,6 @@ def test_a_clock_outside_the_protocol_is_refused() -> None:
 
 
 def notes_on(times: Array, values: Array, **given: Any) -> tuple[str, str]:
-    """Return the status of a trace, and all notes on it."""
     found = told(times, values, **given)
     notes = " ".join(note["text"] for note in found.data["notes"])
     assert "--" not in f"{notes} {found}", "options of the command, which are arguments here"

@@ -36,7 +36,6 @@ def noisy(clean: Array, share: float = 0.02, seed: int = 0) -> Array:
 
 
 def swept(values: Array, omega: Array = OMEGA, **given: Any) -> Any:
-    """What a sweep tells in a notebook."""
     return told(omega, values[0], loss=values[1], **(GIVEN | given))
 
 
@@ -129,7 +128,6 @@ FILES: dict[str, tuple[str, str, Any, list[str]]] = {
 
 @pytest.mark.parametrize("name", FILES)
 def test_files_of_instruments_tell_the_same(tmp_path: Path, name: str) -> None:
-    """To the nine digits that are written."""
     trace, values = tmp_path / "sweep.txt", solid()
     head, separator, columns, (frequency, *readings) = FILES[name]
     rows = np.transpose(columns(OMEGA, *values))

@@ -70,7 +70,6 @@ def listed(table: str = "found.csv") -> list[dict[str, str]]:
 
 
 def refused(path: Path) -> list[str]:
-    """The lines by which a table is refused."""
     with pytest.raises(BiogripError) as error:
         read_table(path)
     return str(error.value).splitlines()
@@ -201,7 +200,6 @@ def test_text_that_is_no_table_is_refused(tmp_path: Path, text: str, said: str) 
 
 
 def test_settings_that_cannot_be_used_are_said_at_once(here: Path) -> None:
-    """As those of a config are, by row, column and key."""
     header = ["file", "measurement.noise_rad", "fixed.k_s", "sample.model", "measurment.skip"]
     rows = [["usual.csv", "-1", "", "maxwel", "2"], ["other.csv", "", "2", "", ""]]
     write(here / "cells.tsv", [header, *rows])
@@ -244,7 +242,6 @@ def test_traces_of_a_command_read_one_quantity(here: Path) -> None:
 
 
 def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
-    """In its place, with what the table says of it; of a single row, too."""
     rows = [["file", "dish"], ["gone.csv", "lost"], ["usual.csv", "left"]]
     for few in (3, 2):
         write(here / "cells.tsv", rows[:few])

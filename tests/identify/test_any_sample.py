@@ -46,7 +46,6 @@ def test_a_rejected_model_is_told_from_what_no_linear_sample_does(
 
 
 def test_five_lines_follow_a_model_that_fits(inadequate: TraceResult) -> None:
-    """And where times are asked for, all that is told at these, with the truth within limits."""
     fitted = told(SECONDS, 50 + 60 * np.exp(-SECONDS / 5) + SCATTER, **RELAXATION)
     assert fitted.status == "ok"
     lines = str(fitted).splitlines()
@@ -61,7 +60,6 @@ def test_five_lines_follow_a_model_that_fits(inadequate: TraceResult) -> None:
 
 
 def test_table_and_page_have_it(tmp_path: Path) -> None:
-    """Of a rejected model, too; all kinds of what was asked for at a time."""
     trace = tmp_path / "a.csv"
     write_trace(trace, SECONDS, SOFTENING + SCATTER, header="time_s,modulus_Pa")
     files = "--csv", tmp_path / "found.csv", "--report", tmp_path / "page.html"
