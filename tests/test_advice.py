@@ -1,5 +1,6 @@
-"""Advice of another model leads to one that is adequate."""
+"""Advice of another model leads to one that is adequate, or says that there is none."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,14 @@ TIMES = np.logspace(-1, 6, 46)
 STRENGTHS_PA, RELAXATION_S = (3e8, 8e7, 2e7, 3e6), (0.3, 30.0, 3e3, 1e5)
 
 
-def told(model: str) -> dict[str, Any]:
+def told(model: str, models: Sequence[str] | None = None) -> dict[str, Any]:
     """Of a master curve of four processes, of which the models that are compared have three."""
     pairs = zip(STRENGTHS_PA, RELAXATION_S, strict=True)
     curve = 5e5 + sum((k * np.exp(-TIMES / tau) for k, tau in pairs), 0 * TIMES)
     curve *= 1 + 0.02 * np.random.default_rng(4).standard_normal(len(TIMES))
-    return identify_trace(TIMES, curve, reads="modulus", noise_share=0.02, model=model).data
+    config: dict[str, Any] = {"measurement": {"noise_share": 0.02}}
+    config |= {"model_selection": {"models": [*models]}} if models else {}
+    return identify_trace(TIMES, curve, reads="modulus", model=model, config=config).data
 
 
 @pytest.mark.nightly
@@ -39,3 +42,9 @@ def test_branches_are_added_where_a_power_law_fits_better_than_three() -> None:
     noise = 1 + 0.02 * np.random.default_rng(5).normal(size=110)
     told = identify_trace(times, clean * noise, reads="modulus", noise_share=0.02).data
     assert (told["fit"], told["preferred_model"]) == ("rejected", "generalized_maxwell_5")
+
+
+def test_that_none_is_adequate_is_said() -> None:
+    found = told("zener_maxwell", ["zener_maxwell", "generalized_maxwell_2"])
+    assert (found["fit"], found["preferred_model"]) == ("rejected", None)
+    assert found["advice"].startswith("None of the 2 models tried is adequate: the best of them, ")

@@ -74,6 +74,7 @@ def test_a_force_that_is_held_tells_compliances(tmp_path: Path) -> None:
     found = identified(
         *(tmp_path, trace, "--reading", "displacement=depth_um", "--hold", "1 nN", *SPHERE[:2]),
         *("--model", "zener_kelvin", "--no-compare"),
+        config="",
     )
     limits = by_quantity(found)
     for name, true in (("k_s", 500), ("k_v", 400), ("tau_v", 2)):
