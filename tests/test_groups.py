@@ -411,6 +411,7 @@ def test_limits_of_traces_without_noise_may_be_equal(said: Said) -> None:
         ("dish", "confidence", "0.9", "found limits of 0.9 and 0.95; allowed are those of one"),
         ("dish", "k value (N/m)", "10,1", "a number of at least"),
         ("dish", "k low (N/m)", "nan", "a number above 0"),
+        ("dish", "k low (N/m)", "0", "a number above 0"),
         ("dish", "k high (N/m)", "inf", "a number of at least"),
         ("dish", "k verdict", "certain", "determined, bounded below"),
         ("dish", "fit", "good", "ok, doubtful, rejected, failed"),

@@ -84,10 +84,7 @@ CLOCKS = {
 }
 
 
-@pytest.mark.parametrize(
-    "clock",
-    [*[*CLOCKS][:1], *(pytest.param(each, marks=pytest.mark.nightly) for each in [*CLOCKS][1:])],
-)
+@pytest.mark.parametrize("clock", CLOCKS)
 def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
     """Its misfit is no higher than with the onset of the simulation."""
     times = CLOCKS[clock]

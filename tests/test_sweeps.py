@@ -117,6 +117,12 @@ FILES: dict[str, tuple[str, str, Any, list[str]]] = {
         lambda w, a, b: (w / (2 * np.pi), np.hypot(a, b), np.degrees(np.arctan2(b, a))),
         ["f (Hz)", "complex_modulus=|G*| (Pa)", "phase=phase (deg)"],
     ),
+    "size and loss modulus": (
+        "f (Hz),|G*| (Pa),G'' (kPa)",
+        ",",
+        lambda w, a, b: (w / (2 * np.pi), np.hypot(a, b), b / 1e3),
+        ["f (Hz)", "complex_modulus=|G*| (Pa)", "loss=G'' (kPa)"],
+    ),
     "loss factor": (
         "w in rad/s,E' in MPa,tan(delta)",
         ",",
@@ -143,16 +149,13 @@ def test_files_of_instruments_tell_the_same(tmp_path: Path, name: str) -> None:
     np.testing.assert_allclose([storage, loss[::-1]], values, rtol=3e-8)
 
 
-def test_several_sweeps_have_a_page_a_table_and_methods(tmp_path: Path, few: Path) -> None:
+def test_a_sweep_has_a_page_a_table_and_methods(tmp_path: Path, few: Path) -> None:
     header = "w (rad/s),G' (Pa),G'' (Pa)"
-    traces = [
-        write_trace(tmp_path / f"{seed}.csv", OMEGA, *solid(seed), header=header)
-        for seed in range(2)
-    ]
+    trace = write_trace(tmp_path / "sweep.csv", OMEGA, *solid(), header=header)
     given = ["--frequency", "w (rad/s)", "--reading", "storage=G' (Pa)", "--model", "sls"]
     given += ["--reading", "loss=G'' (Pa)", "--config", str(few), "--no-compare"]
     page, table = tmp_path / "page.html", tmp_path / "found.csv"
-    status, printed, said = identify(*traces, *given, "--csv", table, "--report", page)
+    status, printed, said = identify(trace, *given, "--csv", table, "--report", page)
     assert status == 0, printed + said
     for text in (table.read_text(), page.read_text()):
         assert "In oscillation storage and loss moduli were recorded over frequency." in text

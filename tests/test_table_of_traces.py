@@ -336,7 +336,9 @@ def test_results_in_any_unit_are_read_as_they_were_written(
     data = {"reads": {"quantity": reads}, "noise_rad": 1.5, "notes": [{"drift_rad_per_s": None}]}
     data |= {"assumed": {"noise_rad": 1 / 3}}
     write_result(tmp_path / "a.json", data, "this")
-    assert json.loads((tmp_path / "a.json").read_text())[f"noise{unit}"] == 1.5
+    written = json.loads((tmp_path / "a.json").read_text())
+    assert (written[f"noise{unit}"], written.pop("assumed")) == (1.5, data["assumed"])
+    assert "_rad" not in json.dumps(written)
     assert read_result(tmp_path / "a.json", "this") == data
     with pytest.raises(BiogripError, match="its digest is another one"):
         read_result(tmp_path / "a.json", "that")

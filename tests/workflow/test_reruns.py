@@ -48,10 +48,6 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         | {"case_tables": 1, "case_figures": 1}
         | STUDY,
     ),
-    "a title": (
-        {"cases": {"mine": {"title": "Mine"}}},
-        {"case_tables": 1, "recorded_case_figures": 1} | STUDY,
-    ),
     "what is read of a recorded trace": (
         {"cases": {"mine": {"measurement": {"until_s": 300.0}}}},
         {"recording": 1, "identification": 2, "model_fits": 1, "recorded_judgement": 1}
