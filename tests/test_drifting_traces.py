@@ -52,9 +52,7 @@ def test_an_offset_beside_a_declared_drift_is_one_degree_of_freedom() -> None:
 
 
 @pytest.mark.parametrize("known", [None, 2.0])
-def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(
-    known: float | None,
-) -> None:
+def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(known: float | None) -> None:
     """With the noise that is known, or that with which each residual is likeliest."""
     residual = np.random.default_rng(4).standard_normal(50)
     fits = 2.0 * residual, 1.7 * residual

@@ -240,10 +240,7 @@ def test_several_groups_are_compared_with_the_first(
 
 @pytest.mark.nightly
 def test_identify_and_groups_say_the_same_of_a_cell(
-    tmp_path: Path,
-    few: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, few: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """From traces to the comparison: both springs of treated cells are 1.5 times as stiff, and the
     arms slipped in b5.

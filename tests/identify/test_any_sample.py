@@ -26,9 +26,7 @@ def inadequate() -> TraceResult:
     return told(SECONDS, SOFTENING + SCATTER, **RELAXATION)
 
 
-def test_a_rejected_model_is_told_from_what_no_linear_sample_does(
-    inadequate: TraceResult,
-) -> None:
+def test_a_rejected_model_is_told_from_what_no_linear_sample_does(inadequate: TraceResult) -> None:
     """Noise of 0.2 Pa, of which a second difference tells the scatter to a tenth."""
     text = str(inadequate)
     assert inadequate.status == "rejected"
