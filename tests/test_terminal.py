@@ -99,7 +99,8 @@ def test_a_commands_progress_is_no_output(
     with terminal.Progress("a", 1, live=alone) as told:
         told.done()
     shown = capsys.readouterr()
-    assert (shown.err, shown.out)[:: 1 if alone else -1] == ("a: 1 of 1 done\n", "")
+    seen, empty = (shown.err, shown.out) if alone else (shown.out, shown.err)
+    assert (seen, empty) == ("a: 1 of 1 done\n", "")
 
 
 @pytest.mark.parametrize("command", ["identify", "groups", "design"])
