@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 from biogrip.arrays import Array
 from biogrip.cli import _parser
 from biogrip.command.settings import Asked, Setting, read_trace
+from biogrip.command.words import set_up_in_words
 from biogrip.errors import BiogripError
 from biogrip.library import INSTRUMENTS, Sample, hold, set_up, simulate
 from biogrip.physics.models import MODELS
@@ -149,18 +150,6 @@ def test_files_of_instruments_tell_the_same(tmp_path: Path, name: str) -> None:
     np.testing.assert_allclose([storage, loss[::-1]], values, rtol=3e-8)
 
 
-def test_a_sweep_has_a_page_a_table_and_methods(tmp_path: Path, few: Path) -> None:
-    header = "w (rad/s),G' (Pa),G'' (Pa)"
-    trace = write_trace(tmp_path / "sweep.csv", OMEGA, *solid(), header=header)
-    given = ["--frequency", "w (rad/s)", "--reading", "storage=G' (Pa)", "--model", "sls"]
-    given += ["--reading", "loss=G'' (Pa)", "--config", str(few), "--no-compare"]
-    page, table = tmp_path / "page.html", tmp_path / "found.csv"
-    status, printed, said = identify(trace, *given, "--csv", table, "--report", page)
-    assert status == 0, printed + said
-    for text in (table.read_text(), page.read_text()):
-        assert "In oscillation storage and loss moduli were recorded over frequency." in text
-
-
 @pytest.mark.parametrize(
     ("header", "options", "said"),
     [
@@ -231,6 +220,8 @@ def test_limits_are_those_of_scipy_and_lmfit(tmp_path: Path) -> None:
 def test_a_relaxation_time_beyond_the_sweep_is_only_bounded() -> None:
     told_of = swept(solid(c=3e7))
     assert told_of.diagnosis.likelihood.problem.residuals.duration_s == pytest.approx(1 / OMEGA[0])
+    said = "In oscillation storage and loss moduli were recorded over frequency."
+    assert said in set_up_in_words(told_of.data)
     found = by_quantity(told_of.data)
     assert found["tau"]["high"] is None or found["tau"]["high"] > 100 * found["tau"]["low"]
 

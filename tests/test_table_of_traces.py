@@ -300,33 +300,25 @@ def test_a_killed_process_costs_a_batch_its_trace_alone(
     table = (here / "first.csv").read_bytes()
     assert identify("cells.tsv", "--csv", "found.csv")[2].startswith("2 of 2 traces are taken")
     assert (here / "found.csv").read_bytes() == table
+    # No JSON file has a picture.
+    assert identify("cells.tsv", "--report", "page.html")[2].startswith("1 of 2: usual.csv")
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        "trace",
-        *(
-            pytest.param(it, marks=pytest.mark.nightly)
-            for it in ("result", "option", "config", "page")
-        ),
-    ],
-)
-def test_a_result_of_anything_else_is_not_taken(here: Path, change: str) -> None:
-    assert identify("cells.tsv")[0] == 0
-    file, options = here / "other.identified.json", list[str]()
-    if change == "trace":
-        (here / "other.csv").write_text((here / "other.csv").read_text() + "100.5,1e-3\n")
-    elif change == "result":
-        file.write_text(file.read_text().replace('"confidence": 0.95', '"confidence": 0.94'))
-    elif change == "config":
-        (here / "few.yaml").write_text(yaml.safe_dump({**FEW, "identifiability": {"at_s": [9]}}))
-    else:
-        options = {"option": ["--at", "10"], "page": ["--report", "page.html"]}[change]
-    said = identify("cells.tsv", *options)[2]
-    assert said.startswith("1 of 2 traces are taken" if change in ("trace", "result") else "")
-    assert "2 of 2: other.csv" in said
-    assert found("other.csv")["confidence"] == 0.95
+def test_a_result_is_made_from_trace_config_and_options(tmp_path: Path) -> None:
+    """What is taken from a JSON file, as its digest tells."""
+    trace, config = tmp_path / "a.csv", tmp_path / "few.yaml"
+    at = Setting("--at", ("identifiability", "at_s"), [10])
+    made_from = set()
+    for text, keys, settings in (
+        ("time_s,rotation_rad\n0,1\n", "", ()),
+        ("time_s,rotation_rad\n0,2\n", "", ()),
+        ("time_s,rotation_rad\n0,2\n", "seeds: 9", ()),
+        ("time_s,rotation_rad\n0,2\n", "seeds: 9", (at,)),
+    ):
+        trace.write_text(text)
+        config.write_text(keys)
+        made_from.add(command._made_from(Asked(trace, config, settings)))
+    assert len(made_from) == 4
 
 
 @pytest.mark.parametrize(("reads", "unit"), [("strain", ""), ("displacement", "_m")])
@@ -342,6 +334,9 @@ def test_results_in_any_unit_are_read_as_they_were_written(
     assert read_result(tmp_path / "a.json", "this") == data
     with pytest.raises(BiogripError, match="its digest is another one"):
         read_result(tmp_path / "a.json", "that")
+    (tmp_path / "a.json").write_text((tmp_path / "a.json").read_text().replace("1.5", "1.6"))
+    with pytest.raises(BiogripError, match="its digest is another one"):
+        read_result(tmp_path / "a.json", "this")
 
 
 def test_what_a_row_says_goes_before_options(here: Path) -> None:
