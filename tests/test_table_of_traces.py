@@ -13,7 +13,7 @@ import yaml
 
 from biogrip.command import files as command
 from biogrip.command.outputs import read_result, write_result
-from biogrip.command.settings import Asked, Setting, is_table, read_table
+from biogrip.command.settings import Asked, Setting, case_of, is_table, read_table
 from biogrip.errors import BiogripError
 from biogrip.library import Sample, hold, set_up, simulate
 from tests.helpers.default import STUDY
@@ -21,6 +21,7 @@ from tests.helpers.identified import identify as run
 from tests.helpers.identified import write_trace
 
 SHORT = {"phases": [{"duration_s": 100.0, "torque_Nm": 2e-9}]}
+TIME = "measurement", "time"
 FEW = {"least_squares": {"candidates": 50, "starts": 2}, "model_selection": {"models": []}}
 TABLE = [
     ["file", "dish", "protocol.phases", "measurement.time", "gripper.arm_length_m"],
@@ -76,33 +77,27 @@ def refused(path: Path) -> list[str]:
 
 
 def test_a_row_says_what_options_and_config_say_of_one_trace(here: Path) -> None:
-    status, printed, _ = identify("cells.tsv", "--csv", "found.csv")
+    _, other = read_table(here / "cells.tsv")
+    said = {"protocol": SHORT, "gripper": {"arm_length_m": 3e-3}}
+    (here / "lab.yaml").write_text(yaml.safe_dump(said))
+    asked = Asked(other.trace, here / "lab.yaml", (Setting("--time", TIME, "t_s"),))
+    assert case_of(other).block == case_of(asked).block
+
+
+def test_a_trace_may_stand_beside_a_table_that_does_not_name_it(here: Path) -> None:
+    assert "the same file to be written twice" in identify("cells.tsv", "other.csv")[2]
+    write(here / "cells.tsv", [TABLE[0], TABLE[2]])
+    status, printed, _ = identify("usual.csv", "cells.tsv", "--csv", "found.csv")
     assert status == 0
     # What is not so of all traces is said of each.
     assert "\nusual.csv: Assumed: the default study's gripper and the default study's" in printed
     assert "other.csv: Assumed" not in printed
-    rows = {name: found(name) for name in ("usual.csv", "other.csv")}
-    assert [each["by_default"] for each in rows.values()] == [["gripper", "protocol"], []]
-    said = {"protocol": SHORT, "gripper": {"arm_length_m": 3e-3}}
-    (here / "few.yaml").write_text(yaml.safe_dump(FEW | said))
-    assert identify("other.csv", "--time", "t_s")[0] == 0
-    assert found("other.csv") == rows["other.csv"]
-    columns = ("trace", "dish", "fit", "confidence")
+    columns = ["trace", "dish", "fit", "confidence"]
+    assert list(listed()[0])[:3] == columns[:3]
     assert [[row[name] for name in columns] for row in listed()] == [
-        ["usual.csv", "left", "ok", "0.95"],
+        ["usual.csv", "", "ok", "0.95"],
         ["other.csv", "right", "ok", "0.95"],
     ]
-    assert list(listed()[0])[:3] == ["trace", "dish", "fit"]
-    # A trace may stand beside a table that does not name it.
-    write(here / "cells.tsv", [TABLE[0], TABLE[2]])
-    (here / "few.yaml").write_text(yaml.safe_dump(FEW))
-    assert identify("usual.csv", "cells.tsv", "--csv", "found.csv")[0] == 0
-    assert [(row["trace"], row["dish"]) for row in listed()] == [
-        ("usual.csv", ""),
-        ("other.csv", "right"),
-    ]
-    assert {name: found(name) for name in rows} == rows
-    assert "the same file to be written twice" in identify("cells.tsv", "other.csv")[2]
 
 
 @pytest.mark.parametrize(
