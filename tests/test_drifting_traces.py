@@ -1,6 +1,7 @@
 """What drifts slowly beside the noise is said of a trace, and what does not is not."""
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,8 +9,9 @@ import pytest
 from scipy.stats import chi2, norm
 
 from biogrip.arrays import Array
+from biogrip.identify.prepare import flow_of
 from biogrip.judging.likelihood import compute_fall
-from biogrip.library import TraceResult
+from biogrip.library import INSTRUMENTS, Sample, TraceResult, hold, set_up
 from tests.helpers.identified import told
 from tests.helpers.problems import clean
 
@@ -87,22 +89,50 @@ def test_an_offset_alone_is_advised_if_it_explains_as_much() -> None:
     assert all(words[name].startswith(value) for name, value in advised)
 
 
-def test_a_power_law_is_not_taken_for_an_offset_and_a_drift() -> None:
+GOOD_TO_TWO_PERCENT = {"model": "zener_kelvin", "reads": "strain", "hold": 1.0, "level": 3e-3}
+
+
+@pytest.mark.parametrize(
+    ("exponent", "fit", "given"),
+    [
+        (-0.15, "rejected", {"model": "kelvin_voigt", "reads": "modulus"}),
+        pytest.param(0.15, "doubtful", GOOD_TO_TWO_PERCENT, marks=pytest.mark.nightly),
+    ],
+)
+def test_a_power_law_is_not_taken_for_an_offset_and_a_drift(
+    exponent: float, fit: str, given: dict[str, Any]
+) -> None:
     """Nor are its first readings outliers; the springpot fits far better."""
-    found = crept(1000 * CREEP**-0.15, models=["springpot"], model="kelvin_voigt", reads="modulus")
-    assert found.status == "rejected"
+    found = crept(1e-2 * CREEP**exponent, models=["springpot"], **given)
+    assert found.status == fit
     assert '(model="springpot") is preferred' in found.data["advice"]
     for word in ("offset", "drift", "outliers"):
         assert word not in str(found)
 
 
-def test_flow_under_a_constant_load_is_said_to_look_like_a_drift() -> None:
+@pytest.mark.parametrize("noise_model", ["white", "coloured"])
+def test_flow_under_a_constant_load_is_said_to_look_like_a_drift(noise_model: str) -> None:
     """Nor is a drift fitted along by default that would take the flow away."""
-    found = crept(1 / 1000 + CREEP / 3e4, model="maxwell", reads="strain", hold=1.0)
+    given: dict[str, Any] = {"model": "maxwell", "reads": "strain", "hold": 1.0}
+    found = crept(1 / 1000 + CREEP / 3e4, noise_model=noise_model, **given)
     assert "are one line: c holds if the instrument does not drift" in str(found)
     flow = found.to_frame().loc["c"]
     assert flow["value"] == pytest.approx(3e4, rel=0.1)
     assert flow["high"] < 2 * flow["low"]
+
+
+@pytest.mark.parametrize(
+    ("model", "fixed", "dampers"),
+    [
+        *(("maxwell", (), "c"), ("burgers", (), "c_s"), ("zener_maxwell", (), "")),
+        ("generalized_maxwell", ("k_p",), "c + c_p"),
+    ],
+)
+def test_dampers_without_a_spring_beside_them_let_a_sample_flow(
+    model: str, fixed: tuple[str, ...], dampers: str
+) -> None:
+    creep = set_up(INSTRUMENTS["strain"], (hold(120.0, 1.0),), Sample(model))
+    assert flow_of(replace(creep, fixed=dict.fromkeys(fixed, 0.0))) == dampers
 
 
 def test_of_a_drift_that_is_declared_and_flow_only_the_sum_is_determined() -> None:

@@ -74,6 +74,7 @@ def test_a_declared_offset_and_drift_are_fitted_along() -> None:
     # Both are known to some per cent of the rotation.
     assert found.data["offset_rad"] == pytest.approx(5e-4, abs=1e-4)
     assert found.data["drift_rad_per_s"] == pytest.approx(1e-6, abs=1e-6)
+    assert "χ² falls" not in str(found)
 
 
 @pytest.mark.parametrize(

@@ -100,6 +100,15 @@ def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
 
 
 @pytest.mark.nightly
+@pytest.mark.parametrize("last_s", [1e3, 1e4])
+def test_a_trace_over_many_decades_of_time_has_an_answer(last_s: float) -> None:
+    """A liquid on which no reading of the first decades moves, and exact times."""
+    times = np.geomspace(1e-4, last_s, 81)
+    found = told(times, 1.0 + times, reads="strain", hold=1.0, model="maxwell").to_frame()
+    np.testing.assert_allclose(found["value"], 1.0, rtol=1e-6)
+
+
+@pytest.mark.nightly
 def test_readings_near_a_fitted_onset_are_not_said_to_show_a_ring() -> None:
     """Of milliseconds, where the onset is known to tenths of a second."""
     times, values = late(2)
@@ -115,6 +124,19 @@ def test_padding_before_the_onset_is_no_measurement() -> None:
     found = gripped(*late(2, flat=True), start=ONSET_S)
     assert (found.status, found.data["samples"]) == ("ok", 301 - 40)
     assert "Left out for want of a number: 40 rows of 301." in str(found)
+
+
+@pytest.mark.nightly
+def test_readings_before_the_onset_tell_the_zero() -> None:
+    """On a clock with negative times, too."""
+    times, values = late(2)
+    whole, without = (
+        gripped(times[cut] - ONSET_S, values[cut] + 2e-6, offset=True, start=0.0)
+        for cut in (times >= 0, times >= ONSET_S)
+    )
+    assert whole.data["offset_rad"] == pytest.approx(2e-6, abs=5 * NOISE_RAD / np.sqrt(40))
+    wide, narrow = (np.ptp(it.to_frame().loc["k_p", ["low", "high"]]) for it in (whole, without))
+    assert wide < 0.9 * narrow
 
 
 def test_a_clock_outside_the_protocol_is_refused() -> None:
@@ -195,6 +217,21 @@ def test_models_are_compared_each_at_its_own_onset() -> None:
     found = told(times, values, models, start="fit", reads="strain", model=models[0], hold=1.0)
     misfits = {row["model"]: row["misfit_rad"] for row in found.data["models"]}
     assert misfits["springpot"] == pytest.approx(0.02, rel=0.15)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("unit_s", [1e-3, 86_400.0])
+def test_a_fitted_onset_lies_between_its_readings_on_any_clock(unit_s: float) -> None:
+    """Log-spaced over five decades on either side, most readings far further apart than there."""
+    apart = np.geomspace(1e-3, 1e2, 60)
+    times = np.r_[-apart[::-3], apart]
+    values = np.where(times > 0, 1000 * np.exp(-np.clip(times, 0, None)), 0.0)
+    values += 5.0 * np.random.default_rng(7).standard_normal(len(times))
+    given: dict[str, Any] = {"reads": "modulus", "model": "maxwell", "start": "fit"}
+    found = told(unit_s * (times + 200), values, **given)
+    ends_s = np.array([found.data["onset_s"], *found.data["onset_limits_s"]])
+    assert np.abs(ends_s / unit_s - 200).max() < 1.5e-3
+    assert found.to_frame().loc["k", "value"] == pytest.approx(1000, rel=0.02)
 
 
 HOLD = np.arange(0.4, 44, 0.4)
