@@ -15,6 +15,7 @@ from playwright.sync_api import Browser
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.protocol import Course, Phase, hold, join_phases
 from tests.helpers.browser import chromium, executable
+from tests.helpers.identified import FEW
 from tests.helpers.required import cannot_run
 from tests.helpers.runs import built_once, run_tiny
 
@@ -79,6 +80,13 @@ def phases() -> tuple[Phase, ...]:
 @pytest.fixture(scope="session")
 def steps(phases: tuple[Phase, ...]) -> Course:
     return join_phases(phases)
+
+
+@pytest.fixture(scope="session")
+def few(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A config with few starts, and few models to compare: leave it as it is."""
+    (config := tmp_path_factory.mktemp("few") / "few.yaml").write_text(FEW)
+    return config
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ from biogrip.design import (
     set_up,
 )
 from biogrip.fit.experiment import Experiment
-from biogrip.library import identify_sample, simulate
+from biogrip.library import simulate
 from biogrip.physics.protocol import sample_times
 from biogrip.physics.simulation import compute_grip
 from tests.helpers.default import study_of
@@ -49,38 +49,15 @@ KELVIN = DRIFTING.replace(
 )
 
 
-def designed(folder: Path, text: str = GRIPPER) -> Path:
+def designed(folder: Path, text: str = GRIPPER, *given: str) -> Path:
     (folder / "my.yaml").write_text(text)
-    assert main(["design", str(folder / "my.yaml")]) == 0
+    assert main(["design", str(folder / "my.yaml"), *given]) == 0
     return folder / "my_designed.yaml"
 
 
 def set_up_of(text: str = GRIPPER) -> tuple[Limits, list[Specimen]]:
     study = study_of(text)
     return set_up(list(study.cases.values()), study.config.design)
-
-
-@pytest.mark.nightly
-def test_a_design_is_better_keeps_its_limits_and_runs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    alone = GRIPPER.replace(", liquid_drop_2", "")
-    output = designed(tmp_path, alone)
-    said = capsys.readouterr().out
-    rows = [line for line in said.splitlines() if "bound (%)" in line]
-    bounds = np.array([[float(number) for number in row.split()[-2:]] for row in rows])
-    assert len(bounds) == 3
-    assert bounds[:, 1].max() < 0.7 * bounds[:, 0].max()
-    # Noise, torque, rate and force stand beside the bounds.
-    for label in ("noise of the rotation (rad)", "largest torque (N m)", "highest rate (Hz)"):
-        assert label in said
-    (case,) = study_of(output.read_text()).cases.values()
-    assert max(phase.level for phase in case.phases) <= 1.6e-9 * (1 + 1e-12)
-    assert case.experiment.torque.end_s == pytest.approx(400.0)
-    assert len(case.times_s) == 4001
-    # The same command gives the same bytes.
-    before = output.read_bytes()
-    assert designed(tmp_path, alone).read_bytes() == before
 
 
 def test_a_parameter_that_is_told_to_less_than_an_e_fold_has_no_bound() -> None:
@@ -156,70 +133,84 @@ def test_parameters_that_trade_have_no_bound() -> None:
     assert by_name["k_p"] < 0.1
 
 
-@pytest.mark.parametrize(("instrument", "held"), [("creep", "stress_Pa"), ("relaxation", "strain")])
-def test_creep_and_relaxation_are_designed(
+@pytest.mark.parametrize(
+    ("text", "held", "largest", "duration_s"),
+    [
+        (GRIPPER.replace(", liquid_drop_2", ""), "torque_Nm", 1.6e-9, 400.0),
+        (CREEP.replace("HELD", "stress_Pa"), "stress_Pa", 1.0, 30.0),
+        (CREEP.replace("HELD", "strain").replace("creep", "relaxation"), "strain", 1.0, 30.0),
+    ],
+)
+def test_a_design_is_better_and_keeps_its_limits(
     tmp_path: Path,
-    instrument: str,
+    text: str,
     held: str,
+    largest: float,
+    duration_s: float,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(design, "GENERATIONS", 20)
-    output = designed(tmp_path, CREEP.replace("HELD", held).replace("creep", instrument))
+    output = designed(tmp_path, text)
     said = capsys.readouterr().out
-    assert "jaws" not in said
-    assert f"largest {held.removesuffix('_Pa')}" in said
-    phases = yaml.safe_load(output.read_text())["cases"]["solid"]["protocol"]["phases"]
+    rows = [line for line in said.splitlines() if "bound (%)" in line]
+    bounds = np.array([[float(number) for number in row.split()[-2:]] for row in rows])
+    assert len(bounds) == 3
+    assert bounds[:, 1].max() < 0.7 * bounds[:, 0].max()
+    # Noise, what is held, rate, and force where there are jaws stand beside the bounds.
+    assert "noise of the " in said
+    assert "highest rate (Hz)" in said
+    assert f"largest {held.partition('_')[0]}" in said
+    assert ("jaws" in said) == (held == "torque_Nm")
+    (case,) = study_of(output.read_text()).cases.values()
+    assert max(phase.level for phase in case.phases) <= largest * (1 + 1e-12)
+    assert case.experiment.torque.end_s == pytest.approx(duration_s)
+    assert len(case.times_s) == 10 * duration_s + 1
+    phases = yaml.safe_load(output.read_text())["cases"][case.name]["protocol"]["phases"]
     assert {held, "duration_s"} == set(phases[0])
+    # The same command gives the same bytes.
+    before = output.read_bytes()
+    assert designed(tmp_path, text).read_bytes() == before
 
 
 @pytest.mark.parametrize(
-    ("block", "words"),
+    ("block", "within", "words"),
     [
-        ("design: {stepps: 4}", "Did you mean 'steps'?"),
-        ("design: {duration_s: 0.1}", "my.yaml: design.duration_s: found 0.1 s, room for 1 "),
-        (
-            "design: {duration_s: 1.0e+9}",
-            "room for 10000000000 readings at 10 Hz; allowed are 5 to",
-        ),
-        ("measurement: {rate_Hz: 1.0e+4}", "room for 4000000 readings at 10000 Hz; allowed are"),
-        ("measurement: {noise: {level: 0.1, reference: signal}}", "noise: allowed is white noise"),
+        ("design: {stepps: 4}", "", "Did you mean 'steps'?"),
+        ("design: {duration_s: 0.1}", "", "my.yaml: design.duration_s: found 0.1 s, room for 1 "),
+        ("design: {duration_s: 1.0e+9}", "", "room for 10000000000 readings at 10 Hz; allowed are"),
+        ("measurement: {rate_Hz: 1.0e+4}", "", "room for 4000000 readings at 10000 Hz; allowed"),
+        ("measurement: {noise: {level: 0.1, reference: signal}}", "", "noise: allowed is white no"),
+        ("fixed: {c_p: 1.0e-3}", "kp=10", "found 'kp', allowed are k, k_p, c. Did you mean 'k_p'?"),
     ],
 )
 def test_what_cannot_be_designed_is_said(
-    tmp_path: Path, block: str, words: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, block: str, within: str, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = tmp_path / "my.yaml"
     config.write_text(f"only: [endothelial_cell]\n{block}\n")
-    assert main(["design", str(config)]) == 1
-    said = capsys.readouterr().err
-    assert words in said
-    assert "Traceback" not in said
-    assert not (tmp_path / "my_designed.yaml").exists()
+    given = ["--within", within] if within else []
+    assert main(["design", str(config), *given]) == 1
+    assert words in capsys.readouterr().err
+    assert [*tmp_path.iterdir()] == [config]
 
 
 WITHIN = re.compile("designed is the (shortest|most precise), (\\S+) s at (\\S+) Hz", re.I)
 
 
-def within(folder: Path, asked: str, text: str, capsys: pytest.CaptureFixture[str]) -> str:
-    (folder / "my.yaml").write_text(text)
-    assert main(["design", str(folder / "my.yaml"), "--within", asked]) == 0
-    return capsys.readouterr().out
-
-
 def test_the_shortest_protocol_is_found_and_what_noise_a_better_one_takes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By searches a fifth as long."""
     monkeypatch.setattr(design, "_QUICK", 5)
     monkeypatch.setattr(design, "_FEWER", 20)
-    said = within(tmp_path, "k_s=6", KELVIN, capsys)
+    output = designed(tmp_path, KELVIN, "--within", "k_s=6")
+    said = capsys.readouterr().out
     found = WITHIN.search(said)
     assert found
     what, lasts_s, rate_Hz = found.groups()
     assert (what, rate_Hz) == ("shortest", "10")
     assert 1.0 < float(lasts_s) < 30.0
-    (case,) = study_of((tmp_path / "my_designed.yaml").read_text()).cases.values()
+    (case,) = study_of(output.read_text()).cases.values()
     assert case.experiment.torque.end_s == pytest.approx(float(lasts_s), rel=0.06)
     bound = next(line for line in said.splitlines() if "k_s: bound" in line).split()[-1]
     assert 1.96 * float(bound) < 6.3
@@ -227,43 +218,6 @@ def test_the_shortest_protocol_is_found_and_what_noise_a_better_one_takes(
     rows = [line.split() for line in said.splitlines()[2:] if len(line.split()) == 5]
     products = [float(row[3]) * float(row[4]) for row in rows if row[3] != "none"]
     assert products == pytest.approx([products[0]] * len(products), rel=0.01)
-    said = within(tmp_path, "k_s=0.001", (tmp_path / "my.yaml").read_text(), capsys)
-    assert "No protocol reaches 0.001 %; designed is the most precise" in said
-
-
-@pytest.mark.nightly
-def test_identified_simulations_scatter_as_designed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Of 60 estimates the standard deviation is known to 9 %; three of these."""
-    said = within(tmp_path, "15", KELVIN, capsys)
-    (case,) = study_of((tmp_path / "my_designed.yaml").read_text()).cases.values()
-    problem, rng = case.experiment, np.random.default_rng(0)
-    times_s = case.times_s[1:]
-    read = simulate(problem, case.parameters, times_s)
-    bounds = {
-        line.split()[1].rstrip(":"): float(line.split()[-1]) / 100
-        for line in said.splitlines()
-        if "bound (%)" in line
-    }
-    noise = case.noise.level_rad or 0.0
-    found = [
-        identify_sample(problem, times_s, read + noise * rng.standard_normal(len(read)) + 1e-3)
-        for _ in range(60)
-    ]
-    names = problem.searched.names
-    logs = np.log(
-        [[dict(zip(names, it.parameters, strict=True))[name] for name in bounds] for it in found]
-    )
-    assert logs.std(axis=0) == pytest.approx([*bounds.values()], rel=0.3)
-
-
-def test_a_parameter_that_is_not_there_is_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "my.yaml").write_text(GRIPPER)
-    assert main(["design", str(tmp_path / "my.yaml"), "--within", "kp=10"]) == 1
-    assert (
-        "--within: found 'kp', allowed are k, k_p, c. Did you mean 'k_p'?"
-        in capsys.readouterr().err
-    )
+    designed(tmp_path, KELVIN, "--within", "k_s=0.001")
+    said = "No protocol reaches 0.001 %; designed is the most precise"
+    assert said in capsys.readouterr().out

@@ -53,11 +53,6 @@ def test_the_heaviest_note_decides() -> None:
     assert find_reasons([middle, heavy, light]) == [REJECTION]
 
 
-@pytest.mark.parametrize("noise_model", NOISE_MODELS)
-def test_a_right_set_up_is_ok(noise_model: str) -> None:
-    assert identified(RIGHT, noise_model=noise_model).status == OK
-
-
 def test_a_parameter_at_the_end_of_its_range_is_named() -> None:
     """What the other parameters then are, is not what they are in truth."""
     ranges = {"k_p": {"exponent": [-3, -1], "digit": [1, 9]}}
@@ -85,13 +80,3 @@ def test_a_rejected_fit_says_only_why(noise_model: str) -> None:
     assert ("noise that cannot be told" in str(found)) == (noise_model == "coloured")
     for word in ("allow for", "richer", "suits the trace", "intervals", "Limits are"):
         assert word not in str(found)
-
-
-def test_six_readings_determine_two_parameters() -> None:
-    times = np.arange(1.0, 7.0)
-    noise = 8 * np.random.default_rng(0).standard_normal(6)
-    readings = 450 * np.exp(-times * 450 / 3800) + noise
-    found = told(times, readings, reads="modulus", model="maxwell")
-    assert found.status != REJECTED
-    k = found.to_frame().loc["k"]
-    assert k["low"] <= 450 <= k["high"] < 2 * k["low"]

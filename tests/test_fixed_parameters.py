@@ -45,7 +45,7 @@ def test_the_others_are_scipys() -> None:
 
 def test_a_config_fixes_an_option_adds_and_it_is_said_everywhere(tmp_path: Path) -> None:
     file = write_trace(tmp_path / "trace.csv", TIMES, TRACE)
-    page, table, config = (tmp_path / name for name in ("page.html", "table.csv", "c.yaml"))
+    page, table, config = (tmp_path / name for name in ("page.html", "a.csv", "a.yaml"))
     config.write_text(f"{FEW}fixed: {{k: 20.0, c_p: 1.0}}\n")
     outputs = ("--report", page, "--csv", table, "--output", tmp_path / "f.json")
     status, said, _ = identify(file, "--config", config, "--fix", "c_p=50", *outputs)

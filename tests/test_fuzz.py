@@ -1,5 +1,6 @@
 """Damaged files: each command gives an answer or one message, and no traceback."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from biogrip.cli import main
 from biogrip.command.settings import Asked, check_settings, is_table, read_table
 from biogrip.errors import BiogripError
-from tests.helpers.identified import FEW, identify
+from tests.helpers.identified import identify
 from tests.helpers.places import EXAMPLE
 
 pytestmark = [pytest.mark.nightly, pytest.mark.filterwarnings("error")]
@@ -16,47 +17,51 @@ pytestmark = [pytest.mark.nightly, pytest.mark.filterwarnings("error")]
 FILES = 100
 
 NUMBERS = ["", "nan", "inf", "-0", "1e308", "1e-320", "-1e30", "1,5", "0x1F", "٣", "1e400", "$x$"]
-NAMES = ["time_ms", "time [h]", "rotation_deg", "rotation [mrad]", "File", "", "\x1b[31m", "<b>"]
+NAMES = ["time_ms", "time [h]", "rotation_deg", "rotation [mrad]", "x", "", "\x1b[31m", "<b>"]
 MARKS = [";", "\t", " ", ",,", "\r", "\n\n", "\0", '"', "#", "\\", "é", "\ufeff", "\u202e"]
 
 
-def damaged(seed: int) -> bytes:
-    """Return every tenth reading of the example, perhaps scaled, damaged in one to four ways."""
+def damaged(seed: int, header: list[str], rows: list[list[str]], words: list[str]) -> bytes:
+    """Return a table with cells, columns, rows, marks or bytes damaged in one to four ways."""
     rng = np.random.default_rng([2026, seed])
-    readings = np.loadtxt(EXAMPLE, delimiter=",", skiprows=1)[::10]
-    readings *= 10.0 ** rng.choice([0, 0, *range(-13, 14)], 2)
-    cells = [[f"{it:.9g}" for it in row] for row in readings]
-    rows = np.array([["time_s", "rotation_rad"], *cells], object)
+    cells = np.array([header, *rows], object)
     separator, ending = ",", "\n"
-    for way in rng.integers(0, 7, rng.integers(1, 5)):
-        some, column = rng.integers(1, len(rows), rng.choice([1, 5, 100])), rng.integers(2)
-        if way == 0:
-            rows[some, column] = rng.choice(NUMBERS)
-        elif way == 1:
-            rows[0, column] = rng.choice(NAMES)
-        elif way == 2:
-            rows = np.tile(rows[: 2 + rng.integers(20)], (int(rng.integers(1, 3)), 1))
+    for way in rng.integers(0, 10, rng.integers(1, 5)):
+        some = rng.integers(1, len(cells), rng.choice([1, 5, 100]))
+        column = rng.integers(cells.shape[1])
+        if way <= 2:
+            cells[some, column] = rng.choice(words)
         elif way == 3:
-            rows[1:] = rng.permutation(rows[1:])
+            cells[0, column] = rng.choice([*header, *NAMES])
         elif way == 4:
-            separator, ending = rng.choice(MARKS), rng.choice(["\n", "\r\n", "\r"])
+            cells = np.delete(cells, column, axis=1) if cells.shape[1] > 1 else cells
         elif way == 5:
-            rows[1:, column] = rows[1, column]
+            cells[1:, column] = cells[1:, rng.integers(cells.shape[1])]
+        elif way == 6:
+            cells = np.tile(cells[: some[0] + 1], (int(rng.integers(1, 3)), 1))
+        elif way == 7:
+            cells[1:] = rng.permutation(cells[1:])
+        elif way == 8:
+            separator, ending = rng.choice(MARKS), rng.choice(["\n", "\r\n", "\r"])
         else:
-            rows[some, column] += rng.choice(MARKS)
-    content = bytearray(ending.join(separator.join(row) for row in rows).encode())
+            cells[some, column] += rng.choice(MARKS)
+    content = bytearray(ending.join(map(separator.join, cells)).encode() + b"\n")
     if seed % 3 == 0:
-        for place in rng.integers(0, len(content), 3):
-            content[place] = int(rng.integers(256))
-    return bytes(content)
+        content[rng.integers(len(content))] = rng.integers(256)
+    return bytes(content if seed % 7 else content[: rng.integers(len(content))])
 
 
 @pytest.mark.parametrize("hundred", range(3))
-def test_a_damaged_trace_gives_an_answer_or_one_message(tmp_path: Path, hundred: int) -> None:
-    (tmp_path / "few.yaml").write_text(FEW)
+def test_a_damaged_trace_gives_an_answer_or_one_message(
+    tmp_path: Path, few: Path, hundred: int
+) -> None:
+    readings = np.loadtxt(EXAMPLE, delimiter=",", skiprows=1)[::10]
     for seed in range(FILES * hundred, FILES * (hundred + 1)):
-        (tmp_path / "trace.csv").write_bytes(damaged(seed))
-        status, said, text = identify(tmp_path / "trace.csv", "--config", tmp_path / "few.yaml")
+        scale = 10.0 ** np.random.default_rng(seed).choice([0, 0, *range(-13, 14)], 2)
+        rows = [[f"{it:.9g}" for it in row] for row in readings * scale]
+        trace = damaged(seed, ["time_s", "rotation_rad"], rows, NUMBERS)
+        (tmp_path / "trace.csv").write_bytes(trace)
+        status, said, text = identify(tmp_path / "trace.csv", "--config", few)
         assert status in (0, 1), seed
         # What is recognised in an unusual file is told before.
         assert said if status == 0 else f"\n{text}".count("\nbiogrip: ") == 1, seed
@@ -67,32 +72,6 @@ def test_a_damaged_trace_gives_an_answer_or_one_message(tmp_path: Path, hundred:
 WORDS = [*NUMBERS, "0", "-1", "1e-400", "0.9", "2", "1_0", "b", "a1", "<b>", "\x1b[31m", "=1+1"]
 WORDS += ["determined", "Determined", "bounded above", "not determined", "fit rejected"]
 WORDS += ["ok", "doubtfull", "rejected", "failed"]
-
-
-def sheet(seed: int, header: list[str], rows: list[list[str]], words: list[str]) -> bytes:
-    """Return a CSV file with cells, columns, rows or bytes damaged in one to three ways."""
-    rng = np.random.default_rng([65, seed])
-    cells = np.array([header, *rows], object)
-    separator = ","
-    for way in rng.integers(0, 8, rng.integers(1, 4)):
-        row, column = rng.integers(1, len(cells)), rng.integers(cells.shape[1])
-        if way <= 2:
-            cells[row, column] = rng.choice(words)
-        elif way == 3:
-            cells[0, column] = rng.choice([*header, "", "x", f"{cells[0, column]}x"])
-        elif way == 4:
-            cells = np.delete(cells, column, axis=1)
-        elif way == 5:
-            other = rng.integers(cells.shape[1])
-            cells[1:, [column, other]] = cells[1:, [other, column]]
-        elif way == 6:
-            cells = cells[: row + 1]
-        else:
-            cells[rng.integers(1, len(cells), 3), column] += rng.choice(MARKS)
-    content = bytearray("\n".join(map(separator.join, cells)).encode() + b"\n")
-    if seed % 5 == 0:
-        content[rng.integers(len(content))] = rng.integers(256)
-    return bytes(content if seed % 7 else content[: rng.integers(len(content))])
 
 
 def found(trace: str, group: str, value: float) -> list[str]:
@@ -113,13 +92,13 @@ def test_a_damaged_table_of_groups_gives_numbers_or_one_message(
         found(f"{group}{n}", group, 18 + n + 9 * (group == "b")) for group in "ab" for n in range(4)
     ]
     for seed in range(FILES * hundred, FILES * (hundred + 1)):
-        (tmp_path / "found.csv").write_bytes(sheet(seed, header, rows, WORDS))
+        (tmp_path / "found.csv").write_bytes(damaged(seed, header, rows, WORDS))
         status = main(["groups", str(tmp_path / "found.csv"), "--by", "dish"])
         said, text = capsys.readouterr()
         assert status in (0, 1), seed
         assert text.count("\n") == status, seed
-        assert "nan" not in said.replace(f"{tmp_path}", ""), seed
-        assert "inf" not in said, seed
+        # A trace or a group may have such a name.
+        assert not re.search(r"\b(nan|inf) (\(\d|to \d)|\d to (nan|inf)", said), seed
         assert "\x1b" not in said + text, seed
 
 
@@ -130,7 +109,7 @@ def test_a_damaged_sheet_asks_for_traces_or_is_refused(tmp_path: Path) -> None:
     odd = [*NUMBERS, "1:30", "[1", "{a: 1}", "&a [*a]", "!!python/none", "? x", "off"]
     odd += ["0.csv", ".", "/"]
     for seed in range(5 * FILES):
-        (tmp_path / "cells.csv").write_bytes(sheet(seed, header, rows, odd))
+        (tmp_path / "cells.csv").write_bytes(damaged(seed, header, rows, odd))
         said = ""
         try:
             check_settings(read_table(tmp_path / "cells.csv"))

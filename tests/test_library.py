@@ -92,11 +92,10 @@ def test_columns_of_pandas_are_identified_as_by_the_command(tmp_path: Path) -> N
     result = library.identify_trace(FRAME["t"], FRAME[["strain"]], **HELD, **own, **config)
     FRAME.to_csv(tmp_path / "trace.csv", index=False)
     options = "--time t --set measurement.time_unit=s --reading strain=strain --start 85"
-    options += " --model zener_kelvin --offset --noise 2e-4"
-    given = yaml.safe_dump(config["config"])
-    told = *options.split(), "--hold", "5e-3 kPa"
-    told += "--csv", str(tmp_path / "found.csv")
-    found = identified(tmp_path, tmp_path / "trace.csv", *told, config=given)
+    options += f" --model zener_kelvin --offset --noise 2e-4 --csv {tmp_path / 'found.csv'}"
+    given = *options.split(), "--hold", "5e-3 kPa"
+    settings = yaml.safe_dump(config["config"])
+    found = identified(tmp_path, tmp_path / "trace.csv", *given, config=settings)
     assert found["load"] == f"Held: 0.005 kPa from 85 s to {FRAME['t'].iloc[-1]:g} s."
     assert f"\nHeld: 5 Pa from 85 s to {FRAME['t'].iloc[-1]:g} s.\n" in str(result)
     frame = result.to_frame()
@@ -142,19 +141,11 @@ def test_a_trace_is_identified_again_with_other_arguments_by_the_model_s_usual_n
     assert other.data["load"] == told.data["load"]
 
 
-@pytest.mark.parametrize(
-    ("name", "model", "branches", "fixed"),
-    [
-        *(("SLS", "zener_maxwell", 1, {}), ("zener", "zener_maxwell", 1, {})),
-        ("Prony3", "generalized_maxwell", 3, {"c_p": 0.0}),
-        ("prony_1", "generalized_maxwell", 1, {"c_p": 0.0}),
-    ],
-)
-def test_models_have_usual_names(
-    name: str, model: str, branches: int, fixed: dict[str, float]
-) -> None:
+@pytest.mark.parametrize(("name", "branches"), [("Prony3", 3), ("prony_1", 1)])
+def test_a_prony_series_has_no_damper_beside_its_branches(name: str, branches: int) -> None:
     case = case_of(Asked(EXAMPLE, None, (Setting("--model", ("sample", "model"), name),)))
-    assert (case.sample.name, case.sample.branches, case.fixed) == (model, branches, fixed)
+    assert (case.sample.name, case.sample.branches) == ("generalized_maxwell", branches)
+    assert case.fixed == {"c_p": 0.0}
 
 
 def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read(
@@ -172,40 +163,27 @@ def test_pictures_have_the_clock_of_the_file_and_the_name_of_what_is_read(
     ("given", "said"),
     [
         ({"reads": "strian"}, "reads: found 'strian', allowed are rotation, displacement, strain,"),
+        ({"reads": ["strain"]}, r"reads: found '\['strain'\]', allowed are rotation"),
         ({"hold": None}, "hold: is missing; allowed is the stress in Pa that was held"),
         ({"hold": 0.0}, "hold: protocol.phases: no phase has a stress"),
-        ({"model": "zener_k"}, "model: .*found 'zener_k'. Did you mean 'zener_kelvin'"),
-        ({"sd": [1.0]}, "found 325 of time_s and 325 of strain and 1 of sd; allowed are as many"),
-        ({"config": {"protocol": {}}}, "found hold and protocol; allowed is one of them."),
-        ({"start": "soon"}, "start: measurement.start_s: found 'soon', allowed is a number"),
-        ({"config": {"protocl": {}}}, "protocl"),
-        ({"time_s": FRAME}, r"time_s: found the shape \(325, 2\), allowed is one column"),
-        ({"time_s": 3.0}, r"time_s: found the shape \(\), allowed is one column"),
-        ({"time_s": None}, r"time_s: found the shape \(\), allowed is one column"),
-        ({"sd": 0.1}, r"sd: found the shape \(\), allowed is one column"),
-        (
-            {"readings": [[0.1], [0.1, 0.2]]},
-            "strain.*: setting an array element .*; allowed are num",
-        ),
-        ({"readings": {"a": 1}}, "strain: .*; allowed are numbers"),
-        ({"fixed": [1]}, r"fixed: found \[1\], allowed are values by name"),
-        ({"fixed": {1: 2.0}}, "fixed: found {1: 2.0}, allowed are values by name"),
-        ({"config": [1]}, r"config: found \[1\], allowed are values by name"),
-        ({"config": {1: 2}}, "config: found {1: 2}, allowed are values by name"),
-        ({"reads": ["strain"]}, r"reads: found '\['strain'\]', allowed are rotation"),
-        ({"reads": None}, "reads: found 'None', allowed are rotation"),
-        ({"start": np.array([1.0, 2.0])}, "start: measurement.start_s: found .*, allowed is a num"),
         ({"hold": "5,0"}, "hold: found '5,0', a decimal comma. Allowed is a point"),
         ({"hold": [1.0]}, r"hold: found '\[1.0\]', allowed is a number, or one with its unit"),
-        ({"hold": "soon"}, "hold: found 'soon', allowed is a number"),
+        ({"config": {"protocol": {}}}, "found hold and protocol; allowed is one of them."),
+        ({"config": {"protocl": {}}}, "protocl"),
+        ({"config": [1]}, r"config: found \[1\], allowed are values by name"),
+        ({"fixed": {1: 2.0}}, "fixed: found {1: 2.0}, allowed are values by name"),
+        ({"model": "zener_k"}, "model: .*found 'zener_k'. Did you mean 'zener_kelvin'"),
         ({"model": 5}, "model: .*found "),
+        ({"start": "soon"}, "start: measurement.start_s: found 'soon', allowed is a number"),
+        ({"start": np.array([1.0, 2.0])}, "start: measurement.start_s: found .*, allowed is a num"),
         ({"noise": "much"}, "noise: measurement.noise_rad: found 'much', allowed is a number"),
+        ({"sd": [1.0]}, "found 325 of time_s and 325 of strain and 1 of sd; allowed are as many"),
+        ({"sd": 0.1}, r"sd: found the shape \(\), allowed is one column"),
+        ({"readings": [[0.1], [0.1, 0.2]]}, "strain.*: setting an array element .*; allowed are"),
+        ({"readings": {"a": 1}}, "strain: .*; allowed are numbers"),
+        ({"time_s": FRAME}, r"time_s: found the shape \(325, 2\), allowed is one column"),
         ({"time_s": ["a"]}, "time_s: could not convert .*; allowed are numbers"),
         ({"time_s": pd.to_datetime(["2026-01-01"])}, "time_s: found datetime64.*; allowed are num"),
-        (
-            {"time_s": FRAME["t"][::-1]},
-            r"time_s\[1\]: .* \(\[0\]\), allowed are times that increase",
-        ),
     ],
 )
 def test_what_cannot_be_used_is_said_by_the_name_of_the_argument(
@@ -228,6 +206,7 @@ def test_times_of_pandas_are_seconds_and_masked_readings_are_gaps() -> None:
         pd.Series(clock), masked, reads="strain", hold=100.0, model="kelvin_voigt", **compared()
     )
     assert (told.status, told.data["samples"]) == ("ok", 97)
+    assert "they were taken: 1 reading, at " in str(told)
     limits = told.to_frame().loc[["k_p", "c_p"]]
     assert np.all((limits["low"] < [1000, 500]) & (limits["high"] > [1000, 500]))
 
@@ -244,7 +223,7 @@ def test_a_few_readings_that_relax_are_a_response(count: int) -> None:
     assert np.all((limits["low"] < [100, 20]) & (limits["high"] > [100, 20]))
 
 
-@pytest.mark.parametrize("unit_s", [1e-7, 1.0, 86_400.0])
+@pytest.mark.parametrize("unit_s", [1e-7, 86_400.0])
 def test_a_power_law_has_no_time_of_its_own(unit_s: float) -> None:
     """t^alpha/(k Gamma(1 + alpha)) of 100 units of time, 700 Pa and 0.25 in that unit."""
     times = np.linspace(0.5, 100.0, 120)
@@ -263,14 +242,11 @@ def test_a_power_law_has_no_time_of_its_own(unit_s: float) -> None:
 
 def test_all_of_the_library_can_be_had_from_the_package() -> None:
     assert all(getattr(biogrip, name) is getattr(library, name) for name in library.__all__)
+    with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
+        _ = biogrip.nonsense
 
 
 def test_it_identifies_as_the_default_study() -> None:
     assert STUDY.ranges == library._RANGES
     budgets = [case.block.least_squares for case in STUDY.cases.values()]
     assert all(budget == CREEP.least_squares for budget in budgets)
-
-
-def test_what_is_not_there_is_said_as_everywhere() -> None:
-    with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
-        _ = biogrip.nonsense

@@ -46,7 +46,6 @@ atexit.register(stop)
 
 
 def ended(code: str, folder: Path) -> tuple[int, str, str]:
-    """Status, output and errors of Python."""
     command = [sys.executable, "-c", code]
     run = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
     return run.returncode, run.stdout, run.stderr

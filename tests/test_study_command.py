@@ -21,7 +21,6 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
 def test_command_and_study_are_one_answer(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Of a gripper whose arms are shorter, from a config, without damper and other models."""
     monkeypatch.chdir(tmp_path)
     shutil.copy(EXAMPLE, "cell.csv")
     Path("mine.yaml").write_text("gripper: {arm_length_m: 1.2e-3}\n", encoding="utf-8")
@@ -59,7 +58,6 @@ def test_a_folder_is_new_and_whole(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_traces_of_one_name_are_cases_of_their_own(tmp_path: Path) -> None:
-    """With what differs from the default study, creep in its own units."""
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         rows = (f"{t},{0.01 + 0.001 * t + 1e-5 * (t % 3)}" for t in range(1, 40))

@@ -4,24 +4,21 @@ Samples are written down here, or in `tests.helpers.laplace`, as impedances.
 """
 
 import re
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
+from biogrip.cli import _parser
+from biogrip.command.settings import Asked, Setting, read_trace
+from biogrip.command.words import set_up_in_words
 from biogrip.errors import BiogripError
 from biogrip.library import INSTRUMENTS, Sample, hold, set_up, simulate
 from biogrip.physics.models import MODELS
-from biogrip.records.identifications import read_verdicts
-from biogrip.stages.identification import judge
-from biogrip.stages.targets import record
-from tests.helpers.default import study_of
-from tests.helpers.identified import by_quantity, identified, identify, told
+from tests.helpers.identified import by_quantity, identified, identify, told, write_trace
 from tests.helpers.laplace import IMPEDANCES
 
 OMEGA: Array = np.geomspace(0.1, 100.0, 25)
@@ -40,13 +37,7 @@ def noisy(clean: Array, share: float = 0.02, seed: int = 0) -> Array:
 
 
 def swept(values: Array, omega: Array = OMEGA, **given: Any) -> Any:
-    """What a sweep tells in a notebook."""
     return told(omega, values[0], loss=values[1], **(GIVEN | given))
-
-
-@cache
-def solid_in_a_notebook() -> dict[str, dict[str, Any]]:
-    return by_quantity(swept(solid()).data)
 
 
 def solid(seed: int = 1, **given: Any) -> Array:
@@ -106,94 +97,57 @@ def test_the_fit_that_rheos_publishes_has_its_misfit_and_lies_within_the_limits(
     assert found.loc["beta", "value"] == pytest.approx(published["beta"], rel=0.02)
 
 
-def trios(values: Array, omega: Array) -> tuple[str, list[str]]:
-    rows = np.c_[omega, values.T, values[1] / values[0]]
-    lines = ["Filename\tgel.tri", "", "[step]", "Frequency sweep - 1"]
-    lines += ["Angular frequency\tStorage modulus\tLoss modulus\tTan(delta)", "rad/s\tPa\tPa\t"]
-    lines += ["\t".join(f"{value:.9g}" for value in row) for row in rows]
-    return "\n".join(lines), ["Angular frequency", "storage=Storage modulus", "loss=Loss modulus"]
+FILES: dict[str, tuple[str, str, Any, list[str]]] = {
+    "TRIOS": (
+        "Filename\tgel.tri\n\n[step]\nFrequency sweep - 1\n"
+        "Angular frequency\tStorage modulus\tLoss modulus\tTan(delta)\nrad/s\tPa\tPa\t",
+        "\t",
+        lambda w, stored, lost: (w, stored, lost, lost / stored),
+        ["Angular frequency", "storage=Storage modulus", "loss=Loss modulus"],
+    ),
+    "Anton Paar, from high to low frequencies": (
+        "Projekt:;Zellen\n\nIntervall-Daten:;Punktnr.;Kreisfrequenz;Speichermodul;Verlustmodul\n"
+        ";;;;\n;;[1/s];[kPa];[kPa]",
+        ";",
+        lambda w, *moduli: (w, w[::-1], *(it[::-1] / 1e3 for it in moduli)),
+        ["Kreisfrequenz", "storage=Speichermodul", "loss=Verlustmodul"],
+    ),
+    "size and phase": (
+        "f (Hz),|G*| (Pa),phase (deg)",
+        ",",
+        lambda w, a, b: (w / (2 * np.pi), np.hypot(a, b), np.degrees(np.arctan2(b, a))),
+        ["f (Hz)", "complex_modulus=|G*| (Pa)", "phase=phase (deg)"],
+    ),
+    "size and loss modulus": (
+        "f (Hz),|G*| (Pa),G'' (kPa)",
+        ",",
+        lambda w, a, b: (w / (2 * np.pi), np.hypot(a, b), b / 1e3),
+        ["f (Hz)", "complex_modulus=|G*| (Pa)", "loss=G'' (kPa)"],
+    ),
+    "loss factor": (
+        "w in rad/s,E' in MPa,tan(delta)",
+        ",",
+        lambda w, stored, lost: (w, stored / 1e6, lost / stored),
+        ["w in rad/s", "storage=E\u2032 in MPa", "loss_factor=tan(delta)"],
+    ),
+}
 
 
-def anton_paar(values: Array, omega: Array) -> tuple[str, list[str]]:
-    """From high to low frequencies, in kPa, with decimal commas."""
-    rows = np.c_[omega, values.T / 1e3][::-1]
-    lines = [
-        "Projekt:;Zellen",
-        "",
-        "Intervall-Daten:;Punktnr.;Kreisfrequenz;Speichermodul;Verlustmodul",
-    ]
-    lines += [";;;;", ";;[1/s];[kPa];[kPa]"]
-    text = [";".join(f"{value:.9g}" for value in row) for row in rows]
-    lines += [f";{number};{row}".replace(".", ",") for number, row in enumerate(text, 1)]
-    return "\n".join(lines), ["Kreisfrequenz", "storage=Speichermodul", "loss=Verlustmodul"]
-
-
-def bare(values: Array, omega: Array) -> tuple[str, list[str]]:
-    whole = values[0] + 1j * values[1]
-    rows = np.c_[omega / (2 * np.pi), abs(whole), np.degrees(np.angle(whole))]
-    lines = ["f (Hz),|G*| (Pa),phase (deg)", *(",".join(f"{it:.9g}" for it in row) for row in rows)]
-    return "\n".join(lines), ["f (Hz)", "complex_modulus=|G*| (Pa)", "phase=phase (deg)"]
-
-
-def of_factor(values: Array, omega: Array) -> tuple[str, list[str]]:
-    rows = np.c_[omega, values[0] / 1e6, values[1] / values[0]]
-    lines = ["w in rad/s,E' in MPa,tan(delta)", *(",".join(f"{it:.9g}" for it in r) for r in rows)]
-    return "\n".join(lines), ["w in rad/s", "storage=E\u2032 in MPa", "loss_factor=tan(delta)"]
-
-
-@pytest.mark.parametrize("written", [trios, anton_paar, bare, of_factor])
-def test_files_of_instruments_tell_the_same(tmp_path: Path, written: Any) -> None:
-    trace, expected = tmp_path / "sweep.txt", solid_in_a_notebook()
-    text, (frequency, *readings) = written(solid(), OMEGA)
-    trace.write_text(text, encoding="utf-8")
+@pytest.mark.parametrize("name", FILES)
+def test_files_of_instruments_tell_the_same(tmp_path: Path, name: str) -> None:
+    trace, values = tmp_path / "sweep.txt", solid()
+    head, separator, columns, (frequency, *readings) = FILES[name]
+    rows = np.transpose(columns(OMEGA, *values))
+    text = "\n".join(separator.join(f"{it:.9g}" for it in row) for row in rows)
+    if separator == ";":
+        text = f";{text}".replace("\n", "\n;").replace(".", ",")
+    trace.write_text(f"{head}\n{text}\n", encoding="utf-8")
     options = [option for each in readings for option in ("--reading", each)]
-    more = ["--frequency", frequency, *options, "--model", "zener_maxwell"]
-    found = by_quantity(identified(tmp_path, trace, *more, config="model_selection: {models: []}"))
-    for name, truth in (SOLID | {"tau": 2 / 3}).items():
-        assert found[name]["value"] == pytest.approx(expected[name]["value"], rel=1e-4)
-        # Twice the half width of 95 % limits: four standard deviations.
-        assert abs(found[name]["value"] - truth) < found[name]["high"] - found[name]["low"]
-
-
-@pytest.mark.parametrize("count", [2, pytest.param(1, marks=pytest.mark.nightly)])
-def test_sweeps_alone_and_together_have_a_page_a_table_and_methods(
-    tmp_path: Path, count: int
-) -> None:
-    header, config = "w (rad/s),G' (Pa),G'' (Pa)", tmp_path / "few.yaml"
-    config.write_text("model_selection: {models: []}")
-    traces = [tmp_path / f"{seed}.csv" for seed in range(count)]
-    for seed, trace in enumerate(traces):
-        np.savetxt(trace, np.c_[OMEGA, solid(seed).T], "%.6g", ",", header=header, comments="")
-    given = ["--frequency", "w (rad/s)", "--reading", "storage=G' (Pa)", "--model", "sls"]
-    given += ["--reading", "loss=G'' (Pa)", "--config", str(config)]
-    page, table = tmp_path / "page.html", tmp_path / "found.csv"
-    status, printed, said = identify(*traces, *given, "--csv", table, "--report", page)
-    assert status == 0, printed + said
-    for text in (table.read_text(), page.read_text()):
-        assert "In oscillation storage and loss moduli were recorded over frequency." in text
-
-
-def test_a_study_says_of_a_recorded_sweep_what_the_command_says(tmp_path: Path) -> None:
-    """Its limits are wider where nothing tells the noise, but how it scatters."""
-    values, trace = solid(), tmp_path / "sweep.csv"
-    header = "w (rad/s),G' (Pa),G'' (Pa)"
-    np.savetxt(trace, np.c_[OMEGA, values.T], "%.9g", ",", header=header, comments="")
-    measured = {"file": str(trace), "frequency": "w (rad/s)", "loss": "G'' (Pa)"}
-    block = {
-        "instrument": "oscillation",
-        "protocol": {"phases": [{"duration_s": 1.0, "strain": 1.0}]},
-        "sample": {"model": "SLS"},
-        "measurement": measured | {"storage": "G' (Pa)"},
-    }
-    given = {"cases": {"mine": block}, "model_selection": {"models": []}}
-    case = study_of(yaml.safe_dump(given)).cases["mine"]
-    traces, verdicts = tmp_path / "t.npz", tmp_path / "v.json"
-    record(case, trace, traces)
-    judge(case, traces, [], verdicts)
-    found, said = (by_quantity(it) for it in (read_verdicts(verdicts), swept(values).data))
-    for name in said:
-        for key in ("value", "low", "high"):
-            assert found[name][key] == pytest.approx(said[name][key], rel=2e-5)
+    given = _parser().parse_args(["identify", "a", "--frequency", frequency, *options]).settings
+    recording, _ = read_trace(Asked(trace, None, tuple(Setting(*each) for each in given)))
+    loss, storage = np.split(recording.readings, 2)
+    np.testing.assert_allclose(recording.time_s, np.append(-OMEGA[::-1], OMEGA), rtol=1e-8)
+    np.testing.assert_allclose([storage, loss[::-1]], values, rtol=3e-8)
 
 
 @pytest.mark.parametrize(
@@ -210,8 +164,8 @@ def test_a_study_says_of_a_recorded_sweep_what_the_command_says(tmp_path: Path) 
 def test_what_a_sweep_cannot_have_is_refused(
     tmp_path: Path, header: str, options: list[str], said: str
 ) -> None:
-    trace, names = tmp_path / "sweep.csv", header.split(",")
-    np.savetxt(trace, np.c_[OMEGA, solid().T], "%.6g", ",", header=header, comments="")
+    trace = write_trace(tmp_path / "sweep.csv", OMEGA, *solid(), header=header)
+    names = header.split(",")
     given = ["--frequency", names[0], "--reading", f"storage={names[1]}"]
     status, _, complained = identify(trace, *given, "--reading", f"loss={names[2]}", *options)
     assert (status, said in complained) == (1, True), complained
@@ -236,9 +190,8 @@ def test_limits_are_those_of_scipy_and_lmfit(tmp_path: Path) -> None:
     clean = moduli("zener_maxwell", OMEGA, *SOLID.values())
     sd = np.array([[0.02], [0.03]]) * clean
     scatter = np.random.default_rng(3).standard_normal(2 * len(OMEGA)).reshape(clean.shape)
-    values, trace = clean + sd * scatter, tmp_path / "sweep.csv"
-    header = "w in rad/s,stored in Pa,lost in Pa,a in Pa,b in Pa"
-    np.savetxt(trace, np.c_[OMEGA, values.T, sd.T], "%.12g", ",", header=header, comments="")
+    values, header = clean + sd * scatter, "w in rad/s,stored in Pa,lost in Pa,a in Pa,b in Pa"
+    trace = write_trace(tmp_path / "sweep.csv", OMEGA, *values, *sd, header=header)
     options = ["--frequency", "w in rad/s", "--reading", "storage=stored in Pa"]
     options += ["--reading", "loss=lost in Pa", "--sd", "a in Pa", "--model", "zener_maxwell"]
     options += ["--set", "measurement.loss_sd=b in Pa"]
@@ -264,35 +217,11 @@ def test_limits_are_those_of_scipy_and_lmfit(tmp_path: Path) -> None:
             assert least(name, found[name][end]) - best == pytest.approx(3.841, rel=0.02)
 
 
-@pytest.mark.nightly
-def test_creep_relaxation_and_sweep_of_a_sample_agree() -> None:
-    """Limits of differences are roots of sums of squares: each of nine is missed once in 20."""
-    times = np.geomspace(0.02, 30.0, 120)
-    solid_of = {"model": "zener_maxwell"}
-    whole, share = SOLID["k"] + SOLID["k_p"], SOLID["k"] / (SOLID["k"] + SOLID["k_p"])
-    tau = SOLID["c"] / SOLID["k"]
-    relaxing = SOLID["k_p"] + SOLID["k"] * np.exp(-times / tau)
-    creeping = (1 - share * np.exp(-times * (1 - share) / tau)) / SOLID["k_p"]
-    scatter = np.random.default_rng(4).standard_normal((2, len(times)))
-    results = [
-        swept(solid(seed=4)),
-        told(times, relaxing + 0.005 * whole * scatter[0], reads="modulus", **solid_of),
-        told(times, creeping * (1 + 0.01 * scatter[1]), reads="compliance", **solid_of),
-    ]
-    frames = [result.to_frame() for result in results]
-    for name in SOLID:
-        for one, other in ((0, 1), (0, 2), (1, 2)):
-            both = [
-                np.log(frames[i].loc[name, ["value", "low", "high"]].astype(float))
-                for i in (one, other)
-            ]
-            half = np.hypot(*(0.5 * (each["high"] - each["low"]) for each in both))
-            assert abs(both[0]["value"] - both[1]["value"]) < 1.5 * half
-
-
 def test_a_relaxation_time_beyond_the_sweep_is_only_bounded() -> None:
     told_of = swept(solid(c=3e7))
     assert told_of.diagnosis.likelihood.problem.residuals.duration_s == pytest.approx(1 / OMEGA[0])
+    said = "In oscillation storage and loss moduli were recorded over frequency."
+    assert said in set_up_in_words(told_of.data)
     found = by_quantity(told_of.data)
     assert found["tau"]["high"] is None or found["tau"]["high"] > 100 * found["tau"]["low"]
 
@@ -315,10 +244,6 @@ def test_moduli_that_do_not_belong_to_one_sample_are_told(wrong: Any, said: str)
         percent = float(re.findall(r", (\S+) % at the highest", reason)[0])
         taken = 100 * (clean - wrong(clean))[0, -1] / wrong(clean)[0, -1]
         assert 0.3 * taken < percent < 1.5 * taken
-
-
-def test_another_model_is_rejected() -> None:
-    assert swept(solid(), model="kelvin_voigt").status == "rejected"
 
 
 @pytest.mark.nightly

@@ -11,7 +11,7 @@ import pytest
 from biogrip import terminal
 from biogrip.cli import _parser, main
 from biogrip.terminal import visible, visible_lines
-from tests.helpers.identified import FEW, identify
+from tests.helpers.identified import identify
 from tests.helpers.places import EXAMPLE
 
 # A colour, the title of a window, a line that is cleared, text that runs from right to left.
@@ -57,14 +57,13 @@ def test_what_was_typed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert not OBEYED.search(error)
 
 
-def test_names_of_traces_are_shown_wherever_they_are_said(tmp_path: Path) -> None:
+def test_names_of_traces_are_shown_wherever_they_are_said(tmp_path: Path, few: Path) -> None:
     page = tmp_path / "page.html"
     good, bad, absent = (tmp_path / f"{name}{HOSTILE}\n.csv" for name in ("good", "bad", "absent"))
     shutil.copy(EXAMPLE, good)
     bad.write_text("time_s,rotation_rad\n1,high\n")
-    (tmp_path / "few.yaml").write_text(FEW)
-    options = ("--config", tmp_path / "few.yaml", "--model", "maxwell")
-    several = identify(good, bad, absent, *options, "--report", page)
+    options = ("--config", few, "--model", "maxwell")
+    several = identify(good, bad, good, absent, *options, "--report", page)
     alone = identify(good, *options)
     assert (several[0], alone[0]) == (1, 0)
     for _, said, error in (several, alone):
@@ -93,17 +92,15 @@ def test_progress_and_warnings_are_shown(
 
 @pytest.mark.parametrize("alone", [True, False])
 def test_a_commands_progress_is_no_output(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    alone: bool,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], alone: bool
 ) -> None:
     """A job's is: its log has what goes to standard error."""
     monkeypatch.setattr(terminal, "_EVERY_S", 0.0)
     with terminal.Progress("a", 1, live=alone) as told:
         told.done()
     shown = capsys.readouterr()
-    assert (shown.err if alone else shown.out) == "a: 1 of 1 done\n"
-    assert (shown.out if alone else shown.err) == ""
+    seen, empty = (shown.err, shown.out) if alone else (shown.out, shown.err)
+    assert (seen, empty) == ("a: 1 of 1 done\n", "")
 
 
 @pytest.mark.parametrize("command", ["identify", "groups", "design"])

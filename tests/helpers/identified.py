@@ -53,11 +53,9 @@ def by_quantity(found: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {item["quantity"]: item for item in found["quantities"]}
 
 
-def write_trace(
-    path: Path, times: Array, values: Array, header: str = "time_s,rotation_rad"
-) -> Path:
+def write_trace(path: Path, *columns: Array, header: str = "time_s,rotation_rad") -> Path:
     """Write a trace as CSV, and return its path."""
-    np.savetxt(path, np.c_[times, values], "%.9g", ",", header=header, comments="")
+    np.savetxt(path, np.column_stack(columns), "%.17g", ",", header=header, comments="")
     return path
 
 

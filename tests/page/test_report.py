@@ -205,7 +205,6 @@ def test_sliders_show_the_response_of_the_sample(
 
 
 def test_c_moves_against_c_p_and_nothing_is_seen(opened: Opened) -> None:
-    """While k moves the curve, and so does c_p alone."""
     page = opened.page
 
     def seen() -> tuple[dict[str, float], float, str]:
@@ -269,7 +268,6 @@ def test_summaries_are_whole_and_legible(browser: Any, tiny: Path) -> None:
 def test_a_study_of_one_s_own_has_a_page_without_the_paper(
     browser: Any, tiny: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With its title, what its trace determines, and fit and profiles unfolded."""
     monkeypatch.chdir(tiny)
     study, results = load_given_study(TINY, []).of(["mine"]), tiny / "results"
     names = ("errors_mine", "verdicts_mine", "models", "gene_ranges", "left_out")

@@ -102,22 +102,34 @@ def test_the_largest_reading_and_the_smoothed_one_are_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("unit", "factor", "hint"),
+    ("column", "factor", "found", "hint"),
     [
-        ("rad", 1e6, "1e-06 times (is it in urad?)."),
-        ("rad", 1e3, "0.001 times (is it in mrad?)."),
-        ("rad", 180 / np.pi, "0.001 times (is it in mrad?) or 0.01745 times (is it in deg?)."),
-        ("mrad", 1e-3, "1000 times (is it in rad?) or 17.45 times (is it in deg?)."),
-        ("mrad", 1e3, "0.001 times (is it in urad?)."),
-        ("urad", 1e-6, "1e+06 times (is it in rad?) or 1.745e+04 times (is it in deg?)."),
-        ("urad", 1e3, "0.001 times."),
+        ("rotation_rad", 1e6, "line ", "1e-06 times (is it in urad?)."),
+        (
+            *("rotation_rad", 180 / np.pi, "line "),
+            "0.001 times (is it in mrad?) or 0.01745 times (is it in deg?).",
+        ),
+        ("rotation_mrad", 1e-3, "line ", "1000 times (is it in rad?) or 17.45 times (is it in d"),
+        ("rotation_mrad", 1e3, "line ", "0.001 times (is it in urad?)."),
+        ("rotation_urad", 1e3, "line ", "0.001 times."),
+        ("time_s", 1e3, "line 3, column 'time_s': found 1000 s", "0.001 times (is it in ms?)."),
+        ("time_ms", 1e-3, "lines 2 to 402, column 'time_ms': found only 0 to 0.4 s", "1000 times"),
+        ("time_s", 1 / 60, "lines 2 to 402, column 'time_s': found only 0 to 6.66667 s", "60 ti"),
+        ("time_min", 60.0, "line 9, column 'time_min': found 420 s", "0.01667 times (is it in s?)"),
     ],
 )
-def test_the_unit_that_would_fit_is_named(unit: str, factor: float, hint: str) -> None:
-    values = factor * trace(SAMPLES["liquid_drop_1"])
-    found = said(TIMES, values, Columns("time_s", f"rotation_{unit}"))
-    assert f"column 'rotation_{unit}'" in found
-    assert found.endswith(f"It would fit if it were {hint}")
+def test_the_unit_that_would_fit_is_named(
+    column: str, factor: float, found: str, hint: str
+) -> None:
+    values = trace(SAMPLES["liquid_drop_1"])
+    if column.startswith("time"):
+        text = said(factor * TIMES, values, Columns(column, "rotation_rad"))
+        assert "400 s" in text
+    else:
+        text = said(TIMES, factor * values, Columns("time_s", column))
+    assert text.startswith(f"trace.csv, {found}")
+    assert f"column '{column}'" in text
+    assert f"It would fit if it were {hint}" in text
 
 
 def test_a_stiff_sample_passes_if_its_rotation_is_far_above_a_given_noise() -> None:
@@ -131,16 +143,6 @@ def test_a_stiff_sample_passes_if_its_rotation_is_far_above_a_given_noise() -> N
     assert said(TIMES, trace(SAMPLES["liquid_drop_1"]), noise_sd=1e-6) == ""
 
 
-@pytest.mark.parametrize("rate_Hz", [10.0, 0.1])
-@pytest.mark.parametrize("sigma_rad", [1e-9, 1e-4, 1.0])
-def test_mere_noise_is_refused(rate_Hz: float, sigma_rad: float) -> None:
-    times = sample_times(400.0, rate_Hz)
-    where = f"trace.csv, lines 2 to {len(times) + 1}, column 'rotation_rad': {NO_RESPONSE}"
-    for seed in range(20):
-        values = sigma_rad * np.random.default_rng([5, seed]).standard_normal(len(times))
-        assert said(times, values).startswith(where)
-
-
 @pytest.mark.parametrize(("explained", "responds"), [(7.9, False), (8.2, True)])
 def test_a_response_explains_more_than_noise_would(explained: float, responds: bool) -> None:
     """Ten readings, three unknowns: F(3, 7) at 99.9 % is 18.77, times 3 / 7 of the rest."""
@@ -148,15 +150,20 @@ def test_a_response_explains_more_than_noise_would(explained: float, responds: b
     assert _responds(trace, np.zeros((0, 10)), 1.0, 3, 7) == responds
 
 
-@pytest.mark.parametrize("value", [0.0, 1e-3, -1e-3, 5.0])
-@pytest.mark.parametrize("sigma", [0.0, 0.03])
-def test_a_constant_is_no_response(value: float, sigma: float) -> None:
-    values = value * (1 + sigma * np.random.default_rng(1).standard_normal(len(TIMES)))
-    text = said(TIMES, values)
-    found = re.search(NO_RESPONSE + r", but (\S+) rad throughout, give or take (\S+) rad", text)
-    assert found is not None
-    assert float(found[1]) == pytest.approx(value, rel=0.01)
-    assert float(found[2]) == pytest.approx(abs(sigma * value), rel=0.15)
+@pytest.mark.parametrize("rate_Hz", [10.0, 0.1])
+@pytest.mark.parametrize("mean", [0.0, 1e-3, -1e-3, 5.0])
+@pytest.mark.parametrize("sd", [0.0, 1e-9, 1e-4, 1.0])
+def test_noise_about_a_constant_is_no_response(rate_Hz: float, mean: float, sd: float) -> None:
+    times = sample_times(400.0, rate_Hz)
+    where = f"trace.csv, lines 2 to {len(times) + 1}, column 'rotation_rad': {NO_RESPONSE}"
+    for seed in range(20):
+        values = mean + sd * np.random.default_rng([5, seed]).standard_normal(len(times))
+        text = said(times, values)
+        assert text.startswith(where)
+        found = re.search(r", but (\S+) rad throughout, give or take (\S+) rad", text)
+        assert found is not None
+        told = [float(number) for number in found.groups()]
+        assert told == pytest.approx([values.mean(), values.std()], rel=0.05)
 
 
 def test_an_offset_is_no_response_no_hindrance_and_no_wrong_sign() -> None:
@@ -197,25 +204,6 @@ def test_the_free_rotation_is_that_of_the_left_arm() -> None:
     ):
         found = free_rotation(UNEQUAL, join_phases(phases))
         assert found == pytest.approx(largest, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("unit", "factor", "found", "hint"),
-    [
-        ("s", 1e3, "line 3, column 'time_s': found 1000 s", "0.001 times (is it in ms?)."),
-        ("ms", 1e-3, "lines 2 to 402, column 'time_ms': found only 0 to 0.4 s", "1000 times (is"),
-        ("s", 1 / 60, "lines 2 to 402, column 'time_s': found only 0 to 6.66667 s", "60 times (is"),
-        ("s", 1 / 3600, "lines 2 to 402, column 'time_s': found only 0 to 0.111111", "3600 times"),
-        ("min", 60.0, "line 9, column 'time_min': found 420 s", "0.01667 times (is it in s?)."),
-        ("ms", 1e3, "line 3, column 'time_ms': found 1000 s", "0.001 times (is"),
-    ],
-)
-def test_times_in_a_wrong_unit_are_refused(unit: str, factor: float, found: str, hint: str) -> None:
-    values = trace(SAMPLES["liquid_drop_1"])
-    text = said(factor * TIMES, values, Columns(f"time_{unit}", "rotation_rad"))
-    assert text.startswith(f"trace.csv, {found}")
-    assert "400 s" in text
-    assert f"It would fit if it were {hint}" in text
 
 
 @pytest.mark.parametrize(
@@ -263,10 +251,8 @@ def test_the_sign_of_a_trace_is_told(protocol: str) -> None:
     torque, rng = join_phases(PULLING[protocol]), np.random.default_rng(10)
     mirrored = missed = passed = 0
     for trial in range(40):
-        model, gripper = (
-            list(MODELS.values())[trial % len(MODELS)],
-            (GRIPPER, UNEQUAL)[trial // 2 % 2],
-        )
+        model = [*MODELS.values()][trial % len(MODELS)]
+        gripper = (GRIPPER, UNEQUAL)[trial // 2 % 2]
         powers = rng.uniform(-2, 2.5, len(model.names))
         exponents = np.array([parameter.kind == "exponent" for parameter in model.parameters])
         network = model.network(np.where(exponents, (powers + 2.1) / 4.7, 10**powers))

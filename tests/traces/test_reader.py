@@ -121,29 +121,22 @@ def encoded(text: str, encoding: str) -> bytes:
     return mark + text.encode(encoding)
 
 
+SIGNS = [(",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ",")]
+LINE_ENDS = ["\n", "\r\n", "\r"]
+MORE = ["", "  ", "# 1,2", "#REF!", " #x", "##;1"]
+
+
 @settings(max_examples=60, deadline=None)
-@given(
-    values=st.lists(st.floats(-1e300, 1e300), min_size=10, max_size=20),
-    signs=st.sampled_from([(",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ",")]),
-    line_end=st.sampled_from(["\n", "\r\n", "\r"]),
-    encoding=st.sampled_from([*ENCODINGS]),
-    quoting=st.sampled_from([csv.QUOTE_ALL, csv.QUOTE_MINIMAL, csv.QUOTE_NONNUMERIC]),
-    more=st.lists(st.sampled_from(["", "  ", "# 1,2", "#REF!", " #x", "##;1"]), max_size=3),
-    seed=st.integers(0, 1000),
-)
+@given(st.data())
 def test_what_pandas_writes_is_read_to_the_last_bit(
-    tmp_path_factory: pytest.TempPathFactory,
-    values: list[float],
-    signs: tuple[str, str],
-    line_end: str,
-    encoding: str,
-    quoting: Any,
-    more: list[str],
-    seed: int,
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     """With gaps, other columns, comments and empty lines between the rows."""
-    separator, decimal = signs
-    rng = np.random.default_rng(seed)
+    values = data.draw(st.lists(st.floats(-1e300, 1e300), min_size=10, max_size=20))
+    separator, decimal = data.draw(st.sampled_from(SIGNS))
+    line_end, encoding = data.draw(st.tuples(*map(st.sampled_from, (LINE_ENDS, [*ENCODINGS]))))
+    quoting = data.draw(st.sampled_from([csv.QUOTE_ALL, csv.QUOTE_MINIMAL, csv.QUOTE_NONNUMERIC]))
+    rng = np.random.default_rng(data.draw(st.integers(0, 1000)))
     times = np.cumsum(rng.uniform(1e-3, 10, len(values)))
     frame = pd.DataFrame({"angle, left (µrad)": values, "time_s": times})
     holes = rng.choice(len(values) + 1, 2)
@@ -152,7 +145,7 @@ def test_what_pandas_writes_is_read_to_the_last_bit(
     path = tmp_path_factory.mktemp("t") / "t.csv"
     form = {"sep": separator, "decimal": decimal, "quoting": quoting}
     lines = frame.to_csv(index=False, na_rep="NA", lineterminator="\n", **form).splitlines()
-    for line in more:
+    for line in data.draw(st.lists(st.sampled_from(MORE), max_size=3)):
         lines.insert(int(rng.integers(len(lines) + 1)), line)
     path.write_bytes(encoded("".join(line + line_end for line in lines), encoding))
     found = read_recording(path, Columns("time_s", "angle, left (urad)"))
@@ -210,12 +203,10 @@ def test_a_unit_is_read_off_a_name_or_a_row_of_units_or_stated(
     ("column", "given", "below", "message"),
     [
         ("x_s", None, "", "found no unit, neither stated (by HOW) nor"),
-        ("phi_left", None, "", "found no unit"),
         ("phi (mrad) left", None, "", "found no unit"),
         ("phi (rad/s)", None, "", "found the unit 'rad/s' at the end of the name; allowed"),
         ("phi / mm", None, "", "found the unit 'mm' at the end of the name; allowed are rad, mrad"),
         ("phi_Mrad", None, "", "found no unit"),
-        ("phi", None, "[V]", "found no unit (but '[V]' below it)"),
         ("phi", None, "m", "found no unit (but 'm' below it)"),
         ("phi", "V", "", "found the unit 'V', allowed are rad, mrad, urad, deg."),
         ("phi_mrad", "urad", "", "found the unit 'urad' where the name says 'mrad', allowed is"),
@@ -283,7 +274,7 @@ def test_readings_of_equal_times_are_averaged(tmp_path: Path, sd: dict[str, str]
         np.testing.assert_allclose(found.sd, of_means, rtol=1e-13)
 
 
-@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("newline", LINE_ENDS)
 def test_a_byte_that_is_no_text_is_placed_however_late_it_is(tmp_path: Path, newline: str) -> None:
     """The byte 0x81 is no character of Windows-1252; UTF-16 has no half of a pair."""
     path = tmp_path / "t.csv"
@@ -350,7 +341,6 @@ def test_a_damaged_file_is_refused_or_leaves_a_trace(kept: dict[str, Any], tmp_p
 
 # Separator, time and reading of row i, and the numbers that they are; None is refused.
 MARKED = [
-    (";", "{i},0", "{i}.857", lambda i: (i, 1000 * i + 857)),
     (";", "{i},5", "{i}.857.123,25", lambda i: (i + 0.5, 1e6 * i + 857123.25)),
     ("\t", "{i}.0", "{i},857", lambda i: (i, 1000 * i + 857)),
     (",", "{i}.0", '"{i},857"', lambda i: (i, 1000 * i + 857)),
@@ -358,7 +348,6 @@ MARKED = [
     (";", "{i}", "{i}'857.5", lambda i: (i, 1000 * i + 857.5)),
     (";", "{i}", "{i}\u00a0857,5", lambda i: (i, 1000 * i + 857.5)),
     (";", "0,{i}5", "{i},857", lambda i: (float(f"0.{i}5"), i + 0.857)),
-    (",", "{i}", "{i}.857", lambda i: (i, i + 0.857)),
     (";", "{i}.500", "{i},857", None),
     (";", "{i}.5", "{i},85", None),
     (",", "00:01:{i}.5", "{i}", lambda i: (60.5 + i, i)),

@@ -36,7 +36,6 @@ def test_every_kind_of_case_is_made(tmp_path: Path, made: list[str]) -> None:
 
 
 def test_a_study_writes_in_its_folder_alone(tmp_path: Path) -> None:
-    """Run from another folder, with a config that lies there."""
     mine, here = tmp_path / "mine", tmp_path / "here"
     here.mkdir()
     (here / "my.yaml").write_text(yaml.safe_dump(CONFIG))
@@ -48,7 +47,6 @@ def test_a_study_writes_in_its_folder_alone(tmp_path: Path) -> None:
 
 
 def test_a_wrong_config_stops_with_one_message(tmp_path: Path) -> None:
-    """Of a file, and of the command line."""
     wrong = {"seedz": 3, "methods": ["gentic"]}
     run = snakemake(tmp_path, "-n", "--config", "onyl=x", "seeds=0", config=wrong)
     assert run.status == 1

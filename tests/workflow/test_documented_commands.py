@@ -125,7 +125,6 @@ def test_what_the_readme_types_runs(place: Path) -> None:
 
 
 def _typed(command: list[str]) -> list[str]:
-    """Return a command such that a run is small."""
     program, *arguments = command
     if program == "snakemake" and "--snakefile" not in arguments:
         files = (

@@ -21,7 +21,6 @@ _REMOVED = ("identifications", "histories")
 
 
 def started(folder: Path) -> "subprocess.Popen[bytes]":
-    """Start a run of Snakemake, and do not wait for it."""
     for stage in _REMOVED:
         shutil.rmtree(folder / "results" / stage / "liquid_drop_2")
     for file in (ERRORS, "results/identifications/liquid_drop_2.csv"):

@@ -25,7 +25,6 @@ module biogrip:
 
 
 def host(folder: Path, text: str, *arguments: str) -> Run:
-    """Run a Snakefile of the host's in a folder."""
     (folder / "Snakefile").write_text(text)
     return called(folder, "-j2", "--workflow-profile", "none", *arguments)
 

@@ -48,10 +48,6 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         | {"case_tables": 1, "case_figures": 1}
         | STUDY,
     ),
-    "a title": (
-        {"cases": {"mine": {"title": "Mine"}}},
-        {"case_tables": 1, "recorded_case_figures": 1} | STUDY,
-    ),
     "what is read of a recorded trace": (
         {"cases": {"mine": {"measurement": {"until_s": 300.0}}}},
         {"recording": 1, "identification": 2, "model_fits": 1, "recorded_judgement": 1}
@@ -85,27 +81,20 @@ def test_a_dry_run_says_which_setting_changed_from_what_to_what(tiny: Path) -> N
         assert re.search(rf"{when}: {{[^:]*{evaluation}", told.output)
 
 
-def test_an_edited_trace_is_read_again(tiny_copy: Path) -> None:
-    with (tiny_copy / "mine.csv").open("a") as trace:
-        trace.write("400.5,1e-3\n")
+def test_an_edited_or_older_trace_in_the_place_of_another_is_read(tiny_copy: Path) -> None:
+    """As by `mv`, `cp -p`, or an archive: the date alone says that nothing has changed."""
+    trace = tiny_copy / "mine.csv"
+    first, *lines = trace.read_text().splitlines(keepends=True)
+    trace.write_text("".join([first, *lines, "400.5,1e-3\n"]))
     again = {"recording": 1, "identification": 2, "recorded_judgement": 1, "case_tables": 1}
     assert planned(tiny_copy, "results/identifications/mine.csv", config=TINY) == again
-
-
-def test_an_older_trace_in_the_place_of_another_is_read(tiny_copy: Path) -> None:
-    """As by `mv`, `cp -p`, or an archive: the date alone says that nothing has changed."""
-    trace, other = tiny_copy / "mine.csv", tiny_copy / "other.csv"
-    first, *lines = trace.read_text().splitlines(keepends=True)
-    other.write_text("".join([first, *lines[::2]]))
-    os.utime(other, (1.5e9, 1.5e9))
-    other.rename(trace)
-    told = dry_run(tiny_copy, "--", "results/measurements/mine/seeds_0-0.npz", config=TINY)
-    assert told.jobs == {"recording": 1}
-    assert re.search(r"before: \{'recorded': '\w+'\} now: \{'recorded': '\w+'\}", told.output)
-    # One with an earlier date and the same readings is the same trace.
-    trace.write_text("".join([first, *lines]))
-    os.utime(trace, (1.5e9, 1.5e9))
-    assert planned(tiny_copy, config=TINY) == {}
+    for kept, jobs in ((lines[::2], {"recording": 1}), (lines, {})):
+        trace.write_text("".join([first, *kept]))
+        os.utime(trace, (1.5e9, 1.5e9))
+        told = dry_run(tiny_copy, "--", "results/measurements/mine/seeds_0-0.npz", config=TINY)
+        assert told.jobs == jobs
+        said = re.search(r"before: \{'recorded': '\w+'\} now: \{'recorded': '\w+'\}", told.output)
+        assert bool(said) == bool(jobs)
 
 
 def test_an_edit_of_the_library_runs_everything_again_and_is_named(
