@@ -23,7 +23,7 @@ from scipy.special import ndtri, stdtr, stdtrit
 
 from biogrip.arrays import Array
 from biogrip.judging.doubts import OK
-from biogrip.judging.verdicts import DETERMINED, FIT_REJECTED
+from biogrip.judging.verdicts import BOUNDED_BELOW, DETERMINED, FIT_REJECTED
 
 FEWEST_CELLS, FEWEST_UNITS = 3, 2
 """Fewest cells of which a mean is estimated, and fewest units of which its limits are."""
@@ -222,8 +222,10 @@ def gather(traces: Sequence[Told], by: str, unit: str | None, confidence: float)
                 weights = (width / np.maximum(highs - lows, _LEAST_WIDTH)) ** 2
                 mean = float(np.average(values, weights=weights))
                 cell.known[name] = mean, float(weights.sum()) ** -0.5
-            elif told[0][0]:
-                cell.others[name] = told[0][0], told[0][2] or told[0][3]
+                continue
+            verdict, _, low, high = told[0]
+            if verdict:
+                cell.others[name] = verdict, low if verdict == BOUNDED_BELOW else high
     return [*cells.values()]
 
 
