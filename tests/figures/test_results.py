@@ -126,9 +126,7 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     history["method"] = np.repeat(["genetic", "least_squares"], 2 * seeds)
     write_arrays(tmp_path / "history.npz", history)
     study = seen(
-        shown_method=METHODS["genetic"],
-        near_noise_tolerance=0.02,
-        config=seen(methods=["genetic"]),
+        shown_method=METHODS["genetic"], near_noise_tolerance=0.02, config=seen(methods=["genetic"])
     )
     block = seen(genetic_algorithm=seen(mutation_start=20))
     known = {"name": "x", "seeds": seeds, "sample": Sample(MODEL.name)}

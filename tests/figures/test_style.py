@@ -8,14 +8,7 @@ import pytest
 from matplotlib.lines import Line2D
 
 from biogrip.figures.fit import scale_of
-from biogrip.figures.style import (
-    figure,
-    line_of,
-    literal,
-    points_within,
-    save,
-    styled,
-)
+from biogrip.figures.style import figure, line_of, literal, points_within, save, styled
 from biogrip.fit.problem import METHODS
 from tests.helpers.default import STUDY
 from workflow.paper.gripper import draw_torque

@@ -24,15 +24,7 @@ from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.physics.models import CANDIDATES, MODELS, contained
 from biogrip.physics.response import step_response, superpose
 from tests.helpers.default import seen, study_of
-from tests.helpers.problems import (
-    GRIPPER,
-    MODEL,
-    SAMPLES,
-    TORQUE,
-    clean,
-    pose_noisy,
-    posed_for,
-)
+from tests.helpers.problems import GRIPPER, MODEL, SAMPLES, TORQUE, clean, pose_noisy, posed_for
 
 TRIED = (*MODELS, "generalized_maxwell_2")
 LADDERS = [name for name in TRIED if not CANDIDATES[name].model.power_law]

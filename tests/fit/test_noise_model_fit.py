@@ -22,11 +22,7 @@ DIRECTIONS = np.stack((np.ones(200), TIMES, np.exp(-TIMES / 40)))
 
 
 def restricted(
-    time_s: Array,
-    rows: Array,
-    left: Array,
-    noise_model: NoiseModel,
-    growing: Array | None = None,
+    time_s: Array, rows: Array, left: Array, noise_model: NoiseModel, growing: Array | None = None
 ) -> float:
     """Minus twice the restricted likelihood, the scale profiled out, from dense matrices."""
     matrix = correlation(time_s, noise_model, growing)

@@ -158,10 +158,7 @@ def snakemake(
 
 
 def dry_run(
-    folder: Path,
-    *arguments: str,
-    config: dict[str, Any],
-    snakefile: Path = ROOT / "Snakefile",
+    folder: Path, *arguments: str, config: dict[str, Any], snakefile: Path = ROOT / "Snakefile"
 ) -> Run:
     """Ask Snakemake what it would run."""
     # Other workers ask in the same folder.

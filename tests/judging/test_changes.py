@@ -46,10 +46,7 @@ def test_of_white_noise_both_tests_fail_as_many_as_their_level_says(
     assert np.mean(alarms, axis=1) == pytest.approx(LEVEL, abs=0.011)
 
 
-@pytest.mark.parametrize(
-    ("change", "least"),
-    [("jump", 0.58), ("gain", 0.94), ("start", 0.81)],
-)
+@pytest.mark.parametrize(("change", "least"), [("jump", 0.58), ("gain", 0.94), ("start", 0.81)])
 def test_steps_are_told_and_timed(change: str, least: float) -> None:
     """A scan tells 65, 97 and 88 %: of 200 traces no less than three standard errors below."""
     times = np.arange(1, 101.0)

@@ -25,9 +25,7 @@ CLEAN = simulate(EXPERIMENT, SAMPLE, TIMES)
 
 
 def diagnosed(
-    readings: Array,
-    experiment: Experiment = EXPERIMENT,
-    sample: Mapping[str, float] = SAMPLE,
+    readings: Array, experiment: Experiment = EXPERIMENT, sample: Mapping[str, float] = SAMPLE
 ) -> Diagnosis:
     problem = experiment.of(TIMES, readings)
     found = identify_from(problem, experiment.logs(sample))

@@ -10,11 +10,7 @@ import pytest
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.likelihood import Likelihood, bound, covariance
 from biogrip.judging.profiles import _increases, compute_valley
-from biogrip.judging.quantities import (
-    characteristic_times,
-    find_combinations,
-    parameters_and_sum,
-)
+from biogrip.judging.quantities import characteristic_times, find_combinations, parameters_and_sum
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.models import CANDIDATES, MODELS, Sample
 from biogrip.physics.response import step_response, superpose

@@ -11,13 +11,7 @@ from scipy.stats import chi2
 from biogrip.arrays import Array
 from biogrip.fit import any_sample
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
-from biogrip.judging.without_model import (
-    LEVEL,
-    Told,
-    WithoutModel,
-    decades,
-    tell_without_model,
-)
+from biogrip.judging.without_model import LEVEL, Told, WithoutModel, decades, tell_without_model
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.instruments import INSTRUMENTS

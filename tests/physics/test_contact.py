@@ -5,14 +5,7 @@ import pytest
 from mpmath import mp, mpf
 
 from biogrip.errors import BiogripError
-from biogrip.physics.gripper import (
-    CombDrive,
-    Gripper,
-    capacitance_slope,
-    contact,
-    torque,
-    voltage,
-)
+from biogrip.physics.gripper import CombDrive, Gripper, capacitance_slope, contact, torque, voltage
 from biogrip.physics.models import MODELS
 from biogrip.physics.response import step_response
 from workflow.paper.mechanics import (

@@ -110,8 +110,7 @@ def notes_of(model: str, time_s: Array, level: float, truth: dict[str, float]) -
 
 
 @pytest.mark.parametrize(
-    "model",
-    ["zener_kelvin", pytest.param("generalized_maxwell", marks=pytest.mark.nightly)],
+    "model", ["zener_kelvin", pytest.param("generalized_maxwell", marks=pytest.mark.nightly)]
 )
 def test_who_samples_fast_is_told_to_leave_out_the_first_milliseconds(model: str) -> None:
     """Without these readings nothing is said any more."""

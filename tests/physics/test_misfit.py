@@ -20,11 +20,7 @@ PROTOCOLS = {
 
 
 def direct(
-    gripper: Gripper,
-    steps: Course,
-    time_s: np.ndarray,
-    trace: np.ndarray,
-    samples: np.ndarray,
+    gripper: Gripper, steps: Course, time_s: np.ndarray, trace: np.ndarray, samples: np.ndarray
 ) -> np.ndarray:
     """Form every response, subtract, square, average."""
     response = step_response(gripper, MODEL.network(samples), inertia=False)

@@ -12,18 +12,8 @@ from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, displacement_of_tip, rotation_of_tip
 from biogrip.physics.models import damper, generalized_maxwell, kelvin_voigt, maxwell
 from biogrip.physics.nonlinear import correction, nonlinear_rotation
-from biogrip.physics.protocol import (
-    Course,
-    Phase,
-    evaluate,
-    hold,
-    join_phases,
-)
-from biogrip.physics.response import (
-    linear_jaw_force,
-    step_response,
-    superpose,
-)
+from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
+from biogrip.physics.response import linear_jaw_force, step_response, superpose
 from biogrip.physics.simulation import compute_grip, jaw_force
 from tests.helpers.radau import TOLERANCE, equal_arms, tip
 from tests.helpers.responses import random_samples

@@ -8,12 +8,7 @@ import pytest
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS, generalized_maxwell
 from biogrip.physics.protocol import Course, hold, join_phases
-from biogrip.physics.response import (
-    LEFT,
-    RIGHT,
-    step_response,
-    superpose,
-)
+from biogrip.physics.response import LEFT, RIGHT, step_response, superpose
 from biogrip.physics.sample_model import Network
 from tests.helpers.laplace import drawn, rotations, series
 

@@ -15,11 +15,7 @@ from biogrip.physics.protocol import Course, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel, with_fixed
-from tests.helpers.responses import (
-    MODEL_PARAMETERS,
-    PROTOCOLS,
-    random_samples,
-)
+from tests.helpers.responses import MODEL_PARAMETERS, PROTOCOLS, random_samples
 
 TIMES = np.array([0.1, 1.0, 7.5, 60.0, 199.0, 200.1, 201.0, 230.0, 399.0])
 

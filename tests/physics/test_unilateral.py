@@ -16,13 +16,7 @@ from biogrip.physics.models import (
     liquid_drop,
     maxwell,
 )
-from biogrip.physics.protocol import (
-    Course,
-    Phase,
-    evaluate,
-    hold,
-    join_phases,
-)
+from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.simulation import jaw_force
 from biogrip.physics.unilateral import UnilateralResponse, _Forcing, unilateral_response

@@ -7,13 +7,7 @@ import pytest
 
 from biogrip.command.outputs import COLUMNS, join_tables
 from biogrip.errors import BiogripError
-from biogrip.records.rows import (
-    as_it_was,
-    escape_formula,
-    read_frame,
-    read_rows,
-    write_rows,
-)
+from biogrip.records.rows import as_it_was, escape_formula, read_frame, read_rows, write_rows
 
 FORMULAS = ("=1+1", "+1+1", "-1+1", "@SUM(A1)", "\t=1", "\r=1", "-x", "=", "'=1", "''=1", "+")
 PLAIN = ("-1", "+2.5", "-1e-05", "-inf", "-", "a=b", "'a", "", "1.5", "it's", "NaN-1")
