@@ -1,11 +1,13 @@
 """A few times stand for all: the same sums of squares, gradients and information."""
 
+import functools
+
 import numpy as np
 import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.gripper import Gripper
+from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import join_phases
@@ -40,9 +42,9 @@ def assert_alike(residuals: Residuals, x: Array) -> int:
     return len(few[0])
 
 
-def posed(gripper: Gripper, model: SampleModel, condensed: Condensed, trace: Array) -> Residuals:
-    torque, time_s = condensed.course, condensed.all_s
-    return Residuals(gripper, model, torque, Trace(time_s, trace, condensed), instrument=GRIPPER)
+def posed(gripper: Gripper, model: SampleModel, rows: Condensed, trace: Array) -> Residuals:
+    given = Trace(rows.all_s, trace, rows)
+    return Residuals(gripper, model, rows.course, given, instrument=GRIPPER)
 
 
 def noise(count: int) -> Array:
@@ -57,23 +59,33 @@ def test_least_squares_sees_no_difference(
 ) -> None:
     """To 1e-10 of the trace, over the whole search range; noise is at least 1e-3 of it."""
     torque, time_s = join_phases(PROTOCOLS[protocol]), TIMES[times]
-    condensed = condensed_of(torque, time_s, offset=nuisance, drift=nuisance)
+    rows = condensed_of(torque, time_s, offset=nuisance, drift=nuisance)
     for arms in (gripper, unequal_gripper):
-        residuals = posed(arms, MAXWELL, condensed, noise(len(time_s)))
+        residuals = posed(arms, MAXWELL, rows, noise(len(time_s)))
         for sample in random_samples(8, seed=8):
-            rows = assert_alike(residuals, np.log(sample))
-            assert rows <= min(80, len(time_s) + 1)
+            count = assert_alike(residuals, np.log(sample))
+            assert count <= min(80, len(time_s) + 1)
 
 
-@pytest.mark.parametrize("protocol", ["steps", "ramps and parabola"])
+@functools.cache
+def condensed(protocol: str, times: str, device: str) -> Condensed:
+    course = join_phases(PROTOCOLS[protocol], deforms=device == "relaxation")
+    return condensed_of(course, TIMES[times], offset=True)
+
+
+@pytest.mark.parametrize(
+    ("device", "times"), [("arms", "few"), ("creep", "uneven"), ("relaxation", "uneven")]
+)
+@pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize("name", MODEL_PARAMETERS)
-def test_of_no_model_it_sees_a_difference(gripper: Gripper, name: str, protocol: str) -> None:
+def test_of_no_model_it_sees_a_difference(
+    gripper: Gripper, name: str, protocol: str, device: str, times: str
+) -> None:
     """Rows without slopes are the same, too, but for last bits: they are real numbers."""
-    torque, time_s = join_phases(PROTOCOLS[protocol]), TIMES["few"]
-    condensed = condensed_of(torque, time_s, offset=True)
-    residuals = posed(gripper, MODELS[name], condensed, noise(len(time_s)))
+    arms, rows = gripper if device == "arms" else NO_ARMS, condensed(protocol, times, device)
+    residuals = posed(arms, MODELS[name], rows, noise(len(rows.all_s)))
     middle, rng = np.log(MODEL_PARAMETERS[name]), np.random.default_rng(5)
-    x = np.clip(middle + rng.normal(size=(4, len(middle))), *log_range(MODELS[name]))
+    x = np.clip(middle + rng.normal(size=(2, len(middle))), *log_range(MODELS[name]))
     for each in x:
         assert_alike(residuals, each)
     found = residuals.condensed_responses(x)[:, :1]
@@ -85,8 +97,8 @@ def test_of_no_model_it_sees_a_difference(gripper: Gripper, name: str, protocol:
 def test_rows_do_not_depend_on_who_else_is_there(either_gripper: Gripper, name: str) -> None:
     """Byte for byte, for any subset in any order, down to a single one."""
     model = MODELS.get(name, Sample("generalized_maxwell", 2).model)
-    condensed = condensed_of(join_phases(PROTOCOLS["steps"]), TIMES["few"], offset=True)
-    residuals = posed(either_gripper, model, condensed, np.zeros(len(TIMES["few"])))
+    rows = condensed_of(join_phases(PROTOCOLS["steps"]), TIMES["few"], offset=True)
+    residuals = posed(either_gripper, model, rows, np.zeros(len(TIMES["few"])))
     low, high = log_range(model)
     x = np.random.default_rng(3).uniform(low, high, (40, len(low)))
     together = residuals.condensed_responses(x)
@@ -100,6 +112,6 @@ def test_rows_do_not_depend_on_who_else_is_there(either_gripper: Gripper, name: 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_many_readings_are_worth_few_rows(gripper: Gripper, protocol: str, times: str) -> None:
     torque, time_s = join_phases(PROTOCOLS[protocol]), DENSE[times]
-    condensed = condensed_of(torque, time_s, offset=True)
-    residuals = posed(gripper, MAXWELL, condensed, noise(len(time_s)))
+    rows = condensed_of(torque, time_s, offset=True)
+    residuals = posed(gripper, MAXWELL, rows, noise(len(time_s)))
     assert assert_alike(residuals, CELL) < 200

@@ -1,26 +1,18 @@
 """Creep and relaxation without a gripper; networks with springpots against impedances by hand."""
 
-import functools
-
 import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.physics.condensed import Condensed
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S, on_clock
 from biogrip.physics.gripper import NO_ARMS
-from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS
-from biogrip.physics.modes import linear_responses
 from biogrip.physics.protocol import Course, Phase, hold, join_phases, ramp
-from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
 from biogrip.physics.simulation import simulated_response
 from tests.helpers.laplace import IMPEDANCES, Impedance, drawn, inverted
-from tests.physics.test_condensed import assert_alike
 
 DRIVEN = pytest.mark.parametrize("deforms", [False, True], ids=["creep", "relaxation"])
-EVERY_MODEL = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 
 
 # A ramp of finite rate, a hold, a parabola, a ramp down that ends with a jump, recovery.
@@ -69,56 +61,6 @@ def test_responses_to_ramps_and_parabolas_are_inverse_laplace_transforms(
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.max(np.abs(expected)))
 
 
-@DRIVEN
-@EVERY_MODEL
-def test_derivatives_are_those_of_finite_differences(model: SampleModel, deforms: bool) -> None:
-    history = join_phases(PHASES, deforms=deforms)
-    times, step = np.linspace(0.0, 7.4, 40), 1e-4
-    logs = np.log([model.example])
-
-    def rows(at: Array) -> Array:
-        return linear_responses(NO_ARMS, model, history, times, np.exp(at))[0]
-
-    found = rows(logs)
-    assert found[0] == pytest.approx(simulated(example(model), history, times), rel=1e-12)
-    for i, unit in enumerate(np.eye(logs.shape[1])):
-        up, down = rows(logs + step * unit)[0], rows(logs - step * unit)[0]
-        scale = np.max(np.abs(found[1 + i])) or 1.0
-        # The error of a central difference is of the second order in the step.
-        assert found[1 + i] == pytest.approx((up - down) / (2 * step), abs=1e-6 * scale)
-
-
-HELD = {"mixed": PHASES, "steps": (hold(5.0, 1.0), hold(2.5, 0.3))}
-READ_S = np.linspace(0.004, 7.5, 601)
-
-
-@functools.cache
-def condensed(held: str, deforms: bool) -> Condensed:
-    history = join_phases(HELD[held], deforms=deforms)
-    return Condensed(history, READ_S, np.zeros((0, len(READ_S))))
-
-
-@DRIVEN
-@pytest.mark.parametrize("held", HELD)
-@EVERY_MODEL
-def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
-    model: SampleModel, held: str, deforms: bool
-) -> None:
-    rows = condensed(held, deforms)
-    true = simulated(example(model), rows.course, READ_S)
-    noise = np.random.default_rng(5).standard_normal(len(READ_S))
-    given = Trace(READ_S, true + 0.01 * (np.ptp(true) or 1.0) * noise, rows)
-    residuals = Residuals(NO_ARMS, model, rows.course, given, instrument=GRIPPER)
-    # Exponents stay below one.
-    moved = [parameter.kind != "exponent" for parameter in model.parameters]
-    logs = np.log([model.example]) + np.array([[-0.3], [0.4]]) * moved
-    found = residuals.misfit(np.exp(logs))
-    expected = [np.sqrt(np.mean(residuals(at)[0] ** 2)) for at in logs]
-    assert found == pytest.approx(expected, rel=1e-10)
-    for at in logs:
-        assert_alike(residuals, at)
-
-
 def test_a_reading_at_the_instant_of_a_step_is_taken_before_it() -> None:
     network = example(MODELS["zener_maxwell"])
     history = join_phases((hold(1.0, 1.0), hold(1.0, 3.0)), deforms=True)
@@ -128,13 +70,9 @@ def test_a_reading_at_the_instant_of_a_step_is_taken_before_it() -> None:
     assert found[2] - found[1] == pytest.approx(2 * at_once)
 
 
-TIMES = np.geomspace(1e-3, 1e3, 13)
 # Sinusoids of periods up to the longest experiment, and steps at times between both ends.
 OMEGA = np.geomspace(2 * np.pi / LONGEST_S, 1 / SHORTEST_S, 60)
 POWER_LAWS = [name for name, model in MODELS.items() if model.power_law]
-EVERY_SAMPLE = pytest.mark.parametrize(
-    ("model", "seed"), [(model, seed) for model in POWER_LAWS for seed in range(2)]
-)
 
 
 def exponents_of(model: str) -> list[int]:
@@ -158,36 +96,16 @@ def modulus(network: Network) -> Array:
     return found
 
 
-@EVERY_SAMPLE
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("model", MODELS)
 def test_a_model_is_the_network_that_its_drawing_shows(model: str, seed: int) -> None:
     """Of elements in series or in parallel, none has an error above a springpot's, 3e-7."""
     sample = sample_of(model, seed)
     network = MODELS[model].network(sample)
-    np.testing.assert_allclose(modulus(network), IMPEDANCES[model](1j * OMEGA, *sample), rtol=3e-7)
+    rtol = 3e-7 if MODELS[model].power_law else 1e-11
+    np.testing.assert_allclose(modulus(network), IMPEDANCES[model](1j * OMEGA, *sample), rtol=rtol)
     assert np.all(network.k > 0)
     assert np.all(network.c > 0)
-
-
-@pytest.mark.parametrize("deforms", [False, True], ids=["creep", "relaxation"])
-@EVERY_SAMPLE
-def test_creep_and_relaxation_are_inverse_laplace_transforms(
-    model: str, seed: int, deforms: bool
-) -> None:
-    """After a step, whose impulse dampers take; to 1e-6 of it, or of what a springpot has alone."""
-    sample = sample_of(model, seed)
-    given, held = drawn(model, sample), join_phases((hold(2e3, 1.0),), deforms=deforms)
-    network = MODELS[model].network(sample)
-    found = simulated_response(NO_ARMS, network, held, TIMES, nonlinear=False)[0]
-    expected = np.array(
-        [inverted(lambda s: given(s) / s if deforms else 1 / (s * given(s)), t) for t in TIMES]
-    )
-    scale = expected
-    named = dict(zip(MODELS[model].names, sample, strict=True))
-    if deforms and "c" in named:
-        # Most of the springpot's modulus is taken away by a damper, but for its error.
-        alone = drawn("springpot", [named["k_alpha"], named["alpha"]])
-        scale = np.maximum(expected, [inverted(lambda s: alone(s) / s, t) for t in TIMES])
-    assert np.max(np.abs(found - expected) / scale) < 1e-6
 
 
 @pytest.mark.parametrize("model", POWER_LAWS)

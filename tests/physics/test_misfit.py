@@ -44,26 +44,6 @@ def test_agrees_with_forming_the_responses(name: str, gripper: Gripper) -> None:
     np.testing.assert_allclose(misfit(samples), expected, rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", PROTOCOLS)
-def test_projections_agree_with_direct_sums(name: str, gripper: Gripper) -> None:
-    """From modes that stand still to those that are over at once."""
-    phases, rate_Hz = PROTOCOLS[name]
-    steps = join_phases(phases)
-    count = len(sample_times(steps.end_s, rate_Hz))
-    trace = np.random.default_rng(5).standard_normal(count)
-    misfit = SeriesMisfit(gripper, MODEL, steps, 1 / rate_Hz, trace)
-    rates = -np.concatenate(([1e-300], np.geomspace(1e-9, 1e9, 500)))
-    found = misfit.projections(rates)
-    expected, scale = np.zeros((2, 1, len(rates)))
-    for start, height in zip(steps.time_s * rate_Hz, steps.changes[:, 0], strict=True):
-        first = round(start)
-        terms = np.exp(np.outer(rates, np.arange(first, count) - start)) * trace[first:]
-        expected += height * terms.sum(axis=1)
-        scale += np.abs(height) * np.abs(terms).sum(axis=1)
-    assert np.all(np.abs(found - expected) <= 1e-14 * scale)
-    np.testing.assert_allclose(misfit.exact_projections(rates), expected, atol=1e-14 * scale.max())
-
-
 @pytest.mark.parametrize(("level", "rtol"), [(1e-4, 1e-9), (0.0, 1e-8)])
 def test_a_constant_trace(level: float, rtol: float, gripper: Gripper, steps: Course) -> None:
     """Against zero the misfit is the response itself, in the slowest samples what is left of it.

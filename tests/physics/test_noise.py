@@ -7,7 +7,6 @@ from scipy.linalg import cholesky
 from scipy.signal import lfilter, periodogram
 
 from biogrip.arrays import Array
-from biogrip.physics.condensed import Condensed
 from biogrip.physics.noise import (
     AR1,
     KINDS,
@@ -27,9 +26,7 @@ from biogrip.physics.noise import (
     rms,
     stream,
 )
-from biogrip.physics.protocol import hold, join_phases, sample_times
-from tests.helpers.problems import EXPERIMENT, MODEL, SAMPLES, TORQUE
-from tests.physics.test_condensed import assert_alike
+from biogrip.physics.protocol import hold, join_phases
 
 CLEAN = np.concatenate((np.zeros(100_000), np.full(100_000, 2.0)))
 
@@ -231,22 +228,6 @@ def test_nuisance_and_what_is_uncertain_are_parts_of_the_noise() -> None:
     white = whitening(rows)
     np.testing.assert_allclose(white @ white.T, expected, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(whitening(nuisance), 0, atol=1e-12)
-
-
-@pytest.mark.parametrize("rate_Hz", [1.0, 10.0])
-def test_few_rows_stand_for_all_whitened_samples(rate_Hz: float) -> None:
-    """To 1e-10 of the trace's, as without a colour (test_condensed.py)."""
-    time_s = sample_times(400.0, rate_Hz)
-    nuisance = nuisance_basis(time_s, offset=True, drift=True)
-    whitening = Whitening(time_s, COLOURS[0], nuisance)
-    condensed = Condensed(TORQUE, time_s, nuisance, whitening=whitening)
-    trace = np.random.default_rng(6).standard_normal(len(time_s))
-    residuals = EXPERIMENT.of(time_s, trace, MODEL, condensed=condensed).residuals
-    sample = SAMPLES["endothelial_cell"]
-    x = np.log([sample[name] for name in MODEL.names])
-    white = whitening(residuals.response(x) - trace)
-    np.testing.assert_allclose(residuals(x)[0], white, atol=1e-12)
-    assert_alike(residuals, x)
 
 
 def test_a_drift_is_flow_only_under_a_constant_torque() -> None:

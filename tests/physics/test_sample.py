@@ -17,7 +17,7 @@ from biogrip.physics.models import (
 from biogrip.physics.protocol import Course, hold, join_phases
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import complex_modulus, with_fixed
-from tests.helpers.laplace import IMPEDANCES, series
+from tests.helpers.laplace import series
 
 TIMES = np.linspace(0.1, 400, 300)
 
@@ -37,16 +37,6 @@ def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
         # The branch relaxes within c/k = 1e-6 s, and the arms' inertia lags as little.
         ours = superpose(response, steps, TIMES)[0]
         np.testing.assert_allclose(ours, expected, atol=1e-6 * expected.max())
-
-
-@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if not model.power_law])
-def test_storage_and_loss_modulus_are_those_of_the_drawing(name: str) -> None:
-    """Over ten decades; those with springpots are in test_creep_and_relaxation.py."""
-    rng, omega = np.random.default_rng(1), np.geomspace(1e-5, 1e5, 21)
-    values = 10 ** rng.uniform(-3, 3, (50, len(MODELS[name].parameters)))
-    storage, loss = complex_modulus(MODELS[name].network(values), omega)
-    expected = [IMPEDANCES[name](1j * omega, *own) for own in values]
-    np.testing.assert_allclose(storage + 1j * loss, expected, rtol=1e-11)
 
 
 def test_more_branches_add_up() -> None:
