@@ -5,9 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array
 from biogrip.fit.problem import Fit, TraceProblem, identifier, silent
+from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.models import MODELS
@@ -24,11 +26,18 @@ EXPERIMENT = STUDY.cases["liquid_drop_2"].experiment
 GRIPPER, TORQUE = EXPERIMENT.gripper, EXPERIMENT.torque
 
 
+def rotation(
+    model: SampleModel, parameters: ArrayLike, times: Array, *, inertia: bool = True
+) -> Array:
+    """Of the study's gripper under its protocol, with one sample."""
+    network = model.network(np.atleast_2d(parameters))
+    return superpose(step_response(GRIPPER, network, inertia=inertia), TORQUE, times)[0]
+
+
 @functools.cache
 def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
     times = sample_times(400.0, rate_Hz)
-    network = MODEL.network([[SAMPLES[case][name] for name in MODEL.names]])
-    return times, superpose(step_response(GRIPPER, network), TORQUE, times)[0]
+    return times, rotation(MODEL, [SAMPLES[case][name] for name in MODEL.names], times)
 
 
 def posed_for(model: SampleModel, times: Array, trace: Array, **assumed: Any) -> TraceProblem:
@@ -68,6 +77,10 @@ def likelihood_of(posed: TraceProblem, seed: int = 0) -> Likelihood:
     """What is judged of a trace: its best fit by least squares."""
     found = run("least_squares", posed, seed)
     return make_likelihood(posed, np.log(found.parameters), found.misfit, confidence=0.95)
+
+
+def diagnosis_of(posed: TraceProblem, model: SampleModel, **known: Any) -> Diagnosis:
+    return diagnose(posed, model, run("least_squares", posed), confidence=0.95, **known)
 
 
 def condensed_of(

@@ -110,6 +110,8 @@ def without_stated_noise(noisy: Array) -> TraceResult:
         ),
         (0.85, HARMLESS, "is 1.18 times the noise that was given: limits are too narrow"),
         (1.0, "", ""),
+        (1.5, "", ""),
+        (2.5, DOUBT, "The noise that was given is 2.5 times what the fit leaves"),
         (1e5, DOUBT, "The noise that was given is 100000 times"),
     ],
 )

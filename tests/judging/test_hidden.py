@@ -111,13 +111,3 @@ def test_a_sample_in_kelvins_form_has_a_second_branch_as_in_maxwells() -> None:
         for own in (JUDGED, other)
     )
     assert words == same
-
-
-def test_less_noise_hides_less() -> None:
-    quiet = diagnosed(CLEAN + (NOISY - CLEAN) / 10)
-    (loud_jump,), (quiet_jump,) = (
-        [each for each in own.hidden if each.words().startswith("A jump")]
-        for own in (JUDGED, quiet)
-    )
-    ratio = abs(loud_jump.moves["k_p"] / quiet_jump.moves["k_p"])
-    assert ratio == pytest.approx(10, rel=0.1)

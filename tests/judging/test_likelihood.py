@@ -5,17 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biogrip.judging.likelihood import (
-    Likelihood,
-    bounds_percent,
-    check_rows,
-    covariance,
-    make_likelihood,
-)
-from biogrip.library import Sample, hold, set_up, simulate
-from biogrip.physics.noise import Noise
+from biogrip.judging.likelihood import Likelihood, check_rows, covariance, make_likelihood
 from tests.helpers.default import seen
-from tests.helpers.problems import GRIPPER, likelihood_of, problem
+from tests.helpers.problems import likelihood_of, problem
 
 
 def likelihood_with(freedom: float) -> Likelihood:
@@ -64,21 +56,6 @@ def test_what_a_trace_without_noise_tells_may_outweigh_every_prior() -> None:
     likelihood = make_likelihood(*given, confidence=0.95, noise_sd=1.0)
     total = seen(gradient=lambda best: np.ones(2))
     assert likelihood.deviation(total) == pytest.approx(1e-12, rel=1e-6, abs=0)
-
-
-def test_bounds_are_those_of_numerical_derivatives() -> None:
-    times, truth = np.arange(1.0, 60.0), {"k_p": 6.0, "c_p": 30.0}
-    protocol = hold(20.0, 1e-9), hold(40.0, 0.4e-9)
-    experiment = set_up(GRIPPER, protocol, Sample("kelvin_voigt"))
-    above, below = (
-        np.array([simulate(experiment, truth | {name: by * truth[name]}, times) for name in truth])
-        for by in (np.exp(1e-4), np.exp(-1e-4))
-    )
-    rows = (above - below) / 2e-4
-    sd = 0.1 * simulate(experiment, truth, times).max()
-    expected = 100 * sd * np.sqrt(np.diag(np.linalg.inv(rows @ rows.T)))
-    found = bounds_percent(experiment, Noise("gaussian", 0.1, "peak"), truth, times)
-    assert [percent for _, percent in found] == pytest.approx(expected, rel=1e-5)
 
 
 def test_noise_that_grows_has_the_covariance_of_unweighted_fits() -> None:
