@@ -1,6 +1,7 @@
 """Deviations in proportion to what is read, of a trace whose sample has no model yet."""
 
 from dataclasses import replace
+from math import gamma
 from typing import Any
 
 import numpy as np
@@ -8,8 +9,12 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit.any_sample import fit_any_sample, proportional_deviations
+from biogrip.library import set_up
+from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.models import Sample
+from biogrip.physics.protocol import hold
 from tests.helpers.default import STUDY
-from tests.helpers.problems import clean
+from tests.helpers.problems import clean, run
 
 CLEAN_S, CLEAN = clean("endothelial_cell", 2.0)
 
@@ -66,3 +71,23 @@ def test_of_readings_against_the_load_nothing_is_fitted() -> None:
     left, basis = fit.left_of_readings()
     np.testing.assert_array_equal(left, -CLEAN)
     assert basis.shape == (0, len(CLEAN))
+
+
+def test_the_published_fit_comes_out_to_five_digits() -> None:
+    """That of polystyrene at 190 degC in pyRheo, with weights of 5 % of the compliance."""
+    v, beta, eta = 25856.7, 0.4223, 68281.1
+    times = np.geomspace(1.0, 1e4, 120)
+    compliance = times / eta + times**beta / (v * gamma(1 + beta))
+    creep = set_up(INSTRUMENTS["compliance"], (hold(1e4, 1.0),), Sample("fractional_maxwell"))
+    posed = creep.weighted(0.05 * compliance).of(times, compliance)
+    assert run("least_squares", posed).parameters == pytest.approx([v, beta, eta], rel=5e-6)
+
+
+def test_a_plateau_is_no_noise() -> None:
+    """A relaxation that ends at a plateau, of which deviations are a share as of all else."""
+    times = np.geomspace(1.0, 1e3, 100)
+    smooth = 800 + 700 * np.exp(-times / 20)
+    readings = smooth * (1 + 0.01 * np.random.default_rng(0).standard_normal(len(times)))
+    relaxation = set_up(INSTRUMENTS["modulus"], (hold(1e3, 1.0),), Sample("zener_maxwell"))
+    found = proportional_deviations(replace(relaxation, noise_share=0.01), times, readings)
+    assert found == pytest.approx(0.01 * smooth, rel=0.02)

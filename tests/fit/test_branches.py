@@ -9,10 +9,9 @@ from biogrip.fit.problem import METHODS, Fit, TraceProblem, identifier, silent
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.quantities import parameters_and_sum
 from biogrip.physics.models import Sample
-from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import with_fixed
 from tests.helpers.default import STUDY, study_of
-from tests.helpers.problems import GRIPPER, TORQUE, clean, likelihood_of, pose_noisy
+from tests.helpers.problems import clean, likelihood_of, pose_noisy, rotation
 
 TIMES = clean("endothelial_cell")[0]
 TWO = Sample("generalized_maxwell", 2).model
@@ -21,8 +20,8 @@ SAMPLE = {"k_1": 30.0, "k_2": 10.0, "k_p": 12.3, "c_1": 150.0, "c_2": 600.0, "c_
 
 
 def problems(count: int, level: float) -> list[TraceProblem]:
-    response = step_response(GRIPPER, TWO.sample(SAMPLE), inertia=False)
-    return pose_noisy(TIMES, superpose(response, TORQUE, TIMES)[0], count, TWO, level)
+    response = rotation(TWO, [*SAMPLE.values()], TIMES, inertia=False)
+    return pose_noisy(TIMES, response, count, TWO, level)
 
 
 def identified(method: str, experiment: list[TraceProblem]) -> list[Fit]:

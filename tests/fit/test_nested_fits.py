@@ -22,9 +22,8 @@ from biogrip.fit.nested_fits import (
 )
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.physics.models import CANDIDATES, MODELS, contained
-from biogrip.physics.response import step_response, superpose
 from tests.helpers.default import seen, study_of
-from tests.helpers.problems import GRIPPER, MODEL, SAMPLES, TORQUE, clean, pose_noisy, posed_for
+from tests.helpers.problems import MODEL, SAMPLES, clean, pose_noisy, posed_for, rotation
 
 TRIED = (*MODELS, "generalized_maxwell_2")
 LADDERS = [name for name in TRIED if not CANDIDATES[name].model.power_law]
@@ -72,9 +71,8 @@ def test_a_model_fits_no_worse_than_one_in_it(
     problems, found = fitted(response, times, tried, 2, level)
     assert worse(problems, found) == []
     for name, answers in found.items():
-        network = CANDIDATES[name].model.network([answer.parameters for answer in answers])
-        rotations = superpose(step_response(GRIPPER, network, inertia=False), TORQUE, times)
-        for problem, answer, own in zip(problems[name], answers, rotations, strict=True):
+        for problem, answer in zip(problems[name], answers, strict=True):
+            own = rotation(CANDIDATES[name].model, answer.parameters, times, inertia=False)
             misfit = np.sqrt(np.mean((own - problem.residuals.trace.cleared) ** 2))
             assert answer.misfit == pytest.approx(misfit, rel=1e-9)
 
@@ -99,9 +97,7 @@ def test_a_simpler_model_fits_better_if_nine_digits_say_so() -> None:
 def test_elements_vanish_where_the_range_does_not_reach() -> None:
     """A Maxwell liquid between the jaws: no spring as weak as the range allows is weak enough."""
     times = clean("liquid_drop_1")[0]
-    response = superpose(
-        step_response(GRIPPER, MODELS["maxwell"].network([[9.5, 10.0]])), TORQUE, times
-    )[0]
+    response = rotation(MODELS["maxwell"], [9.5, 10.0], times)
     problems, found = fitted(response, times, ("maxwell", "liquid_drop"), 8, 0.1)
     assert worse(problems, found) == []
     pairs = zip(found["liquid_drop"], found["maxwell"], strict=True)
@@ -165,8 +161,7 @@ def test_branches_are_added_beside_a_power_law_that_is_not_adequate() -> None:
 def test_a_fit_ends_no_higher_than_with_another_seed() -> None:
     """A drop of which Burgers' model shows one element; one of these seeds misses the basin."""
     times, _ = clean("liquid_drop_1")
-    drop = {"k": 77.0, "k_p": 1e-9, "c": 1.2, "c_p": 0.04}
-    response = superpose(step_response(GRIPPER, MODEL.sample(drop)), TORQUE, times)[0]
+    response = rotation(MODEL, [77.0, 1e-9, 1.2, 0.04], times)
     noise = 0.05 * response.max() * np.random.default_rng(8).standard_normal(len(times))
     posed = [posed_for(CANDIDATES["burgers"].model, times, response + noise)] * 2
     rngs = [np.random.default_rng([seed, 8]) for seed in (0, 2)]

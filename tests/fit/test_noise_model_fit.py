@@ -21,19 +21,20 @@ TIMES = np.cumsum(np.random.default_rng(0).exponential(1.0, 200))
 DIRECTIONS = np.stack((np.ones(200), TIMES, np.exp(-TIMES / 40)))
 
 
-def restricted(
-    time_s: Array, rows: Array, left: Array, noise_model: NoiseModel, growing: Array | None = None
-) -> float:
-    """Minus twice the restricted likelihood, the scale profiled out, from dense matrices."""
-    matrix = correlation(time_s, noise_model, growing)
+def restricted(matrix: Array, rows: Array, left: Array) -> tuple[float, float]:
+    """Minus twice the restricted likelihood, from dense matrices; and the scale, profiled out."""
     inverse = np.linalg.inv(matrix)
     information = rows @ inverse @ rows.T
     taken = inverse - inverse @ rows.T @ np.linalg.solve(information, rows @ inverse)
-    return float(
-        (len(time_s) - len(rows)) * np.log(left @ taken @ left)
-        + np.linalg.slogdet(matrix)[1]
-        + np.linalg.slogdet(information)[1]
-    )
+    count = len(left) - len(rows)
+    scale = float(left @ taken @ left) / count
+    determinants = sum(np.linalg.slogdet(each)[1] for each in (matrix, information))
+    return count * float(np.log(scale)) + float(determinants), scale
+
+
+def of_slow(x: Array) -> float:
+    """The prior on 1/f noise and a third of a walk, of logarithms."""
+    return float(np.log(np.exp(x[2]) + np.exp(x[3]) / 3))
 
 
 @pytest.mark.parametrize(
@@ -46,15 +47,15 @@ def restricted(
 def test_the_likelihood_is_that_of_dense_matrices(
     colours: list[tuple[float, ...]], growing: Array | None
 ) -> None:
-    """Differences between colours, less the prior on 1/f noise and a third of a walk; twelve digits
-    are there, and the condition of the matrices takes four."""
+    """Differences between colours, less the prior; of twelve digits the matrices take four."""
     left = np.random.default_rng(1).standard_normal(200)
     likelihood = NoiseModelLikelihood(TIMES, left, DIRECTIONS, growing)
     found, expected = [], []
     for noise_model in (NoiseModel(*shares) for shares in colours):
         x = _logarithms(noise_model)
-        found.append(likelihood._deviance(x) + np.log(np.exp(x[2]) + np.exp(x[3]) / 3))
-        expected.append(restricted(TIMES, DIRECTIONS, left, noise_model, growing))
+        found.append(likelihood._deviance(x) + of_slow(x))
+        matrix = correlation(TIMES, noise_model, growing)
+        expected.append(restricted(matrix, DIRECTIONS, left)[0])
     np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-8)
 
 
@@ -73,20 +74,13 @@ def test_degrees_of_freedom_are_those_of_satterthwaite() -> None:
     rows = np.vstack((sensitivity, nuisance))
 
     def deviance(x: Array) -> float:
-        slow = np.log(np.exp(x[2]) + np.exp(x[3]) / 3)
-        return restricted(TIMES, DIRECTIONS, left, _noise_model(x)) - slow
+        matrix = correlation(TIMES, _noise_model(x))
+        return restricted(matrix, DIRECTIONS, left)[0] - of_slow(x)
 
     def log_variances(x: Array) -> Array:
         matrix = correlation(TIMES, _noise_model(x))
-        inverse = np.linalg.inv(matrix)
-        covariance = np.linalg.inv(rows @ inverse @ rows.T)[:2, :2]
-        dense = matrix, DIRECTIONS @ inverse @ DIRECTIONS.T
-        determinants = sum(np.linalg.slogdet(each)[1] for each in dense)
-        scale = (
-            np.exp((deviance(x) + np.log(np.exp(x[2]) + np.exp(x[3]) / 3) - determinants) / 197)
-            / 197
-        )
-        return np.log(np.diagonal(covariance) * scale)
+        covariance = np.linalg.inv(rows @ np.linalg.inv(matrix) @ rows.T)[:2, :2]
+        return np.log(np.diagonal(covariance) * restricted(matrix, DIRECTIONS, left)[1])
 
     x, steps = _logarithms(noise_model), 0.1 * np.eye(4)
     second = [

@@ -8,15 +8,14 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.judging.likelihood import headlines
-from biogrip.physics.models import MODELS, generalized_maxwell
-from biogrip.physics.response import step_response, superpose
+from biogrip.physics.models import MODELS
 from biogrip.records.identifications import columns
 from biogrip.records.rows import write_rows
 from biogrip.stages import sweeps as stage
 from biogrip.study.study import Study
 from biogrip.tables.sweeps import robustness
 from tests.helpers.default import study_of
-from tests.helpers.problems import GRIPPER, TORQUE
+from tests.helpers.problems import MODEL, rotation
 
 CASE = "endothelial_cell"
 TRUTH = np.array([35.0, 12.3, 299.9, 1e-3])
@@ -70,19 +69,18 @@ def judged(study: Study, identifications: list[Path], tmp_path: Path) -> Path:
     return tmp_path / "judged" / f"{CASE}.csv"
 
 
-def _response(parameters: Array) -> Array:
-    return superpose(step_response(GRIPPER, generalized_maxwell(parameters)), TORQUE, TIME_S)[0]
-
-
 def _resolution() -> float:
     """Misfit of the truth with two digits of 1 to 9: 35, 12, 290 (300 has none) and 0.99e-3."""
-    rounded = _response(np.array([35.0, 12.0, 290.0, 0.99e-3]))
-    return float(np.sqrt(np.mean((rounded - _response(TRUTH)) ** 2)))
+    rounded = rotation(MODEL, np.array([35.0, 12.0, 290.0, 0.99e-3]), TIME_S)
+    return float(np.sqrt(np.mean((rounded - rotation(MODEL, TRUTH, TIME_S)) ** 2)))
 
 
 def _by_hand(relative_sigma: Array) -> Array:
     """Sandwich covariance of log k, log k_p, log c from central differences."""
-    ends = ((_response(TRUTH * np.exp(h)), _response(TRUTH * np.exp(-h))) for h in 1e-5 * np.eye(4))
+    ends = (
+        (rotation(MODEL, TRUTH * np.exp(h), TIME_S), rotation(MODEL, TRUTH * np.exp(-h), TIME_S))
+        for h in 1e-5 * np.eye(4)
+    )
     jacobian = np.array([(up - down) / 2e-5 for up, down in ends])[:3]
     inverse = np.linalg.inv(jacobian @ jacobian.T)
     spread: Array = (jacobian * relative_sigma) @ (jacobian * relative_sigma).T
@@ -119,7 +117,7 @@ def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
     rows = pd.read_csv(judged, dtype={"row": str})
     chosen = rows[(rows["row"] == "20") & (rows["column"] == column)]
     found = chosen[chosen["method"] == "genetic"].set_index("quantity")["bound_percent"]
-    phi = _response(TRUTH)
+    phi = rotation(MODEL, TRUTH, TIME_S)
     sigma = 0.2 * (np.full_like(phi, phi.max()) if column == "additive, any" else np.abs(phi))
     wanted = 100 * np.sqrt(np.diag(_by_hand(sigma)))
     np.testing.assert_allclose(found[["k", "k_p", "c"]], wanted, rtol=1e-3)
