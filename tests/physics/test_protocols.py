@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from scipy.optimize import brentq
 
 from biogrip.arrays import Array
 from biogrip.library import set_up
@@ -27,7 +28,7 @@ from biogrip.physics.protocol import (
     sample_times,
 )
 from biogrip.physics.response import phi_functions, step_response, superpose
-from biogrip.physics.roots import SMALLEST_GAP, separate
+from biogrip.physics.roots import SMALLEST_GAP, interlaced_zeros, separate
 from biogrip.physics.simulation import jaw_force
 from biogrip.study.experiment_blocks import PhaseBlock, ProtocolBlock
 from tests.helpers.responses import exact_50_digits, random_samples
@@ -170,3 +171,21 @@ def test_coinciding_roots_are_moved_apart_about_their_mean() -> None:
     assert abs(found[0] - found[1]) == pytest.approx(3 * SMALLEST_GAP, rel=1e-6)
     assert found[:2].mean() == pytest.approx(-3.0, rel=1e-12)
     assert found[2] == -1.0
+
+
+RANDOM = np.random.default_rng(0)
+POLES: Array = np.cumsum(RANDOM.lognormal(0, 2, (9, 200)), axis=0)
+POLES[0] = 0.0
+WEIGHTS, LEVEL = RANDOM.lognormal(0, 2, (9, 200)), RANDOM.lognormal(0, 1, 200)
+
+
+def test_zeros_are_those_of_a_bracketing_search() -> None:
+    found = interlaced_zeros(WEIGHTS[:, :3], POLES[:, :3], LEVEL[:3]).from_pole(np.zeros(3))
+    for zeros, weights, poles, level in zip(found.T, WEIGHTS.T, POLES.T, LEVEL, strict=False):
+        ends = [*poles, poles[-1] + 2 * np.sum(weights) / level]
+        for zero, low, high in zip(zeros, ends, ends[1:], strict=False):
+            inside = low * (1 + 1e-12) + 1e-12, high * (1 - 1e-12)
+            alone = brentq(
+                lambda x, w=weights, p=poles, b=level: np.sum(w / (x - p)) - b, *inside, xtol=1e-14
+            )
+            assert zero == pytest.approx(alone, rel=1e-9)

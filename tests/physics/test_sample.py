@@ -5,49 +5,10 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.models import (
-    CANDIDATES,
-    MODELS,
-    Sample,
-    as_richer,
-    contained,
-    different_in,
-    generalized_maxwell,
-)
-from biogrip.physics.protocol import Course, hold, join_phases
+from biogrip.physics.models import CANDIDATES, MODELS, as_richer, contained, different_in
+from biogrip.physics.protocol import hold, join_phases
 from biogrip.physics.response import step_response, superpose
-from biogrip.physics.sample_model import complex_modulus, with_fixed
-from tests.helpers.laplace import series
-
-TIMES = np.linspace(0.1, 400, 300)
-
-
-def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
-    gripper: Gripper, steps: Course
-) -> None:
-    """k to infinity: Kelvin-Voigt with c + c_p, one exponential a step, however it is split."""
-    u, spring, damper = 2 * gripper.lever_m**2, 0.02, 10.0
-    stiffness = gripper.left.stiffness_Nm_per_rad + u * spring
-    rate = stiffness / (gripper.left.damping_Nms_per_rad + u * damper)
-    expected = np.zeros_like(TIMES)
-    for start, height in zip(steps.time_s, steps.changes[:, 0], strict=True):
-        expected -= height / stiffness * np.expm1(-rate * np.maximum(TIMES - start, 0))
-    for c, c_p in ((9.9, 0.1), (2.0, 8.0), (0.1, 9.9)):
-        response = step_response(gripper, generalized_maxwell([1e7, spring, c, c_p]))
-        # The branch relaxes within c/k = 1e-6 s, and the arms' inertia lags as little.
-        ours = superpose(response, steps, TIMES)[0]
-        np.testing.assert_allclose(ours, expected, atol=1e-6 * expected.max())
-
-
-def test_more_branches_add_up() -> None:
-    model, omega = Sample("generalized_maxwell", branches=3).model, np.geomspace(1e-4, 1e3, 15)
-    s = 1j * omega
-    given = {"k_1": 1.0, "k_2": 2.0, "k_3": 3.0, "k_p": 0.5}
-    given |= {"c_1": 10.0, "c_2": 0.1, "c_3": 700.0, "c_p": 0.02}
-    assert model.names == tuple(given)
-    storage, loss = complex_modulus(model.sample(given), omega)
-    branches = sum(series(given[f"k_{j}"], given[f"c_{j}"] * s) for j in (1, 2, 3))
-    np.testing.assert_allclose(storage[0] + 1j * loss[0], 0.5 + 0.02 * s + branches, rtol=1e-12)
+from biogrip.physics.sample_model import with_fixed
 
 
 def test_fixing_a_parameter_leaves_the_others() -> None:

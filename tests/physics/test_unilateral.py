@@ -35,68 +35,54 @@ def integrated(
 ) -> tuple[Array, list[float]]:
     """phi_2, phi_4, delta, y and force by SciPy, regime by regime; and when they change."""
     k, k_p, c, c_p = (float(value) for value in sample)
-    arms, b = (gripper.left, gripper.right), gripper.lever_m
-    c_2, c_4 = (arm.damping_Nms_per_rad for arm in arms)
-    k_2, k_4 = (arm.stiffness_Nm_per_rad for arm in arms)
+    b, arms = gripper.lever_m, (gripper.left, gripper.right)
+    _, dampings, stiffnesses = np.transpose([[*vars(arm).values()] for arm in arms])
 
-    def touching_rates(t: float, z: Array) -> tuple[Array, float]:
-        delta, spring = b * (z[0] + z[1]), 0.0
-        spring = k_p * delta + k * (delta - z[3])
-        tau = float(evaluate(torque, t))
-        free = (tau - k_2 * z[0]) / c_2, (tau - k_4 * z[1]) / c_4
-        # phi_i' = free_i - b F/c_i and F = spring + c_p b (phi_2' + phi_4').
-        force = (spring + c_p * b * sum(free)) / (1 + c_p * b * b * (1 / c_2 + 1 / c_4))
-        rates = np.array([free[0] - b * force / c_2, free[1] - b * force / c_4, 0.0, 0.0])
-        rates[2], rates[3] = b * (rates[0] + rates[1]), k / c * (delta - z[3])
-        return rates, force
-
-    def apart_rates(t: float, z: Array) -> Array:
-        tau = float(evaluate(torque, t))
-        damper_rate = k / c * (z[2] - z[3])
-        delta_rate = -(k_p * z[2] + k * (z[2] - z[3])) / c_p if c_p else k / (k + k_p) * damper_rate
-        return np.array(
-            [(tau - k_2 * z[0]) / c_2, (tau - k_4 * z[1]) / c_4, delta_rate, damper_rate]
-        )
+    def motion(t: float, z: Array, touching: bool) -> tuple[Array, float]:
+        """Rates, and force."""
+        rates = (float(evaluate(torque, t)) - stiffnesses * z[:2]) / dampings
+        spring, y_rate, force = k_p * z[2] + k * (z[2] - z[3]), k / c * (z[2] - z[3]), 0.0
+        if touching:
+            # phi_i' = free_i - b F/c_i and F = spring + c_p b (phi_2' + phi_4').
+            force = spring + c_p * b * np.sum(rates)
+            force /= 1 + c_p * b * b * np.sum(1 / dampings)
+            rates = rates - b * force / dampings
+            delta_rate = b * np.sum(rates)
+        else:
+            delta_rate = -spring / c_p if c_p else k / (k + k_p) * y_rate
+        return np.array([*rates, delta_rate, y_rate]), force
 
     def lets_go(t: float, z: Array) -> float:
-        return touching_rates(t, z)[1]
+        return motion(t, z, True)[1]
 
     def meets(t: float, z: Array) -> float:
         return float(z[2] - b * (z[0] + z[1]))
 
     for event in (lets_go, meets):
         event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
-    edges = [*torque.time_s, torque.end_s]
+    given = {"rtol": 1e-12, "atol": [1e-15, 1e-15, 1e-18, 1e-18], "max_step": 0.1}
     z, touching, found, changes = np.zeros(4), True, [], []
-    for start, end in pairwise(edges):
-        here, end = start, np.nextafter(end, 0)
-        if touching and lets_go(start, z) < 0:
+    for here, end in pairwise([*torque.time_s, torque.end_s]):
+        end = np.nextafter(end, 0)
+        if touching and lets_go(here, z) < 0:
             touching = False
-            changes.append(start)
+            changes.append(here)
         while here < end:
-            slope = (lambda t, z: touching_rates(t, z)[0]) if touching else apart_rates
             solved = solve_ivp(
-                slope,
-                (here, end),
-                z,
-                "LSODA",
+                lambda t, z, touching=touching: motion(t, z, touching)[0],
+                *((here, end), z, "LSODA"),
                 events=lets_go if touching else meets,
                 dense_output=True,
-                rtol=1e-12,
-                atol=[1e-15, 1e-15, 1e-18, 1e-18],
-                max_step=0.1,
+                **given,
             )
-            inside = time_s[(time_s >= here) & (time_s < solved.t[-1])]
-            if len(inside):
-                states = solved.sol(inside)
-                pairs = list(zip(inside, states.T, strict=True))
-                forces = [lets_go(*each) if touching else 0.0 for each in pairs]
-                found.append(np.vstack((states, forces)))
+            for t in time_s[(time_s >= here) & (time_s < solved.t[-1])]:
+                state = solved.sol(t)
+                found.append([*state, motion(t, state, touching)[1]])
             here, z = float(solved.t[-1]), solved.y[:, -1]
             if solved.status == 1:
                 touching = not touching
                 changes.append(here)
-    return np.concatenate(found, axis=1), changes
+    return np.transpose(found), changes
 
 
 @pytest.mark.parametrize(
