@@ -1,4 +1,4 @@
-"""What decides which fits are continued, and whether one has converged."""
+"""What decides which fits are continued, and whether one has converged; steps of a descent."""
 
 from typing import Any
 

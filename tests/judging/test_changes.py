@@ -1,4 +1,4 @@
-"""Changes within a trace: how often each test is wrong, and what it tells of a Zener relaxation."""
+"""Changes within a trace and lines in its spectrum: how often tests are wrong, what they tell."""
 
 import numpy as np
 import pytest

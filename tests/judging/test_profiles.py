@@ -1,4 +1,4 @@
-"""Quantities held exactly in many fits at once, against SciPy's fits of all samples."""
+"""Quantities held exactly in many fits at once, against SciPy's fits of all samples; limits."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""A few times stand for all: the same sums of squares, gradients and information."""
+"""A few times, and sums of series, stand for all readings."""
 
 import functools
 
@@ -9,9 +9,11 @@ from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.misfit import SeriesMisfit
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.protocol import join_phases
+from biogrip.physics.protocol import Phase, hold, join_phases, sample_times
 from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
 from tests.helpers.problems import condensed_of, condensed_rows
 from tests.helpers.responses import MODEL_PARAMETERS, PROTOCOLS, log_range, random_samples
@@ -115,3 +117,39 @@ def test_many_readings_are_worth_few_rows(gripper: Gripper, protocol: str, times
     rows = condensed_of(torque, time_s, offset=True)
     residuals = posed(gripper, MAXWELL, rows, noise(len(time_s)))
     assert assert_alike(residuals, CELL) < 200
+
+
+PAPER = PROTOCOLS["steps"]
+
+
+@pytest.mark.parametrize(
+    ("phases", "rate_Hz", "level", "rtol"),
+    [
+        # Large sums cancel: eps times (squares summed / squares left), 1e6 for the stiffest samples
+        # under the noise of the first four.
+        (PAPER, 10.0, None, 1e-9),
+        ((hold(300.0, 1.6e-9),), 3.0, None, 1e-9),
+        (PAPER, 1 / 200, None, 1e-9),
+        (PAPER, 1 / 100, None, 1e-9),
+        (PAPER, 10.0, 1e-4, 1e-9),
+        # Against zero the misfit is the response itself: of their way to rest, 1e6 s, the slowest
+        # go a fraction 4e-4; constant and mode cancel to its square.
+        (PAPER, 10.0, 0.0, 1e-8),
+    ],
+)
+def test_sums_of_series_are_those_of_all_residuals(
+    gripper: Gripper, phases: tuple[Phase, ...], rate_Hz: float, level: float | None, rtol: float
+) -> None:
+    """Of a noisy trace or a constant one; parameters that are no numbers have no misfit."""
+    steps = join_phases(phases)
+    time_s = sample_times(steps.end_s, rate_Hz)
+    samples = np.vstack((np.exp(CELL), random_samples(500, 3)))
+    response = step_response(gripper, MAXWELL.network(samples), inertia=False)
+    responses = superpose(response, steps, time_s)
+    noise = np.random.default_rng(1).standard_normal(len(time_s))
+    noisy = responses[0] + 0.1 * np.abs(responses[0]).max() * noise
+    trace = noisy if level is None else np.full(len(time_s), level)
+    misfit = SeriesMisfit(gripper, MAXWELL, steps, 1 / rate_Hz, trace)
+    expected = np.sqrt(np.mean((responses - trace) ** 2, axis=1))
+    found = misfit(np.vstack((samples, np.full(4, np.nan))))
+    np.testing.assert_allclose(found, [*expected, np.nan], rtol=rtol)

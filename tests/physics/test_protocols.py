@@ -1,4 +1,4 @@
-"""The linear response against 50 digits, and exact under ramps and parabolas."""
+"""The linear response against 50 digits; protocols, and zeros between poles."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Tables of errors, methods, models and verdicts, recomputed by hand."""
+"""Tables of errors, methods, models, verdicts and printed values, recomputed by hand."""
 
 from pathlib import Path
 from typing import Any
@@ -9,11 +9,25 @@ import pytest
 
 from biogrip.fit.problem import METHODS
 from biogrip.physics.models import MODELS, Published, Sample
-from biogrip.records.identifications import MODEL_FITS, columns
+from biogrip.records.identifications import (
+    ALL,
+    MODEL_FITS,
+    basins,
+    columns,
+    near_noise,
+    near_noise_words,
+)
 from biogrip.records.rows import write_object
-from biogrip.tables.cases import errors, errors_of_case, verdicts
+from biogrip.tables.cases import (
+    errors,
+    errors_of_case,
+    interval_of,
+    interval_of_value,
+    value_in_case,
+    verdicts,
+)
 from biogrip.tables.methods import methods, models
-from tests.helpers.default import seen, study_of
+from tests.helpers.default import STUDY, seen, study_of
 
 PAPER = Published(
     table=9,
@@ -188,3 +202,64 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     assert (total["target"], total["value"], total["high"]) == (1.5, None, 3.0)
     assert total["expected_verdict"] is None
     assert "c and c_p trade against each other: determined is c + c_p." in table.caption
+
+
+@pytest.mark.parametrize(
+    ("printed", "target", "error", "ends"),
+    [
+        # 10 (1 - 0.027) to 10 (1 - 0.0255): two digits are too few, for 9.7 errs by 3 %.
+        (9.7, 10.0, "2.6", (9.73, 9.745)),
+        (0.97, 1.0, "2.6", (0.973, 0.9745)),
+        # 35 (1 - 0.062) to 35 (1 - 0.0605).
+        (32.8, 35.0, "6.1", (32.83, 32.8825)),
+        # The error is cut off: rounded, it would be 0.9. 299.9 * 1.009 = 302.5991.
+        (302.5, 299.9, "-0.8", (302.45, 302.5991)),
+        # A sign that belies its value tells no side.
+        (6.7, 9.5, "-29", (6.65, 6.7925)),
+        # No number, or one that the value belies, leaves the value alone.
+        (1e-4, 1e-3, ">100", (5e-5, 2e-4)),
+        (5.5, 10.0, "3", (5.45, 5.6)),
+        (5.5, None, None, (5.45, 5.6)),
+        (5.5, 0.0, "3", (5.45, 5.6)),
+    ],
+)
+def test_a_value_and_its_error_leave_an_interval(
+    printed: float, target: Any, error: Any, ends: tuple[float, float]
+) -> None:
+    assert interval_of(printed, target, error) == pytest.approx(ends, rel=1e-12)
+
+
+def test_a_value_alone_is_rounded_or_cut_off() -> None:
+    assert interval_of_value(0.23) == pytest.approx((0.225, 0.24))
+
+
+def test_of_dampers_that_trade_the_sum_is_ten() -> None:
+    """9.7375 + 0.23, and 9.7375 + 0.25: c has the printed error, c_p none."""
+    for name, value in (("liquid_drop_1", 9.9675), ("liquid_drop_2", 9.9875)):
+        told = value_in_case(STUDY.cases[name], ["c", "c_p"])
+        assert told
+        assert told[0] == pytest.approx(value)
+        assert told[1] < told[0] < told[2]
+    assert value_in_case(STUDY.cases["liquid_drop_1"], ["alpha"]) is None
+
+
+def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:
+    runs = pd.DataFrame({"seed": range(len(misfit)), "misfit": misfit, "noise_rms": noise})
+    return runs.astype({"noise_rms": float})
+
+
+def test_two_basins_have_a_tenth_of_the_runs_each() -> None:
+    """And none is told where the noise is unknown, or absent."""
+    one = basins(found([1.05, 1.01, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), 0.02)
+    assert {name: len(runs) for name, runs in one.items()} == {ALL: 20}
+    two = basins(found([1.05, 1.06, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), 0.02)
+    assert two["above the noise"]["seed"].tolist() == [0, 1]
+    assert two["near the noise"]["seed"].tolist() == list(range(2, 20))
+    for noise in (None, 0.0):
+        assert list(basins(found([3.0, 1.0], [noise, noise]), 0.02)) == [ALL]
+
+
+def test_near_the_noise_is_a_share_of_it() -> None:
+    runs = found([1.019, 1.021, 2.03, 1.0], [1.0, 1.0, 2.0, None])
+    np.testing.assert_array_equal(near_noise(runs, 0.02), [True, False, True, False])
+    assert near_noise_words(0.025) == "within 2.5 % of the noise"
