@@ -46,8 +46,7 @@ def response(values: list[float]) -> Array:
     problem = STUDY.cases[CASE].experiment
     network = problem.model.network(np.array([values]))
     device = problem.gripper, network, problem.torque
-    found: Array = simulated_response(*device, TIME_S, nonlinear=False)[0]
-    return found
+    return simulated_response(*device, TIME_S, nonlinear=False)[0]
 
 
 @pytest.fixture

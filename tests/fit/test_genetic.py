@@ -168,12 +168,10 @@ def test_no_encodable_point_is_lower_where_the_optimum_is_not_encodable(digit: i
 
     def valley(parameters: Array) -> Array:
         first, second = np.log(parameters / [33.73, 0.2843]).T
-        found: Array = np.sqrt(1 + 100 * (first + second) ** 2 + first**2)
-        return found
+        return np.sqrt(1 + 100 * (first + second) ** 2 + first**2)
 
     def beyond(parameters: Array) -> Array:
-        found: Array = np.log(1e5 / parameters).sum(axis=1)
-        return found
+        return np.log(1e5 / parameters).sum(axis=1)
 
     every = np.array(list(product(*(genes.values for genes in ranges))))
     found = [
@@ -189,7 +187,6 @@ def test_the_first_digit_is_searched_with_the_second_kept(digit: int) -> None:
 
     def rungs(parameters: Array) -> Array:
         first, second = np.divmod(np.rint(parameters[:, 0]), 10)
-        found: Array = 1.0 + abs(first - 7) + 10 * (second != 4)
-        return found
+        return 1.0 + abs(first - 7) + 10 * (second != 4)
 
     assert lowest_encodable(rungs, [GeneRange((2, 2), (digit, 9), 2)], np.array([[24.0]])) == 1

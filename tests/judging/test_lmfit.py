@@ -25,8 +25,7 @@ TWO_HALVES = np.where(MANY < 30, 2e-4, 8e-4)
 
 def creep(t: Array, k_s: float, k_v: float, c_v: float) -> Array:
     """The strain under 5 Pa of a spring and a Kelvin-Voigt element in series."""
-    strain: Array = 5 / k_s + 5 / k_v * (1 - np.exp(-t * k_v / c_v))
-    return strain
+    return 5 / k_s + 5 / k_v * (1 - np.exp(-t * k_v / c_v))
 
 
 @pytest.mark.parametrize(

@@ -241,8 +241,7 @@ def test_a_held_fit_is_scipys(label: str) -> None:
 
 def parabolas(values: Array) -> Array:
     """Two basins about -2 and 2, whose square roots are straight."""
-    increases: Array = np.minimum((values + 2) ** 2, (values - 2) ** 2)
-    return increases
+    return np.minimum((values + 2) ** 2, (values - 2) ** 2)
 
 
 def test_a_set_in_two_parts_has_a_gap_that_its_verdict_names() -> None:

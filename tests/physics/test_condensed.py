@@ -32,8 +32,7 @@ DENSE = {
 def products(rows: Array, slopes: Array) -> Array:
     """Sum of squares, gradients and information: all that least squares sees."""
     together = np.vstack((rows, slopes))
-    found: Array = together @ together.T
-    return found
+    return together @ together.T
 
 
 def assert_alike(residuals: Residuals, x: Array) -> int:

@@ -86,14 +86,12 @@ def sample_of(model: str, seed: int) -> Array:
     spread = rng.normal(size=len(MODELS[model].names))
     values = np.array(MODELS[model].example) * np.exp(1.5 * spread)
     values[exponents_of(model)] = rng.uniform(0.05, 0.95, len(exponents_of(model)))
-    ordered: Array = np.take_along_axis(values[None], MODELS[model].in_order(values[None]), 1)[0]
-    return ordered
+    return np.take_along_axis(values[None], MODELS[model].in_order(values[None]), 1)[0]
 
 
 def modulus(network: Network) -> Array:
     storage, loss = complex_modulus(network, OMEGA)
-    found: Array = storage[0] + 1j * loss[0]
-    return found
+    return storage[0] + 1j * loss[0]
 
 
 @pytest.mark.parametrize("seed", range(5))

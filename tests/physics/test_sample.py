@@ -35,8 +35,7 @@ def drawn(candidate: str, rng: np.random.Generator) -> Array:
 
 def response(gripper: Gripper, candidate: str, parameters: Array, inertia: bool) -> Array:
     network = CANDIDATES[candidate].model.network(parameters)
-    found: Array = superpose(step_response(gripper, network, inertia=inertia), TORQUE, TIME_S)[0]
-    return found
+    return superpose(step_response(gripper, network, inertia=inertia), TORQUE, TIME_S)[0]
 
 
 @pytest.mark.parametrize("inertia", [False, True], ids=["without inertia", "with inertia"])

@@ -39,8 +39,7 @@ sweeps:
 
 def told(given: dict[str, Any]) -> dict[str, Any]:
     """As Snakemake keeps it between the workflow and its jobs."""
-    found: dict[str, Any] = json.loads(json.dumps(given))
-    return found
+    return json.loads(json.dumps(given))
 
 
 @pytest.mark.parametrize("key", ["times_s", "experiment", "gripper", "seeds", "title"])
