@@ -52,8 +52,6 @@ def test_names_change_nothing_else() -> None:
     drawn = np.exp(rng.uniform(problem.low, problem.high, (200, 6)))
     ordered = np.take_along_axis(drawn, TWO.in_order(drawn), axis=1)
     assert_in_order(ordered)
-    changed = np.any(drawn != ordered, axis=1)
-    assert 50 < np.sum(changed) < 150
     misfit = problem.residuals.misfit
     np.testing.assert_allclose(misfit(ordered), misfit(drawn), rtol=1e-9)
 

@@ -64,43 +64,34 @@ def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
     Estimates and standard deviations of the logarithms agree to a twentieth of the latter:
     what is taken for straight is 2 % of a stiffness.
     """
-    share, level = 0.02, 0.02 * CLEAN.max()
-    arms = POSED.gripper.left, POSED.gripper.right
-    known = [share * arm.stiffness_Nm_per_rad for arm in arms]
-    uncertainty = {
-        name: {"stiffness_Nm_per_rad": value}
-        for name, value in zip(("left", "right"), known, strict=True)
-    }
-    experiment = replace(POSED, uncertainty=uncertainty, noise_sd=float(level))
+    share, level, key = 0.02, float(0.02 * CLEAN.max()), "stiffness_Nm_per_rad"
+    arms = {"left": POSED.gripper.left, "right": POSED.gripper.right}
+    uncertainty = {name: {key: share * getattr(arm, key)} for name, arm in arms.items()}
     trace = noisy(Noise("gaussian", 0.02, "peak"))
-    fit = fitted(experiment, trace)
-    _, slopes = fit.problem.residuals(np.log(fit.found.parameters))
+    fit = fitted(replace(POSED, uncertainty=uncertainty, noise_sd=level), trace)
+    best, low, high = np.log(fit.found.parameters), fit.problem.low, fit.problem.high
+    _, slopes = fit.problem.residuals(best)
     told = [0, 2]  # k and c: nothing is told of c_p, and next to nothing of k_p.
 
     def residuals(z: Array) -> Array:
-        left, right = (
-            replace(arm, stiffness_Nm_per_rad=arm.stiffness_Nm_per_rad * (1 + share * y))
-            for arm, y in zip(arms, z[4:], strict=True)
-        )
-        gripper = replace(POSED.gripper, left=left, right=right)
+        softer: dict[str, Any] = {
+            name: replace(arm, stiffness_Nm_per_rad=getattr(arm, key) * (1 + share * y))
+            for (name, arm), y in zip(arms.items(), z[4:], strict=True)
+        }
+        gripper = replace(POSED.gripper, **softer)
         return np.append((simulated(gripper, z[:4]) - trace) / level, z[4:])
 
-    start = np.append(np.log(fit.found.parameters), [0.0, 0.0])
-    low, high = np.append(fit.problem.low, [-5, -5]), np.append(fit.problem.high, [5, 5])
-    start[:4] = np.clip(start[:4], fit.problem.low + 1e-6, fit.problem.high - 1e-6)
-    both = least_squares(residuals, start, bounds=(low, high), x_scale="jac")
+    start = np.append(np.clip(best, low + 1e-6, high - 1e-6), [0, 0])
+    bounds = np.append(low, [-5, -5]), np.append(high, [5, 5])
+    both = least_squares(residuals, start, bounds=bounds, x_scale="jac")
 
-    def deviations(information: Array) -> Array:
-        return np.sqrt(np.diagonal(np.linalg.inv(information + 1e-6 * np.eye(len(information)))))
+    def deviations(rows: Array) -> Array:
+        return np.sqrt(np.diagonal(np.linalg.inv(rows.T @ rows + 1e-6 * np.eye(rows.shape[1]))))
 
-    own = deviations((slopes @ slopes.T / level**2)[np.ix_(told, told)])
-    rows = both.jac[:, [*told, 4, 5]]
-    expected = deviations(rows.T @ rows)[:2]
-    alone = deviations(both.jac[:-2, told].T @ both.jac[:-2, told])
+    own, expected = deviations(slopes[told].T / level), deviations(both.jac[:, [*told, 4, 5]])[:2]
     np.testing.assert_allclose(own, expected, rtol=0.05)
-    assert np.all(own > 1.2 * alone)
-    moved = (np.log(fit.found.parameters) - both.x[:4])[told]
-    assert np.all(np.abs(moved) < 0.05 * expected + 1e-3)
+    assert np.all(own > 1.2 * deviations(both.jac[:-2, told]))
+    assert np.all(np.abs(best - both.x[:4])[told] < 0.05 * expected + 1e-3)
 
 
 def test_an_uncertain_gripper_is_held_against_what_parameters_leave(

@@ -6,8 +6,6 @@ from mpmath import mp, mpf
 
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import CombDrive, Gripper, capacitance_slope, contact, torque, voltage
-from biogrip.physics.models import MODELS
-from biogrip.physics.response import step_response
 from workflow.paper.mechanics import (
     apparent_modulus,
     drag_of_arm,
@@ -56,20 +54,6 @@ def test_the_gripper_yields_as_two_springs_in_a_row(unequal_gripper: Gripper) ->
     force, b = 1e-6, unequal_gripper.lever_m
     opening = sum(b * force * b / k for k in (4.4e-7, 5.5e-7))
     assert unequal_gripper.jaw_stiffness_N_per_m == pytest.approx(force / opening)
-
-
-def test_unequal_arms_come_to_rest_where_their_springs_hold_the_torques(
-    unequal_gripper: Gripper,
-) -> None:
-    network, b = (
-        MODELS["generalized_maxwell"].network([[20.0, 5.0, 80.0, 1.0]]),
-        unequal_gripper.lever_m,
-    )
-    springs = np.diag([4.4e-7, 5.5e-7]) + 5.0 * b**2
-    rest = np.linalg.solve(springs, [1.0, 1.0])
-    assert step_response(unequal_gripper, network).static[0] == pytest.approx(rest)
-    force = 5.0 * b * rest.sum()
-    assert step_response(unequal_gripper, network, force=True).static[0] == pytest.approx([force])
 
 
 def test_fringing_against_charges_on_two_strips() -> None:

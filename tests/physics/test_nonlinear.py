@@ -11,12 +11,11 @@ from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, displacement_of_tip, rotation_of_tip
 from biogrip.physics.models import damper, generalized_maxwell, kelvin_voigt, maxwell
 from biogrip.physics.nonlinear import correction, nonlinear_rotation
-from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
+from biogrip.physics.protocol import Course, Phase, hold, join_phases
 from biogrip.physics.response import linear_jaw_force, step_response, superpose
 from biogrip.physics.simulation import compute_grip, jaw_force
 from tests.helpers.radau import integrated
 from tests.helpers.responses import random_samples
-from tests.physics.test_protocols import TORQUE
 
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)
 OTHER = Arm(1.3e-14, 2.5e-12, 5.5e-7)
@@ -118,34 +117,7 @@ def test_too_large_a_torque_is_refused(gripper: Gripper) -> None:
         nonlinear_rotation(gripper, network, join_phases((hold(100.0, 1e-5),)), TIMES[:10])
 
 
-DROPS = np.array([[9.5, 1e-4, 10.0, 1e-4], [1.0, 1e-4, 10.0, 1e-3]])
 CELL = np.array([[35.0, 12.3, 299.9, 1e-3]])
-
-
-@pytest.mark.parametrize("inertia", [False, True])
-@pytest.mark.parametrize(
-    "samples",
-    [
-        np.concatenate((DROPS, CELL, random_samples(20, 5))),
-        np.array([[2.0, 5.0, 1.0, 0.2, 30.0, 1e3, 0.3, 0.5]]),
-    ],
-    ids=["one branch", "three branches"],
-)
-def test_the_arms_equation_closes_under_ramps_and_parabolas(
-    either_gripper: Gripper, samples: Array, inertia: bool
-) -> None:
-    """b F = tau - k phi - c phi' (- I phi'', which is nothing beside these a moment later)."""
-    gripper, network = either_gripper, generalized_maxwell(samples)
-    time_s, arm = np.linspace(0.3, TORQUE.end_s - 0.2, 301), gripper.left
-    response = step_response(gripper, network, inertia=False)
-    rest = evaluate(TORQUE, time_s) - arm.stiffness_Nm_per_rad * superpose(response, TORQUE, time_s)
-    rest -= arm.damping_Nms_per_rad * superpose(response, TORQUE, time_s, rate=True)
-    of_steps = step_response(gripper, network, inertia=inertia, force=True)
-    force = linear_jaw_force(of_steps, TORQUE, time_s)
-    largest = evaluate(TORQUE, time_s).max()
-    np.testing.assert_allclose(
-        gripper.lever_m * force, rest, rtol=0, atol=(3e-6 if inertia else 1e-12) * largest
-    )
 
 
 def test_what_is_left_in_the_end(gripper: Gripper) -> None:

@@ -66,18 +66,6 @@ def test_a_case_is_one_block_and_yaml_1_1_numbers_are_numbers(tmp_path: Path) ->
     assert case.block == replace(other, sample=case.block.sample, title=None, published=None)
 
 
-def test_a_case_may_change_a_block_for_itself(tmp_path: Path) -> None:
-    study = load(
-        tmp_path,
-        f"cases: {{soft: {{{DROP}, gripper: {{left: {{stiffness_Nm_per_rad: 1.0e-7}}}}}}}}",
-    )
-    arms = study.cases["soft"].block.gripper
-    assert arms.left.stiffness_Nm_per_rad == 1e-7
-    assert arms.right.stiffness_Nm_per_rad == 4.4e-7
-    other = study.cases["endothelial_cell"].block.gripper
-    assert other.left.stiffness_Nm_per_rad == 4.4e-7
-
-
 @pytest.mark.parametrize("name", ["unit", "title", "label", "error_percent"])
 def test_a_case_may_have_the_name_of_a_key(tmp_path: Path, name: str) -> None:
     """And a title that begins like a number stays text."""
@@ -141,21 +129,12 @@ def test_cases_in_volts_and_in_torque_share_a_study(tmp_path: Path) -> None:
     assert phase.level == pytest.approx(float(torque(study.actuator, 10.0)))
 
 
-@pytest.mark.parametrize(
-    ("noise_model", "along"),
-    [
-        ("white", (False, False)),
-        ("coloured", (True, True)),
-        ("coloured, drift: false", (True, False)),
-    ],
-)
-def test_with_coloured_noise_an_offset_and_a_drift_are_fitted(
-    tmp_path: Path, noise_model: str, along: tuple[bool, bool]
-) -> None:
-    study = load(tmp_path, f"measurement: {{rate_Hz: 1.0, noise_model: {noise_model}}}")
-    assert {(case.experiment.offset, case.experiment.drift) for case in study.cases.values()} == {
-        along
-    }
+def test_with_coloured_noise_an_offset_and_a_drift_are_fitted(tmp_path: Path) -> None:
+    known = {"white": (False, False), "coloured": (True, True)}
+    for noise_model, along in {**known, "coloured, drift: false": (True, False)}.items():
+        study = load(tmp_path, f"measurement: {{rate_Hz: 1.0, noise_model: {noise_model}}}")
+        cases = (case.experiment for case in study.cases.values())
+        assert {(experiment.offset, experiment.drift) for experiment in cases} == {along}
 
 
 SIGNED = ("-0.8", ">100", "0", "6.1", "<0.001", ">+5", "+2.6")

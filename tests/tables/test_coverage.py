@@ -62,6 +62,12 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
     assert [k[f"shown_{name}"] for name in shown] == [2, 1, 0, 1, 1]
     assert [c_p[f"shown_{name}"] for name in shown] == [2, 0, 0, 2, 1]
     assert "bound_percent" not in c_p
+    # A batch that lost its end is refused, whatever is left of it.
+    lines = file.read_text().splitlines(keepends=True)
+    for kept in range(1, len(lines)):
+        file.write_text("".join(lines[:kept]))
+        with pytest.raises(BiogripError, match=r"seeds_0-2.csv: found \d+ rows, wanted .* delete"):
+            coverage(every_other, [target], [file], [])
 
 
 def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
@@ -120,19 +126,3 @@ def test_some_seeds_are_judged_in_full(
     # There is but one basin.
     assert k["shown_low"] == pytest.approx(k["low"], rel=1e-3)
     assert k["shown_high"] == pytest.approx(k["high"], rel=1e-3)
-
-
-def test_a_batch_that_lost_its_end_is_refused(tmp_path: Path, target: Path) -> None:
-    """Of each number of rows but the whole: a seed, or a quantity of one."""
-    overlay = OVERLAY.replace("0.9}", "0.9, verdicts_every: 2}")
-    expected, file = tmp_path / "expected.json", tmp_path / CASE / "seeds_1-3.csv"
-    write_object(expected, {"quantities": [{"quantity": "k", "verdict": "determined"}]})
-    study = study_of(overlay)
-    stage.estimate(study.case(CASE), range(1, 4), target, expected, [], file)
-    lines = file.read_text().splitlines(keepends=True)
-    assert len(lines) == 1 + 1 + 5 + 1
-    assert coverage(study, [target], [file], []).rows
-    for kept in range(1, len(lines)):
-        file.write_text("".join(lines[:kept]))
-        with pytest.raises(BiogripError, match=r"seeds_1-3.csv: found \d rows, wanted .* delete"):
-            coverage(study, [target], [file], [])
