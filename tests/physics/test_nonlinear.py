@@ -174,3 +174,13 @@ def test_pressed_throughout(gripper: Gripper, steps: Course) -> None:
 def test_no_torque_no_force(gripper: Gripper) -> None:
     grip = compute_grip(gripper, damper(5.0), join_phases((hold(10.0, 0.0),)), nonlinear=False)
     assert (grip.largest_N, grip.lowest_N, grip.pulls_from_s) == (0, 0, None)
+
+
+def test_unequal_arms_come_to_rest_where_their_springs_hold_the_torques(
+    unequal_gripper: Gripper,
+) -> None:
+    network, b = generalized_maxwell([20.0, 5.0, 80.0, 1.0]), unequal_gripper.lever_m
+    rest = np.linalg.solve(np.diag([4.4e-7, 5.5e-7]) + 5.0 * b**2, [1.0, 1.0])
+    for force, expected in ((False, rest), (True, [5.0 * b * rest.sum()])):
+        found = step_response(unequal_gripper, network, force=force).static[0]
+        assert found == pytest.approx(np.array(expected))
