@@ -27,12 +27,12 @@ from biogrip.figures.style import (
 from biogrip.fit.problem import METHODS
 from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import columns
 from biogrip.records.rows import write_arrays, write_object
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.stages import targets
 from tests.helpers.default import STUDY, seen, study_of
+from tests.helpers.problems import rotation
 from workflow.paper.gripper import draw_torque
 
 CASE = "liquid_drop_2"
@@ -40,13 +40,6 @@ TRUTH = [1.0, 1e-4, 10.0, 1e-3]
 TIME_S = np.arange(0.0, 400.5, 1.0)
 FEW = "seeds: 3\nmethods: [genetic]\n"
 MODEL = MODELS["generalized_maxwell"]
-
-
-def response(values: list[float]) -> Array:
-    problem = STUDY.cases[CASE].experiment
-    network = problem.model.network(np.array([values]))
-    device = problem.gripper, network, problem.torque
-    return simulated_response(*device, TIME_S, nonlinear=False)[0]
 
 
 @pytest.fixture
@@ -68,7 +61,7 @@ def identifications(tmp_path: Path) -> Path:
 @pytest.fixture
 def measurements(tmp_path: Path) -> Path:
     """Three traces whose noise falls from seed to seed."""
-    target, rng = response(TRUTH), np.random.default_rng(0)
+    target, rng = rotation(MODEL, TRUTH, TIME_S), np.random.default_rng(0)
     traces = {
         seed: target + 1e-4 / (1 + seed) * rng.standard_normal(len(TIME_S)) for seed in range(3)
     }
@@ -85,11 +78,13 @@ def test_the_first_run_of_each_basin_is_drawn(identifications: Path, measurement
     with styled():
         drawn = draw_fits(study_of(FEW).cases[CASE], identifications, [measurements], [])
     for label, k in (("seed 1, near the noise", 0.7), ("seed 0, above the noise", 9.0)):
-        expected = 1e3 * response([k, *TRUTH[1:]])
+        expected = 1e3 * rotation(MODEL, [k, *TRUTH[1:]], TIME_S)
         np.testing.assert_allclose(curve(drawn, label), expected, rtol=1e-9)
     # Of the second the target's residual.
     left = np.asarray(drawn.axes[1].lines[2].get_ydata(), dtype=float)
-    np.testing.assert_allclose(left, 1e3 * (response(TRUTH) - response([9.0, *TRUTH[1:]])))
+    np.testing.assert_allclose(
+        left, 1e3 * (rotation(MODEL, TRUTH, TIME_S) - rotation(MODEL, [9.0, *TRUTH[1:]], TIME_S))
+    )
     # The paper's axis is on it, and all that was measured.
     low, high = drawn.axes[0].get_ylim()
     assert low <= -0.6

@@ -7,15 +7,6 @@ import pytest
 
 from biogrip.arrays import Array, IntArray
 from biogrip.fit import least_squares, levenberg_marquardt
-from biogrip.fit.least_squares import (
-    ROUGH,
-    LocalFits,
-    _convex,
-    _finished,
-    fit_from,
-    identify_from,
-    refine_optima,
-)
 from biogrip.fit.levenberg_marquardt import Minima, Normal, minimize
 from tests.helpers.default import seen
 from tests.helpers.problems import MODEL, clean, posed_for, problem
@@ -27,11 +18,13 @@ def test_four_rough_fits_are_continued() -> None:
 
     def fitted(starts: Array, trace: IntArray, tolerance: float = 0.0) -> Minima:
         basins = starts[:, 0].astype(int)
-        misfit = starts[:, 0] + 4 if tolerance == ROUGH else fine[basins]
+        misfit = starts[:, 0] + 4 if tolerance == least_squares.ROUGH else fine[basins]
         return Minima(starts, misfit, np.ones_like(trace), np.ones(len(trace), dtype=bool))
 
     fits: Any = seen(fitted=fitted)
-    _, _, finished, trace = _finished(fits, [np.array([[5.0], [3.0], [1.0], [0.0], [4.0], [2.0]])])
+    _, _, finished, trace = least_squares._finished(
+        fits, [np.array([[5.0], [3.0], [1.0], [0.0], [4.0], [2.0]])]
+    )
     assert sorted(finished.x[:, 0]) == [0.0, 1.0, 2.0, 3.0]
     assert finished.misfit.min() == 1.0
     assert trace.tolist() == [0, 0, 0, 0]
@@ -43,14 +36,14 @@ def test_a_fit_that_stops_short_has_converged_if_no_data_tell(
 ) -> None:
     """After one step from where chi^2 is by so much higher; limits are where it is by 4."""
     posed, one = problem("endothelial_cell", 0), np.zeros(1, dtype=np.int64)
-    best = fit_from([posed], np.log([35.0, 12.3, 299.9, 1e-3])).x
-    fits = LocalFits([posed])
+    best = least_squares.fit_from([posed], np.log([35.0, 12.3, 299.9, 1e-3])).x
+    fits = least_squares.LocalFits([posed])
     curvature = fits.normal(best, one, curved=True).information[0, 0, 0]
     start = best + np.sqrt(rise / curvature) * np.eye(4)[:1]
     short = Minima(start, np.full(1, np.inf), one, np.ones(1, dtype=bool))
     monkeypatch.setattr(least_squares, "minimize", lambda *_: short)
     monkeypatch.setattr(least_squares, "_MOST_STEPS", 1)
-    assert refine_optima(fits, short, one).converged == [converged]
+    assert least_squares.refine_optima(fits, short, one).converged == [converged]
 
 
 @pytest.mark.parametrize(
@@ -65,7 +58,9 @@ def test_what_is_pushed_against_a_bound_has_no_curvature(
     normal = Normal(np.ones(1), np.array([[gradient, 0.5]]), information, np.ones(1))
     bounds = {"low": np.full((1, 2), -1.0), "high": np.full((1, 2), 1.0)}
     fits: Any = seen(normal=lambda x, trace, curved: normal, **bounds)
-    found = _convex(fits, np.array([[x, 0.0]]), np.zeros(1, dtype=np.int64)).information[0]
+    found = least_squares._convex(
+        fits, np.array([[x, 0.0]]), np.zeros(1, dtype=np.int64)
+    ).information[0]
     assert found.tolist() == ([[1.0, 0.0], [0.0, 2.0]] if held else [[2.0, 1.0], [1.0, 2.0]])
 
 
@@ -78,7 +73,9 @@ def test_beside_a_parameter_at_its_bound_the_others_reach_their_optimum() -> Non
     times, response = clean("liquid_drop_2", 0.5)
     posed = posed_for(MODEL, times, np.round(response, 8))
     starts = [[1.0, 1e-4, 10.0, 1e-3], [0.98, 3e-4, 9.8, 0.2], [0.9, 1e-3, 9.0, 0.9]]
-    first, *others = (identify_from(posed, np.log(start)).parameters for start in starts)
+    first, *others = (
+        least_squares.identify_from(posed, np.log(start)).parameters for start in starts
+    )
     assert np.log(first[1]) == posed.low[1]
     for other in others:
         np.testing.assert_allclose(other, first, rtol=1e-7)

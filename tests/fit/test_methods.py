@@ -8,15 +8,6 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit import genetic, least_squares
-from biogrip.fit.least_squares import (
-    PRIOR_WIDTH,
-    ROUGH,
-    LocalFits,
-    alike,
-    best_of_starts,
-    fit_from,
-    refine_optima,
-)
 from biogrip.fit.problem import METHODS, TraceProblem, identifier, silent
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.residuals import Residuals
@@ -26,7 +17,6 @@ from tests.helpers.problems import (
     MODEL,
     SAMPLES,
     clean,
-    of_case,
     pose_noisy,
     posed_for,
     problem,
@@ -70,7 +60,7 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
 
     def settled_silently(*given: Any) -> Any:
         before = counted[0]
-        found = refine_optima(*given)
+        found = refine(*given)
         counted[0] = before
         return found
 
@@ -83,6 +73,7 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
         return of_many(residuals, x, slopes=slopes)
 
     of_one, of_many = Residuals.__call__, Residuals.condensed_responses
+    refine = least_squares.refine_optima
     monkeypatch.setattr(least_squares, "refine_optima", settled_silently)
     monkeypatch.setattr(genetic, "make_misfit", lambda residuals: residuals.misfit)
     monkeypatch.setattr(Residuals, "__call__", at_one)
@@ -117,9 +108,11 @@ def test_a_history_is_of_the_fits_so_far() -> None:
     """Their lowest and their median misfit."""
     posed = problem("liquid_drop_2", 0)
     starts = np.random.default_rng(11).uniform(posed.low, posed.high, (6, 4))
-    fitted = LocalFits([posed]).fitted(starts, np.zeros(6, dtype=np.int64), ROUGH)
+    fitted = least_squares.LocalFits([posed]).fitted(
+        starts, np.zeros(6, dtype=np.int64), least_squares.ROUGH
+    )
     row = np.exp(starts[0]), 1.0, 1.0, 10
-    history = best_of_starts([posed], [starts], [row], silent)[0].history
+    history = least_squares.best_of_starts([posed], [starts], [row], silent)[0].history
     for count in range(1, 6):
         so_far = fitted.misfit[:count]
         # In single precision, in which fits are compared.
@@ -138,7 +131,9 @@ def test_a_trace_without_noise_gives_every_model_back(model: SampleModel) -> Non
     truth, times = np.array(LOOSE.get(model, model.example)), clean("endothelial_cell")[0]
     response = rotation(model, truth, times, inertia=False)
     near = np.log(truth) + 0.1 * np.random.default_rng(1).normal(size=(5, len(truth)))
-    found = LocalFits([posed_for(model, times, response)]).fitted(near, np.zeros(5, dtype=int))
+    found = least_squares.LocalFits([posed_for(model, times, response)]).fitted(
+        near, np.zeros(5, dtype=int)
+    )
     assert np.min(found.misfit) < 1e-6 * np.abs(response).max()
     if model not in LOOSE:
         best = found.x[np.argmin(found.misfit)]
@@ -148,15 +143,15 @@ def test_a_trace_without_noise_gives_every_model_back(model: SampleModel) -> Non
 def test_answers_do_not_depend_on_the_batch_byte_for_byte() -> None:
     """Fits share responses: of one model, at the same times; search ranges may differ."""
     times, response = clean("liquid_drop_2")
-    linear = of_case("liquid_drop_2", 4)
+    linear = pose_noisy(times, response, 4)
     (offset,) = pose_noisy(times, response, 1, offset=True)
     (sparse,) = pose_noisy(times[::2], response[::2], 1)
     narrow = replace(linear[2], low=linear[2].low + 1)
     simple = posed_for(MODELS["liquid_drop"], times, response)
     problems = [linear[0], linear[1], sparse, offset, narrow, linear[3], simple]
-    groups = alike(problems)
+    groups = least_squares.alike(problems)
     assert [group.tolist() for group in groups] == [[0, 1, 4, 5], [2], [3], [6]]
-    assert alike([]) == []
+    assert least_squares.alike([]) == []
     few = least_squares.LeastSquaresSettings(5, 2)
 
     def rngs() -> list[np.random.Generator]:
@@ -194,7 +189,7 @@ def noisy(model: SampleModel, count: int) -> list[tuple[TraceProblem, Array]]:
 def gradient(posed: TraceProblem, x: Array) -> Array:
     """Half of that of what is minimized, on all samples."""
     residual, slopes = posed.residuals(x)
-    away = (x - 0.5 * (posed.low + posed.high)) / PRIOR_WIDTH**2
+    away = (x - 0.5 * (posed.low + posed.high)) / least_squares.PRIOR_WIDTH**2
     return slopes @ residual / posed.residuals.noise_scale**2 + away
 
 
@@ -202,7 +197,7 @@ def gradient(posed: TraceProblem, x: Array) -> Array:
 def test_curvatures_are_those_of_what_is_minimized(name: str) -> None:
     """All second derivatives, against differences of gradients on all samples; away from optima."""
     for posed, sample in noisy(MODELS_SETTLED[name], 6):
-        fits, trace, x = LocalFits([posed]), np.zeros(1, dtype=np.int64), sample + 0.3
+        fits, trace, x = least_squares.LocalFits([posed]), np.zeros(1, dtype=np.int64), sample + 0.3
         found = fits.normal(x[None], trace, curved=True)
         unit = np.eye(len(x))
 
@@ -224,6 +219,9 @@ def test_the_optimum_is_settled_to_the_last_digits() -> None:
     experiment = problem("endothelial_cell", 3)
     best = np.log(run("least_squares", experiment).parameters)
     rng = np.random.default_rng(0)
-    ends = [fit_from([experiment], best + 0.01 * rng.standard_normal(4)).x[0] for _ in range(4)]
+    ends = [
+        least_squares.fit_from([experiment], best + 0.01 * rng.standard_normal(4)).x[0]
+        for _ in range(4)
+    ]
     assert np.max(np.ptp(ends, axis=0)) < 1e-9
     assert np.max(np.abs(gradient(experiment, ends[0]))) < 1e-6

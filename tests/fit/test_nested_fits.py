@@ -7,19 +7,8 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.fit import nested_fits
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
-from biogrip.fit.nested_fits import (
-    _is_noticeably_lower,
-    _of_contained,
-    _worse,
-    advice,
-    deepen,
-    fit_models,
-    is_within,
-    one_branch_more,
-    preferred,
-    ranked,
-)
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.physics.models import CANDIDATES, MODELS, contained
 from tests.helpers.default import STUDY, seen
@@ -37,7 +26,7 @@ def fitted(
         name: pose_noisy(times, response, traces, CANDIDATES[name].model, level) for name in tried
     }
     rngs = {name: [np.random.default_rng(n) for n in range(traces)] for name in tried}
-    return problems, fit_models(problems, FEW, rngs, lambda: None)
+    return problems, nested_fits.fit_models(problems, FEW, rngs, lambda: None)
 
 
 def worse(
@@ -84,14 +73,14 @@ def test_a_model_fits_no_worse_than_one_in_it(
 def test_what_has_vanished_starts_from_its_like(inner: str, expected: list[list[float]]) -> None:
     """A spring in front that was rigid is 3 and 100 times the other, one that was none is less."""
     found = {inner: [seen(parameters=np.array([6.0, 30.0]))]}
-    starts = [*_of_contained("zener_kelvin", found, 0, 400.0)]
+    starts = [*nested_fits._of_contained("zener_kelvin", found, 0, 400.0)]
     np.testing.assert_allclose(starts, expected)
 
 
 def test_a_simpler_model_fits_better_if_nine_digits_say_so() -> None:
     for lower, expected in ((0.0, []), (4e-10, []), (2e-9, [("liquid_drop", "maxwell", 0)])):
         found = {"maxwell": [seen(misfit=1 - lower)], "liquid_drop": [seen(misfit=1.0)]}
-        assert [*_worse(found)] == expected
+        assert [*nested_fits._worse(found)] == expected
 
 
 def test_elements_vanish_where_the_range_does_not_reach() -> None:
@@ -104,7 +93,7 @@ def test_elements_vanish_where_the_range_does_not_reach() -> None:
     without = [pair for pair in pairs if pair[0].parameters[1] == 0]
     assert without
     for answer, simpler in without:
-        assert not is_within(answer.parameters, problems["liquid_drop"][0])
+        assert not nested_fits.is_within(answer.parameters, problems["liquid_drop"][0])
         np.testing.assert_array_equal(answer.history.best_parameters[-1], answer.parameters)
         # It is as much the optimum as that of the simpler model is.
         assert simpler.converged
@@ -130,12 +119,12 @@ READINGS = 1000
 )
 def test_the_sentence_is_that_of_the_numbers(gained: dict[str, float], said: str) -> None:
     misfits = [float(np.exp(-gain / (2 * READINGS))) for gain in gained.values()]
-    tried = ranked(list(gained), misfits, READINGS)
-    assert said in advice(tried, "generalized_maxwell")
-    other = preferred(tried, "generalized_maxwell")
+    tried = nested_fits.ranked(list(gained), misfits, READINGS)
+    assert said in nested_fits.advice(tried, "generalized_maxwell")
+    other = nested_fits.preferred(tried, "generalized_maxwell")
     assert (other is None) == ("none of" in said)
     words = "None of the 2 models tried is adequate: the best of them, "
-    inadequate = advice(tried, "generalized_maxwell", adequate=False)
+    inadequate = nested_fits.advice(tried, "generalized_maxwell", adequate=False)
     assert inadequate.startswith(words) == (other is not None)
 
 
@@ -146,16 +135,16 @@ def test_a_branch_is_taken_that_lowers_chi_squared_by_a_hundredth(
     """Far less than the 1 that a standard error changes it by."""
     problem = seen(residuals=seen(samples=READINGS))
     before = float(np.sqrt(1 + gained / READINGS))
-    assert _is_noticeably_lower(1.0, before, problem) == taken
+    assert nested_fits._is_noticeably_lower(1.0, before, problem) == taken
 
 
 def test_branches_are_added_beside_a_power_law_that_is_not_adequate() -> None:
     """Of five processes over eight decades; misfits are in noises of 110 readings."""
     misfits = {"generalized_maxwell": 29.0, "generalized_maxwell_2": 19.0}
     misfits |= {"generalized_maxwell_3": 11.0, "springpots_in_series": 5.2}
-    tried = ranked([*misfits], [*misfits.values()], 110)
-    assert one_branch_more(tried) is None
-    assert one_branch_more(tried, adequate=False) == "generalized_maxwell_4"
+    tried = nested_fits.ranked([*misfits], [*misfits.values()], 110)
+    assert nested_fits.one_branch_more(tried) is None
+    assert nested_fits.one_branch_more(tried, adequate=False) == "generalized_maxwell_4"
 
 
 def test_a_fit_ends_no_higher_than_with_another_seed() -> None:
@@ -168,7 +157,7 @@ def test_a_fit_ends_no_higher_than_with_another_seed() -> None:
     found = identify_many(posed, LeastSquaresSettings(candidates=1000, starts=16), rngs)
     apart, together = (
         len(times) * (each[1].misfit ** 2 / each[0].misfit ** 2 - 1)
-        for each in (found, deepen(posed, found))
+        for each in (found, nested_fits.deepen(posed, found))
     )
     assert apart > 0.3
     assert abs(together) < 0.01

@@ -15,7 +15,6 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.models import MODELS
 from biogrip.physics.noise import Noise, add_noise, nuisance_basis
 from biogrip.physics.protocol import Course, sample_times
-from biogrip.physics.residuals import Residuals
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
 from tests.helpers.default import STUDY
@@ -59,10 +58,6 @@ def pose_noisy(
     return replace(EXPERIMENT, ranges=STUDY.ranges, **assumed).of_each(times, traces, model)
 
 
-def of_case(case: str, count: int, level: float = 0.1) -> list[TraceProblem]:
-    return pose_noisy(*clean(case), count, level=level)
-
-
 def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> TraceProblem:
     return pose_noisy(*clean(case, rate_Hz), seed + 1, level=level)[seed]
 
@@ -88,9 +83,3 @@ def condensed_of(
 ) -> Condensed:
     """Rows that stand for the samples of any trace at these times."""
     return Condensed(torque, time_s, nuisance_basis(time_s, offset=offset, drift=drift))
-
-
-def condensed_rows(residuals: Residuals, x: Array) -> tuple[Array, Array]:
-    """Rows that stand for the residuals at log-parameters (n_parameters,), and their slopes."""
-    rows = residuals.condensed_responses(x[None])[0]
-    return rows[0] - residuals.trace.rows, rows[1:]

@@ -18,7 +18,6 @@ from flint import acb, acb_mat, arb, ctx
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import Course, Phase, hold
 from biogrip.physics.sample_model import SampleModel
 
@@ -30,7 +29,6 @@ PROTOCOLS = {
         Phase(200.0, 1.4e-9, -4e-12),
     ),
 }
-MODEL_PARAMETERS = {name: list(model.example) for name, model in MODELS.items()}
 # Logarithms between which parameters of each kind are searched for, about.
 LOG_RANGES = {
     "stiffness": (-9.1, 18.4),

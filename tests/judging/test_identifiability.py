@@ -71,9 +71,8 @@ def test_quantities_and_their_gradients(form: str, value: float, low: float, hig
 
 
 @functools.cache
-def told(case: str) -> tuple[Diagnosis, Likelihood]:
-    diagnosis = diagnosis_of(problem(case, 4, rate_Hz=10.0), MODEL)
-    return diagnosis, diagnosis.likelihood
+def told(case: str) -> Diagnosis:
+    return diagnosis_of(problem(case, 4, rate_Hz=10.0), MODEL)
 
 
 @pytest.mark.parametrize(
@@ -88,7 +87,7 @@ def told(case: str) -> tuple[Diagnosis, Likelihood]:
     ],
 )
 def test_verdicts_on_the_papers_cases(case: str, verdicts: list[str]) -> None:
-    diagnosis, _ = told(case)
+    diagnosis = told(case)
     assert [finding.verdict for finding in diagnosis.findings] == verdicts
     pulls = case != "endothelial_cell"
     assert ["would have to pull" in note.text for note in diagnosis.notes] == [True] * pulls
@@ -132,7 +131,7 @@ def test_a_bare_damper_is_known_from_one_side_by_a_spring_it_hides() -> None:
 
 
 def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:
-    diagnosis, likelihood = told("liquid_drop_1")
+    diagnosis, likelihood = told("liquid_drop_1"), told("liquid_drop_1").likelihood
     valley, _ = compute_valley(likelihood, MODEL)
     assert valley is not None
     along, arm = ({key: np.array(grid[key]) for key in grid} for grid in valley["grids"])
@@ -144,10 +143,7 @@ def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:
     assert np.all(increases[sums / best < 0.93] > likelihood.certainty)
     assert increases.min() > -0.1
     # Beyond the sum a weak, slow branch hides any c: c_p alone is what the sum was.
-    beyond = arm["x_values"] > 0.5 * best
-    lowest = [
-        arm["increases"][:, i].min() for i in range(arm["increases"].shape[1]) if beyond[0, i]
-    ]
+    lowest = arm["increases"].min(axis=0)[arm["x_values"][0] > 0.5 * best]
     assert max(lowest) < likelihood.certainty
     assert np.ptp(lowest) < 0.5
     assert compute_valley(likelihood, MODELS["maxwell"]) == (None, None)
@@ -201,15 +197,10 @@ def test_arms_ring_as_beside_the_least_damper_that_the_trace_allows(
     def ring(network: Network, _: float) -> Any:
         dampers.append(network.c_p)
 
-    judged = seen(
-        likelihood=seen(
-            problem=seen(residuals=seen(model=MODEL, ring=ring, noise_scale=1.0)),
-            best=np.zeros(4),
-            independent=np.inf,
-            noise_sd=1.0,
-        ),
-        findings=[seen(quantity=seen(label="c_p"), low=low, value=3.0)],
-    )
+    problem = seen(residuals=seen(model=MODEL, ring=ring, noise_scale=1.0))
+    known = seen(problem=problem, best=np.zeros(4), independent=np.inf, noise_sd=1.0)
+    found = seen(quantity=seen(label="c_p"), low=low, value=3.0)
+    judged = seen(likelihood=known, findings=[found])
     assert [*_ringing(judged, rejected=False)] == []
     assert dampers == [[least]]
 

@@ -7,14 +7,7 @@ from scipy.linalg import expm
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.physics.calibration import (
-    FreeMotion,
-    _first_guess,
-    calibrate,
-    calibration_yaml,
-    free_motion,
-    read_calibrated_arms,
-)
+from biogrip.physics import calibration
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.noise import Noise, add_noise
 
@@ -29,7 +22,7 @@ CAUSES = (1.6e-9, 2e-13)
 def test_free_motion_is_the_exponential_of_its_matrix(damping: float) -> None:
     arm = dataclasses.replace(ARM, damping_Nms_per_rad=damping)
     matrix = np.array([[0.0, 1.0], [-4.4e-7 / 1e-14, -damping / 1e-14]])
-    motion = free_motion(arm, TIME_S, *CAUSES)
+    motion = calibration.free_motion(arm, TIME_S, *CAUSES)
     for record, torque, rate in (
         (motion.step, CAUSES[0], 0.0),
         (motion.impulse, 0.0, CAUSES[1] / ARM.inertia_kgm2),
@@ -40,10 +33,10 @@ def test_free_motion_is_the_exponential_of_its_matrix(damping: float) -> None:
         assert np.max(np.abs(record - expected[:, 0])) < 1e-8 * np.abs(record).max()
 
 
-def noisy(arm: Arm, level: float, seed: int, time_s: Array = TIME_S) -> FreeMotion:
-    motion = free_motion(arm, time_s, *CAUSES)
+def noisy(arm: Arm, level: float, seed: int, time_s: Array = TIME_S) -> calibration.FreeMotion:
+    motion = calibration.free_motion(arm, time_s, *CAUSES)
     rng, noise = np.random.default_rng(seed), Noise("gaussian", level, "peak")
-    return FreeMotion(
+    return calibration.FreeMotion(
         time_s, add_noise(motion.step, noise, rng), add_noise(motion.impulse, noise, rng)
     )
 
@@ -51,10 +44,10 @@ def noisy(arm: Arm, level: float, seed: int, time_s: Array = TIME_S) -> FreeMoti
 @pytest.mark.parametrize("scale", [0.3, 1.0, 3.0])
 def test_without_noise_the_arm_itself_is_found(scale: float) -> None:
     arm = Arm(1e-14 * scale, 3.3e-12, 4.4e-7 * scale)
-    record, true = free_motion(arm, TIME_S, *CAUSES), dataclasses.astuple(arm)
+    record, true = calibration.free_motion(arm, TIME_S, *CAUSES), dataclasses.astuple(arm)
     # Decay is read off the first two eighths, frequency off a spectrum.
-    np.testing.assert_allclose(_first_guess(record, CAUSES[0]), true, rtol=0.02)
-    found = calibrate(record, *CAUSES).arm
+    np.testing.assert_allclose(calibration._first_guess(record, CAUSES[0]), true, rtol=0.02)
+    found = calibration.calibrate(record, *CAUSES).arm
     np.testing.assert_allclose(dataclasses.astuple(found), true, rtol=1e-7)
 
 
@@ -63,7 +56,7 @@ def test_uncertainties_are_honest(time_s: Array) -> None:
     """Over 40 records the errors have the spread that each record's own uncertainty says."""
     pulls = []
     for seed in range(40):
-        found = calibrate(noisy(ARM, 0.05, seed, time_s), *CAUSES)
+        found = calibration.calibrate(noisy(ARM, 0.05, seed, time_s), *CAUSES)
         error = np.subtract(dataclasses.astuple(found.arm), dataclasses.astuple(ARM))
         pulls.append(error / dataclasses.astuple(found.uncertainty))
     # The standard deviation of 40 draws is known to 11 %, three times that is allowed.
@@ -71,16 +64,16 @@ def test_uncertainties_are_honest(time_s: Array) -> None:
 
 
 def test_a_dead_arm_is_no_calibration() -> None:
-    still = FreeMotion(TIME_S, -np.ones_like(TIME_S), np.ones_like(TIME_S))
+    still = calibration.FreeMotion(TIME_S, -np.ones_like(TIME_S), np.ones_like(TIME_S))
     with pytest.raises(BiogripError, match="does not follow"):
-        calibrate(still, *CAUSES)
+        calibration.calibrate(still, *CAUSES)
 
 
 def test_calibration_is_written_and_read_back(tmp_path: Path) -> None:
-    found = calibrate(noisy(ARM, 0.05, 2), *CAUSES)
+    found = calibration.calibrate(noisy(ARM, 0.05, 2), *CAUSES)
     path, nominal = tmp_path / "gripper.yaml", Gripper(1.5e-3, 75.0, ARM, ARM)
-    path.write_text(calibration_yaml(found, found))
-    read, known = read_calibrated_arms(path, nominal)
+    path.write_text(calibration.calibration_yaml(found, found))
+    read, known = calibration.read_calibrated_arms(path, nominal)
     assert known["left"]["stiffness_Nm_per_rad"] == pytest.approx(
         found.uncertainty.stiffness_Nm_per_rad, rel=0.05
     )
@@ -89,4 +82,4 @@ def test_calibration_is_written_and_read_back(tmp_path: Path) -> None:
     )
     path.write_text("gripper: {left: 3}")
     with pytest.raises(BiogripError, match="cannot be read as a calibration"):
-        read_calibrated_arms(path, nominal)
+        calibration.read_calibrated_arms(path, nominal)

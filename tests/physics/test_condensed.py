@@ -15,12 +15,12 @@ from biogrip.physics.protocol import Phase, hold, join_phases, sample_times
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
-from tests.helpers.problems import condensed_of, condensed_rows
-from tests.helpers.responses import MODEL_PARAMETERS, PROTOCOLS, log_range, random_samples
+from tests.helpers.problems import condensed_of
+from tests.helpers.responses import PROTOCOLS, log_range, random_samples
 from tests.helpers.responses import SAMPLING_TIMES as TIMES
 
 MAXWELL = MODELS["generalized_maxwell"]
-CELL = np.log([35.0, 12.3, 299.9, 1e-3])
+TRUTH = np.array([[35.0, 12.3, 299.9, 1e-3]])
 _RNG = np.random.default_rng(5)
 DENSE = {
     "uniform": np.linspace(0.0, 400.0, 200_000),
@@ -37,7 +37,8 @@ def products(rows: Array, slopes: Array) -> Array:
 
 def assert_alike(residuals: Residuals, x: Array) -> int:
     """All samples and the rows give the same, to 1e-10 of the trace; so many rows there are."""
-    every, few = residuals(x), condensed_rows(residuals, x)
+    every, (of_rows, *slopes) = residuals(x), residuals.condensed_responses(x[None])[0]
+    few = of_rows - residuals.trace.rows, np.array(slopes)
     scale = np.linalg.norm(every[0]) + np.linalg.norm(every[1])
     assert np.max(np.abs(products(*every) - products(*few))) < 1e-10 * scale**2
     return len(few[0])
@@ -53,19 +54,20 @@ def noise(count: int) -> Array:
 
 
 @pytest.mark.parametrize("nuisance", [False, True])
-@pytest.mark.parametrize("times", TIMES)
+@pytest.mark.parametrize("times", [*TIMES, *DENSE])
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_least_squares_sees_no_difference(
     gripper: Gripper, unequal_gripper: Gripper, protocol: str, times: str, nuisance: bool
 ) -> None:
     """To 1e-10 of the trace, over the whole search range; noise is at least 1e-3 of it."""
-    torque, time_s = join_phases(PROTOCOLS[protocol]), TIMES[times]
+    torque, time_s = join_phases(PROTOCOLS[protocol]), (TIMES | DENSE)[times]
     rows = condensed_of(torque, time_s, offset=nuisance, drift=nuisance)
-    for arms in (gripper, unequal_gripper):
+    many = times in DENSE
+    samples, most = (TRUTH, 200) if many else (random_samples(8, seed=8), min(80, len(time_s) + 1))
+    for arms in (gripper,) if many else (gripper, unequal_gripper):
         residuals = posed(arms, MAXWELL, rows, noise(len(time_s)))
-        for sample in random_samples(8, seed=8):
-            count = assert_alike(residuals, np.log(sample))
-            assert count <= min(80, len(time_s) + 1)
+        for sample in samples:
+            assert assert_alike(residuals, np.log(sample)) <= most
 
 
 @functools.cache
@@ -78,14 +80,14 @@ def condensed(protocol: str, times: str, device: str) -> Condensed:
     ("device", "times"), [("arms", "few"), ("creep", "uneven"), ("relaxation", "uneven")]
 )
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-@pytest.mark.parametrize("name", MODEL_PARAMETERS)
+@pytest.mark.parametrize("name", MODELS)
 def test_of_no_model_it_sees_a_difference(
     gripper: Gripper, name: str, protocol: str, device: str, times: str
 ) -> None:
     """Rows without slopes are the same, too, but for last bits: they are real numbers."""
     arms, rows = gripper if device == "arms" else NO_ARMS, condensed(protocol, times, device)
     residuals = posed(arms, MODELS[name], rows, noise(len(rows.all_s)))
-    middle, rng = np.log(MODEL_PARAMETERS[name]), np.random.default_rng(5)
+    middle, rng = np.log(MODELS[name].example), np.random.default_rng(5)
     x = np.clip(middle + rng.normal(size=(2, len(middle))), *log_range(MODELS[name]))
     for each in x:
         assert_alike(residuals, each)
@@ -94,7 +96,7 @@ def test_of_no_model_it_sees_a_difference(
     assert np.all(np.abs(alone - found) <= 1e-12 * np.abs(found).max(axis=2, keepdims=True))
 
 
-@pytest.mark.parametrize("name", [*MODEL_PARAMETERS, "two branches"])
+@pytest.mark.parametrize("name", [*MODELS, "two branches"])
 def test_rows_do_not_depend_on_who_else_is_there(either_gripper: Gripper, name: str) -> None:
     """Byte for byte, for any subset in any order, down to a single one."""
     model = MODELS.get(name, Sample("generalized_maxwell", 2).model)
@@ -107,15 +109,6 @@ def test_rows_do_not_depend_on_who_else_is_there(either_gripper: Gripper, name: 
     for count in (1, 2, 7, 40):
         chosen = rng.permutation(40)[:count]
         np.testing.assert_array_equal(residuals.condensed_responses(x[chosen]), together[chosen])
-
-
-@pytest.mark.parametrize("times", DENSE)
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_many_readings_are_worth_few_rows(gripper: Gripper, protocol: str, times: str) -> None:
-    torque, time_s = join_phases(PROTOCOLS[protocol]), DENSE[times]
-    rows = condensed_of(torque, time_s, offset=True)
-    residuals = posed(gripper, MAXWELL, rows, noise(len(time_s)))
-    assert assert_alike(residuals, CELL) < 200
 
 
 PAPER = PROTOCOLS["steps"]
@@ -142,7 +135,7 @@ def test_sums_of_series_are_those_of_all_residuals(
     """Of a noisy trace or a constant one; parameters that are no numbers have no misfit."""
     steps = join_phases(phases)
     time_s = sample_times(steps.end_s, rate_Hz)
-    samples = np.vstack((np.exp(CELL), random_samples(500, 3)))
+    samples = np.vstack((TRUTH, random_samples(500, 3)))
     response = step_response(gripper, MAXWELL.network(samples), inertia=False)
     responses = superpose(response, steps, time_s)
     noise = np.random.default_rng(1).standard_normal(len(time_s))

@@ -6,14 +6,7 @@ from mpmath import mp, mpf
 
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import CombDrive, Gripper, capacitance_slope, contact, torque, voltage
-from workflow.paper.mechanics import (
-    apparent_modulus,
-    drag_of_arm,
-    drag_of_sample,
-    fringing_of_comb,
-    mass_of_sample,
-    rolling_of_contact,
-)
+from workflow.paper import mechanics
 
 
 @pytest.mark.parametrize("size_um", [30, 60, 120])
@@ -68,21 +61,25 @@ def test_fringing_against_charges_on_two_strips() -> None:
     potential = (0.5 * np.log(apart**2 + g**2) - own) / (2 * math.pi)
     charge = np.linalg.solve(potential, np.full(n, 0.5)).sum()
     # Palmer's terms are the first two of a series; n segments give three digits.
-    assert 1 + fringing_of_comb(TABLE_2) == pytest.approx(charge * g / h, rel=5e-3)
+    assert 1 + mechanics.fringing_of_comb(TABLE_2) == pytest.approx(charge * g / h, rel=5e-3)
 
 
 def test_drag_of_an_arm_is_summed_along_it(gripper: Gripper) -> None:
     x = np.linspace(0, 1.5e-3, 10_001)
     per_length = 4 * math.pi * 1e-3 / (math.log(1.5e-3 / 40e-6) + 0.84)
     expected = np.trapezoid(per_length * x * x, x)
-    assert drag_of_arm(gripper, 40e-6) == pytest.approx(expected, rel=1e-7, abs=0)
+    assert mechanics.drag_of_arm(gripper, 40e-6) == pytest.approx(expected, rel=1e-7, abs=0)
 
 
 def test_small_things(gripper: Gripper) -> None:
-    assert drag_of_sample(120e-6) == pytest.approx(6 * math.pi * 1e-3 * 60e-6)
-    assert 1e6 * mass_of_sample(100e-6) == pytest.approx(1e9 * 4 / 3 * math.pi * (50e-6) ** 3)
+    assert mechanics.drag_of_sample(120e-6) == pytest.approx(6 * math.pi * 1e-3 * 60e-6)
+    assert 1e6 * mechanics.mass_of_sample(100e-6) == pytest.approx(
+        1e9 * 4 / 3 * math.pi * (50e-6) ** 3
+    )
     # A wheel of 60 um that turns by 3 mrad, on an arm of 1.5 mm.
-    assert rolling_of_contact(gripper, 120e-6, 3e-3) == pytest.approx(60e-6 * 3e-3 / 1.5e-3)
+    assert mechanics.rolling_of_contact(gripper, 120e-6, 3e-3) == pytest.approx(
+        60e-6 * 3e-3 / 1.5e-3
+    )
 
 
 @pytest.mark.parametrize(("size_m", "strain"), [(30e-6, 0.02), (120e-6, 0.1)])
@@ -92,7 +89,7 @@ def test_against_the_pressure_in_the_contact(size_m: float, strain: float) -> No
     a = math.sqrt(radius * indentation)
     p_0 = 2 * modulus / 0.75 * a / (math.pi * radius)
     force = 2 / 3 * p_0 * math.pi * a**2
-    found = apparent_modulus(force, strain * size_m, size_m)
+    found = mechanics.apparent_modulus(force, strain * size_m, size_m)
     assert found == pytest.approx(modulus, rel=1e-12)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from scipy.stats import f
+from scipy.stats import binomtest
 
 from biogrip.errors import BiogripError
 from biogrip.records.identifications import INTERVALS
@@ -71,7 +71,7 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
 
 
 def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
-    """Intervals of shares by the F distribution, as Clopper and Pearson's are in textbooks."""
+    """With the intervals of Clopper and Pearson that SciPy has."""
     empty = ("", "", "", "")
     rows = [
         # Of k = 1 two intervals within a factor of 3, one of which holds it, and one that is wider.
@@ -95,11 +95,9 @@ def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
     assert [row.get("narrow") for row in found.values()] == [None, 2, None]
     determined = found["determined"]
     for count, tried, name in ((3, 5, "reached"), (2, 3, "true")):
-        more = tried - count + 1
-        low = 1 / (1 + more / (count * f.isf(0.975, 2 * count, 2 * more)))
-        odds = (count + 1) / (tried - count) * f.isf(0.025, 2 * (count + 1), 2 * (tried - count))
-        assert determined[f"{name}_from_percent"] == pytest.approx(100 * low)
-        assert determined[f"{name}_to_percent"] == pytest.approx(100 * odds / (1 + odds))
+        ends = [determined[f"{name}_{end}_percent"] for end in ("from", "to")]
+        low, high = binomtest(count, tried).proportion_ci(method="exact")
+        assert ends == pytest.approx([100 * low, 100 * high])
     assert "at 90 %" in made.caption
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import binomtest
 
 from biogrip.fit.problem import METHODS
 from biogrip.physics.models import MODELS, Published, Sample
@@ -125,10 +126,7 @@ def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> No
     assert (first["seeds"], first["reached_share"]) == (3, pytest.approx(1 / 3))
     assert second["reached_share"] == 1.0
     assert first["encodable_rise"] == second["encodable_rise"] == pytest.approx(60.9)
-    # By Wilson's formula, (p + z^2/2n +- z sqrt(p (1 - p)/n + z^2/4n^2)) / (1 + z^2/n).
-    z2 = 1.959964**2
-    middle, half = 1 / 3 + z2 / 6, np.sqrt(z2) * np.sqrt(2 / 27 + z2 / 36)
-    ends = np.array([middle - half, middle + half]) / (1 + z2 / 3)
+    ends = binomtest(1, 3).proportion_ci(method="wilson")
     np.testing.assert_allclose([first["reached_low"], first["reached_high"]], ends, rtol=1e-6)
     assert second["median_evaluations"] == 11
     assert first["error_percent k"] == pytest.approx(20.0)
