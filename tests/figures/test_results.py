@@ -45,13 +45,10 @@ MODEL = MODELS["generalized_maxwell"]
 @pytest.fixture
 def identifications(tmp_path: Path) -> Path:
     """Of the seeds 1 and 2 near the noise, and 0 above it."""
+    runs = (0, 9.0, 1.3e-4, 1e-4), (1, 0.7, 5.05e-5, 5e-5), (2, 1e-6, 3e-5, 3e-5)
     rows = [
-        [CASE, "genetic", seed, k, *TRUTH[1:], misfit, noise, 7, 100, "stalled"]
-        for seed, k, misfit, noise in (
-            (0, 9.0, 1.3e-4, 1e-4),
-            (1, 0.7, 5.05e-5, 5e-5),
-            (2, 1e-6, 3e-5, 3e-5),
-        )
+        [CASE, "genetic", seed, k, *TRUTH[1:], *misfits, 7, 100, "stalled"]
+        for seed, k, *misfits in runs
     ]
     frame = pd.DataFrame(rows, columns=columns(MODEL))
     frame.to_csv(tmp_path / f"{CASE}.csv", index=False)
@@ -62,9 +59,8 @@ def identifications(tmp_path: Path) -> Path:
 def measurements(tmp_path: Path) -> Path:
     """Three traces whose noise falls from seed to seed."""
     target, rng = rotation(MODEL, TRUTH, TIME_S), np.random.default_rng(0)
-    traces = {
-        seed: target + 1e-4 / (1 + seed) * rng.standard_normal(len(TIME_S)) for seed in range(3)
-    }
+    noise = 1e-4 / np.array([[1], [2], [3]]) * rng.standard_normal((3, len(TIME_S)))
+    traces = dict(enumerate(target + noise))
     write_measurements(tmp_path / "seeds_0-2.npz", Measurements(TIME_S, target, traces))
     return tmp_path / "seeds_0-2.npz"
 
@@ -135,8 +131,8 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
         shown_method=METHODS["genetic"], near_noise_tolerance=0.02, config=seen(methods=["genetic"])
     )
     block = seen(genetic_algorithm=seen(mutation_start=20))
-    known = {"name": "x", "seeds": seeds, "sample": Sample(MODEL.name)}
-    case = seen(title="A cell", block=block, study=study, **known)
+    known = {"name": "x", "seeds": seeds, "sample": Sample(MODEL.name), "study": study}
+    case = seen(title="A cell", block=block, **known)
     drawn = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.npz")
     (axes,), (legend,) = drawn.axes, drawn.legends
     colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]
@@ -154,9 +150,8 @@ def scattered(overlay: str, identifications: Path) -> Any:
     content = {"quantities": items, "trades": [], "notes": []}
     write_object(folder / "expected.json", content)
     with styled():
-        return draw_scatter(
-            case, identifications, folder / "target.csv", folder / "expected.json", []
-        )
+        files = identifications, folder / "target.csv", folder / "expected.json"
+        return draw_scatter(case, *files, [])
 
 
 def test_a_band_of_the_study_s_confidence_is_drawn_of_what_is_determined_alone(

@@ -71,16 +71,10 @@ def rng_of(seed: int) -> np.random.Generator:
 
 
 def content(answer: Fit) -> tuple[bytes | float | str, ...]:
-    history = answer.history
-    return (
-        answer.parameters.tobytes(),
-        answer.misfit,
-        answer.generations,
-        answer.evaluations,
-        answer.stop_reason,
-        *(array.tobytes() for array in vars(history).values()),
-        *(str(array.dtype) for array in vars(history).values()),
-    )
+    arrays = vars(answer.history).values()
+    numbers = answer.misfit, answer.generations, answer.evaluations, answer.stop_reason
+    types = (str(array.dtype) for array in arrays)
+    return (*numbers, answer.parameters.tobytes(), *(a.tobytes() for a in arrays), *types)
 
 
 @pytest.mark.parametrize("name", POPULATIONS)
@@ -98,9 +92,8 @@ def test_populations_are_what_they_are_alone_and_gene_by_gene(name: str) -> None
     ]
     everyone = list(range(len(problems)))
     for group in (everyone[::-1], everyone[1:], everyone[:1]):
-        found = genetic.identify_many(
-            [problems[seed] for seed in group], settings, [rng_of(seed) for seed in group]
-        )
+        rngs = [rng_of(seed) for seed in group]
+        found = genetic.identify_many([problems[seed] for seed in group], settings, rngs)
         assert [content(answer) for answer in found] == [plain[seed] for seed in group]
 
 
@@ -142,11 +135,8 @@ def test_any_number_of_digits_is_decoded_as_the_decimal_number_it_is(
 @pytest.mark.parametrize("digits", [1, 3, 4])
 def test_nearest_encodable_is_the_nearest_of_all(value: float, digits: int) -> None:
     genes = GeneRange((-2, 4), (0, 9), digits)
-    every = [
-        float(f"{mantissa}e{exponent - digits}")
-        for mantissa in range(10 ** (digits - 1), 10**digits)
-        for exponent in range(-2, 5)
-    ]
+    mantissas, exponents = range(10 ** (digits - 1), 10**digits), range(-2, 5)
+    every = (float(f"{m}e{exponent - digits}") for m in mantissas for exponent in exponents)
     nearest = min(abs(each - value) for each in every)
     assert abs(nearest_encodable(value, genes) - value) == nearest
 
@@ -174,11 +164,9 @@ def test_no_encodable_point_is_lower_where_the_optimum_is_not_encodable(digit: i
         return np.log(1e5 / parameters).sum(axis=1)
 
     every = np.array(list(product(*(genes.values for genes in ranges))))
-    found = [
-        lowest_encodable(each, ranges, np.array([[33.73, 0.2843]])) for each in (valley, beyond)
-    ]
-    assert found == [valley(every).min(), beyond(every).min()]
-    assert found[0] > 1 + 1e-6
+    for each in (valley, beyond):
+        found = lowest_encodable(each, ranges, np.array([[33.73, 0.2843]]))
+        assert found == each(every).min() > 1 + 1e-6
 
 
 @pytest.mark.parametrize("digit", [0, 1])

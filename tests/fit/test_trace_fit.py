@@ -171,9 +171,8 @@ def test_an_uncertain_length_is_that_of_all_elements() -> None:
     """A length enters as its square, by which every element of the sample is multiplied."""
     share, length = 0.05, POSED.gripper.arm_length_m
     odd, even = functions({"gripper": {"arm_length_m": share * length}})
-    above, nominal, below = (
-        simulated(POSED.gripper, TRUTH + 2 * np.log1p(error)) for error in (share, 0, -share)
-    )
+    errors = np.log1p([share, 0, -share])
+    above, nominal, below = (simulated(POSED.gripper, TRUTH + 2 * error) for error in errors)
     np.testing.assert_allclose(odd, 0.5 * (above - below), rtol=1e-9, atol=1e-12)
     bent = 0.5 * (above + below) - nominal
     assert even @ bent / np.linalg.norm(even) / np.linalg.norm(bent) == pytest.approx(1.0)

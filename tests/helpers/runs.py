@@ -135,19 +135,7 @@ def snakemake(
     config: dict[str, Any] | None = None,
     snakefile: Path = ROOT / "Snakefile",
 ) -> Run:
-    """Run the workflow in a folder, over a config that is laid on the default study.
-
-    Parameters
-    ----------
-    folder
-        Where results are to be.
-    arguments
-        Further ones of Snakemake's: targets, or `-n`.
-    config
-        The config, which is written to `overlay.yaml` in the folder; none by default.
-    snakefile
-        Of this clone, or of another.
-    """
+    """Run the workflow in a folder, over a config laid on the default study, as `overlay.yaml`."""
     given: list[str | Path] = ["-s", snakefile, "--directory", folder]
     if config is not None:
         (folder / "overlay.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")

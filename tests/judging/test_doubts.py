@@ -105,9 +105,7 @@ def without_stated_noise(noisy: Array) -> TraceResult:
     ("times", "weight", "said"),
     [
         (1e-4, DOUBT, "is 10000 times the noise that was given: its value or unit"),
-        pytest.param(
-            *(0.5, DOUBT, "is 2 times the noise that was given"), marks=pytest.mark.nightly
-        ),
+        (0.5, DOUBT, "is 2 times the noise that was given"),
         (0.85, HARMLESS, "is 1.18 times the noise that was given: limits are too narrow"),
         (1.0, "", ""),
         (1.5, "", ""),

@@ -58,12 +58,8 @@ def test_quantities_and_their_gradients(form: str, value: float, low: float, hig
     model = Sample("burgers").model
     x = np.log([3.0, 200.0, 2.0, 40.0])
     springs, times = find_combinations(model, [0, 2]), find_combinations(model, [0, 3])
-    quantity = {
-        "sum": springs[0],
-        "series": springs[1],
-        "time": times[0],
-        "parameter": parameters_and_sum(model)[1],
-    }[form]
+    every = {"sum": springs[0], "series": springs[1], "time": times[0]}
+    quantity = (every | {"parameter": parameters_and_sum(model)[1]})[form]
     assert math.exp(quantity.log(x)) == pytest.approx(value, rel=1e-12)
     slopes = [(quantity.log(x + h) - quantity.log(x - h)) / 2e-6 for h in 1e-6 * np.eye(4)]
     assert quantity.gradient(x) == pytest.approx(np.array(slopes), abs=1e-8)

@@ -48,16 +48,13 @@ def labelled(*labels: str) -> list[Quantity]:
     return [quantity for quantity in QUANTITIES if quantity.label in labels]
 
 
-BURGERS = MODELS["burgers"]
+BURGERS, PAIRS = MODELS["burgers"], ([0, 2], [0, 3])
 TWO, THREE = (Sample("generalized_maxwell", branches).model for branches in (2, 3))
 FORMS = {
     "one branch": (MODEL, find_combinations(MODEL, [0, 1, 2])),
     "two branches": (TWO, parameters_and_sum(TWO)[-1:]),
     "three branches": (THREE, find_combinations(THREE, [0, 1, 4])),
-    "burgers": (
-        BURGERS,
-        [q for pair in ([0, 2], [0, 3]) for q in find_combinations(BURGERS, pair)],
-    ),
+    "burgers": (BURGERS, [q for pair in PAIRS for q in find_combinations(BURGERS, pair)]),
 }
 
 
@@ -80,10 +77,9 @@ def test_points_are_moved_to_where_quantities_are_held(form: str) -> None:
     assert np.all((x >= low) & (x <= high))
     values = [quantities[q].log(point) for q, point in zip(which, x, strict=True)]
     assert np.max(np.abs(values - targets)) < 1e-6
+    beyond = QuantityConstraint(quantities, which, targets + 20, *bounds, 400.0, np.ones(3000))
     with pytest.raises(ValueError, match="outside its range"):
-        QuantityConstraint(
-            quantities, which, targets + 20, *bounds, 400.0, np.ones(len(x))
-        ).started(x)
+        beyond.started(x)
 
 
 def test_along_a_constraint_the_eliminated_parameter_follows() -> None:
@@ -146,9 +142,7 @@ def test_the_search_range_determines_no_combination() -> None:
     # To first order it is known well enough to be looked at.
     assert told.likelihood.deviation(series) < 0.5
     ((one,),) = compute_profiles([told.likelihood], [series])
-    assert one.low is None
-    assert one.high is not None
-    assert told.trades == []
+    assert (one.low is None, one.high is None, told.trades) == (True, False, [])
     # With one spring as soft as it may be, and the other any, it is lower than any limit.
     soft, best = problem.low[0], told.likelihood.best
     assert series.log(np.array([soft, *best[1:]])) < soft + 1e-3

@@ -50,18 +50,9 @@ def test_of_white_noise_each_test_fails_as_many_as_its_level_says(
     basis = absorbed(directions(np.geomspace(10.0**-decades, 1.0, readings) if decades else even))
     noise = np.random.default_rng(readings + decades).standard_normal((TRACES, readings))
     left = noise - noise @ basis.T @ basis
-    chances = np.array(
-        [
-            (
-                correlated(residual, basis)[1],
-                wandering(residual, basis),
-                uneven(residual, basis),
-                far_out(residual, outliers_of(by_leverage(residual, basis)), basis),
-            )
-            for residual in left
-        ]
-    )
-    shares = np.mean(chances < LEVEL, axis=0)
+    chances = [[correlated(it, basis)[1], wandering(it, basis), uneven(it, basis)] for it in left]
+    struck = [far_out(it, outliers_of(by_leverage(it, basis)), basis) for it in left]
+    shares = np.mean(np.column_stack((chances, struck)) < LEVEL, axis=0)
     margin = 4 * np.sqrt(LEVEL / TRACES)
     assert np.all(shares < LEVEL + margin)
     exact = [0] if readings < 20 else [0, 1]
@@ -244,11 +235,9 @@ def test_of_white_noise_both_tests_fail_as_many_as_their_level_says(
     noise = np.random.default_rng(readings + decades).standard_normal((2000, readings))
     left = noise - noise @ basis.T @ basis
     share = (left @ steps.shapes.T / steps.norms) ** 2 / np.sum(left**2, axis=1)[:, None]
-    alarms = [
-        [steps.chance(own) < LEVEL for own in np.max(share, axis=1).tolist()],
-        [compare_halves(own, basis, readings // 2) < LEVEL for own in left],
-    ]
-    assert np.mean(alarms, axis=1) == pytest.approx(LEVEL, abs=0.011)
+    of_steps = [steps.chance(own) for own in np.max(share, axis=1).tolist()]
+    chances = np.array([of_steps, [compare_halves(own, basis, readings // 2) for own in left]])
+    assert np.mean(chances < LEVEL, axis=1) == pytest.approx(LEVEL, abs=0.011)
 
 
 @pytest.mark.parametrize(("change", "least"), [("jump", 0.58), ("gain", 0.94), ("start", 0.81)])
@@ -256,20 +245,16 @@ def test_steps_are_told_and_timed(change: str, least: float) -> None:
     """A scan tells 65, 97 and 88 %: of 200 traces no less than three standard errors below."""
     times = np.arange(1, 101.0)
     true, basis = relaxation(times)
-    wrong = {
-        "jump": 2 * NOISE * (times > 50),
-        "gain": -0.1 * true * (times > 50),
-        "start": 5 * NOISE * (times < 2.5),
-    }[change]
+    late, early = times > 50, times < 2.5
+    wrong = {"jump": 2 * NOISE * late, "gain": -0.1 * true * late, "start": 5 * NOISE * early}
     noise = NOISE * np.random.default_rng(3).standard_normal((200, 100))
-    left = wrong + noise
+    left = wrong[change] + noise
     left -= left @ basis.T @ basis
     found = [find_step(own, basis, itself) for own in left]
     seen = [step for step in found if step and step.chance < FALSE_ALARM]
     assert len(seen) > least * 200
-    assert np.median([step.before for step in seen]) == pytest.approx(
-        2 if change == "start" else 50, abs=1
-    )
+    before = np.median([step.before for step in seen])
+    assert before == pytest.approx(2 if change == "start" else 50, abs=1)
 
 
 def test_a_step_is_what_a_fit_with_it_finds() -> None:

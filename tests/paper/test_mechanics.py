@@ -38,13 +38,11 @@ def test_springs_alone_tell_what_statics_says() -> None:
     )
     small, large, sized = mechanics(study.of(study.gripped)).rows
     force = 0.5 * 1.6e-9 / STUDY.gripper.lever_m
-    assert small["largest_force_uN"] == pytest.approx(1e6 * force)
-    assert small["shortening_um"] == pytest.approx(1e6 * force / own)
-    assert small["stiffness_over_gripper"] == pytest.approx(1)
-    assert (small["size_um"], large["size_um"]) == (pytest.approx(30), pytest.approx(120))
-    assert small["strain_percent"] == pytest.approx(100 * force / own / 30e-6)
-    assert sized["size_um"] == pytest.approx(90)
-    assert small["lowest_force_uN"] == pytest.approx(1e6 * force / 5)
+    assert [row["size_um"] for row in (small, large, sized)] == pytest.approx([30, 120, 90])
+    forces = {"largest_force_uN": 1e6 * force, "lowest_force_uN": 1e6 * force / 5}
+    gives = {"shortening_um": 1e6 * force / own, "strain_percent": 100 * force / own / 30e-6}
+    for name, value in {**forces, **gives, "stiffness_over_gripper": 1.0}.items():
+        assert small[name] == pytest.approx(value), name
 
 
 def test_the_nonlinear_model_differs_little() -> None:

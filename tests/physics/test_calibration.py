@@ -74,12 +74,10 @@ def test_calibration_is_written_and_read_back(tmp_path: Path) -> None:
     path, nominal = tmp_path / "gripper.yaml", Gripper(1.5e-3, 75.0, ARM, ARM)
     path.write_text(calibration.calibration_yaml(found, found))
     read, known = calibration.read_calibrated_arms(path, nominal)
-    assert known["left"]["stiffness_Nm_per_rad"] == pytest.approx(
-        found.uncertainty.stiffness_Nm_per_rad, rel=0.05
-    )
-    np.testing.assert_allclose(
-        dataclasses.astuple(read.left), dataclasses.astuple(found.arm), rtol=1e-6
-    )
+    expected = found.uncertainty.stiffness_Nm_per_rad
+    assert known["left"]["stiffness_Nm_per_rad"] == pytest.approx(expected, rel=0.05)
+    arms = np.array([dataclasses.astuple(arm) for arm in (read.left, found.arm)])
+    np.testing.assert_allclose(arms[0], arms[1], rtol=1e-6)
     path.write_text("gripper: {left: 3}")
     with pytest.raises(BiogripError, match="cannot be read as a calibration"):
         calibration.read_calibrated_arms(path, nominal)

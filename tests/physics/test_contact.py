@@ -73,9 +73,8 @@ def test_drag_of_an_arm_is_summed_along_it(gripper: Gripper) -> None:
 
 def test_small_things(gripper: Gripper) -> None:
     assert mechanics.drag_of_sample(120e-6) == pytest.approx(6 * math.pi * 1e-3 * 60e-6)
-    assert 1e6 * mechanics.mass_of_sample(100e-6) == pytest.approx(
-        1e9 * 4 / 3 * math.pi * (50e-6) ** 3
-    )
+    milligrams = 1e6 * mechanics.mass_of_sample(100e-6)
+    assert milligrams == pytest.approx(1e9 * 4 / 3 * math.pi * (50e-6) ** 3)
     # A wheel of 60 um that turns by 3 mrad, on an arm of 1.5 mm.
     assert mechanics.rolling_of_contact(gripper, 120e-6, 3e-3) == pytest.approx(
         60e-6 * 3e-3 / 1.5e-3

@@ -90,11 +90,9 @@ def test_a_ring_shows_by_its_norm_beside_the_noise(gripper: Gripper) -> None:
     found = find_ring(*given, lambda rows: rows / noise_sd)
     assert found is not None
     assert found.largest == pytest.approx(10.0)
-    norms = [
-        np.linalg.norm(change[time_s > last]) / noise_sd
-        for last in (found.lasts_s, found.lasts_s - 1e-9)
-    ]
-    assert norms[0] <= VISIBLE < norms[1]
+    lasts = found.lasts_s, found.lasts_s - 1e-9
+    after, before = (np.linalg.norm(change[time_s > last]) / noise_sd for last in lasts)
+    assert after <= VISIBLE < before
     least = 0.99 * VISIBLE / np.linalg.norm(change)
     assert find_ring(*given, lambda rows: least * rows) is None
 
@@ -185,9 +183,7 @@ def test_three_branches_against_inversion(
     network = generalized_maxwell([*k, k_p, *c, c_p])
 
     def impedance(s: Any) -> Any:
-        return (
-            k_p + c_p * s + sum(series(*of) for of in zip(k, (s * one for one in c), strict=True))
-        )
+        return k_p + c_p * s + sum(series(k_j, c_j * s) for k_j, c_j in zip(k, c, strict=True))
 
     exact = rotations(given, impedance, steps, NEAR, inertia=inertia)
     response = step_response(given, network, inertia=inertia)

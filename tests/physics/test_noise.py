@@ -166,18 +166,12 @@ COLOURS = [
 def correlation(time_s: Array, noise_model: NoiseModel, growing: Array | None = None) -> Array:
     """The matrix as it is defined."""
     grown = np.ones(len(time_s)) if growing is None else growing**2 / np.mean(growing**2)
-    apart = np.abs(np.subtract.outer(time_s, time_s))
-    rates = flicker_rates(time_s)
-    flicker = np.mean([np.exp(-rate * apart) for rate in rates], axis=0)
-    matrix: Array = (
-        noise_model.white * np.eye(len(time_s))
-        + noise_model.proportional * np.diag(grown)
-        + noise_model.ar1 * np.exp(-apart / noise_model.time_s)
-        + noise_model.flicker * flicker
-    )
-    since = time_s - time_s[0]
-    matrix += noise_model.walk * np.minimum.outer(since, since) / np.mean(since)
-    return matrix
+    apart, since = np.abs(np.subtract.outer(time_s, time_s)), time_s - time_s[0]
+    matrix = np.diag(noise_model.white + noise_model.proportional * grown)
+    matrix += noise_model.ar1 * np.exp(-apart / noise_model.time_s)
+    flicker = [np.exp(-rate * apart) for rate in flicker_rates(time_s)]
+    matrix += noise_model.flicker * np.mean(flicker, axis=0)
+    return matrix + noise_model.walk * np.minimum.outer(since, since) / np.mean(since)
 
 
 def test_rates_of_flicker_noise_are_as_far_apart_as_allowed() -> None:
@@ -212,9 +206,8 @@ def test_nuisance_and_what_is_uncertain_are_parts_of_the_noise() -> None:
     nuisance = nuisance_basis(time_s, offset=True, drift=True)
     uncertain = 3 * np.random.default_rng(1).standard_normal((2, 300)) / np.sqrt(300)
     whitening = Whitening(time_s, noise_model, nuisance, uncertain)
-    matrix = (
-        correlation(time_s, noise_model) + uncertain.T @ uncertain + 1e8 * nuisance.T @ nuisance
-    )
+    matrix = correlation(time_s, noise_model) + uncertain.T @ uncertain
+    matrix += 1e8 * nuisance.T @ nuisance
     rows = np.random.default_rng(2).standard_normal((3, 300))
     expected = rows @ np.linalg.solve(matrix, rows.T)
     white = whitening(rows)

@@ -34,16 +34,14 @@ from biogrip.study.experiment_blocks import PhaseBlock, ProtocolBlock
 from tests.helpers.responses import exact_50_digits, random_samples
 from tests.physics.test_contact import TABLE_2
 
-PROTOCOL = ProtocolBlock(
-    (
-        PhaseBlock(5.0, torque_Nm=0.0, to_torque_Nm=2e-9),
-        PhaseBlock(10.0, voltage_V=12.0),
-        PhaseBlock(4.0, voltage_V=3.0, to_voltage_V=15.0),
-        PhaseBlock(5.0, torque_Nm=1e-9, to_torque_Nm=2e-10),
-        PhaseBlock(5.0, torque_Nm=0.5e-9),
-    )
+BLOCKS = (
+    PhaseBlock(5.0, torque_Nm=0.0, to_torque_Nm=2e-9),
+    PhaseBlock(10.0, voltage_V=12.0),
+    PhaseBlock(4.0, voltage_V=3.0, to_voltage_V=15.0),
+    PhaseBlock(5.0, torque_Nm=1e-9, to_torque_Nm=2e-10),
+    PhaseBlock(5.0, torque_Nm=0.5e-9),
 )
-TORQUE = join_phases(PROTOCOL.make_phases(GRIPPER, TABLE_2))
+TORQUE = join_phases(ProtocolBlock(BLOCKS).make_phases(GRIPPER, TABLE_2))
 PER_SQUARE_VOLT = float(torque_of_voltage(TABLE_2, 1.0))
 # The protocol's torque until some times, phase by phase.
 WRITTEN_OUT: list[tuple[float, Callable[[float], float]]] = [
@@ -68,10 +66,8 @@ def test_phi_functions_against_50_digits() -> None:
     with mp.workdps(50):
         for order in (1, 2, 3):
             for z in (-1e-12, -1e-3, -0.3, -0.9999, -1.0001, -7.0, -300.0, -1e8):
-                series = mp.exp(mpf(z)) - mp.fsum(
-                    mpf(z) ** k / mp.factorial(k) for k in range(order)
-                )
-                exact = series / mpf(z) ** order
+                first = mp.fsum(mpf(z) ** k / mp.factorial(k) for k in range(order))
+                exact = (mp.exp(mpf(z)) - first) / mpf(z) ** order
                 ours = float(phi_functions(max(order, 1), np.array([z]))[order][0])
                 assert ours == pytest.approx(float(exact), rel=1e-13)
 
@@ -185,7 +181,6 @@ def test_zeros_are_those_of_a_bracketing_search() -> None:
         ends = [*poles, poles[-1] + 2 * np.sum(weights) / level]
         for zero, low, high in zip(zeros, ends, ends[1:], strict=False):
             inside = low * (1 + 1e-12) + 1e-12, high * (1 - 1e-12)
-            alone = brentq(
-                lambda x, w=weights, p=poles, b=level: np.sum(w / (x - p)) - b, *inside, xtol=1e-14
-            )
+            given = {"args": (weights, poles, level), "xtol": 1e-14}
+            alone = brentq(lambda x, w, p, b: np.sum(w / (x - p)) - b, *inside, **given)
             assert zero == pytest.approx(alone, rel=1e-9)

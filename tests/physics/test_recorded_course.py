@@ -64,9 +64,8 @@ def test_rows_are_followed_whatever_they_are(clock: str) -> None:
     rows_s, values = CLOCKS[clock], RNG.standard_normal(251)
     course = follow_rows(rows_s, values, deforms=False)
     np.testing.assert_allclose(evaluate(course, rows_s), values, atol=1e-11)
-    np.testing.assert_allclose(
-        evaluate(course, rows_s[1:-1] * (1 - 1e-15)), values[1:-1], atol=1e-9
-    )
+    before = evaluate(course, rows_s[1:-1] * (1 - 1e-15))
+    np.testing.assert_allclose(before, values[1:-1], atol=1e-9)
 
 
 def test_a_step_between_two_rows_stands_in_the_middle() -> None:
@@ -186,9 +185,8 @@ def test_a_sample_under_a_recorded_sinusoid_responds_as_under_the_true_one(name:
 @functools.cache
 def condensed(deforms: bool, noise: str) -> Condensed:
     """Rows for readings before the course, at its rows, and beside them."""
-    course = follow_rows(
-        UNEVEN, np.sin(3 * UNEVEN) + 0.02 * RNG.standard_normal(251), deforms=deforms
-    )
+    held = np.sin(3 * UNEVEN) + 0.02 * RNG.standard_normal(251)
+    course = follow_rows(UNEVEN, held, deforms=deforms)
     time_s = np.unique(np.r_[-0.3, -0.1, UNEVEN[1:], RNG.uniform(0, 10, 40)])
     nuisance = nuisance_basis(time_s, offset=noise != "plain", drift=noise != "plain")
     colour = NoiseModel(ar1=0.5, time_s=0.3, flicker=0.0)

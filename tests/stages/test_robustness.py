@@ -119,10 +119,8 @@ def _bounds(**percent: list[float]) -> list[tuple[str, float]]:
 def test_headlines_follow_from_the_bounds() -> None:
     assert headlines(_bounds(k=[50, 60], k_p=[5, 6], c=[1, 2])) == ["c", "k"]
     # A sum stands for its parts, whatever their bounds.
-    assert headlines(_bounds(c=[1, 1], c_p=[2, 2], c_and_c_p=[3, 3], k=[99, 98])) == [
-        "c + c_p",
-        "k",
-    ]
+    sums = _bounds(c=[1, 1], c_p=[2, 2], c_and_c_p=[3, 3], k=[99, 98])
+    assert headlines(sums) == ["c + c_p", "k"]
     assert headlines(_bounds(k=[99, 400, 400], c=[1, 1, np.nan])) == ["c"]
     assert headlines(_bounds(k=[400.0])) == []
 

@@ -103,9 +103,8 @@ def test_all_problems_are_said_once_and_many_are_cut_short(tmp_path: Path) -> No
 def test_models_have_their_usual_names_too(tmp_path: Path) -> None:
     """As on the command line, in any case of letters."""
     text = "{model_selection: {models: [SLS, kv]}, traces: {table: x.csv, model: Zener}, "
-    config = load(
-        tmp_path, text + "cases: {a: {sample: {model: drop, k: 1, k_p: 1, c: 1}}}}"
-    ).config
+    text += "cases: {a: {sample: {model: drop, k: 1, k_p: 1, c: 1}}}}"
+    config = load(tmp_path, text).config
     assert config.model_selection.models == ("zener_maxwell", "kelvin_voigt")
     assert config.traces is not None
     assert config.traces.model == "zener_maxwell"
@@ -213,10 +212,8 @@ def test_what_cannot_be_read_is_refused_with_its_line(tmp_path: Path, name: str)
 
 
 def test_a_config_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(
-        BiogripError,
-        match=r"nowhere.yaml: cannot be read: No such file .* in the folder .*test_a_con",
-    ):
+    said = r"nowhere.yaml: cannot be read: No such file .* in the folder .*test_a_con"
+    with pytest.raises(BiogripError, match=said):
         load_study({}, [tmp_path / "nowhere.yaml"])
 
 
@@ -328,11 +325,9 @@ def test_whatever_is_added_changes_no_other_point(tmp_path: Path, old: str, new:
 
 
 def test_a_whole_number_is_the_same_point_however_it_is_written(tmp_path: Path) -> None:
-    names = [
-        set(load(tmp_path, SWEEP.replace("[0.1, 2e-2]", f"[{one}]")).points)
-        for one in ("1", "1.0", "1e0", "10e-1")
-    ]
-    assert names[0] == names[1] == names[2] == names[3]
+    texts = [SWEEP.replace("[0.1, 2e-2]", f"[{one}]") for one in ("1", "1.0", "1e0", "10e-1")]
+    first, *others = (set(load(tmp_path, text).points) for text in texts)
+    assert others == [first] * 3
 
 
 def test_values_are_shown_in_the_axis_unit(tmp_path: Path) -> None:
@@ -376,10 +371,8 @@ def test_a_problem_that_no_value_has_alone_is_placed_at_its_sweep(tmp_path: Path
     """Jaws that are 10 um apart cannot hold the sample of 60 um that the case has."""
     text = SWEEP.replace("measurement.noise.level", "gripper.jaw_gap_m").replace("0.1,", "1e-5,")
     said = refusal(tmp_path, f"{text}cases: {{liquid_drop_2: {{sample: {{size_m: 60e-6}}}}}}")
-    assert (
-        "line 2: sweeps.noise: liquid_drop_2--noise--1e-05--uniform-peak: gives sample.size_m"
-        in said
-    )
+    point = "sweeps.noise: liquid_drop_2--noise--1e-05--uniform-peak"
+    assert f"line 2: {point}: gives sample.size_m" in said
 
 
 def test_a_case_cannot_have_the_name_of_a_point(tmp_path: Path) -> None:
