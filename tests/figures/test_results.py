@@ -78,13 +78,11 @@ def test_the_first_run_of_each_basin_is_drawn(identifications: Path, measurement
         np.testing.assert_allclose(curve(drawn, label), expected, rtol=1e-9)
     # Of the second the target's residual.
     left = np.asarray(drawn.axes[1].lines[2].get_ydata(), dtype=float)
-    np.testing.assert_allclose(
-        left, 1e3 * (rotation(MODEL, TRUTH, TIME_S) - rotation(MODEL, [9.0, *TRUTH[1:]], TIME_S))
-    )
+    apart = rotation(MODEL, TRUTH, TIME_S) - rotation(MODEL, [9.0, *TRUTH[1:]], TIME_S)
+    np.testing.assert_allclose(left, 1e3 * apart)
     # The paper's axis is on it, and all that was measured.
     low, high = drawn.axes[0].get_ylim()
-    assert low <= -0.6
-    assert high >= 4.2
+    assert low <= -0.6 < 4.2 <= high
 
 
 @pytest.mark.parametrize(
@@ -189,14 +187,10 @@ def drawn_valley(
     sums = 10 * np.array([[0.9], [1.0], [1.1]])
     grid = {"x_values": sums * shares, "y_values": sums * (1 - shares), "increases": increases}
     axis = {"name": "c", "symbol": "$c$", "unit": "N s/m"}
-    found = {
-        "x": axis,
-        "y": {**axis, "name": "c_p", "symbol": "$c_p$"},
-        "grids": [{key: np.asarray(each).tolist() for key, each in grid.items()}],
-        "best": [9.0, 1.0],
-    }
-    path = folder / "v.json"
-    write_object(path, {"valley": found})
+    other = {**axis, "name": "c_p", "symbol": "$c_p$"}
+    grids = [{key: np.asarray(each).tolist() for key, each in grid.items()}]
+    path, valley = folder / "v.json", {"x": axis, "y": other, "grids": grids, "best": [9.0, 1.0]}
+    write_object(path, {"valley": valley})
     rows: dict[str, Any] = {p.column: 1.0 for p in MODEL.parameters}
     rows |= {f"{name}_Ns_per_m": values for name, values in fits.items()}
     frame = pd.DataFrame(rows).assign(case="x", method="least_squares", misfit=1, noise_rms=1)
@@ -227,9 +221,8 @@ def test_a_valleys_axes_end_around_what_is_in_it(tmp_path: Path) -> None:
     assert 8.5 < low < 8.78 < 9.05 < high < 9.3
     low, high = narrow.get_ylim()
     assert 0.7 < low < 0.95 < 1.22 < high < 1.5
-    wide = drawn_valley(tmp_path, DEEP, near)
-    assert wide.get_xlim()[0] < 1
-    assert wide.get_xlim()[1] > 9
+    low, high = drawn_valley(tmp_path, DEEP, near).get_xlim()
+    assert low < 1 < 9 < high
     known = {"c": 6.0, "c_p": 4.0}
     more = drawn_valley(tmp_path, CLOSED, {"c": [6.0, 9.05], "c_p": [4.0, 0.95]})
     for axes in (more, *(drawn_valley(tmp_path, CLOSED, near, **{n: known}) for n in KNOWN)):

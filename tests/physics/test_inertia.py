@@ -19,6 +19,7 @@ from biogrip.physics.simulation import VISIBLE, elapsed_s, find_ring, ring, ring
 from tests.helpers.laplace import drawn, rotations, series
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE
 
+STEP, NONE = join_phases((hold(1.0, 1e-9),)), np.zeros((1, 0))
 # Dampers between the jaws end a ring before it is seen; a spring in front of them goes on.
 RINGING = {
     "generalized_maxwell": {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 1e-6},
@@ -35,9 +36,8 @@ def test_an_empty_gripper_rings_like_a_damped_oscillator() -> None:
     time_s: Array = 1e-4 * np.arange(1.0, 1000.0)
     envelope = np.exp(-decay * time_s)
     swing = envelope * (np.cos(omega * time_s) + decay / omega * np.sin(omega * time_s))
-    nothing = Network(np.zeros(1), np.zeros(1), np.zeros((1, 0)), np.zeros((1, 0)))
-    torque = join_phases((hold(1.0, 1e-9),))
-    found = ring(Gripper(1.5e-3, 75.0, arm, arm), nothing, torque, time_s)[0]
+    nothing = Network(np.zeros(1), np.zeros(1), NONE, NONE)
+    found = ring(Gripper(1.5e-3, 75.0, arm, arm), nothing, STEP, time_s)[0]
     expected = 1e-9 / stiffness * (np.exp(-stiffness / damping * time_s) - swing)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * 1e-9 / stiffness)
 
@@ -45,12 +45,10 @@ def test_an_empty_gripper_rings_like_a_damped_oscillator() -> None:
 @pytest.mark.parametrize("stiffness", [0.0, 1e-2, 1.0, 1e2, 1e4])
 def test_rings_are_over_when_they_are_said_to_be(either_gripper: Gripper, stiffness: float) -> None:
     """Even those of a bare spring, from which only the arms' own dampers take energy."""
-    none = np.zeros((1, 0))
-    spring = Network(np.array([stiffness]), np.zeros(1), none, none)
-    step = join_phases((hold(1.0, 1e-9),))
+    spring = Network(np.array([stiffness]), np.zeros(1), NONE, NONE)
     after_s = ringing_s(either_gripper) * np.linspace(1.0, 1.5, 500)
     with_it, without = (
-        superpose(step_response(either_gripper, spring, inertia=inertia), step, after_s)
+        superpose(step_response(either_gripper, spring, inertia=inertia), STEP, after_s)
         for inertia in (True, False)
     )
     assert np.max(np.abs(with_it - without)) < 1e-14 * np.max(np.abs(without))
@@ -66,9 +64,9 @@ def test_arms_that_are_critically_damped(model: str, beyond: float) -> None:
     both = 2 * np.sqrt(inertia * (hinge + 2 * lever**2 * k_p)) * (1 + beyond)
     arm = Arm(inertia, both - 2 * lever**2 * damper, hinge)
     damped = Gripper(1.5e-3, 75.0, arm, arm)
-    torque, times = join_phases((hold(1.0, 1e-9),)), np.geomspace(1e-5, 0.5, 20)
-    found = superpose(step_response(damped, MODELS[model].network(sample)), torque, times)[0]
-    exact = rotations(damped, drawn(model, sample), torque, times, inertia=True)[0]
+    times = np.geomspace(1e-5, 0.5, 20)
+    found = superpose(step_response(damped, MODELS[model].network(sample)), STEP, times)[0]
+    exact = rotations(damped, drawn(model, sample), STEP, times, inertia=True)[0]
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-7 * exact.max())
 
 
@@ -81,11 +79,10 @@ def test_a_ring_shows_by_its_norm_beside_the_noise(gripper: Gripper) -> None:
     """All readings after the one that is named change by less than what counts."""
     time_s = np.random.default_rng(1).permutation(1e-4 * np.arange(1.0, 600.0))
     network = MODEL.sample(RINGING["generalized_maxwell"])
-    torque = join_phases((hold(1.0, 1e-9),))
-    given = gripper, network, torque, time_s
+    given = gripper, network, STEP, time_s
     # A parallel damper that is seen only while it rings does not end the ring.
     free = replace(network, c_p=np.zeros(1))
-    change = np.where(time_s < ringing_s(gripper), ring(gripper, free, torque, time_s)[0], 0.0)
+    change = np.where(time_s < ringing_s(gripper), ring(gripper, free, STEP, time_s)[0], 0.0)
     noise_sd = 0.1 * np.abs(change).max()
     found = find_ring(*given, lambda rows: rows / noise_sd)
     assert found is not None

@@ -51,15 +51,8 @@ def test_the_default_study_holds_the_papers_targets() -> None:
 
 
 def test_a_case_is_one_block_and_yaml_1_1_numbers_are_numbers(tmp_path: Path) -> None:
-    study = load(
-        tmp_path,
-        """
-        seeds: 1e2
-        cases:
-          my_cell:
-            sample: {model: generalized_maxwell, k: 20.0, k_p: 5.0, c: 80.0, c_p: 1e-3}
-        """,
-    )
+    sample = "{model: generalized_maxwell, k: 20.0, k_p: 5.0, c: 80.0, c_p: 1e-3}"
+    study = load(tmp_path, f"seeds: 1e2\ncases: {{my_cell: {{sample: {sample}}}}}")
     assert list(study.cases)[-1] == "my_cell"
     case = study.cases["my_cell"]
     assert (case.seeds, case.parameters["c_p"], case.title) == (100, 0.001, "my_cell")
@@ -106,7 +99,7 @@ def test_models_have_their_usual_names_too(tmp_path: Path) -> None:
     text += "cases: {a: {sample: {model: drop, k: 1, k_p: 1, c: 1}}}}"
     config = load(tmp_path, text).config
     assert config.model_selection.models == ("zener_maxwell", "kelvin_voigt")
-    assert config.traces is not None
+    assert config.traces
     assert config.traces.model == "zener_maxwell"
     assert config.cases["a"].sample.model == "liquid_drop"
     twice = "model_selection: {models: [zener, zener_maxwell]}"
@@ -180,10 +173,7 @@ UNREADABLE: dict[str, tuple[str | bytes, str]] = {
     "aliases of aliases": (BOMB, r"line \d+: found more than 50 levels or 100000 values, those of"),
     "large": ("# " + "x" * LARGEST_BYTES, r"my.yaml: found more than 1000000 bytes; allowed are"),
     "tag": ("a: !!python/object/apply:os.system [x]", r"line 1: not valid YAML: could not"),
-    "sexagesimal": (
-        "study_seed: 2\nseeds: 1:30",
-        r"line 2: seeds: found 1:30, which YAML reads in base 60; allowed is a number without col",
-    ),
+    "sexagesimal": ("study_seed: 2\nseeds: 1:30", r"line 2: seeds: found 1:30, .* in base 60; al"),
     "octal": ("seeds: 010", r"line 1: seeds: found 010, which YAML reads in base 8; allowed is a"),
     "date": ("cases: {x: {title: 2020-01-01}}", r"cases.x.title: found 2020-01-01, which YAML re"),
     "number as a key": ("cases: {1: {}}", r"line 1: cases.1: is no text: YAML reads on, off, yes"),
@@ -194,7 +184,7 @@ UNREADABLE: dict[str, tuple[str | bytes, str]] = {
     "code": ("__use_yte__: true\nseeds: ?1+1", r"line 1: with __use_yte__ a config"),
     "code, merged": (
         "<<: {__use_yte__: true}\nseeds: ?1+1",
-        r"line 1: with __use_yte__ a config is a program.* has run by now",
+        r"line 1: .*is a program.* has run by",
     ),
     "open": ("seeds: [1\n", r"line 2: not valid YAML"),
 }
