@@ -19,19 +19,21 @@ LADDERS = [name for name in TRIED if not CANDIDATES[name].model.power_law]
 FEW = LeastSquaresSettings(candidates=200, starts=4)
 
 
+Problems = dict[str, list[TraceProblem]]
+Found = dict[str, list[Fit]]
+
+
 def fitted(
     response: Array, times: Array, tried: Sequence[str], traces: int, level: float
-) -> tuple[dict[str, list[TraceProblem]], dict[str, list[Fit]]]:
-    problems = {
-        name: pose_noisy(times, response, traces, CANDIDATES[name].model, level) for name in tried
-    }
+) -> tuple[Problems, Found]:
+    models = {name: CANDIDATES[name].model for name in tried}
+    given = times, response, traces
+    problems = {name: pose_noisy(*given, model, level) for name, model in models.items()}
     rngs = {name: [np.random.default_rng(n) for n in range(traces)] for name in tried}
     return problems, nested_fits.fit_models(problems, FEW, rngs, lambda: None)
 
 
-def worse(
-    problems: dict[str, list[TraceProblem]], found: dict[str, list[Fit]]
-) -> list[tuple[str, str, float]]:
+def worse(problems: Problems, found: Found) -> list[tuple[str, str, float]]:
     """Pairs the wrong way round, and by how much in chi^2."""
     increases = [
         (richer, simpler, problem.residuals.samples * (2 * np.log(a.misfit / b.misfit)))

@@ -78,8 +78,7 @@ def diagnosis_of(posed: TraceProblem, model: SampleModel, **known: Any) -> Diagn
     return diagnose(posed, model, run("least_squares", posed), confidence=0.95, **known)
 
 
-def condensed_of(
-    torque: Course, time_s: Array, *, offset: bool = False, drift: bool = False
-) -> Condensed:
+def condensed_of(torque: Course, time_s: Array, **nuisance: bool) -> Condensed:
     """Rows that stand for the samples of any trace at these times."""
-    return Condensed(torque, time_s, nuisance_basis(time_s, offset=offset, drift=drift))
+    along = {"offset": False, "drift": False, **nuisance}
+    return Condensed(torque, time_s, nuisance_basis(time_s, **along))

@@ -7,19 +7,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
+from biogrip.physics import models
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.models import (
-    MODELS,
-    damper,
-    generalized_maxwell,
-    kelvin_voigt,
-    liquid_drop,
-    maxwell,
-)
 from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.simulation import jaw_force
-from biogrip.physics.unilateral import UnilateralResponse, _Forcing, unilateral_response
+from biogrip.physics.unilateral import _Forcing, unilateral_response
 from tests.helpers.responses import random_samples
 
 # Slow arms, which an integrator can follow through contact and flight.
@@ -101,7 +94,7 @@ def test_against_lsoda_with_events(k_p: float, c_p: float, torque: Course, right
     sample = np.array([0.5, k_p, 1.5, c_p])
     time_s = np.linspace(0, torque.end_s, 401)[:-1] + 1e-3
     expected, changes = integrated(gripper, sample, torque, time_s)
-    ours = unilateral_response(gripper, generalized_maxwell(sample), torque, time_s)
+    ours = unilateral_response(gripper, models.generalized_maxwell(sample), torque, time_s)
     states = np.vstack((ours.rotation, ours.shortening_m, ours.dampers_m, ours.jaw_force_N))
     scale = np.abs(expected).max(axis=1, keepdims=True)
     # The integrator's tolerance over some hundred steps and a few events.
@@ -118,8 +111,8 @@ def test_over_the_whole_search_range_the_jaws_never_pull(
 ) -> None:
     """Up to the first loss of contact it is the bilateral response."""
     time_s = np.concatenate((np.geomspace(1e-3, 200, 40), 200 + np.geomspace(1e-3, 200, 40)))
-    every_model = [model.network([model.example]) for model in MODELS.values()]
-    for network in (*map(generalized_maxwell, random_samples(30, 77)), *every_model):
+    every_model = [model.network([model.example]) for model in models.MODELS.values()]
+    for network in (*map(models.generalized_maxwell, random_samples(30, 77)), *every_model):
         found = unilateral_response(either_gripper, network, steps, time_s)
         both = jaw_force(either_gripper, network, steps, time_s, nonlinear=False, inertia=False)[0]
         assert np.all(found.jaw_force_N >= 0)
@@ -145,23 +138,22 @@ def test_loads_go_on_from_a_later_instant() -> None:
 
 def test_samples_that_lack_elements(gripper: Gripper, steps: Course) -> None:
     time_s = np.array([199.9, 200.1, 400.0])
-    for network in (maxwell([1.0, 10.0]), damper([10.0]), liquid_drop([1.0, 0.0, 10.0])):
+    for network in (
+        models.maxwell([1.0, 10.0]),
+        models.damper([10.0]),
+        models.liquid_drop([1.0, 0.0, 10.0]),
+    ):
         found = unilateral_response(gripper, network, steps, time_s)
         assert found.touching.tolist() == [True, False, False]
         # No spring brings a liquid back.
         assert found.shortening_m[2] == pytest.approx(found.shortening_m[1], rel=1e-12)
-    spring = unilateral_response(gripper, kelvin_voigt([0.05, 0.0]), steps, time_s)
+    spring = unilateral_response(gripper, models.kelvin_voigt([0.05, 0.0]), steps, time_s)
     assert np.all(spring.touching)
 
 
 def test_ends_do_not_depend_on_when_one_looks(gripper: Gripper) -> None:
-    time_s = np.linspace(0, 40, 1000)
-    network = liquid_drop([1.0, 0.1, 10.0])
-
-    def seen(times: Array) -> UnilateralResponse:
-        return unilateral_response(gripper, network, RAMPS, times)
-
-    whole, some = seen(time_s), seen(time_s[::37])
+    time_s, given = np.linspace(0, 40, 1000), (gripper, models.liquid_drop([1.0, 0.1, 10.0]), RAMPS)
+    whole, some = (unilateral_response(*given, times) for times in (time_s, time_s[::37]))
     np.testing.assert_allclose(whole.rotation[:, ::37], some.rotation, rtol=1e-13)
     assert whole.parted_s == some.parted_s
     assert len(whole.parted_s) > 3

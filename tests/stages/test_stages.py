@@ -19,19 +19,11 @@ from tests.helpers.places import EXAMPLE
 
 
 def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
-    torque = join_phases((hold(100.0, torque_Nm), *more))
-    return seen(
-        name="Drop",
-        instrument=GRIPPER,
-        gripper=STUDY.gripper,
-        torque=torque,
-        times_s=sample_times(torque.end_s, 1.0),
-        sample=Sample("maxwell"),
-        network=Sample("maxwell").model.sample({"k": 1.0, "c": 1.0}),
-        nonlinear_target=False,
-        unilateral=unilateral,
-        stroke=0.0785,
-    )
+    torque, sample = join_phases((hold(100.0, torque_Nm), *more)), Sample("maxwell")
+    device = {"instrument": GRIPPER, "gripper": STUDY.gripper, "stroke": 0.0785}
+    held = {"torque": torque, "times_s": sample_times(torque.end_s, 1.0), "unilateral": unilateral}
+    known = {"name": "Drop", "sample": sample, "nonlinear_target": False, **device, **held}
+    return seen(network=sample.model.network([1.0, 1.0]), **known)
 
 
 def test_arms_cannot_turn_further_than_their_combs(tmp_path: Path) -> None:

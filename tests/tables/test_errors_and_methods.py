@@ -174,10 +174,10 @@ cases:
 def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     item = {"unit": "N/m", "value": 2.0, "low": 1.0, "high": 3.0, "excluded": [[1.5, 1.8]]}
     first = {**item, "quantity": "k", "verdict": "determined"}
-    total = {**item, "quantity": "c + c_p", "verdict": "bounded above", "low": None}
+    second = {**item, "quantity": "c + c_p", "verdict": "bounded above", "low": None}
     told: dict[str, Any] = {"fit": "ok", "confidence": 0.9, "notes": []}
     told["trades"] = [{"members": ["c", "c_p"], "quantity": "c + c_p"}]
-    write_object(tmp_path / "a.json", {**told, "quantities": [first, total]})
+    write_object(tmp_path / "a.json", {**told, "quantities": [first, second]})
     write_object(tmp_path / "b.json", {**told, "quantities": [{**first, "high": 4.0}]})
     known = seen(name="x", title="X", parameters={"k": 2.5, "c": 1.0, "c_p": 0.5})
     table = verdicts(known, tmp_path / "a.json", [tmp_path / "b.json"])
