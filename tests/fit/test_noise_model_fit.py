@@ -83,11 +83,10 @@ def test_degrees_of_freedom_are_those_of_satterthwaite() -> None:
         return np.log(np.diagonal(covariance) * restricted(matrix, DIRECTIONS, left)[1])
 
     x, steps = _logarithms(noise_model), 0.1 * np.eye(4)
-    second = [
-        [sum(i * j * deviance(x + i * a + j * b) for i, j in SIGNS) / 0.04 for a in steps]
-        for b in steps
+    curved = [
+        [[i * j * deviance(x + i * a + j * b) for i, j in SIGNS] for a in steps] for b in steps
     ]
-    information = 0.5 * np.array(second) + np.eye(4) / 9
+    information = 0.5 * np.sum(curved, axis=2) / 0.04 + np.eye(4) / 9
     slopes = np.array([log_variances(x + a) - log_variances(x - a) for a in steps]) / 0.2
     spread = np.diagonal(slopes.T @ np.linalg.solve(information, slopes))
     found = likelihood.freedom(noise_model, sensitivity, nuisance)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from textwrap import dedent
 from typing import Any
 
 import numpy as np
@@ -75,17 +74,14 @@ def test_a_damper_between_both_jaws_damps_a_rotation_twice() -> None:
 
 
 def rows_of(overlay: str) -> dict[tuple[str, str], Mapping[str, Any]]:
-    study = study_of(f"seeds: 3\n{dedent(overlay)}")
+    study = study_of(f"seeds: 3\n{overlay}")
     return {(row["case"], row["quantity"]): row for row in contact_loss(study).rows}
 
 
 def test_what_nobody_notices_is_taken_for_the_sample() -> None:
-    found = rows_of(
-        """
-        least_squares: {candidates: 200, starts: 4}
-        cases: {bent: {sample: {model: damper, c_p: 9.0}, models: {target: nonlinear}}}
-        """
-    )
+    bent = "{sample: {model: damper, c_p: 9.0}, models: {target: nonlinear}}"
+    few = "least_squares: {candidates: 200, starts: 4}"
+    found = rows_of(f"{few}\ncases: {{bent: {bent}}}")
     # The cell is pressed throughout, and what is not linear is left out.
     drops = {"liquid_drop_1", "liquid_drop_2"}
     assert {case for case, _ in found} == drops
@@ -101,15 +97,9 @@ def test_what_nobody_notices_is_taken_for_the_sample() -> None:
 
 
 def test_a_sample_that_is_lost_at_once_tells_nothing() -> None:
-    found = rows_of(
-        """
-        measurement: {rate_Hz: 0.1}
-        only: [brief]
-        protocol:
-          phases: [{duration_s: 5, torque_Nm: 1.6e-9}, {duration_s: 300, torque_Nm: 0}]
-        cases: {brief: {sample: {model: damper, c_p: 9.0}}}
-        """
-    )
+    phases = "{duration_s: 5, torque_Nm: 1.6e-9}, {duration_s: 300, torque_Nm: 0}"
+    brief = "only: [brief]\ncases: {brief: {sample: {model: damper, c_p: 9.0}}}"
+    found = rows_of(f"measurement: {{rate_Hz: 0.1}}\nprotocol: {{phases: [{phases}]}}\n{brief}")
     assert found["brief", "c_p"]["until_lost"] is None
     assert found["brief", "misfit"]["until_lost"] is None
 

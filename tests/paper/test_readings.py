@@ -1,6 +1,7 @@
 """Which reading can have printed the paper's tables: counts of values, kernels by hand, runs."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from workflow.paper.readings import (
 )
 from workflow.paper.readings_of_case import identify_readings
 
+CASE = "liquid_drop_2"
 ALL = study_of((ROOT / "config" / "readings.yaml").read_text(encoding="utf-8"))
 FEW = """
 seeds: 4
@@ -64,22 +66,18 @@ FAR = (0.1, 5.6e-5, 1.0, 9.0, 1.5, 1.0, 40, 20)
 
 
 @pytest.fixture
-def given(tmp_path: Path) -> tuple[Study, list[Path]]:
-    runs = {"printed": (HIT, AWAY, AWAY, HIT), "other": (HIT, FAR, FAR, FAR)}
-    file = tmp_path / "liquid_drop_2.csv"
-    rows = (
-        ("liquid_drop_2", name, seed, *values)
-        for name, each in runs.items()
-        for seed, values in enumerate(each)
-    )
-    READINGS.write(file, rows)
-    return study_of(FEW), [file]
+def given(tmp_path: Path) -> tuple[Study, Any]:
+    """A study and what its readings found."""
+    rows = [(CASE, "printed", n, *run) for n, run in enumerate((HIT, AWAY, AWAY, HIT))]
+    rows += [(CASE, "other", n, *run) for n, run in enumerate((HIT, FAR, FAR, FAR))]
+    READINGS.write(tmp_path / f"{CASE}.csv", rows)
+    study = study_of(FEW)
+    return study, read(study, [tmp_path / f"{CASE}.csv"])
 
 
-def test_a_likelihood_is_the_mean_of_kernels(given: tuple[Study, list[Path]]) -> None:
+def test_a_likelihood_is_the_mean_of_kernels(given: tuple[Study, Any]) -> None:
     """A run that is one width of 5 % away counts exp(-1/2); at twice the width exp(-1/8)."""
-    study, files = given
-    found = read(study, files)
+    study, found = given
     one = np.array([1, np.exp(-0.5), np.exp(-0.5), 1])
     mean, error = log_likelihood(study, found, "printed", 1.0)
     assert mean == pytest.approx(np.log10(one.mean()), abs=1e-3)
@@ -93,10 +91,9 @@ def test_a_likelihood_is_the_mean_of_kernels(given: tuple[Study, list[Path]]) ->
 
 
 def test_readings_are_compared_with_the_first_that_prints_the_most(
-    given: tuple[Study, list[Path]],
+    given: tuple[Study, Any],
 ) -> None:
-    study, files = given
-    found = read(study, files)
+    study, found = given
     first, second = readings(study, found).rows
     assert (first["likelihood"], first["likelihood_error"]) == (0, 0)
     assert second["likelihood"] == pytest.approx(np.log10(0.25 / 0.803), abs=2e-3)
@@ -118,13 +115,10 @@ cases: {liquid_drop_1: null, endothelial_cell: null}
 readings:
   printed: {title: as printed, changes: {}}
   patience: {title: patient, changes: {genetic_algorithm: {min_generations: 40}}}
-  three:
-    title: three digits
-    changes: {search_range: {k: {digits: 3, digit: [0, 9]}}}
+  three: {title: three digits, changes: {search_range: {k: {digits: 3, digit: [0, 9]}}}}
   uniform: {title: uniform noise, changes: {measurement: {noise: {kind: uniform}}}}
   slow: {title: slow, changes: {measurement: {rate_Hz: 0.5}}}
 """
-CASE = "liquid_drop_2"
 
 
 def test_one_that_changes_nothing_finds_what_the_study_finds(tmp_path: Path) -> None:

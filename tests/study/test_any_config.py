@@ -1,7 +1,6 @@
 """Whatever a config says: it passes the checks, or ends in one message."""
 
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,9 +16,9 @@ from biogrip.study.messages import Schema
 from biogrip.study.source import overlaid, read_config
 from biogrip.study.study import load_study
 from tests.helpers.key_reference import STUDY, leaves
+from tests.helpers.places import CONFIG
 
-DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"
-DEFAULTS = read_config(DEFAULT)
+DEFAULTS = read_config(CONFIG)
 LINE = re.compile(r"[^:]+: .+: (.|\n)+\.")
 # Keys with a value of their own, outside of what the user names.
 SINGLE = {
@@ -113,7 +112,7 @@ def overlays(draw: st.DrawFn) -> dict[str, Any]:
 @given(overlays())
 def test_any_config_is_used_or_ends_in_one_message(overlay: dict[str, Any]) -> None:
     try:
-        study = load_study(overlaid(DEFAULTS, overlay), [DEFAULT])
+        study = load_study(overlaid(DEFAULTS, overlay), [CONFIG])
     except BiogripError as error:
         event("refused")
         first, *lines = str(error).split("\n")
@@ -135,4 +134,4 @@ def test_a_value_out_of_bounds_is_refused_with_its_key(path: str, data: st.DataO
     beyond = st.integers(high + 1) if SINGLE[path].get("type") == "integer" else floats
     overlay = block_of(path, data.draw(beyond))
     with pytest.raises(BiogripError, match=re.escape(f": {path}: found ")):
-        load_study(overlaid(DEFAULTS, overlay), [DEFAULT])
+        load_study(overlaid(DEFAULTS, overlay), [CONFIG])
