@@ -93,14 +93,6 @@ def test_what_is_sure_of_it_reaches_the_global_optimum(case: str) -> None:
         assert np.all(increases < 1)
 
 
-def test_what_a_trace_says_nothing_of_ends_in_the_middle_of_its_range() -> None:
-    """A liquid's damper dominates: the range of k_p that fits is flat, and the prior decides."""
-    experiment = problem("endothelial_cell", 2)
-    answer = run("least_squares", experiment)
-    c_p = np.log(answer.parameters[3])
-    assert experiment.low[3] + 3 < c_p < experiment.high[3] - 3
-
-
 def test_a_history_is_of_the_fits_so_far() -> None:
     """Their lowest and their median misfit."""
     posed = problem("liquid_drop_2", 0)
