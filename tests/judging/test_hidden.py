@@ -10,13 +10,13 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from, identify_from
-from biogrip.fit.noise_model_fit import absorbed
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.levels import FALSE_ALARM
 from biogrip.judging.whiteness import compare_halves, find_step, wandering
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import hold
+from tests.judging.test_whiteness import relaxation
 
 TIMES: Array = np.arange(1.0, 101.0)
 SAMPLE, NOISE = {"k": 80.0, "k_p": 100.0, "c": 1600.0}, 3.6
@@ -63,8 +63,7 @@ def test_an_error_that_is_planted_moves_what_is_said(kind: str) -> None:
 def test_tests_tell_half_of_errors_of_that_size(kind: str) -> None:
     """In noise, by fits to first order; tests that are beside the best one tell a few more."""
     (hidden,) = (each for each in JUDGED.hidden if each.words().startswith(kind))
-    decay = np.exp(-TIMES / 20)
-    basis = absorbed(np.stack([np.ones(100), decay, decay * TIMES]))
+    _, basis = relaxation(TIMES)
     wrong = planted(hidden.words(), CLEAN) - CLEAN
     told = []
     for noise in NOISE * np.random.default_rng(1).standard_normal((200, 100)):

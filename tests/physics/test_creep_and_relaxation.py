@@ -37,15 +37,13 @@ def example(model: SampleModel) -> Network:
 def by_laplace(given: Impedance, history: Course, time_s: float) -> float:
     """Response by numerical inversion: of each change of what is held, by itself."""
 
-    def power(height: float, order: int) -> Impedance:
-        return lambda s: height / s ** (order + 1)
+    def response(height: float, order: int) -> Impedance:
+        return lambda s: height / s ** (order + 1) * (given(s) if history.deforms else 1 / given(s))
 
-    def response(held: Impedance) -> Impedance:
-        return lambda s: held(s) * given(s) if history.deforms else held(s) / given(s)
-
-    changes = [(start, power(height, order)) for start, order, height in history.jumps]
     return sum(
-        inverted(response(held), time_s - start) for start, held in changes if start < time_s
+        inverted(response(height, order), time_s - start)
+        for start, order, height in history.jumps
+        if start < time_s
     )
 
 
