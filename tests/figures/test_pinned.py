@@ -111,9 +111,7 @@ def comparable(pinning: bool) -> None:
 
 
 @pytest.mark.usefixtures("comparable")
-def test_figures_are_what_they_were(
-    pictures: dict[str, Image.Image], tmp_path: Path, pinning: bool
-) -> None:
+def test_no_figure_changed(pictures: dict[str, Image.Image], tmp_path: Path, pinning: bool) -> None:
     """If the change is meant: make pinned."""
     if pinning:
         VERSION_FILE.write_text(f"{VERSION}\n")

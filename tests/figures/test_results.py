@@ -152,9 +152,7 @@ def scattered(overlay: str, identifications: Path) -> Any:
         return draw_scatter(case, *files, [])
 
 
-def test_a_band_of_the_study_s_confidence_is_drawn_of_what_is_determined_alone(
-    identifications: Path,
-) -> None:
+def test_bands_of_the_confidence_are_drawn_of_what_is_determined(identifications: Path) -> None:
     drawn = scattered("", identifications)
     shaded = [any(isinstance(p, Rectangle) for p in axes.patches) for axes in drawn.axes]
     assert shaded == [False] * 4 + [True]

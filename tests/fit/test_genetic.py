@@ -117,9 +117,7 @@ def test_genes_are_drawn_uniformly_from_their_whole_range() -> None:
 
 @pytest.mark.parametrize("digits", range(1, 7))
 @pytest.mark.parametrize("digit", [(1, 9), (0, 9), (3, 5)])
-def test_any_number_of_digits_is_decoded_as_the_decimal_number_it_is(
-    digits: int, digit: tuple[int, int]
-) -> None:
+def test_any_number_of_digits_is_decoded_as_a_decimal(digits: int, digit: tuple[int, int]) -> None:
     ranges = {**RANGES, "k": GeneRange((-16, 16), digit, digits)}
     genome = make_genome(MAXWELL, ranges)
     assert genome.genes == 9 + 1 + digits

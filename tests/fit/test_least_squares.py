@@ -49,9 +49,7 @@ def test_a_fit_that_stops_short_has_converged_if_no_data_tell(
     ("x", "gradient", "held"),
     [(-1.0, 1.0, True), (-1.0, -1.0, False), (1.0, -1.0, True), (1.0, 1.0, False), (0, 1.0, False)],
 )
-def test_what_is_pushed_against_a_bound_has_no_curvature(
-    x: float, gradient: float, held: bool
-) -> None:
+def test_what_is_pushed_to_a_bound_has_no_curvature(x: float, gradient: float, held: bool) -> None:
     """Bounds are -1 and 1; a gradient is uphill."""
     whole, without = [[2.0, 1.0], [1.0, 2.0]], [[1.0, 0.0], [0.0, 2.0]]
     normal = Normal(np.ones(1), np.array([[gradient, 0.5]]), np.array([whole]), np.ones(1))

@@ -54,9 +54,7 @@ def worse(problems: Problems, found: Found) -> list[tuple[str, str, float]]:
     ],
 )
 @pytest.mark.nightly
-def test_a_model_fits_no_worse_than_one_in_it(
-    tried: Sequence[str], case: str, level: float
-) -> None:
+def test_no_model_fits_worse_than_one_in_it(tried: Sequence[str], case: str, level: float) -> None:
     """Parameters and misfit are of one point, also of elements that have vanished."""
     times, response = clean(case)
     problems, found = fitted(response, times, tried, 2, level)
@@ -131,9 +129,7 @@ def test_the_sentence_is_that_of_the_numbers(gained: dict[str, float], said: str
 
 
 @pytest.mark.parametrize(("gained", "taken"), [(0.005, False), (0.02, True), (5.0, True)])
-def test_a_branch_is_taken_that_lowers_chi_squared_by_a_hundredth(
-    gained: float, taken: bool
-) -> None:
+def test_a_branch_counts_that_lowers_chi_squared_by_a_hundredth(gained: float, taken: bool) -> None:
     """Far less than the 1 that a standard error changes it by."""
     problem = seen(residuals=seen(samples=READINGS))
     before = float(np.sqrt(1 + gained / READINGS))

@@ -93,9 +93,7 @@ def test_degrees_of_freedom_are_those_of_satterthwaite() -> None:
     assert found == pytest.approx(2 / spread.max(), rel=0.05)
 
 
-def test_information_is_half_of_what_curves_the_deviance_and_the_prior(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_information_is_half_the_curvature_and_the_prior(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a quadratic form all of it; along what curves the other way there is the prior alone."""
     form = np.array([[2.0, 1, 0, 0], [1, 2, 0, 0], [0, 0, 4, 0], [0, 0, 0, -1]])
     likelihood = NoiseModelLikelihood(TIMES, np.ones(200), DIRECTIONS)

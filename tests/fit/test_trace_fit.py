@@ -94,9 +94,7 @@ def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
     assert np.all(np.abs(best - both.x[:4])[told] < 0.05 * expected + 1e-3)
 
 
-def test_an_uncertain_gripper_is_held_against_what_parameters_leave(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_uncertain_gripper_is_held_against_what_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of ten readings and four parameters, six: the noise is the misfit times sqrt(10 / 6)."""
     uncertainty = {"left": {"stiffness_Nm_per_rad": 1e-8}}
     experiment, condense = replace(POSED, uncertainty=uncertainty), Experiment.in_noise

@@ -52,9 +52,7 @@ def scipy_fit(
     return found.x, noise_sd * float(np.sqrt(2 * found.cost / problem.residuals.samples))
 
 
-def rise_with_held(
-    likelihood: Likelihood, quantity: Quantity, target: float, start: Array
-) -> float:
+def rise_of_held(likelihood: Likelihood, quantity: Quantity, target: float, start: Array) -> float:
     """Rise of chi^2 of a fit with a quantity's logarithm held at a target."""
     residuals = likelihood.problem.residuals
 

@@ -198,9 +198,7 @@ def test_noise_that_grows_over_decades_is_weighed_and_its_share_advised() -> Non
     ("lacking", "of_peak"),
     [(0.06, 0.4), pytest.param(0.005, 0.042, marks=pytest.mark.nightly)],
 )
-def test_a_quiet_trace_has_limits_that_allow_for_a_slightly_wrong_model(
-    lacking: float, of_peak: float
-) -> None:
+def test_limits_of_quiet_traces_allow_for_a_wrong_model(lacking: float, of_peak: float) -> None:
     """A second branch of a share of the first, six times as slow; noise of 0.05 % of the peak."""
     times = np.linspace(0.1, 60, 600)
     values = 1500 + 3000 * (np.exp(-times / 2) + lacking * np.exp(-times / 12))

@@ -185,9 +185,7 @@ def test_jaws_that_pull_after_the_last_reading_are_not_told(last_s: float, notes
 
 
 @pytest.mark.parametrize(("low", "least"), [(None, 0.0), (2.0, 2.0)])
-def test_arms_ring_as_beside_the_least_damper_that_the_trace_allows(
-    low: float | None, least: float
-) -> None:
+def test_arms_ring_as_beside_the_least_damper_allowed(low: float | None, least: float) -> None:
     dampers: list[Array] = []
 
     def ring(network: Network, _: float) -> Any:

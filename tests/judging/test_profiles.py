@@ -34,7 +34,7 @@ from tests.helpers.problems import (
     rotation,
     run,
 )
-from tests.helpers.scipy_fits import rise_with_held
+from tests.helpers.scipy_fits import rise_of_held
 
 QUANTITIES = parameters_and_sum(MODEL)
 SOFT = [20.0, 5.0, 80.0, 1e-3]
@@ -125,7 +125,7 @@ def test_profiles_are_as_low_as_fits_with_the_parameter_known(case: str) -> None
         shown = np.sqrt(np.clip(found.increases, 0.0, 16.0))
         assert np.max(np.abs(np.diff(shown))) <= 0.3
         for value, increase in zip(found.log_values[::12], found.increases[::12], strict=True):
-            alone = rise_with_held(likelihood, quantity, value, likelihood.best)
+            alone = rise_of_held(likelihood, quantity, value, likelihood.best)
             assert increase < alone + 1e-3 * (1 + alone)
 
 
@@ -146,7 +146,7 @@ def test_the_search_range_determines_no_combination() -> None:
     # With one spring as soft as it may be, and the other any, it is lower than any limit.
     soft, best = problem.low[0], told.likelihood.best
     assert series.log(np.array([soft, *best[1:]])) < soft + 1e-3
-    assert rise_with_held(told.likelihood, QUANTITIES[0], soft, best) < told.likelihood.threshold
+    assert rise_of_held(told.likelihood, QUANTITIES[0], soft, best) < told.likelihood.threshold
 
 
 def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
@@ -229,7 +229,7 @@ def test_a_held_fit_is_scipys(label: str) -> None:
         target = quantity.log(likelihood.best) + away
         (increase,), (x,) = fits.at(one, np.array([target]), likelihood.best[None], FINE)
         assert quantity.log(x) == pytest.approx(target, abs=1e-11)
-        scipys = rise_with_held(likelihood, quantity, target, likelihood.best)
+        scipys = rise_of_held(likelihood, quantity, target, likelihood.best)
         assert increase == pytest.approx(scipys, abs=0.02)
 
 

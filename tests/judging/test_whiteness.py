@@ -42,9 +42,7 @@ def directions(times: Array) -> Array:
 @pytest.mark.nightly
 @pytest.mark.parametrize("readings", [10, 20, 400])
 @pytest.mark.parametrize("decades", [0, 4])
-def test_of_white_noise_each_test_fails_as_many_as_its_level_says(
-    readings: int, decades: int
-) -> None:
+def test_of_white_noise_each_test_fails_as_often_as_it_says(readings: int, decades: int) -> None:
     """Within four standard deviations. Two of them have bounds of the chance, and fail fewer."""
     even = np.arange(1, readings + 1) / readings
     basis = absorbed(directions(np.geomspace(10.0**-decades, 1.0, readings) if decades else even))
@@ -178,9 +176,7 @@ def test_independent_residuals_are_counted() -> None:
 @pytest.mark.nightly
 @pytest.mark.parametrize(("decades", "length"), [(0, 0.04), (3, 0.1)])
 @pytest.mark.parametrize("smooth", [True, False])
-def test_limits_that_allow_for_a_misfit_hold_the_truth(
-    decades: int, length: float, smooth: bool
-) -> None:
+def test_limits_with_a_misfit_hold_the_truth(decades: int, length: float, smooth: bool) -> None:
     """A linear fit of a relaxation whose model lacks a random function of the reading's number.
 
     Only what is certainly no noise counts. Of such limits 95 % are to hold, and at least 87 % do
@@ -224,9 +220,7 @@ def itself(rows: Array) -> Array:
 
 @pytest.mark.parametrize("readings", [8, 20, 100, 400])
 @pytest.mark.parametrize("decades", [0, 4])
-def test_of_white_noise_both_tests_fail_as_many_as_their_level_says(
-    readings: int, decades: int
-) -> None:
+def test_of_white_noise_both_tests_fail_as_often_as_they_say(readings: int, decades: int) -> None:
     """Within four standard deviations of 1 % of 2,000 traces, 0.9 %, and an error of a fifth."""
     even = 100 * np.arange(1, readings + 1) / readings
     times = np.geomspace(100 * 10.0**-decades, 100, readings) if decades else even

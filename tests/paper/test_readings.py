@@ -90,9 +90,7 @@ def test_a_likelihood_is_the_mean_of_kernels(given: tuple[Study, Any]) -> None:
     assert of_generations == pytest.approx(np.log10(1 / 4), abs=1e-6)
 
 
-def test_readings_are_compared_with_the_first_that_prints_the_most(
-    given: tuple[Study, Any],
-) -> None:
+def test_readings_are_compared_with_the_first_that_prints_most(given: tuple[Study, Any]) -> None:
     study, found = given
     first, second = readings(study, found).rows
     assert (first["likelihood"], first["likelihood_error"]) == (0, 0)

@@ -44,9 +44,7 @@ CLEAN = np.concatenate((np.zeros(100_000), np.full(100_000, 2.0)))
         (Noise("gaussian", 0.1, "peak", 0.0), 1, 0.0, 0.0),
     ],
 )
-def test_a_level_is_a_standard_deviation(
-    noise: Noise, size: float, first: float, second: float
-) -> None:
+def test_a_level_is_a_deviation(noise: Noise, size: float, first: float, second: float) -> None:
     """Of the first half, which does not turn, and of the second, to four times 0.2 %."""
     found = add_noise(size * CLEAN, noise, np.random.default_rng(0)) - size * CLEAN
     assert [rms(half) for half in np.split(found, 2)] == pytest.approx([first, second], rel=9e-3)

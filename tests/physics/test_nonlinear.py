@@ -176,9 +176,7 @@ def test_no_torque_no_force(gripper: Gripper) -> None:
     assert (grip.largest_N, grip.lowest_N, grip.pulls_from_s) == (0, 0, None)
 
 
-def test_unequal_arms_come_to_rest_where_their_springs_hold_the_torques(
-    unequal_gripper: Gripper,
-) -> None:
+def test_unequal_arms_rest_where_their_springs_hold_the_torques(unequal_gripper: Gripper) -> None:
     network, b = generalized_maxwell([20.0, 5.0, 80.0, 1.0]), unequal_gripper.lever_m
     rest = np.linalg.solve(np.diag([4.4e-7, 5.5e-7]) + 5.0 * b**2, [1.0, 1.0])
     for force, expected in ((False, rest), (True, [5.0 * b * rest.sum()])):

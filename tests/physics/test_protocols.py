@@ -133,9 +133,7 @@ def worst_error(gripper: Gripper, steps: Course, samples: Array) -> float:
     return float(np.max(np.abs(ours - exact) / np.abs(exact).max(axis=2, keepdims=True)))
 
 
-def test_corrected_equations_over_the_whole_search_range(
-    either_gripper: Gripper, steps: Course
-) -> None:
+def test_equations_hold_over_the_whole_search_range(either_gripper: Gripper, steps: Course) -> None:
     """200 chromosomes against 50 digits; 1e-9 of the peak is asked, 1e-11 is held."""
     assert worst_error(either_gripper, steps, random_samples(200, 1)) < 1e-11
 

@@ -198,9 +198,7 @@ def condensed(deforms: bool, noise: str) -> Condensed:
     ("deforms", "noise"), [(False, "plain"), (True, "drifting"), (True, "coloured")]
 )
 @pytest.mark.parametrize("name", MODELS)
-def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
-    name: str, deforms: bool, noise: str
-) -> None:
+def test_rows_have_the_sums_of_squares_of_readings(name: str, deforms: bool, noise: str) -> None:
     """Slow samples and fast ones; to 1e-10 of the trace, as of steps (test_condensed.py)."""
     rows, model, rng = condensed(deforms, noise), MODELS[name], np.random.default_rng(3)
     residuals = posed(NO_ARMS, model, rows, 1e-3 * rng.standard_normal(len(rows.all_s)))

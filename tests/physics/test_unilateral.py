@@ -106,9 +106,7 @@ def test_against_lsoda_with_events(k_p: float, c_p: float, torque: Course, right
     assert np.all(ours.jaw_force_N[~ours.touching] == 0)
 
 
-def test_over_the_whole_search_range_the_jaws_never_pull(
-    either_gripper: Gripper, steps: Course
-) -> None:
+def test_over_the_whole_range_the_jaws_never_pull(either_gripper: Gripper, steps: Course) -> None:
     """Up to the first loss of contact it is the bilateral response."""
     time_s = np.concatenate((np.geomspace(1e-3, 200, 40), 200 + np.geomspace(1e-3, 200, 40)))
     every_model = [model.network([model.example]) for model in models.MODELS.values()]

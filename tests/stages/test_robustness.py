@@ -129,8 +129,6 @@ def test_headlines_follow_from_the_bounds() -> None:
     ("bound", "inside"),
     [(0.05, [False, True, True, False]), (0.5, [True] * 4), (np.nan, [False, True, True, False])],
 )
-def test_the_basin_of_the_truth_is_as_wide_as_noise_makes_it(
-    bound: float, inside: list[bool]
-) -> None:
+def test_the_basin_of_truth_is_as_wide_as_noise_makes_it(bound: float, inside: list[bool]) -> None:
     values = 10.0 * np.array([0.4, 0.6, 1.9, 2.1])
     assert stage.in_basin(values, 10.0, bound).tolist() == inside

@@ -221,9 +221,7 @@ def test_what_is_unusual_but_clear_works(tmp_path: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize("file", sorted(CONFIG.parent.glob("*.yaml")), ids=lambda it: it.stem)
-def test_the_shipped_studies_load_and_the_schema_knows_them(
-    file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_shipped_studies_load_by_the_schema(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     Draft202012Validator.check_schema(SCHEMA)
     assert [e.message for e in Draft202012Validator(SCHEMA).iter_errors(read_config(file))] == []

@@ -86,9 +86,7 @@ def test_error_table_is_the_arithmetic_it_says(eleven_seeds: Path) -> None:
     assert two == [("near the noise", 6, 7.5, 6.25), ("above the noise", 5, 13.0, 12.0)]
 
 
-def test_joined_errors_are_within_the_tolerance_that_their_heading_names(
-    eleven_seeds: Path,
-) -> None:
+def test_joined_errors_are_within_the_tolerance_their_heading_names(eleven_seeds: Path) -> None:
     study = seen(near_noise_tolerance=0.005, cases={"drop": case_of(0.005)})
     made = errors(study, [eleven_seeds])
     # 1.001 and 1.0046.
