@@ -67,7 +67,6 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def pictures(tiny: Path, judged: Path) -> dict[str, Image.Image]:
-    """Every figure by name."""
     files = sorted((tiny / "results" / "figures").glob("*.png"))
     drawn = BytesIO()
     with styled():
@@ -84,7 +83,6 @@ def reduced(picture: Image.Image) -> Image.Image:
 
 
 def in_colours_of(palette: list[int], picture: Image.Image) -> Image.Image:
-    """A picture of the colours of a palette that are nearest."""
     colours = np.reshape(palette, (-1, 3))
     nearest = KDTree(colours).query(np.asarray(picture))[1]
     found = Image.fromarray(nearest.astype(np.uint8), "P")

@@ -48,7 +48,6 @@ def told(time_s: Array, values: Array, models: Sequence[str] = (), **given: Any)
 
 
 def by_quantity(found: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Findings by their labels."""
     return {item["quantity"]: item for item in found["quantities"]}
 
 

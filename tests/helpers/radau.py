@@ -36,7 +36,6 @@ def integrated(
     n, share = len(arms), 2 / len(arms)
 
     def motion(t: float, state: Array) -> tuple[Array, float]:
-        """Rates of the state, and the force."""
         phi, y = state[:n], state[-1]
         b = length * np.sin(hat - phi)
         delta = share * np.sum(2 * length * np.sin(hat - phi / 2) * np.sin(phi / 2))

@@ -101,7 +101,6 @@ def _checked(values: Sequence[arb]) -> Array:
 
 
 def log_range(model: SampleModel) -> tuple[Array, Array]:
-    """Logarithms of the ends of a model's search range."""
     low, high = zip(*(LOG_RANGES[parameter.kind] for parameter in model.parameters), strict=True)
     return np.array(low), np.array(high)
 

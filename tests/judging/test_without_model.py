@@ -45,7 +45,6 @@ def by_name(found: WithoutModel) -> dict[str, Told]:
 
 
 def between(told: Told) -> tuple[float, float]:
-    """Both limits, which there are."""
     assert told.low is not None
     assert told.high is not None
     return told.low, told.high

@@ -67,7 +67,6 @@ FAR = (0.1, 5.6e-5, 1.0, 9.0, 1.5, 1.0, 40, 20)
 
 @pytest.fixture
 def given(tmp_path: Path) -> tuple[Study, Any]:
-    """A study and what its readings found."""
     rows = [(CASE, "printed", n, *run) for n, run in enumerate((HIT, AWAY, AWAY, HIT))]
     rows += [(CASE, "other", n, *run) for n, run in enumerate((HIT, FAR, FAR, FAR))]
     READINGS.write(tmp_path / f"{CASE}.csv", rows)

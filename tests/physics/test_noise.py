@@ -162,7 +162,6 @@ COLOURS = [
 
 
 def correlation(time_s: Array, noise_model: NoiseModel, growing: Array | None = None) -> Array:
-    """The matrix as it is defined."""
     grown = np.ones(len(time_s)) if growing is None else growing**2 / np.mean(growing**2)
     apart, since = np.abs(np.subtract.outer(time_s, time_s)), time_s - time_s[0]
     matrix = np.diag(noise_model.white + noise_model.proportional * grown)

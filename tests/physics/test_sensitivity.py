@@ -74,7 +74,6 @@ def test_nuisance_takes_out_offset_and_drift_and_nothing_else(offset: bool, drif
 
 
 def posed(steps: Course, gripper: Gripper, times: Array, basis: Array) -> Residuals:
-    """Residuals of noise."""
     trace = np.random.default_rng(0).standard_normal(len(times)) * 1e-4
     given = Trace(times, trace, Condensed(steps, times, basis))
     return Residuals(gripper, MODELS["maxwell"], steps, given, instrument=GRIPPER)

@@ -32,7 +32,6 @@ def integrated(
     _, dampings, stiffnesses = np.transpose([[*vars(arm).values()] for arm in arms])
 
     def motion(t: float, z: Array, touching: bool) -> tuple[Array, float]:
-        """Rates, and force."""
         rates = (float(evaluate(torque, t)) - stiffnesses * z[:2]) / dampings
         spring, y_rate, force = k_p * z[2] + k * (z[2] - z[3]), k / c * (z[2] - z[3]), 0.0
         if touching:

@@ -68,7 +68,6 @@ def allowed(shape: Schema) -> st.SearchStrategy[Any]:
 
 
 def block_of(path: str, value: Any) -> dict[str, Any]:
-    """The config that has one key."""
     name, _, rest = path.partition(".")
     return {name: block_of(rest, value) if rest else value}
 

@@ -24,14 +24,12 @@ DROP = "sample: {model: liquid_drop, k: 1.0, k_p: 1.0, c: 1.0}"
 
 
 def load(tmp_path: Path, text: str) -> Study:
-    """Load a config that is laid over the default study."""
     file = tmp_path / "my.yaml"
     file.write_text(text)
     return load_study(overlaid(read_config(CONFIG), read_config(file)), [CONFIG, file])
 
 
 def refusal(tmp_path: Path, text: str) -> str:
-    """What is said of a config that cannot be used."""
     with pytest.raises(BiogripError) as caught:
         load(tmp_path, text)
     said = str(caught.value)

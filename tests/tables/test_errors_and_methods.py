@@ -98,7 +98,6 @@ def test_joined_errors_are_within_the_tolerance_their_heading_names(eleven_seeds
 
 
 def study(parameters: dict[str, float], samples: int, *methods: str, seeds: int = 1) -> Any:
-    """Of one case, a drop."""
     known = {"sample": Sample("generalized_maxwell"), "parameters": parameters, "seeds": seeds}
     own = seen(config=seen(methods=methods))
     cases = {"drop": seen(name="drop", samples=samples, study=own, **known)}
