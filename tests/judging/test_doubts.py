@@ -23,7 +23,7 @@ from biogrip.library import TraceResult
 from biogrip.physics.noise import AR1, Noise, NoiseModel, Outliers, add_noise
 from tests.helpers.default import seen
 from tests.helpers.identified import told
-from tests.helpers.problems import MODEL, clean, likelihood_of, pose_noisy, posed_for
+from tests.helpers.problems import MODEL, clean, likelihood_of, pose_noisy, posed_for, rotation
 
 
 def examined(parts: dict[str, Any], place: int | None = None) -> str:
@@ -83,6 +83,14 @@ def test_a_given_noise_is_held_against_what_parameters_leave(beyond: float, said
     held = make_likelihood(problem, fit.best, fit.misfit, confidence=0.95, noise_sd=noise_sd)
     notes = examine_residuals(held).notes
     assert any("the noise that was given" in note.text for note in notes) == said
+
+
+def test_where_nothing_is_left_no_noise_is_doubted() -> None:
+    times, _ = clean("liquid_drop_2")
+    posed = posed_for(MODEL, times, rotation(MODEL, [1.0, 1.0, 10.0, 0.1], times, inertia=False))
+    fit = likelihood_of(posed)
+    held = make_likelihood(posed, fit.best, fit.misfit, confidence=0.95, noise_sd=1e-6)
+    assert examine_residuals(held).notes == []
 
 
 TIMES = np.linspace(0.25, 100, 400)
