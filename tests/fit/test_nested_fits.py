@@ -153,10 +153,8 @@ def test_a_fit_ends_no_higher_than_with_another_seed() -> None:
     posed = [posed_for(CANDIDATES["burgers"].model, times, response + noise)] * 2
     rngs = [np.random.default_rng([seed, 8]) for seed in (0, 2)]
     found = identify_many(posed, LeastSquaresSettings(candidates=1000, starts=16), rngs)
-    apart, together = (
-        len(times) * (each[1].misfit ** 2 / each[0].misfit ** 2 - 1)
-        for each in (found, nested_fits.deepen(posed, found))
-    )
+    both = found, nested_fits.deepen(posed, found)
+    apart, together = (len(times) * ((two.misfit / one.misfit) ** 2 - 1) for one, two in both)
     assert apart > 0.3
     assert abs(together) < 0.01
 
@@ -175,11 +173,8 @@ def test_it_is_the_same_to_the_last_bit(name: str, offset: bool) -> None:
     ours = experiment.for_model(first, model)
     for one, other in ((ours, alone), (first, experiment.of(TIMES, TRACE))):
         points = np.random.default_rng(4).uniform(other.low, other.high, (40, len(other.low)))
-        mine, theirs = (
-            [*(each.low, each.high, each.genome.low), *each.residuals(points[0])]
-            for each in (one, other)
-        )
-        mine.append(one.residuals.misfit(np.exp(points)))
-        theirs.append(other.residuals.misfit(np.exp(points)))
-        for found, expected in zip(mine, theirs, strict=True):
-            np.testing.assert_array_equal(found, expected)
+        ends = [(each.low, each.high, each.genome.low) for each in (one, other)]
+        misfits = [each.residuals.misfit(np.exp(points)) for each in (one, other)]
+        rows = [np.vstack(each.residuals(points[0])) for each in (one, other)]
+        for both in (misfits, rows, *zip(*ends, strict=True)):
+            np.testing.assert_array_equal(*both)

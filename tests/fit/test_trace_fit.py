@@ -23,6 +23,7 @@ from tests.helpers.default import STUDY
 
 CASE = STUDY.cases["liquid_drop_2"]
 POSED = CASE.experiment
+COLOURED = replace(POSED, coloured=True, offset=True, drift=True)
 TIMES = np.linspace(0, POSED.torque.end_s, 801)
 TRUTH = POSED.logs(CASE.parameters)
 
@@ -116,8 +117,7 @@ def test_an_uncertain_gripper_is_held_against_what_is_left(monkeypatch: pytest.M
 def test_noise_is_found_and_said() -> None:
     noise = Noise("gaussian", 0.02, "peak", ar1=AR1(0.5, 5.0), drift=Drift(2.0))
     noise = replace(noise, outliers=Outliers(0.01, 30.0))
-    experiment = replace(POSED, coloured=True, offset=True, drift=True)
-    fit = fitted(experiment, noisy(noise))
+    fit = fitted(COLOURED, noisy(noise))
     assert fit.noise_model is not None
     assert fit.noise_model.ar1 + fit.noise_model.flicker == pytest.approx(0.5, abs=0.25)
     away = np.abs(noisy(noise) - noisy(replace(noise, outliers=None))) / (0.02 * CLEAN.max())
@@ -128,19 +128,17 @@ def test_noise_is_found_and_said() -> None:
     assert "correlated over some" in model
     assert f"{np.count_nonzero(fit.outliers)} samples of 801" in outliers
     assert fit.problem.residuals.freedom < 1000
-    other = experiment.for_model(fit.problem, POSED.searched)
+    other = COLOURED.for_model(fit.problem, POSED.searched)
     np.testing.assert_array_equal(other.residuals(TRUTH)[0], fit.problem.residuals(TRUTH)[0])
 
 
 def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
     """Three spikes are struck, each of fifteen times the noise of its sample."""
-    experiment = replace(POSED, coloured=True, offset=True, drift=True)
-    trace = noisy(Noise("gaussian", 0.05, "signal"))
-    spikes = [200, 500, 700]
+    trace, spikes = noisy(Noise("gaussian", 0.05, "signal")), [200, 500, 700]
     spiked = trace.copy()
     spiked[spikes] += 15 * 0.05 * CLEAN[spikes]
-    assert not fitted(experiment, trace).outliers.any()
-    fit = fitted(experiment, spiked)
+    assert not fitted(COLOURED, trace).outliers.any()
+    fit = fitted(COLOURED, spiked)
     np.testing.assert_array_equal(np.flatnonzero(fit.outliers), spikes)
     assert fit.noise_model is not None
     assert fit.noise_model.proportional > 0.9
@@ -149,10 +147,9 @@ def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
 
 
 def test_too_many_samples_for_a_colour_are_refused() -> None:
-    experiment: Experiment = replace(POSED, coloured=True, offset=True, drift=True)
     times = np.linspace(0, 400, MOST_SAMPLES + 1)
     with pytest.raises(BiogripError, match="allowed are at most 50000 with a coloured"):
-        fitted(experiment, times, times)
+        fitted(COLOURED, times, times)
 
 
 def functions(uncertainty: Mapping[str, Mapping[str, float]]) -> Array:

@@ -90,9 +90,8 @@ def test_small_things(gripper: Gripper) -> None:
     milligrams = 1e6 * mechanics.mass_of_sample(100e-6)
     assert milligrams == pytest.approx(1e9 * 4 / 3 * math.pi * (50e-6) ** 3)
     # A wheel of 60 um that turns by 3 mrad, on an arm of 1.5 mm.
-    assert mechanics.rolling_of_contact(gripper, 120e-6, 3e-3) == pytest.approx(
-        60e-6 * 3e-3 / 1.5e-3
-    )
+    rolling = mechanics.rolling_of_contact(gripper, 120e-6, 3e-3)
+    assert rolling == pytest.approx(60e-6 * 3e-3 / 1.5e-3)
 
 
 @pytest.mark.parametrize(("size_m", "strain"), [(30e-6, 0.02), (120e-6, 0.1)])
@@ -142,17 +141,14 @@ TIME_S = np.arange(1001) / 33e3
 CAUSES = (1.6e-9, 2e-13)
 
 
-@pytest.mark.parametrize(
-    "damping", [3.3e-12, 1.3266e-10, 9e-10], ids=["rings", "critical", "creeps"]
-)
+@pytest.mark.parametrize("damping", [3.3e-12, 1.3266e-10, 9e-10])
 def test_free_motion_is_the_exponential_of_its_matrix(damping: float) -> None:
+    """Of arms that ring, are critically damped, and creep."""
     arm = dataclasses.replace(ARM, damping_Nms_per_rad=damping)
     matrix = np.array([[0.0, 1.0], [-4.4e-7 / 1e-14, -damping / 1e-14]])
     motion = calibration.free_motion(arm, TIME_S, *CAUSES)
-    for record, load, rate in (
-        (motion.step, CAUSES[0], 0.0),
-        (motion.impulse, 0.0, CAUSES[1] / ARM.inertia_kgm2),
-    ):
+    step, kicked = (motion.step, CAUSES[0], 0.0), (motion.impulse, 0.0, CAUSES[1] / 1e-14)
+    for record, load, rate in (step, kicked):
         # From the rest at torque over stiffness, as far as the arm begins away from it.
         rest = np.array([load / 4.4e-7, 0.0])
         expected = rest + expm(TIME_S[:, None, None] * matrix) @ (np.array([0.0, rate]) - rest)
