@@ -3,7 +3,6 @@
 import re
 from typing import Any
 
-import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
@@ -122,15 +121,3 @@ def test_any_config_is_used_or_ends_in_one_message(overlay: dict[str, Any]) -> N
         event("used")
         assert study.cases
         assert built(StudyConfig, plain(study.config)) == study.config
-
-
-@settings(max_examples=100, deadline=None, derandomize=True)
-@given(st.sampled_from(sorted(SINGLE)), st.data())
-def test_a_value_out_of_bounds_is_refused_with_its_key(path: str, data: st.DataObject) -> None:
-    if (high := SINGLE[path].get("maximum")) is None:
-        return
-    floats: Any = st.floats(high, exclude_min=True, allow_infinity=False)
-    beyond = st.integers(high + 1) if SINGLE[path].get("type") == "integer" else floats
-    overlay = block_of(path, data.draw(beyond))
-    with pytest.raises(BiogripError, match=re.escape(f": {path}: found ")):
-        load_study(overlaid(DEFAULTS, overlay), [CONFIG])
