@@ -12,7 +12,6 @@ from biogrip.fit import genetic, genetic_refined
 from biogrip.fit.genetic import GeneticSettings, select
 from biogrip.fit.genome import GeneRange, lowest_encodable, make_genome, nearest_encodable
 from biogrip.fit.problem import Fit, TraceProblem
-from biogrip.physics.misfit import make_misfit
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.sample_model import with_fixed
 from tests.helpers.plain_genetic import decoded, identified
@@ -86,10 +85,7 @@ def test_populations_are_what_they_are_alone_and_gene_by_gene(name: str) -> None
         problems = posed(5)
     if name == "misfits of their own":
         problems = posed(3, offset=True, drift=True)
-    plain = [
-        content(identified(make_misfit(each.residuals), each.genome, settings, rng_of(seed)))
-        for seed, each in enumerate(problems)
-    ]
+    plain = [content(identified(each, settings, rng_of(n))) for n, each in enumerate(problems)]
     everyone = list(range(len(problems)))
     for group in (everyone[::-1], everyone[1:], everyone[:1]):
         rngs = [rng_of(seed) for seed in group]

@@ -1,13 +1,12 @@
 """The genetic algorithm gene by gene, one population at a time."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import Genome
-from biogrip.fit.problem import Fit, History
+from biogrip.fit.problem import Fit, History, TraceProblem
+from biogrip.physics.misfit import make_misfit
 
 
 def decoded(genome: Genome, chromosomes: IntArray) -> Array:
@@ -20,12 +19,9 @@ def _number(exponent: int, *digits: int) -> float:
     return float(f"{''.join(map(str, digits))}e{exponent - len(digits)}")
 
 
-def identified(
-    misfit: Callable[[Array], Array],
-    genome: Genome,
-    settings: GeneticSettings,
-    rng: np.random.Generator,
-) -> Fit:
+def identified(posed: TraceProblem, settings: GeneticSettings, rng: np.random.Generator) -> Fit:
+    misfit, genome = make_misfit(posed.residuals), posed.genome
+
     def ranked(everyone: IntArray) -> tuple[IntArray, Array]:
         ranking = misfit(decoded(genome, everyone)).astype(np.float32)
         order = np.lexsort((*everyone.T[::-1], ranking))[: settings.survivors]

@@ -45,17 +45,11 @@ def posed_for(model: SampleModel, times: Array, trace: Array, **assumed: Any) ->
 
 
 def pose_noisy(
-    times: Array,
-    response: Array,
-    count: int,
-    model: SampleModel = MODEL,
-    level: float = 0.1,
-    **assumed: Any,
+    times: Array, trace: Array, n: int, model: SampleModel = MODEL, level: float = 0.1, **own: Any
 ) -> list[TraceProblem]:
-    """Problems that share everything but the noise."""
     noise = Noise("gaussian", level, "peak")
-    traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
-    return replace(EXPERIMENT, ranges=STUDY.ranges, **assumed).of_each(times, traces, model)
+    traces = [add_noise(trace, noise, np.random.default_rng([seed, 7])) for seed in range(n)]
+    return replace(EXPERIMENT, ranges=STUDY.ranges, **own).of_each(times, traces, model)
 
 
 def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> TraceProblem:

@@ -14,19 +14,16 @@ from biogrip.fit.problem import TraceProblem
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
 
+_Rows = Callable[[Array], tuple[Array, Array]]
 STIFF = 1e5
 # What the project says of branches that do not relax within the experiment.
 HINGE = 10.0
 
 
 def scipy_fit(
-    problem: TraceProblem,
-    start: Array,
-    more: Callable[[Array], tuple[Array, Array]] | None = None,
-    noise_sd: float | None = None,
-    tolerance: float = 1e-8,
-) -> tuple[Array, float]:
-    """Fit all samples from log-parameters; return where that ends and the RMS misfit.
+    problem: TraceProblem, start: Array, more: _Rows | None = None, noise_sd: float | None = None
+) -> float:
+    """Return the RMS misfit of a fit of all samples from log-parameters.
 
     There may be more residuals, in units of the noise, with their slopes.
     """
@@ -47,9 +44,9 @@ def scipy_fit(
         lambda x: rows(x.tobytes())[1],
         (problem.low, problem.high),
         max_nfev=300,
-        **dict.fromkeys(("ftol", "xtol", "gtol"), tolerance),
+        **dict.fromkeys(("ftol", "xtol", "gtol"), 1e-11),
     )
-    return found.x, noise_sd * float(np.sqrt(2 * found.cost / problem.residuals.samples))
+    return noise_sd * float(np.sqrt(2 * found.cost / problem.residuals.samples))
 
 
 def rise_of_held(likelihood: Likelihood, quantity: Quantity, target: float, start: Array) -> float:
@@ -65,6 +62,6 @@ def rise_of_held(likelihood: Likelihood, quantity: Quantity, target: float, star
         values, turns = map(np.array, zip(*held, strict=True))
         return values, turns
 
-    _, misfit = scipy_fit(likelihood.problem, start, more, likelihood.noise_sd, 1e-11)
+    misfit = scipy_fit(likelihood.problem, start, more, likelihood.noise_sd)
     squares = misfit**2 - likelihood.misfit**2
     return float(residuals.samples * squares / likelihood.noise_sd**2)

@@ -214,10 +214,6 @@ def relaxation(times: Array) -> tuple[Array, Array]:
     return 100 + 80 * decay, absorbed(slopes)
 
 
-def itself(rows: Array) -> Array:
-    return rows
-
-
 @pytest.mark.parametrize("readings", [8, 20, 100, 400])
 @pytest.mark.parametrize("decades", [0, 4])
 def test_of_white_noise_both_tests_fail_as_often_as_they_say(readings: int, decades: int) -> None:
@@ -225,7 +221,7 @@ def test_of_white_noise_both_tests_fail_as_often_as_they_say(readings: int, deca
     even = 100 * np.arange(1, readings + 1) / readings
     times = np.geomspace(100 * 10.0**-decades, 100, readings) if decades else even
     _, basis = relaxation(times)
-    steps = steps_of(basis, itself)
+    steps = steps_of(basis, np.asarray)
     noise = np.random.default_rng(readings + decades).standard_normal((2000, readings))
     left = noise - noise @ basis.T @ basis
     share = (left @ steps.shapes.T / steps.norms) ** 2 / np.sum(left**2, axis=1)[:, None]
@@ -244,7 +240,7 @@ def test_steps_are_told_and_timed(change: str, least: float) -> None:
     noise = NOISE * np.random.default_rng(3).standard_normal((200, 100))
     left = wrong[change] + noise
     left -= left @ basis.T @ basis
-    found = [find_step(own, basis, itself) for own in left]
+    found = [find_step(own, basis, np.asarray) for own in left]
     seen = [step for step in found if step and step.chance < FALSE_ALARM]
     assert len(seen) > least * 200
     before = np.median([step.before for step in seen])
@@ -256,7 +252,7 @@ def test_a_step_is_what_a_fit_with_it_finds() -> None:
     times = np.arange(1, 41.0) * 2.5
     true, basis = relaxation(times)
     trace = true + np.random.default_rng(0).standard_normal(40) + 4.0 * (times > 60)
-    found = find_step(trace - trace @ basis.T @ basis, basis, itself)
+    found = find_step(trace - trace @ basis.T @ basis, basis, np.asarray)
     assert found
     assert found.before == 24
     design: Array = np.vstack((basis, np.where(times > 60, 1.0, 0.0))).T
