@@ -26,21 +26,19 @@ SAMPLES: list[tuple[SampleModel, tuple[float, ...]]] = [
     (Sample("generalized_maxwell", 2).model, (5.0, 0.2, 1.0, 9.0, 99.0, 0.5)),
     (with_fixed(BURGERS, {"c_s": 200.0}), (3.0, 2.0, 40.0)),
 ]
-DEVICES = ["equal arms", "unequal arms", "creep", "relaxation"]
-DRAWN = [("equal arms", MAXWELL, tuple(sample)) for sample in random_samples(12, seed=5)]
+DEVICES = [
+    *(("equal arms", "steps"), ("equal arms", "ramps and parabola"), ("unequal arms", "steps")),
+    *((device, "ramps and parabola") for device in ("unequal arms", "creep", "relaxation")),
+]
+DRAWN = [("equal arms", "steps", MAXWELL, tuple(given)) for given in random_samples(12, seed=5)]
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize(
-    ("device", "model", "given"),
-    [*((device, *sample) for device in DEVICES for sample in SAMPLES), *DRAWN],
+    ("device", "protocol", "model", "given"),
+    [*((*device, *sample) for device in DEVICES for sample in SAMPLES), *DRAWN],
 )
 def test_against_differences(
-    request: pytest.FixtureRequest,
-    device: str,
-    model: SampleModel,
-    given: tuple[float, ...],
-    protocol: str,
+    request: pytest.FixtureRequest, device: str, protocol: str, model: SampleModel, given: Array
 ) -> None:
     torque = join_phases(PROTOCOLS[protocol], deforms=device == "relaxation")
     arms = {"equal arms": "gripper", "unequal arms": "unequal_gripper"}.get(device)
