@@ -1,27 +1,39 @@
-"""Which run a figure shows; what is drawn of fits, bounds, forces, profiles and valleys."""
+"""Which run a figure shows; what is drawn of fits, profiles and valleys; files and styles."""
 
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from biogrip.arrays import Array
 from biogrip.figures.course import draw_convergence, draw_scatter
-from biogrip.figures.fit import Fit, draw_fit, draw_fits
+from biogrip.figures.fit import Fit, draw_fit, draw_fits, scale_of
 from biogrip.figures.likelihood import draw_profile, draw_valley
-from biogrip.figures.style import ALL_SEEDS, RUNS, figure, styled
+from biogrip.figures.style import (
+    ALL_SEEDS,
+    RUNS,
+    figure,
+    line_of,
+    literal,
+    points_within,
+    save,
+    styled,
+)
 from biogrip.fit.problem import METHODS
 from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import columns
 from biogrip.records.rows import write_arrays, write_object
 from biogrip.records.traces import Measurements, write_measurements
 from biogrip.stages import targets
 from tests.helpers.default import STUDY, seen, study_of
+from tests.helpers.problems import rotation
+from workflow.paper.gripper import draw_torque
 
 CASE = "liquid_drop_2"
 TRUTH = [1.0, 1e-4, 10.0, 1e-3]
@@ -30,24 +42,13 @@ FEW = "seeds: 3\nmethods: [genetic]\n"
 MODEL = MODELS["generalized_maxwell"]
 
 
-def response(values: list[float]) -> Array:
-    problem = STUDY.cases[CASE].experiment
-    network = problem.model.network(np.array([values]))
-    device = problem.gripper, network, problem.torque
-    found: Array = simulated_response(*device, TIME_S, nonlinear=False)[0]
-    return found
-
-
 @pytest.fixture
 def identifications(tmp_path: Path) -> Path:
     """Of the seeds 1 and 2 near the noise, and 0 above it."""
+    runs = (0, 9.0, 1.3e-4, 1e-4), (1, 0.7, 5.05e-5, 5e-5), (2, 1e-6, 3e-5, 3e-5)
     rows = [
-        [CASE, "genetic", seed, k, *TRUTH[1:], misfit, noise, 7, 100, "stalled"]
-        for seed, k, misfit, noise in (
-            (0, 9.0, 1.3e-4, 1e-4),
-            (1, 0.7, 5.05e-5, 5e-5),
-            (2, 1e-6, 3e-5, 3e-5),
-        )
+        [CASE, "genetic", seed, k, *TRUTH[1:], *misfits, 7, 100, "stalled"]
+        for seed, k, *misfits in runs
     ]
     frame = pd.DataFrame(rows, columns=columns(MODEL))
     frame.to_csv(tmp_path / f"{CASE}.csv", index=False)
@@ -57,10 +58,9 @@ def identifications(tmp_path: Path) -> Path:
 @pytest.fixture
 def measurements(tmp_path: Path) -> Path:
     """Three traces whose noise falls from seed to seed."""
-    target, rng = response(TRUTH), np.random.default_rng(0)
-    traces = {
-        seed: target + 1e-4 / (1 + seed) * rng.standard_normal(len(TIME_S)) for seed in range(3)
-    }
+    target, rng = rotation(MODEL, TRUTH, TIME_S), np.random.default_rng(0)
+    noise = 1e-4 / np.array([[1], [2], [3]]) * rng.standard_normal((3, len(TIME_S)))
+    traces = dict(enumerate(target + noise))
     write_measurements(tmp_path / "seeds_0-2.npz", Measurements(TIME_S, target, traces))
     return tmp_path / "seeds_0-2.npz"
 
@@ -74,15 +74,15 @@ def test_the_first_run_of_each_basin_is_drawn(identifications: Path, measurement
     with styled():
         drawn = draw_fits(study_of(FEW).cases[CASE], identifications, [measurements], [])
     for label, k in (("seed 1, near the noise", 0.7), ("seed 0, above the noise", 9.0)):
-        expected = 1e3 * response([k, *TRUTH[1:]])
+        expected = 1e3 * rotation(MODEL, [k, *TRUTH[1:]], TIME_S)
         np.testing.assert_allclose(curve(drawn, label), expected, rtol=1e-9)
     # Of the second the target's residual.
     left = np.asarray(drawn.axes[1].lines[2].get_ydata(), dtype=float)
-    np.testing.assert_allclose(left, 1e3 * (response(TRUTH) - response([9.0, *TRUTH[1:]])))
+    apart = rotation(MODEL, TRUTH, TIME_S) - rotation(MODEL, [9.0, *TRUTH[1:]], TIME_S)
+    np.testing.assert_allclose(left, 1e3 * apart)
     # The paper's axis is on it, and all that was measured.
     low, high = drawn.axes[0].get_ylim()
-    assert low <= -0.6
-    assert high >= 4.2
+    assert low <= -0.6 < 4.2 <= high
 
 
 @pytest.mark.parametrize(
@@ -126,13 +126,11 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     history["method"] = np.repeat(["genetic", "least_squares"], 2 * seeds)
     write_arrays(tmp_path / "history.npz", history)
     study = seen(
-        shown_method=METHODS["genetic"],
-        near_noise_tolerance=0.02,
-        config=seen(methods=["genetic"]),
+        shown_method=METHODS["genetic"], near_noise_tolerance=0.02, config=seen(methods=["genetic"])
     )
     block = seen(genetic_algorithm=seen(mutation_start=20))
-    known = {"name": "x", "seeds": seeds, "sample": Sample(MODEL.name)}
-    case = seen(title="A cell", block=block, study=study, **known)
+    known = {"name": "x", "seeds": seeds, "sample": Sample(MODEL.name), "study": study}
+    case = seen(title="A cell", block=block, **known)
     drawn = draw_convergence(case, tmp_path / "found.csv", tmp_path / "history.npz")
     (axes,), (legend,) = drawn.axes, drawn.legends
     colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]
@@ -150,14 +148,11 @@ def scattered(overlay: str, identifications: Path) -> Any:
     content = {"quantities": items, "trades": [], "notes": []}
     write_object(folder / "expected.json", content)
     with styled():
-        return draw_scatter(
-            case, identifications, folder / "target.csv", folder / "expected.json", []
-        )
+        files = identifications, folder / "target.csv", folder / "expected.json"
+        return draw_scatter(case, *files, [])
 
 
-def test_a_band_of_the_study_s_confidence_is_drawn_of_what_is_determined_alone(
-    identifications: Path,
-) -> None:
+def test_bands_of_the_confidence_are_drawn_of_what_is_determined(identifications: Path) -> None:
     drawn = scattered("", identifications)
     shaded = [any(isinstance(p, Rectangle) for p in axes.patches) for axes in drawn.axes]
     assert shaded == [False] * 4 + [True]
@@ -190,14 +185,10 @@ def drawn_valley(
     sums = 10 * np.array([[0.9], [1.0], [1.1]])
     grid = {"x_values": sums * shares, "y_values": sums * (1 - shares), "increases": increases}
     axis = {"name": "c", "symbol": "$c$", "unit": "N s/m"}
-    found = {
-        "x": axis,
-        "y": {**axis, "name": "c_p", "symbol": "$c_p$"},
-        "grids": [{key: np.asarray(each).tolist() for key, each in grid.items()}],
-        "best": [9.0, 1.0],
-    }
-    path = folder / "v.json"
-    write_object(path, {"valley": found})
+    other = {**axis, "name": "c_p", "symbol": "$c_p$"}
+    grids = [{key: np.asarray(each).tolist() for key, each in grid.items()}]
+    path, valley = folder / "v.json", {"x": axis, "y": other, "grids": grids, "best": [9.0, 1.0]}
+    write_object(path, {"valley": valley})
     rows: dict[str, Any] = {p.column: 1.0 for p in MODEL.parameters}
     rows |= {f"{name}_Ns_per_m": values for name, values in fits.items()}
     frame = pd.DataFrame(rows).assign(case="x", method="least_squares", misfit=1, noise_rms=1)
@@ -228,11 +219,63 @@ def test_a_valleys_axes_end_around_what_is_in_it(tmp_path: Path) -> None:
     assert 8.5 < low < 8.78 < 9.05 < high < 9.3
     low, high = narrow.get_ylim()
     assert 0.7 < low < 0.95 < 1.22 < high < 1.5
-    wide = drawn_valley(tmp_path, DEEP, near)
-    assert wide.get_xlim()[0] < 1
-    assert wide.get_xlim()[1] > 9
+    low, high = drawn_valley(tmp_path, DEEP, near).get_xlim()
+    assert low < 1 < 9 < high
     known = {"c": 6.0, "c_p": 4.0}
     more = drawn_valley(tmp_path, CLOSED, {"c": [6.0, 9.05], "c_p": [4.0, 0.95]})
     for axes in (more, *(drawn_valley(tmp_path, CLOSED, near, **{n: known}) for n in KNOWN)):
         assert axes.get_xlim()[0] < 6 < 9.05 < axes.get_xlim()[1]
         assert axes.get_ylim()[0] < 0.95 < 4 < axes.get_ylim()[1]
+
+
+def test_a_matplotlibrc_changes_no_figure(tmp_path: Path) -> None:
+    theirs = tmp_path / "matplotlibrc"
+    for name, content in (("a", ""), ("b", "text.color: red\nsavefig.facecolor: yellow\n")):
+        theirs.write_text(content)
+        with mpl.rc_context(fname=theirs), styled():
+            save(draw_torque(STUDY), tmp_path / f"{name}.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_a_figure_for_print_has_fonts_that_publishers_take(tmp_path: Path) -> None:
+    with styled():
+        save(draw_torque(STUDY), tmp_path / "torque.png", tmp_path / "torque.pdf")
+    content = (tmp_path / "torque.pdf").read_bytes()
+    assert content.startswith(b"%PDF-")
+    assert b"/CIDFontType2" in content
+    assert b"/Type3" not in content
+
+
+@pytest.mark.parametrize("title", [r"$\frac{$", "5$ a day, 10$ a week", r"a_b ^ \ % # & < {"])
+def test_a_title_sets_no_mathematics(tmp_path: Path, title: str) -> None:
+    with styled():
+        for name, text, parsed in (("a", literal(title), True), ("b", title, False)):
+            drawn = figure(3, 2)
+            drawn.suptitle(text, parse_math=parsed)
+            save(drawn, tmp_path / f"{name}.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(2.0, (1.0, "rad")), (3e-3, (1e3, "mrad")), (3e-5, (1e6, "µrad")), (3e-8, (1e9, "nrad"))],
+)
+def test_prefixes(value: float, expected: tuple[float, str]) -> None:
+    assert scale_of(np.array([-value, 0.0]), "rad") == expected
+
+
+def test_every_method_is_drawn_as_no_other() -> None:
+    lines = [tuple(line_of(method).values()) for method in METHODS.values()]
+    assert len(set(lines)) == len(lines)
+    for method in METHODS.values():
+        Line2D([], [], **line_of(method))
+
+
+def test_points_beyond_an_axis_are_triangles_at_its_edge() -> None:
+    axes = figure(3, 3).subplots()
+    points = np.array([[1.0, 0.5], [2.0, 2.0], [3.0, -7.0], [4.0, 7.0], [99.0, 2.0]])
+    points_within(axes, points, (0, 0), (9, 5), {"marker": "o"}, edge_size=3)
+    drawn_at = {line.get_marker(): np.asarray(line.get_xydata()) for line in axes.lines}
+    np.testing.assert_array_equal(drawn_at["o"], points[:2])
+    edges = {"v": [[3, 0]], "^": [[4, 5]], ">": [[9, 2]]}
+    assert {marker: at.tolist() for marker, at in drawn_at.items() if marker != "o"} == edges

@@ -1,57 +1,39 @@
 """A model never fits worse than one that it contains; and what is said of it beside others."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.fit.experiment import Experiment
+from biogrip.fit import nested_fits
 from biogrip.fit.least_squares import LeastSquaresSettings, identify_many
-from biogrip.fit.nested_fits import (
-    _is_noticeably_lower,
-    _of_contained,
-    _worse,
-    advice,
-    deepen,
-    fit_models,
-    is_within,
-    one_branch_more,
-    preferred,
-    ranked,
-)
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.physics.models import CANDIDATES, MODELS, contained
-from biogrip.physics.response import step_response, superpose
-from tests.helpers.default import seen, study_of
-from tests.helpers.problems import (
-    GRIPPER,
-    MODEL,
-    SAMPLES,
-    TORQUE,
-    clean,
-    pose_noisy,
-    posed_for,
-)
+from tests.helpers.default import STUDY, seen
+from tests.helpers.problems import MODEL, SAMPLES, clean, pose_noisy, posed_for, rotation
 
 TRIED = (*MODELS, "generalized_maxwell_2")
 LADDERS = [name for name in TRIED if not CANDIDATES[name].model.power_law]
 FEW = LeastSquaresSettings(candidates=200, starts=4)
 
 
+Problems = dict[str, list[TraceProblem]]
+Found = dict[str, list[Fit]]
+
+
 def fitted(
     response: Array, times: Array, tried: Sequence[str], traces: int, level: float
-) -> tuple[dict[str, list[TraceProblem]], dict[str, list[Fit]]]:
-    problems = {
-        name: pose_noisy(times, response, traces, CANDIDATES[name].model, level) for name in tried
-    }
+) -> tuple[Problems, Found]:
+    models = {name: CANDIDATES[name].model for name in tried}
+    given = times, response, traces
+    problems = {name: pose_noisy(*given, model, level) for name, model in models.items()}
     rngs = {name: [np.random.default_rng(n) for n in range(traces)] for name in tried}
-    return problems, fit_models(problems, FEW, rngs, lambda: None)
+    return problems, nested_fits.fit_models(problems, FEW, rngs, lambda: None)
 
 
-def worse(
-    problems: dict[str, list[TraceProblem]], found: dict[str, list[Fit]]
-) -> list[tuple[str, str, float]]:
+def worse(problems: Problems, found: Found) -> list[tuple[str, str, float]]:
     """Pairs the wrong way round, and by how much in chi^2."""
     increases = [
         (richer, simpler, problem.residuals.samples * (2 * np.log(a.misfit / b.misfit)))
@@ -72,17 +54,14 @@ def worse(
     ],
 )
 @pytest.mark.nightly
-def test_a_model_fits_no_worse_than_one_in_it(
-    tried: Sequence[str], case: str, level: float
-) -> None:
+def test_no_model_fits_worse_than_one_in_it(tried: Sequence[str], case: str, level: float) -> None:
     """Parameters and misfit are of one point, also of elements that have vanished."""
     times, response = clean(case)
     problems, found = fitted(response, times, tried, 2, level)
     assert worse(problems, found) == []
     for name, answers in found.items():
-        network = CANDIDATES[name].model.network([answer.parameters for answer in answers])
-        rotations = superpose(step_response(GRIPPER, network, inertia=False), TORQUE, times)
-        for problem, answer, own in zip(problems[name], answers, rotations, strict=True):
+        for problem, answer in zip(problems[name], answers, strict=True):
+            own = rotation(CANDIDATES[name].model, answer.parameters, times, inertia=False)
             misfit = np.sqrt(np.mean((own - problem.residuals.trace.cleared) ** 2))
             assert answer.misfit == pytest.approx(misfit, rel=1e-9)
 
@@ -94,29 +73,27 @@ def test_a_model_fits_no_worse_than_one_in_it(
 def test_what_has_vanished_starts_from_its_like(inner: str, expected: list[list[float]]) -> None:
     """A spring in front that was rigid is 3 and 100 times the other, one that was none is less."""
     found = {inner: [seen(parameters=np.array([6.0, 30.0]))]}
-    starts = [*_of_contained("zener_kelvin", found, 0, 400.0)]
+    starts = [*nested_fits._of_contained("zener_kelvin", found, 0, 400.0)]
     np.testing.assert_allclose(starts, expected)
 
 
 def test_a_simpler_model_fits_better_if_nine_digits_say_so() -> None:
     for lower, expected in ((0.0, []), (4e-10, []), (2e-9, [("liquid_drop", "maxwell", 0)])):
         found = {"maxwell": [seen(misfit=1 - lower)], "liquid_drop": [seen(misfit=1.0)]}
-        assert [*_worse(found)] == expected
+        assert [*nested_fits._worse(found)] == expected
 
 
 def test_elements_vanish_where_the_range_does_not_reach() -> None:
     """A Maxwell liquid between the jaws: no spring as weak as the range allows is weak enough."""
     times = clean("liquid_drop_1")[0]
-    response = superpose(
-        step_response(GRIPPER, MODELS["maxwell"].network([[9.5, 10.0]])), TORQUE, times
-    )[0]
+    response = rotation(MODELS["maxwell"], [9.5, 10.0], times)
     problems, found = fitted(response, times, ("maxwell", "liquid_drop"), 8, 0.1)
     assert worse(problems, found) == []
     pairs = zip(found["liquid_drop"], found["maxwell"], strict=True)
     without = [pair for pair in pairs if pair[0].parameters[1] == 0]
     assert without
     for answer, simpler in without:
-        assert not is_within(answer.parameters, problems["liquid_drop"][0])
+        assert not nested_fits.is_within(answer.parameters, problems["liquid_drop"][0])
         np.testing.assert_array_equal(answer.history.best_parameters[-1], answer.parameters)
         # It is as much the optimum as that of the simpler model is.
         assert simpler.converged
@@ -142,47 +119,42 @@ READINGS = 1000
 )
 def test_the_sentence_is_that_of_the_numbers(gained: dict[str, float], said: str) -> None:
     misfits = [float(np.exp(-gain / (2 * READINGS))) for gain in gained.values()]
-    tried = ranked(list(gained), misfits, READINGS)
-    assert said in advice(tried, "generalized_maxwell")
-    other = preferred(tried, "generalized_maxwell")
+    tried = nested_fits.ranked(list(gained), misfits, READINGS)
+    assert said in nested_fits.advice(tried, "generalized_maxwell")
+    other = nested_fits.preferred(tried, "generalized_maxwell")
     assert (other is None) == ("none of" in said)
     words = "None of the 2 models tried is adequate: the best of them, "
-    inadequate = advice(tried, "generalized_maxwell", adequate=False)
+    inadequate = nested_fits.advice(tried, "generalized_maxwell", adequate=False)
     assert inadequate.startswith(words) == (other is not None)
 
 
 @pytest.mark.parametrize(("gained", "taken"), [(0.005, False), (0.02, True), (5.0, True)])
-def test_a_branch_is_taken_that_lowers_chi_squared_by_a_hundredth(
-    gained: float, taken: bool
-) -> None:
+def test_a_branch_counts_that_lowers_chi_squared_by_a_hundredth(gained: float, taken: bool) -> None:
     """Far less than the 1 that a standard error changes it by."""
     problem = seen(residuals=seen(samples=READINGS))
     before = float(np.sqrt(1 + gained / READINGS))
-    assert _is_noticeably_lower(1.0, before, problem) == taken
+    assert nested_fits._is_noticeably_lower(1.0, before, problem) == taken
 
 
 def test_branches_are_added_beside_a_power_law_that_is_not_adequate() -> None:
     """Of five processes over eight decades; misfits are in noises of 110 readings."""
     misfits = {"generalized_maxwell": 29.0, "generalized_maxwell_2": 19.0}
     misfits |= {"generalized_maxwell_3": 11.0, "springpots_in_series": 5.2}
-    tried = ranked([*misfits], [*misfits.values()], 110)
-    assert one_branch_more(tried) is None
-    assert one_branch_more(tried, adequate=False) == "generalized_maxwell_4"
+    tried = nested_fits.ranked([*misfits], [*misfits.values()], 110)
+    assert nested_fits.one_branch_more(tried) is None
+    assert nested_fits.one_branch_more(tried, adequate=False) == "generalized_maxwell_4"
 
 
 def test_a_fit_ends_no_higher_than_with_another_seed() -> None:
     """A drop of which Burgers' model shows one element; one of these seeds misses the basin."""
     times, _ = clean("liquid_drop_1")
-    drop = {"k": 77.0, "k_p": 1e-9, "c": 1.2, "c_p": 0.04}
-    response = superpose(step_response(GRIPPER, MODEL.sample(drop)), TORQUE, times)[0]
+    response = rotation(MODEL, [77.0, 1e-9, 1.2, 0.04], times)
     noise = 0.05 * response.max() * np.random.default_rng(8).standard_normal(len(times))
     posed = [posed_for(CANDIDATES["burgers"].model, times, response + noise)] * 2
     rngs = [np.random.default_rng([seed, 8]) for seed in (0, 2)]
     found = identify_many(posed, LeastSquaresSettings(candidates=1000, starts=16), rngs)
-    apart, together = (
-        len(times) * (each[1].misfit ** 2 / each[0].misfit ** 2 - 1)
-        for each in (found, deepen(posed, found))
-    )
+    both = found, nested_fits.deepen(posed, found)
+    apart, together = (len(times) * ((two.misfit / one.misfit) ** 2 - 1) for one, two in both)
     assert apart > 0.3
     assert abs(together) < 0.01
 
@@ -192,26 +164,17 @@ TRACE = RESPONSE * np.random.default_rng(3).normal(1.0, 0.1, len(TIMES))
 
 
 @pytest.mark.parametrize("name", CANDIDATES)
-@pytest.mark.parametrize("block", ["", "{offset: true}"])
-def test_it_is_the_same_to_the_last_bit(name: str, block: str) -> None:
-    experiment: Experiment = (
-        study_of(block and f"measurement: {block}").case("liquid_drop_2").experiment
-    )
+@pytest.mark.parametrize("offset", [False, True])
+def test_it_is_the_same_to_the_last_bit(name: str, offset: bool) -> None:
+    """Another model of a trace that is posed already, and the first one afterwards."""
+    experiment = replace(STUDY.cases["liquid_drop_2"].experiment, offset=offset)
     model = CANDIDATES[name].model
-    first = experiment.of(TIMES, TRACE)
-    ours, fresh = experiment.for_model(first, model), experiment.of(TIMES, TRACE, model)
-    low, high = fresh.low, fresh.high
-    assert (ours.low.tolist(), ours.high.tolist()) == (low.tolist(), high.tolist())
-    assert (ours.genome.low.tolist(), ours.genome.sizes) == (
-        fresh.genome.low.tolist(),
-        fresh.genome.sizes,
-    )
-    points = np.random.default_rng(4).uniform(low, high, (40, len(low)))
-    expected = fresh.residuals.misfit(np.exp(points))
-    np.testing.assert_array_equal(ours.residuals.misfit(np.exp(points)), expected)
-    for one, other in zip(ours.residuals(points[0]), fresh.residuals(points[0]), strict=True):
-        np.testing.assert_array_equal(one, other)
-    # And the first is what it was.
-    again = experiment.of(TIMES, TRACE)
-    sample = np.exp(0.5 * (first.low + first.high))[None]
-    assert first.residuals.misfit(sample) == again.residuals.misfit(sample)
+    first, alone = experiment.of(TIMES, TRACE), experiment.of(TIMES, TRACE, model)
+    ours = experiment.for_model(first, model)
+    for one, other in ((ours, alone), (first, experiment.of(TIMES, TRACE))):
+        points = np.random.default_rng(4).uniform(other.low, other.high, (40, len(other.low)))
+        ends = [(each.low, each.high, each.genome.low) for each in (one, other)]
+        misfits = [each.residuals.misfit(np.exp(points)) for each in (one, other)]
+        rows = [np.vstack(each.residuals(points[0])) for each in (one, other)]
+        for both in (misfits, rows, *zip(*ends, strict=True)):
+            np.testing.assert_array_equal(*both)

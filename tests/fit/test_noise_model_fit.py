@@ -1,10 +1,15 @@
-"""Noise of residuals: its likelihood against dense matrices, its growth, and outliers."""
+"""Noise of residuals: its likelihood against dense matrices, growth, outliers; shares."""
+
+from dataclasses import replace
+from math import gamma
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
 from biogrip.arrays import Array
+from biogrip.fit.any_sample import fit_any_sample, proportional_deviations
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
     _logarithms,
@@ -13,7 +18,13 @@ from biogrip.fit.noise_model_fit import (
     outliers_of,
     significance_of_growth,
 )
+from biogrip.library import set_up
+from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.models import Sample
 from biogrip.physics.noise import AR1, Noise, NoiseModel, add_noise
+from biogrip.physics.protocol import hold
+from tests.helpers.default import STUDY
+from tests.helpers.problems import clean, run
 from tests.physics.test_noise import correlation
 
 SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
@@ -21,23 +32,20 @@ TIMES = np.cumsum(np.random.default_rng(0).exponential(1.0, 200))
 DIRECTIONS = np.stack((np.ones(200), TIMES, np.exp(-TIMES / 40)))
 
 
-def restricted(
-    time_s: Array,
-    rows: Array,
-    left: Array,
-    noise_model: NoiseModel,
-    growing: Array | None = None,
-) -> float:
-    """Minus twice the restricted likelihood, the scale profiled out, from dense matrices."""
-    matrix = correlation(time_s, noise_model, growing)
+def restricted(matrix: Array, rows: Array, left: Array) -> tuple[float, float]:
+    """Minus twice the restricted likelihood, from dense matrices; and the scale, profiled out."""
     inverse = np.linalg.inv(matrix)
     information = rows @ inverse @ rows.T
     taken = inverse - inverse @ rows.T @ np.linalg.solve(information, rows @ inverse)
-    return float(
-        (len(time_s) - len(rows)) * np.log(left @ taken @ left)
-        + np.linalg.slogdet(matrix)[1]
-        + np.linalg.slogdet(information)[1]
-    )
+    count = len(left) - len(rows)
+    scale = float(left @ taken @ left) / count
+    determinants = sum(np.linalg.slogdet(each)[1] for each in (matrix, information))
+    return count * float(np.log(scale)) + float(determinants), scale
+
+
+def of_slow(x: Array) -> float:
+    """The prior on 1/f noise and a third of a walk, of logarithms."""
+    return float(np.log(np.exp(x[2]) + np.exp(x[3]) / 3))
 
 
 @pytest.mark.parametrize(
@@ -50,15 +58,15 @@ def restricted(
 def test_the_likelihood_is_that_of_dense_matrices(
     colours: list[tuple[float, ...]], growing: Array | None
 ) -> None:
-    """Differences between colours, less the prior on 1/f noise and a third of a walk; twelve digits
-    are there, and the condition of the matrices takes four."""
+    """Differences between colours, less the prior; of twelve digits the matrices take four."""
     left = np.random.default_rng(1).standard_normal(200)
     likelihood = NoiseModelLikelihood(TIMES, left, DIRECTIONS, growing)
     found, expected = [], []
     for noise_model in (NoiseModel(*shares) for shares in colours):
         x = _logarithms(noise_model)
-        found.append(likelihood._deviance(x) + np.log(np.exp(x[2]) + np.exp(x[3]) / 3))
-        expected.append(restricted(TIMES, DIRECTIONS, left, noise_model, growing))
+        found.append(likelihood._deviance(x) + of_slow(x))
+        matrix = correlation(TIMES, noise_model, growing)
+        expected.append(restricted(matrix, DIRECTIONS, left)[0])
     np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-8)
 
 
@@ -77,36 +85,26 @@ def test_degrees_of_freedom_are_those_of_satterthwaite() -> None:
     rows = np.vstack((sensitivity, nuisance))
 
     def deviance(x: Array) -> float:
-        slow = np.log(np.exp(x[2]) + np.exp(x[3]) / 3)
-        return restricted(TIMES, DIRECTIONS, left, _noise_model(x)) - slow
+        matrix = correlation(TIMES, _noise_model(x))
+        return restricted(matrix, DIRECTIONS, left)[0] - of_slow(x)
 
     def log_variances(x: Array) -> Array:
         matrix = correlation(TIMES, _noise_model(x))
-        inverse = np.linalg.inv(matrix)
-        covariance = np.linalg.inv(rows @ inverse @ rows.T)[:2, :2]
-        dense = matrix, DIRECTIONS @ inverse @ DIRECTIONS.T
-        determinants = sum(np.linalg.slogdet(each)[1] for each in dense)
-        scale = (
-            np.exp((deviance(x) + np.log(np.exp(x[2]) + np.exp(x[3]) / 3) - determinants) / 197)
-            / 197
-        )
-        return np.log(np.diagonal(covariance) * scale)
+        covariance = np.linalg.inv(rows @ np.linalg.inv(matrix) @ rows.T)[:2, :2]
+        return np.log(np.diagonal(covariance) * restricted(matrix, DIRECTIONS, left)[1])
 
     x, steps = _logarithms(noise_model), 0.1 * np.eye(4)
-    second = [
-        [sum(i * j * deviance(x + i * a + j * b) for i, j in SIGNS) / 0.04 for a in steps]
-        for b in steps
+    curved = [
+        [[i * j * deviance(x + i * a + j * b) for i, j in SIGNS] for a in steps] for b in steps
     ]
-    information = 0.5 * np.array(second) + np.eye(4) / 9
+    information = 0.5 * np.sum(curved, axis=2) / 0.04 + np.eye(4) / 9
     slopes = np.array([log_variances(x + a) - log_variances(x - a) for a in steps]) / 0.2
     spread = np.diagonal(slopes.T @ np.linalg.solve(information, slopes))
     found = likelihood.freedom(noise_model, sensitivity, nuisance)
     assert found == pytest.approx(2 / spread.max(), rel=0.05)
 
 
-def test_information_is_half_of_what_curves_the_deviance_and_the_prior(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_information_is_half_the_curvature_and_the_prior(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a quadratic form all of it; along what curves the other way there is the prior alone."""
     form = np.array([[2.0, 1, 0, 0], [1, 2, 0, 0], [0, 0, 4, 0], [0, 0, 0, -1]])
     likelihood = NoiseModelLikelihood(TIMES, np.ones(200), DIRECTIONS)
@@ -122,9 +120,8 @@ ROTATION = np.geomspace(0.004, 1.0, 400)
 def test_noise_that_is_the_same_everywhere_seldom_grows() -> None:
     """Of 500 traces one or two seem to grow, and at most four standard deviations more."""
     rng = np.random.default_rng(0)
-    grown = sum(
-        bool(np.ptp(compute_growth(rng.standard_normal(400), ROTATION))) for _ in range(500)
-    )
+    growths = (compute_growth(rng.standard_normal(400), ROTATION) for _ in range(500))
+    grown = sum(bool(np.ptp(growth)) for growth in growths)
     assert grown <= 1.5 + 4 * np.sqrt(1.5)
 
 
@@ -192,3 +189,80 @@ def test_what_rounding_hides_does_not_grow() -> None:
 def test_what_does_not_vary_does_not_grow() -> None:
     np.testing.assert_array_equal(compute_growth(np.zeros(50), np.arange(50.0)), 1.0)
     np.testing.assert_array_equal(compute_growth(np.arange(50.0) % 7, np.zeros(50)), 1.0)
+
+
+CLEAN_S, CLEAN = clean("endothelial_cell", 2.0)
+
+
+def deviations(trace: Array, share: float = 0.05, **given: Any) -> Array:
+    problem = replace(STUDY.cases["endothelial_cell"].experiment, noise_share=share, **given)
+    return proportional_deviations(problem, CLEAN_S, trace)
+
+
+def test_deviations_follow_the_rotation_without_its_noise() -> None:
+    """Each reading has noise of 5 %; the smooth rotation is known far better."""
+    rng = np.random.default_rng(0)
+    found = deviations(CLEAN * (1 + 0.05 * rng.standard_normal(len(CLEAN_S))))
+    large = np.quantile(CLEAN, 0.1) < CLEAN
+    errors = np.abs(found[large] / (0.05 * CLEAN[large]) - 1)
+    assert np.median(errors) < 0.05 / 3
+    assert np.quantile(errors, 0.99) < 0.05
+
+
+def test_no_reading_is_certain() -> None:
+    """Of a trace without noise: the first rotation is zero, and counts as one of the smallest."""
+    assert CLEAN[0] == 0
+    smallest = np.sort(CLEAN)[: len(CLEAN) // 10]
+    assert deviations(CLEAN).min() == pytest.approx(0.05 * np.median(smallest), rel=0.01)
+
+
+@pytest.mark.parametrize(("share", "of_peak"), [(1e-3, 0.3), (0.02, 0.02)])
+def test_other_noise_shows_where_the_rotation_is_small(share: float, of_peak: float) -> None:
+    """Far above the share, and by so much that chance does not explain it."""
+    rng = np.random.default_rng(1)
+    floor = of_peak * float(CLEAN.max())
+    proportional = CLEAN * (1 + share * rng.standard_normal(len(CLEAN_S)))
+    found = deviations(proportional + floor * rng.standard_normal(len(CLEAN_S)), share)
+    # Some eighty readings tell the scatter.
+    assert found.min() == pytest.approx(floor, rel=0.3)
+
+
+def test_other_noise_that_is_given_is_added() -> None:
+    floor = 0.3 * float(CLEAN.max())
+    given = deviations(CLEAN, noise_sd=floor)
+    np.testing.assert_allclose(given, np.hypot(0.05 * CLEAN, floor), rtol=1e-3)
+
+
+def test_an_offset_is_not_rotation() -> None:
+    found = deviations(CLEAN + 3 * CLEAN.max(), offset=True)
+    large = np.quantile(CLEAN, 0.2) < CLEAN
+    np.testing.assert_allclose(found[large], 0.05 * CLEAN[large], rtol=0.1)
+
+
+def test_of_readings_against_the_load_nothing_is_fitted() -> None:
+    residuals = STUDY.cases["endothelial_cell"].experiment.of(CLEAN_S, -CLEAN).residuals
+    fit = fit_any_sample(residuals)
+    assert not fit.amplitudes.any()
+    left, basis = fit.left_of_readings()
+    np.testing.assert_array_equal(left, -CLEAN)
+    assert basis.shape == (0, len(CLEAN))
+
+
+def test_the_published_fit_comes_out_to_five_digits() -> None:
+    """That of polystyrene at 190 degC in pyRheo, with weights of 5 % of the compliance."""
+    v, beta, eta = 25856.7, 0.4223, 68281.1
+    times = np.geomspace(1.0, 1e4, 120)
+    compliance = times / eta + times**beta / (v * gamma(1 + beta))
+    creep = set_up(INSTRUMENTS["compliance"], (hold(1e4, 1.0),), Sample("fractional_maxwell"))
+    posed = creep.weighted(0.05 * compliance).of(times, compliance)
+    assert run("least_squares", posed).parameters == pytest.approx([v, beta, eta], rel=5e-6)
+
+
+def test_a_plateau_is_no_noise() -> None:
+    """A relaxation that ends at a plateau, of which deviations are a share as of all else."""
+    times = np.geomspace(1.0, 1e3, 100)
+    smooth = 800 + 700 * np.exp(-times / 20)
+    readings = smooth * (1 + 0.01 * np.random.default_rng(0).standard_normal(len(times)))
+    relaxation = set_up(INSTRUMENTS["modulus"], (hold(1e3, 1.0),), Sample("zener_maxwell"))
+    found = proportional_deviations(replace(relaxation, noise_share=0.01), times, readings)
+    assert found == pytest.approx(0.01 * smooth, rel=0.02)

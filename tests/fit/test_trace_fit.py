@@ -23,6 +23,7 @@ from tests.helpers.default import STUDY
 
 CASE = STUDY.cases["liquid_drop_2"]
 POSED = CASE.experiment
+COLOURED = replace(POSED, coloured=True, offset=True, drift=True)
 TIMES = np.linspace(0, POSED.torque.end_s, 801)
 TRUTH = POSED.logs(CASE.parameters)
 
@@ -64,48 +65,37 @@ def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
     Estimates and standard deviations of the logarithms agree to a twentieth of the latter:
     what is taken for straight is 2 % of a stiffness.
     """
-    share, level = 0.02, 0.02 * CLEAN.max()
-    arms = POSED.gripper.left, POSED.gripper.right
-    known = [share * arm.stiffness_Nm_per_rad for arm in arms]
-    uncertainty = {
-        name: {"stiffness_Nm_per_rad": value}
-        for name, value in zip(("left", "right"), known, strict=True)
-    }
-    experiment = replace(POSED, uncertainty=uncertainty, noise_sd=float(level))
+    share, level, key = 0.02, float(0.02 * CLEAN.max()), "stiffness_Nm_per_rad"
+    arms = {"left": POSED.gripper.left, "right": POSED.gripper.right}
+    uncertainty = {name: {key: share * getattr(arm, key)} for name, arm in arms.items()}
     trace = noisy(Noise("gaussian", 0.02, "peak"))
-    fit = fitted(experiment, trace)
-    _, slopes = fit.problem.residuals(np.log(fit.found.parameters))
+    fit = fitted(replace(POSED, uncertainty=uncertainty, noise_sd=level), trace)
+    best, low, high = np.log(fit.found.parameters), fit.problem.low, fit.problem.high
+    _, slopes = fit.problem.residuals(best)
     told = [0, 2]  # k and c: nothing is told of c_p, and next to nothing of k_p.
 
     def residuals(z: Array) -> Array:
-        left, right = (
-            replace(arm, stiffness_Nm_per_rad=arm.stiffness_Nm_per_rad * (1 + share * y))
-            for arm, y in zip(arms, z[4:], strict=True)
-        )
-        gripper = replace(POSED.gripper, left=left, right=right)
+        softer: dict[str, Any] = {
+            name: replace(arm, stiffness_Nm_per_rad=getattr(arm, key) * (1 + share * y))
+            for (name, arm), y in zip(arms.items(), z[4:], strict=True)
+        }
+        gripper = replace(POSED.gripper, **softer)
         return np.append((simulated(gripper, z[:4]) - trace) / level, z[4:])
 
-    start = np.append(np.log(fit.found.parameters), [0.0, 0.0])
-    low, high = np.append(fit.problem.low, [-5, -5]), np.append(fit.problem.high, [5, 5])
-    start[:4] = np.clip(start[:4], fit.problem.low + 1e-6, fit.problem.high - 1e-6)
-    both = least_squares(residuals, start, bounds=(low, high), x_scale="jac")
+    start = np.append(np.clip(best, low + 1e-6, high - 1e-6), [0, 0])
+    bounds = np.append(low, [-5, -5]), np.append(high, [5, 5])
+    both = least_squares(residuals, start, bounds=bounds, x_scale="jac")
 
-    def deviations(information: Array) -> Array:
-        return np.sqrt(np.diagonal(np.linalg.inv(information + 1e-6 * np.eye(len(information)))))
+    def deviations(rows: Array) -> Array:
+        return np.sqrt(np.diagonal(np.linalg.inv(rows.T @ rows + 1e-6 * np.eye(rows.shape[1]))))
 
-    own = deviations((slopes @ slopes.T / level**2)[np.ix_(told, told)])
-    rows = both.jac[:, [*told, 4, 5]]
-    expected = deviations(rows.T @ rows)[:2]
-    alone = deviations(both.jac[:-2, told].T @ both.jac[:-2, told])
+    own, expected = deviations(slopes[told].T / level), deviations(both.jac[:, [*told, 4, 5]])[:2]
     np.testing.assert_allclose(own, expected, rtol=0.05)
-    assert np.all(own > 1.2 * alone)
-    moved = (np.log(fit.found.parameters) - both.x[:4])[told]
-    assert np.all(np.abs(moved) < 0.05 * expected + 1e-3)
+    assert np.all(own > 1.2 * deviations(both.jac[:-2, told]))
+    assert np.all(np.abs(best - both.x[:4])[told] < 0.05 * expected + 1e-3)
 
 
-def test_an_uncertain_gripper_is_held_against_what_parameters_leave(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_uncertain_gripper_is_held_against_what_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of ten readings and four parameters, six: the noise is the misfit times sqrt(10 / 6)."""
     uncertainty = {"left": {"stiffness_Nm_per_rad": 1e-8}}
     experiment, condense = replace(POSED, uncertainty=uncertainty), Experiment.in_noise
@@ -127,8 +117,7 @@ def test_an_uncertain_gripper_is_held_against_what_parameters_leave(
 def test_noise_is_found_and_said() -> None:
     noise = Noise("gaussian", 0.02, "peak", ar1=AR1(0.5, 5.0), drift=Drift(2.0))
     noise = replace(noise, outliers=Outliers(0.01, 30.0))
-    experiment = replace(POSED, coloured=True, offset=True, drift=True)
-    fit = fitted(experiment, noisy(noise))
+    fit = fitted(COLOURED, noisy(noise))
     assert fit.noise_model is not None
     assert fit.noise_model.ar1 + fit.noise_model.flicker == pytest.approx(0.5, abs=0.25)
     away = np.abs(noisy(noise) - noisy(replace(noise, outliers=None))) / (0.02 * CLEAN.max())
@@ -139,19 +128,17 @@ def test_noise_is_found_and_said() -> None:
     assert "correlated over some" in model
     assert f"{np.count_nonzero(fit.outliers)} samples of 801" in outliers
     assert fit.problem.residuals.freedom < 1000
-    other = experiment.for_model(fit.problem, POSED.searched)
+    other = COLOURED.for_model(fit.problem, POSED.searched)
     np.testing.assert_array_equal(other.residuals(TRUTH)[0], fit.problem.residuals(TRUTH)[0])
 
 
 def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
     """Three spikes are struck, each of fifteen times the noise of its sample."""
-    experiment = replace(POSED, coloured=True, offset=True, drift=True)
-    trace = noisy(Noise("gaussian", 0.05, "signal"))
-    spikes = [200, 500, 700]
+    trace, spikes = noisy(Noise("gaussian", 0.05, "signal")), [200, 500, 700]
     spiked = trace.copy()
     spiked[spikes] += 15 * 0.05 * CLEAN[spikes]
-    assert not fitted(experiment, trace).outliers.any()
-    fit = fitted(experiment, spiked)
+    assert not fitted(COLOURED, trace).outliers.any()
+    fit = fitted(COLOURED, spiked)
     np.testing.assert_array_equal(np.flatnonzero(fit.outliers), spikes)
     assert fit.noise_model is not None
     assert fit.noise_model.proportional > 0.9
@@ -160,10 +147,9 @@ def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
 
 
 def test_too_many_samples_for_a_colour_are_refused() -> None:
-    experiment: Experiment = replace(POSED, coloured=True, offset=True, drift=True)
     times = np.linspace(0, 400, MOST_SAMPLES + 1)
     with pytest.raises(BiogripError, match="allowed are at most 50000 with a coloured"):
-        fitted(experiment, times, times)
+        fitted(COLOURED, times, times)
 
 
 def functions(uncertainty: Mapping[str, Mapping[str, float]]) -> Array:
@@ -180,9 +166,8 @@ def test_an_uncertain_length_is_that_of_all_elements() -> None:
     """A length enters as its square, by which every element of the sample is multiplied."""
     share, length = 0.05, POSED.gripper.arm_length_m
     odd, even = functions({"gripper": {"arm_length_m": share * length}})
-    above, nominal, below = (
-        simulated(POSED.gripper, TRUTH + 2 * np.log1p(error)) for error in (share, 0, -share)
-    )
+    errors = np.log1p([share, 0, -share])
+    above, nominal, below = (simulated(POSED.gripper, TRUTH + 2 * error) for error in errors)
     np.testing.assert_allclose(odd, 0.5 * (above - below), rtol=1e-9, atol=1e-12)
     bent = 0.5 * (above + below) - nominal
     assert even @ bent / np.linalg.norm(even) / np.linalg.norm(bent) == pytest.approx(1.0)

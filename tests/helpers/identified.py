@@ -36,8 +36,7 @@ def identified(
     given = ("--config", folder / "config.yaml", "--output", folder / "found.json")
     status, _, complained = identify(trace, *given, *options)
     assert status == 0, complained
-    found: dict[str, Any] = json.loads((folder / "found.json").read_text())
-    return found
+    return json.loads((folder / "found.json").read_text())
 
 
 def told(time_s: Array, values: Array, models: Sequence[str] = (), **given: Any) -> TraceResult:
@@ -49,7 +48,6 @@ def told(time_s: Array, values: Array, models: Sequence[str] = (), **given: Any)
 
 
 def by_quantity(found: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Findings by their labels."""
     return {item["quantity"]: item for item in found["quantities"]}
 
 

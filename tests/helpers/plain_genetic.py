@@ -1,13 +1,12 @@
 """The genetic algorithm gene by gene, one population at a time."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.genome import Genome
-from biogrip.fit.problem import Fit, History
+from biogrip.fit.problem import Fit, History, TraceProblem
+from biogrip.physics.misfit import make_misfit
 
 
 def decoded(genome: Genome, chromosomes: IntArray) -> Array:
@@ -20,12 +19,9 @@ def _number(exponent: int, *digits: int) -> float:
     return float(f"{''.join(map(str, digits))}e{exponent - len(digits)}")
 
 
-def identified(
-    misfit: Callable[[Array], Array],
-    genome: Genome,
-    settings: GeneticSettings,
-    rng: np.random.Generator,
-) -> Fit:
+def identified(posed: TraceProblem, settings: GeneticSettings, rng: np.random.Generator) -> Fit:
+    misfit, genome = make_misfit(posed.residuals), posed.genome
+
     def ranked(everyone: IntArray) -> tuple[IntArray, Array]:
         ranking = misfit(decoded(genome, everyone)).astype(np.float32)
         order = np.lexsort((*everyone.T[::-1], ranking))[: settings.survivors]
@@ -55,9 +51,8 @@ def identified(
         rows.append((survivors[0], ranking[0], ranking[len(ranking) // 2]))
     fittest, lowest, median = map(np.array, zip(*rows, strict=True))
     history = History(lowest, median, decoded(genome, fittest), np.array(counts))
-    return Fit(
-        history.best_parameters[-1], float(lowest[-1]), generation, counts[-1], reason, history
-    )
+    ended = float(lowest[-1]), generation, counts[-1], reason
+    return Fit(history.best_parameters[-1], *ended, history)
 
 
 def _children(parents: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:
@@ -71,18 +66,11 @@ def _children(parents: IntArray, settings: GeneticSettings, rng: np.random.Gener
         even = count // 2 * 2
         rounds = [rng.permutation(count)[:even] for _ in range(-(-2 * pairs // even))]
         drawn = np.concatenate(rounds)[: 2 * pairs].reshape(pairs, 2)
-    first, last = (
-        min(cut if cut > 0 else genes + cut, genes - 1)
-        for cut in (settings.first_cut, settings.last_cut)
-    )
+    ends = settings.first_cut, settings.last_cut
+    first, last = (min(cut if cut > 0 else genes + cut, genes - 1) for cut in ends)
     cuts = rng.integers(min(first, last), last, size=pairs, endpoint=True)
-    heads = [
-        np.concatenate((parents[one][:cut], parents[other][cut:]))
-        for one, other, cut in (
-            *zip(drawn[:, 0], drawn[:, 1], cuts, strict=True),
-            *zip(drawn[:, 1], drawn[:, 0], cuts, strict=True),
-        )
-    ]
+    both = zip(np.vstack((drawn, drawn[:, ::-1])), np.tile(cuts, 2), strict=True)
+    heads = [np.append(parents[one][:cut], parents[other][cut:]) for (one, other), cut in both]
     return np.array(heads)[:wanted]
 
 

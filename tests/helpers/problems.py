@@ -5,15 +5,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array
 from biogrip.fit.problem import Fit, TraceProblem, identifier, silent
+from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.models import MODELS
 from biogrip.physics.noise import Noise, add_noise, nuisance_basis
 from biogrip.physics.protocol import Course, sample_times
-from biogrip.physics.residuals import Residuals
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
 from tests.helpers.default import STUDY
@@ -24,11 +25,18 @@ EXPERIMENT = STUDY.cases["liquid_drop_2"].experiment
 GRIPPER, TORQUE = EXPERIMENT.gripper, EXPERIMENT.torque
 
 
+def rotation(
+    model: SampleModel, parameters: ArrayLike, times: Array, *, inertia: bool = True
+) -> Array:
+    """Of the study's gripper under its protocol, with one sample."""
+    network = model.network(np.atleast_2d(parameters))
+    return superpose(step_response(GRIPPER, network, inertia=inertia), TORQUE, times)[0]
+
+
 @functools.cache
 def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
     times = sample_times(400.0, rate_Hz)
-    network = MODEL.network([[SAMPLES[case][name] for name in MODEL.names]])
-    return times, superpose(step_response(GRIPPER, network), TORQUE, times)[0]
+    return times, rotation(MODEL, [SAMPLES[case][name] for name in MODEL.names], times)
 
 
 def posed_for(model: SampleModel, times: Array, trace: Array, **assumed: Any) -> TraceProblem:
@@ -37,21 +45,11 @@ def posed_for(model: SampleModel, times: Array, trace: Array, **assumed: Any) ->
 
 
 def pose_noisy(
-    times: Array,
-    response: Array,
-    count: int,
-    model: SampleModel = MODEL,
-    level: float = 0.1,
-    **assumed: Any,
+    times: Array, trace: Array, n: int, model: SampleModel = MODEL, level: float = 0.1, **own: Any
 ) -> list[TraceProblem]:
-    """Problems that share everything but the noise."""
     noise = Noise("gaussian", level, "peak")
-    traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
-    return replace(EXPERIMENT, ranges=STUDY.ranges, **assumed).of_each(times, traces, model)
-
-
-def of_case(case: str, count: int, level: float = 0.1) -> list[TraceProblem]:
-    return pose_noisy(*clean(case), count, level=level)
+    traces = [add_noise(trace, noise, np.random.default_rng([seed, 7])) for seed in range(n)]
+    return replace(EXPERIMENT, ranges=STUDY.ranges, **own).of_each(times, traces, model)
 
 
 def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> TraceProblem:
@@ -70,14 +68,11 @@ def likelihood_of(posed: TraceProblem, seed: int = 0) -> Likelihood:
     return make_likelihood(posed, np.log(found.parameters), found.misfit, confidence=0.95)
 
 
-def condensed_of(
-    torque: Course, time_s: Array, *, offset: bool = False, drift: bool = False
-) -> Condensed:
+def diagnosis_of(posed: TraceProblem, model: SampleModel, **known: Any) -> Diagnosis:
+    return diagnose(posed, model, run("least_squares", posed), confidence=0.95, **known)
+
+
+def condensed_of(torque: Course, time_s: Array, **nuisance: bool) -> Condensed:
     """Rows that stand for the samples of any trace at these times."""
-    return Condensed(torque, time_s, nuisance_basis(time_s, offset=offset, drift=drift))
-
-
-def condensed_rows(residuals: Residuals, x: Array) -> tuple[Array, Array]:
-    """Rows that stand for the residuals at log-parameters (n_parameters,), and their slopes."""
-    rows = residuals.condensed_responses(x[None])[0]
-    return rows[0] - residuals.trace.rows, rows[1:]
+    along = {"offset": False, "drift": False, **nuisance}
+    return Condensed(torque, time_s, nuisance_basis(time_s, **along))

@@ -12,13 +12,13 @@ References
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from flint import acb, acb_mat, arb, ctx
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import Course, Phase, hold
 from biogrip.physics.sample_model import SampleModel
 
@@ -30,7 +30,6 @@ PROTOCOLS = {
         Phase(200.0, 1.4e-9, -4e-12),
     ),
 }
-MODEL_PARAMETERS = {name: list(model.example) for name, model in MODELS.items()}
 # Logarithms between which parameters of each kind are searched for, about.
 LOG_RANGES = {
     "stiffness": (-9.1, 18.4),
@@ -66,15 +65,14 @@ def _solution(gripper: Gripper, parameters: Sequence[arb], steps: Course, time_s
     # State: phi_2, phi_4, their rates, and the node x between spring k and damper c.
     # Force on each tip: k (b phi_2 - x) + k_p delta + c_p delta', delta = b (phi_2 + phi_4).
     force = [(k + k_p) * b, k_p * b, c_p * b, c_p * b, -k]
-    a = acb_mat(5, 5)
-    a[0, 2] = a[1, 3] = 1
-    for row, arm in ((2, 0), (3, 1)):
-        for column in range(5):
-            a[row, column] = -b * force[column] / inertia[arm]
-        a[row, arm] -= stiffness[arm] / inertia[arm]
-        a[row, 2 + arm] -= damping[arm] / inertia[arm]
+    moments = [[b * each for each in force] for _ in range(2)]
+    for arm, own in enumerate(moments):
+        own[arm] += stiffness[arm]
+        own[2 + arm] += damping[arm]
+    arms = [[-each / of for each in own] for own, of in zip(moments, inertia, strict=True)]
     # k (u_B - x) = c (x' - u_C'), u_B = b phi_2, u_C = -b phi_4.
-    a[4, 0], a[4, 4], a[4, 3] = k / c * b, -k / c, -b
+    node: list[Any] = [k / c * b, 0, 0, -b, -k / c]
+    a = acb_mat([[0, 0, 1, 0, 0], [0, 0, 0, 1, 0], *arms, node])
     rates, vectors = a.eig(right=True)
     seen = acb_mat([[1, 0, 0, 0, 0], force])
     of_modes = seen * vectors
@@ -87,25 +85,22 @@ def _solution(gripper: Gripper, parameters: Sequence[arb], steps: Course, time_s
         for i, t in enumerate(time_s):
             elapsed = arb(float(t)) - arb(float(start))
             if elapsed >= 0:
-                fading = [weights[j, 0] * (rates[j] * elapsed).exp() for j in range(5)]
+                fading = [[weights[j, 0] * (rates[j] * elapsed).exp()] for j in range(5)]
+                now = settled + of_modes * acb_mat(fading)
                 for row in range(2):
-                    terms = (of_modes[row, j] * fading[j] for j in range(5))
-                    found[row][i] += settled[row, 0] + sum(terms, acb(0))
+                    found[row][i] += now[row, 0]
     return np.array([_checked([value.real for value in own]) for own in found])
 
 
 def _checked(values: Sequence[arb]) -> Array:
     """As doubles, of what is known to 50 digits of the largest."""
-    middle, radius = (
-        np.array([float(of) for of in own])
-        for own in zip(*((value.mid(), value.rad()) for value in values), strict=True)
-    )
+    both = np.array([(float(value.mid()), float(value.rad())) for value in values])
+    middle, radius = both.T
     assert radius.max() < 1e-50 * np.abs(middle).max()
     return middle
 
 
 def log_range(model: SampleModel) -> tuple[Array, Array]:
-    """Logarithms of the ends of a model's search range."""
     low, high = zip(*(LOG_RANGES[parameter.kind] for parameter in model.parameters), strict=True)
     return np.array(low), np.array(high)
 

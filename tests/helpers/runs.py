@@ -23,30 +23,23 @@ _JOBS = re.compile(r"^(\w+) +(\d+) *$", re.MULTILINE)
 
 # Every kind of file, and of each as little as there can be: a simulated sample, and a trace that
 # a user recorded, which is `mine.csv` in the study's folder.
-TINY: dict[str, Any] = {
-    "seeds": 2,
-    "batch_size": 2,
-    "measurement": {"rate_Hz": 0.5},
-    "methods": ["genetic", "least_squares"],
-    "least_squares": {"candidates": 50, "starts": 3},
-    "genetic_algorithm": {
-        "population": 20,
-        "survivors": 10,
-        "min_generations": 2,
-        "max_generations": 4,
-    },
-    "identifiability": {"coverage_seeds": 2},
-    "model_selection": {"models": ["damper", "maxwell"]},
-    "cases": {
-        "endothelial_cell": None,
-        "liquid_drop_1": None,
-        "mine": {
-            "title": "A trace of mine",
-            "sample": {"model": "generalized_maxwell"},
-            "measurement": {"file": "mine.csv", "time": "time_s", "rotation": "rotation_rad"},
-        },
-    },
-}
+TINY: dict[str, Any] = yaml.safe_load("""
+seeds: 2
+batch_size: 2
+measurement: {rate_Hz: 0.5}
+methods: [genetic, least_squares]
+least_squares: {candidates: 50, starts: 3}
+genetic_algorithm: {population: 20, survivors: 10, min_generations: 2, max_generations: 4}
+identifiability: {coverage_seeds: 2}
+model_selection: {models: [damper, maxwell]}
+cases:
+  endothelial_cell: null
+  liquid_drop_1: null
+  mine:
+    title: A trace of mine
+    sample: {model: generalized_maxwell}
+    measurement: {file: mine.csv, time: time_s, rotation: rotation_rad}
+""")
 SMALL = {key: value for key, value in TINY.items() if key != "cases"}
 """What makes runs of any cases small."""
 
@@ -93,7 +86,6 @@ _PYTHONPATH = os.environ.get("PYTHONPATH")
 
 
 def called(folder: Path, *arguments: str | Path) -> Run:
-    """Call Snakemake in a folder."""
     if os.environ.get("PYTHONPATH") != _PYTHONPATH:
         # With other code than what is loaded.
         return ran(folder, sys.executable, "-m", "snakemake", *arguments)
@@ -123,7 +115,6 @@ def _snakemake(
 
 
 def clone(folder: Path) -> Path:
-    """Make another clone in a folder, and return its Snakefile."""
     for name in ("src", "config", "workflow"):
         shutil.copytree(ROOT / name, folder / name)
     return Path(shutil.copy(ROOT / "Snakefile", folder))
@@ -135,19 +126,7 @@ def snakemake(
     config: dict[str, Any] | None = None,
     snakefile: Path = ROOT / "Snakefile",
 ) -> Run:
-    """Run the workflow in a folder, over a config that is laid on the default study.
-
-    Parameters
-    ----------
-    folder
-        Where results are to be.
-    arguments
-        Further ones of Snakemake's: targets, or `-n`.
-    config
-        The config, which is written to `overlay.yaml` in the folder; none by default.
-    snakefile
-        Of this clone, or of another.
-    """
+    """Run the workflow in a folder, over a config laid on the default study, as `overlay.yaml`."""
     given: list[str | Path] = ["-s", snakefile, "--directory", folder]
     if config is not None:
         (folder / "overlay.yaml").write_text(yaml.safe_dump(config), encoding="utf-8")
@@ -158,10 +137,7 @@ def snakemake(
 
 
 def dry_run(
-    folder: Path,
-    *arguments: str,
-    config: dict[str, Any],
-    snakefile: Path = ROOT / "Snakefile",
+    folder: Path, *arguments: str, config: dict[str, Any], snakefile: Path = ROOT / "Snakefile"
 ) -> Run:
     """Ask Snakemake what it would run."""
     # Other workers ask in the same folder.
@@ -175,12 +151,10 @@ def dry_run(
 
 
 def planned(folder: Path, *targets: str, config: dict[str, Any]) -> dict[str, int]:
-    """Return the number of jobs of each rule that Snakemake would run."""
     return dry_run(folder, "--quiet", "rules", "--", *targets, config=config).jobs
 
 
 def results_of(folder: Path) -> dict[str, bytes]:
-    """Return every result by name, but for logs and benchmarks."""
     results = folder / "results"
     files = {file.relative_to(results): file for file in sorted(results.rglob("*.*"))}
     return {

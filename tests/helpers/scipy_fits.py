@@ -5,7 +5,6 @@ A quantity is held by one stiff residual more, which changes chi^2 by less than 
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -15,29 +14,16 @@ from biogrip.fit.problem import TraceProblem
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
 
-ROUGH, TIGHT = 1e-6, 1e-11
+_Rows = Callable[[Array], tuple[Array, Array]]
 STIFF = 1e5
 # What the project says of branches that do not relax within the experiment.
 HINGE = 10.0
 
 
-@dataclass(frozen=True)
-class ScipyFit:
-    """An optimum: where it is, (n_parameters,), the sum of squares there, and the RMS misfit."""
-
-    log_parameters: Array
-    square_sum: float
-    misfit: float
-
-
 def scipy_fit(
-    problem: TraceProblem,
-    start: Array,
-    more: Callable[[Array], tuple[Array, Array]] | None = None,
-    noise_sd: float | None = None,
-    tolerance: float = 1e-8,
-) -> ScipyFit:
-    """Fit all samples from log-parameters with SciPy's bounded trust-region least squares.
+    problem: TraceProblem, start: Array, more: _Rows | None = None, noise_sd: float | None = None
+) -> float:
+    """Return the RMS misfit of a fit of all samples from log-parameters.
 
     There may be more residuals, in units of the noise, with their slopes.
     """
@@ -58,21 +44,13 @@ def scipy_fit(
         lambda x: rows(x.tobytes())[1],
         (problem.low, problem.high),
         max_nfev=300,
-        **dict.fromkeys(("ftol", "xtol", "gtol"), tolerance),
+        **dict.fromkeys(("ftol", "xtol", "gtol"), 1e-11),
     )
-    square_sum = 2 * float(found.cost)
-    misfit = noise_sd * float(np.sqrt(square_sum / problem.residuals.samples))
-    return ScipyFit(found.x, square_sum, misfit)
+    return noise_sd * float(np.sqrt(2 * found.cost / problem.residuals.samples))
 
 
-def rise_with_held(
-    likelihood: Likelihood,
-    quantity: Quantity,
-    target: float,
-    start: Array,
-    tolerance: float = TIGHT,
-) -> tuple[float, Array]:
-    """Rise of chi^2 of a fit with a quantity's logarithm held at a target, and where it ends."""
+def rise_of_held(likelihood: Likelihood, quantity: Quantity, target: float, start: Array) -> float:
+    """Rise of chi^2 of a fit with a quantity's logarithm held at a target."""
     residuals = likelihood.problem.residuals
 
     def more(x: Array) -> tuple[Array, Array]:
@@ -84,6 +62,6 @@ def rise_with_held(
         values, turns = map(np.array, zip(*held, strict=True))
         return values, turns
 
-    found = scipy_fit(likelihood.problem, start, more, likelihood.noise_sd, tolerance)
-    shares = likelihood.misfit / likelihood.noise_sd
-    return found.square_sum - residuals.samples * shares**2, found.log_parameters
+    misfit = scipy_fit(likelihood.problem, start, more, likelihood.noise_sd)
+    squares = misfit**2 - likelihood.misfit**2
+    return float(residuals.samples * squares / likelihood.noise_sd**2)

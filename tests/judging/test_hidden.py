@@ -10,13 +10,13 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from, identify_from
-from biogrip.fit.noise_model_fit import absorbed
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.levels import FALSE_ALARM
 from biogrip.judging.whiteness import compare_halves, find_step, wandering
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import hold
+from tests.judging.test_whiteness import relaxation
 
 TIMES: Array = np.arange(1.0, 101.0)
 SAMPLE, NOISE = {"k": 80.0, "k_p": 100.0, "c": 1600.0}, 3.6
@@ -24,18 +24,16 @@ EXPERIMENT = set_up(INSTRUMENTS["modulus"], (hold(100.0, 1.0),), Sample("zener_m
 CLEAN = simulate(EXPERIMENT, SAMPLE, TIMES)
 
 
-def diagnosed(
-    readings: Array,
-    experiment: Experiment = EXPERIMENT,
-    sample: Mapping[str, float] = SAMPLE,
-) -> Diagnosis:
-    problem = experiment.of(TIMES, readings)
+NOISY = CLEAN + NOISE * np.random.default_rng(0).standard_normal(100)
+
+
+def diagnosed(experiment: Experiment, sample: Mapping[str, float]) -> Diagnosis:
+    problem = experiment.of(TIMES, NOISY)
     found = identify_from(problem, experiment.logs(sample))
     return diagnose(problem, experiment.searched, found, confidence=0.95)
 
 
-NOISY = CLEAN + NOISE * np.random.default_rng(0).standard_normal(100)
-JUDGED = diagnosed(NOISY)
+JUDGED = diagnosed(EXPERIMENT, SAMPLE)
 
 
 def planted(words: str, response: Array) -> Array:
@@ -57,18 +55,15 @@ def test_an_error_that_is_planted_moves_what_is_said(kind: str) -> None:
     label, ratio = hidden.beyond
     limits = next(each for each in JUDGED.findings if each.quantity.label == label)
     assert ratio > 1
-    assert limits.low
-    assert limits.high
     there = limits.value * np.exp(hidden.moves[label])
-    assert not limits.low < there < limits.high
+    assert not (limits.low or 0.0) < there < (limits.high or np.inf)
 
 
 @pytest.mark.parametrize("kind", ["A jump", "A gain"])
 def test_tests_tell_half_of_errors_of_that_size(kind: str) -> None:
     """In noise, by fits to first order; tests that are beside the best one tell a few more."""
     (hidden,) = (each for each in JUDGED.hidden if each.words().startswith(kind))
-    decay = np.exp(-TIMES / 20)
-    basis = absorbed(np.stack([np.ones(100), decay, decay * TIMES]))
+    _, basis = relaxation(TIMES)
     wrong = planted(hidden.words(), CLEAN) - CLEAN
     told = []
     for noise in NOISE * np.random.default_rng(1).standard_normal((200, 100)):
@@ -103,23 +98,10 @@ def test_a_second_branch_moves_what_is_said() -> None:
 
 def test_a_sample_in_kelvins_form_has_a_second_branch_as_in_maxwells() -> None:
     """Both are one solid, with other names of its parameters, and hide the same."""
-    kelvin = replace(EXPERIMENT, sample=Sample("zener_kelvin"))
     k, k_p, c = SAMPLE.values()
     ratio = (k + k_p) / k
     values = {"k_s": k + k_p, "k_v": k_p * ratio, "c_v": c * ratio**2}
-    other = diagnosed(NOISY, kelvin, values)
-    words, same = (
-        [each.words().split(", which")[0] for each in own.hidden if "second" in each.words()]
-        for own in (JUDGED, other)
-    )
+    other = diagnosed(replace(EXPERIMENT, sample=Sample("zener_kelvin")), values)
+    said = ([each.words().split(", which")[0] for each in own.hidden] for own in (JUDGED, other))
+    words, same = ([each for each in own if "second" in each] for own in said)
     assert words == same
-
-
-def test_less_noise_hides_less() -> None:
-    quiet = diagnosed(CLEAN + (NOISY - CLEAN) / 10)
-    (loud_jump,), (quiet_jump,) = (
-        [each for each in own.hidden if each.words().startswith("A jump")]
-        for own in (JUDGED, quiet)
-    )
-    ratio = abs(loud_jump.moves["k_p"] / quiet_jump.moves["k_p"])
-    assert ratio == pytest.approx(10, rel=0.1)

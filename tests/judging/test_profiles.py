@@ -1,36 +1,43 @@
-"""Quantities held exactly in many fits at once, against SciPy's fits of all samples."""
+"""Quantities held exactly in many fits at once, against SciPy's fits of all samples; limits."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import norm, t
 
 from biogrip.arrays import Array, IntArray
+from biogrip.fit.least_squares import FINE
 from biogrip.fit.levenberg_marquardt import Normal
+from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
-from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.onset import _at, profile_over_onset
-from biogrip.judging.profiles import Points, _limits, compute_profiles
+from biogrip.judging.profiles import Points, Profile, _limits, compute_profiles, find_gaps
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
+from biogrip.judging.verdicts import DETERMINED, Finding
 from biogrip.library import set_up, simulate
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import hold
-from biogrip.physics.response import step_response, superpose
+from biogrip.physics.sample_model import with_fixed
+from biogrip.stages.intervals import judge_quantities
 from tests.helpers.problems import (
     GRIPPER,
     MODEL,
-    TORQUE,
     clean,
+    diagnosis_of,
     likelihood_of,
     pose_noisy,
     posed_for,
+    problem,
+    rotation,
     run,
 )
-from tests.helpers.scipy_fits import rise_with_held
+from tests.helpers.scipy_fits import rise_of_held
 
-PARAMETERS = parameters_and_sum(MODEL)
+QUANTITIES = parameters_and_sum(MODEL)
+SOFT = [20.0, 5.0, 80.0, 1e-3]
 
 
 def likelihoods(case: str, count: int, **assumed: Any) -> list[Likelihood]:
@@ -38,19 +45,16 @@ def likelihoods(case: str, count: int, **assumed: Any) -> list[Likelihood]:
 
 
 def labelled(*labels: str) -> list[Quantity]:
-    return [quantity for quantity in PARAMETERS if quantity.label in labels]
+    return [quantity for quantity in QUANTITIES if quantity.label in labels]
 
 
-BURGERS = MODELS["burgers"]
+BURGERS, PAIRS = MODELS["burgers"], ([0, 2], [0, 3])
 TWO, THREE = (Sample("generalized_maxwell", branches).model for branches in (2, 3))
 FORMS = {
     "one branch": (MODEL, find_combinations(MODEL, [0, 1, 2])),
     "two branches": (TWO, parameters_and_sum(TWO)[-1:]),
     "three branches": (THREE, find_combinations(THREE, [0, 1, 4])),
-    "burgers": (
-        BURGERS,
-        [q for pair in ([0, 2], [0, 3]) for q in find_combinations(BURGERS, pair)],
-    ),
+    "burgers": (BURGERS, [q for pair in PAIRS for q in find_combinations(BURGERS, pair)]),
 }
 
 
@@ -73,10 +77,9 @@ def test_points_are_moved_to_where_quantities_are_held(form: str) -> None:
     assert np.all((x >= low) & (x <= high))
     values = [quantities[q].log(point) for q, point in zip(which, x, strict=True)]
     assert np.max(np.abs(values - targets)) < 1e-6
+    beyond = QuantityConstraint(quantities, which, targets + 20, *bounds, 400.0, np.ones(3000))
     with pytest.raises(ValueError, match="outside its range"):
-        QuantityConstraint(
-            quantities, which, targets + 20, *bounds, 400.0, np.ones(len(x))
-        ).started(x)
+        beyond.started(x)
 
 
 def test_along_a_constraint_the_eliminated_parameter_follows() -> None:
@@ -122,7 +125,7 @@ def test_profiles_are_as_low_as_fits_with_the_parameter_known(case: str) -> None
         shown = np.sqrt(np.clip(found.increases, 0.0, 16.0))
         assert np.max(np.abs(np.diff(shown))) <= 0.3
         for value, increase in zip(found.log_values[::12], found.increases[::12], strict=True):
-            alone = rise_with_held(likelihood, quantity, value, likelihood.best)[0]
+            alone = rise_of_held(likelihood, quantity, value, likelihood.best)
             assert increase < alone + 1e-3 * (1 + alone)
 
 
@@ -131,40 +134,19 @@ def test_the_search_range_determines_no_combination() -> None:
 
     Softer than the softest spring of the search range they could be only if both were at its end.
     """
-    sample = np.array([[20.0, 5.0, 80.0, 1e-3]])
     times = np.linspace(0.0, 400.0, 801)
-    clean_rad = superpose(step_response(GRIPPER, MODEL.network(sample)), TORQUE, times)[0]
     noise = 4e-6 * np.random.default_rng(1).standard_normal(len(times))
-    problem = posed_for(MODEL, times, clean_rad + noise)
-    found, k_and_k_p = run("least_squares", problem), find_combinations(MODEL, [0, 1])
-    told = diagnose(problem, MODEL, found, confidence=0.95, noise_sd=1e-4)
-    series = next(q for q in k_and_k_p if q.sense < 0)
+    problem = posed_for(MODEL, times, rotation(MODEL, SOFT, times) + noise)
+    told = diagnosis_of(problem, MODEL, noise_sd=1e-4)
+    series = next(q for q in find_combinations(MODEL, [0, 1]) if q.sense < 0)
     # To first order it is known well enough to be looked at.
     assert told.likelihood.deviation(series) < 0.5
     ((one,),) = compute_profiles([told.likelihood], [series])
-    assert one.low is None
-    assert one.high is not None
-    assert told.trades == []
+    assert (one.low is None, one.high is None, told.trades) == (True, False, [])
     # With one spring as soft as it may be, and the other any, it is lower than any limit.
     soft, best = problem.low[0], told.likelihood.best
     assert series.log(np.array([soft, *best[1:]])) < soft + 1e-3
-    assert rise_with_held(told.likelihood, PARAMETERS[0], soft, best)[0] < told.likelihood.threshold
-
-
-@pytest.mark.parametrize("taken_out", [{}, {"offset": True}, {"offset": True, "drift": True}])
-def test_noise_and_threshold_are_those_of_a_regression(taken_out: dict[str, bool]) -> None:
-    """Of n readings and p parameters, offset and drift included, n - p are left; Student's t.
-
-    Of known noise it is the normal distribution.
-    """
-    times = np.arange(0.0, 400.0, 40.0)
-    (problem,) = pose_noisy(times, 1e-6 * times, 1, MODELS["maxwell"], **taken_out)
-    left = len(times) - 2 - len(taken_out)
-    found = make_likelihood(problem, np.zeros(2), 1e-6, confidence=0.95)
-    assert found.noise_sd == pytest.approx(1e-6 * np.sqrt(len(times) / left))
-    assert found.threshold == pytest.approx(t.ppf(0.975, left) ** 2)
-    known = make_likelihood(problem, np.zeros(2), 1e-6, confidence=0.95, noise_sd=1e-6)
-    assert known.threshold == pytest.approx(norm.ppf(0.975) ** 2)
+    assert rise_of_held(told.likelihood, QUANTITIES[0], soft, best) < told.likelihood.threshold
 
 
 def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
@@ -173,9 +155,7 @@ def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
     times = np.arange(61.0)
     exact = simulate(experiment, {"k_p": 6.0, "c_p": 30.0}, times)
     trace = exact + 9e-6 * np.random.default_rng(1).standard_normal(len(times))
-    problem = experiment.of(times, trace)
-    found = run("least_squares", problem)
-    alone = diagnose(problem, experiment.model, found, confidence=0.95)
+    alone = diagnosis_of(experiment.of(times, trace), experiment.model)
     merged, _ = profile_over_onset(alone, times)
     # What a later onset costs is taken off the threshold, and off what a limit takes.
     later, best = _at(alone.likelihood, 0.2), alone.likelihood
@@ -215,3 +195,91 @@ def test_a_limit_is_in_the_deepest_basin_that_any_profile_knows() -> None:
     points.from_optimum()
     points.from_neighbours(points.profile == 0)
     assert _limits(points)[:, 0] == pytest.approx([np.nan, 3.0], abs=1e-6, nan_ok=True)
+
+
+def test_an_optimum_that_was_missed_is_judged_again() -> None:
+    maxwell = MODELS["maxwell"]
+    times, response = clean("liquid_drop_2")
+    noise = 0.1 * response.max() * np.random.default_rng(2).standard_normal(len(times))
+    experiment = posed_for(maxwell, times, response + noise)
+    found = run("least_squares", experiment)
+    elsewhere = found.parameters * np.array([1.1, 1.02])
+    misfit = float(experiment.residuals.misfit(elsewhere[None])[0])
+    missed = replace(found, parameters=elsewhere, misfit=misfit)
+    right, again = (diagnose(experiment, maxwell, f, confidence=0.95) for f in (found, missed))
+    assert again.likelihood.misfit == pytest.approx(right.likelihood.misfit, rel=1e-9)
+    # Coverage is tested with limits of the same fit.
+    fit = TraceFit(experiment, missed, None, np.zeros(len(times), bool))
+    (alike,) = judge_quantities([fit], parameters_and_sum(maxwell), 0.95)
+    assert alike.likelihood.misfit == again.likelihood.misfit
+    for one, other in zip(alike.findings, again.findings, strict=True):
+        assert (one.low, one.high) == (other.low, other.high)
+    for one, other in zip(right.findings, again.findings, strict=True):
+        assert one.verdict == DETERMINED
+        assert other.profile.low == pytest.approx(one.profile.low, abs=1e-6)
+        assert other.profile.high == pytest.approx(one.profile.high, abs=1e-6)
+
+
+@pytest.mark.parametrize("label", ["k", "c", "c_p", "c + c_p"])
+def test_a_held_fit_is_scipys(label: str) -> None:
+    likelihood = likelihood_of(problem("endothelial_cell", 1, rate_Hz=10.0), 1)
+    (quantity,) = labelled(label)
+    fits, one = ConstrainedFits([likelihood], [quantity]), np.zeros(1, dtype=np.int64)
+    for away in (-0.3, 0.1):
+        target = quantity.log(likelihood.best) + away
+        (increase,), (x,) = fits.at(one, np.array([target]), likelihood.best[None], FINE)
+        assert quantity.log(x) == pytest.approx(target, abs=1e-11)
+        scipys = rise_of_held(likelihood, quantity, target, likelihood.best)
+        assert increase == pytest.approx(scipys, abs=0.02)
+
+
+def parabolas(values: Array) -> Array:
+    """Two basins about -2 and 2, whose square roots are straight."""
+    return np.minimum((values + 2) ** 2, (values - 2) ** 2)
+
+
+def test_a_set_in_two_parts_has_a_gap_that_its_verdict_names() -> None:
+    values = np.linspace(-5, 5, 101)
+    (gap,) = find_gaps(values, parabolas(values), 1.0)
+    assert gap == pytest.approx((-1.0, 1.0))
+    assert find_gaps(values, parabolas(values), 4.5) == ()
+    # What is above the threshold by no more than fits are good to, a hundredth of it, is none.
+    assert find_gaps(values, np.minimum(parabolas(values), 1.005), 1.0) == ()
+    assert len(find_gaps(values, np.minimum(parabolas(values), 1.02), 1.0)) == 1
+    whole = Profile(values, parabolas(values), 2.0, -3.0, 3.0, np.zeros(4))
+    parts = replace(whole, gaps=(gap,))
+    words = [Finding(QUANTITIES[0], profile, 0.1).words() for profile in (whole, parts)]
+    said = "determined only to 2.6 decades: 7.4 N/m (0.05 to 20)"
+    assert words == [said, f"{said}, except 0.368 to 2.72 N/m"]
+
+
+@pytest.mark.parametrize(("k_p", "stated"), [(0.0, False), (5.0, True)])
+def test_a_sum_whose_condition_the_best_fit_breaks_is_not_stated(k_p: float, stated: bool) -> None:
+    """A branch of 4 s beside a spring that is declared to be none: the branch takes its part."""
+    times, model = clean("liquid_drop_1")[0], with_fixed(MODEL, {"k_p": k_p})
+    noise = 3e-6 * np.random.default_rng(0).standard_normal(len(times))
+    told = diagnosis_of(posed_for(model, times, rotation(MODEL, SOFT, times) + noise), model)
+    total = next(each for each in told.findings if each.quantity.label == "c + c_p")
+    assert (total.verdict == DETERMINED) == stated
+    assert ("a branch of the best fit relaxes in" in total.words()) != stated
+    if total.low and total.high:
+        assert total.low < 80.001 < total.high
+        assert total.high > 1.001 * total.low
+
+
+def test_no_limit_is_said_only_of_what_has_none() -> None:
+    """A profile that ends between 95 and 99.9 % has no limit, yet not every value fits."""
+    likelihood = likelihood_of(problem("liquid_drop_1", 0, rate_Hz=10.0))
+    k = QUANTITIES[:1]
+    ((plain,),) = compute_profiles([likelihood], k, smooth=False)
+    rise = max(plain.increases[[0, -1]])
+    said = []
+    for wanted in (2.0, 7.0):
+        noise_sd = likelihood.noise_sd * np.sqrt(rise / wanted)
+        ((found,),) = compute_profiles([replace(likelihood, noise_sd=noise_sd)], k, smooth=False)
+        assert (found.low, found.high) == (None, None)
+        assert max(found.increases[[0, -1]]) == pytest.approx(wanted, rel=0.05)
+        said.append(Finding(QUANTITIES[0], found, 0.1).words())
+    assert said[0] == "not determined: the trace sets no limit within the search range"
+    assert said[1].startswith("not determined: towards an end of the search range the fit is worse")
+    assert said[1].endswith("and a limit takes 10.8)")

@@ -4,20 +4,29 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 from scipy.stats import beta, kstest
+from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from biogrip.arrays import Array
 from biogrip.fit.noise_model_fit import absorbed, outliers_of
+from biogrip.judging.doubts import DOUBTFUL
+from biogrip.judging.levels import FALSE_ALARM
 from biogrip.judging.whiteness import (
     _restricted,
     as_correlated,
     averaged,
     by_leverage,
+    compare_halves,
     correlated,
     far_out,
+    find_line,
+    find_step,
+    steps_of,
     uneven,
     wandering,
 )
+from tests.fit.test_noise_model_fit import restricted
+from tests.helpers.identified import told
 
 LEVEL = 0.01
 TRACES = 4000
@@ -33,26 +42,15 @@ def directions(times: Array) -> Array:
 @pytest.mark.nightly
 @pytest.mark.parametrize("readings", [10, 20, 400])
 @pytest.mark.parametrize("decades", [0, 4])
-def test_of_white_noise_each_test_fails_as_many_as_its_level_says(
-    readings: int, decades: int
-) -> None:
+def test_of_white_noise_each_test_fails_as_often_as_it_says(readings: int, decades: int) -> None:
     """Within four standard deviations. Two of them have bounds of the chance, and fail fewer."""
     even = np.arange(1, readings + 1) / readings
     basis = absorbed(directions(np.geomspace(10.0**-decades, 1.0, readings) if decades else even))
     noise = np.random.default_rng(readings + decades).standard_normal((TRACES, readings))
     left = noise - noise @ basis.T @ basis
-    chances = np.array(
-        [
-            (
-                correlated(residual, basis)[1],
-                wandering(residual, basis),
-                uneven(residual, basis),
-                far_out(residual, outliers_of(by_leverage(residual, basis)), basis),
-            )
-            for residual in left
-        ]
-    )
-    shares = np.mean(chances < LEVEL, axis=0)
+    chances = [[correlated(it, basis)[1], wandering(it, basis), uneven(it, basis)] for it in left]
+    struck = [far_out(it, outliers_of(by_leverage(it, basis)), basis) for it in left]
+    shares = np.mean(np.column_stack((chances, struck)) < LEVEL, axis=0)
     margin = 4 * np.sqrt(LEVEL / TRACES)
     assert np.all(shares < LEVEL + margin)
     exact = [0] if readings < 20 else [0, 1]
@@ -155,14 +153,8 @@ def test_the_restricted_likelihood_is_that_of_dense_matrices() -> None:
     left, taken = rng.standard_normal(30), np.linalg.qr(rng.standard_normal((30, 5)))[0]
     apart = np.abs(np.subtract.outer(np.arange(30), np.arange(30)))
     covariance = 0.8 * np.exp(-apart / 6) + 0.2 * np.eye(30)
-    inverse = np.linalg.inv(covariance)
-    information = taken.T @ inverse @ taken
-    rest = inverse - inverse @ taken @ np.linalg.solve(information, taken.T @ inverse)
-    size = left @ rest @ left / 25
-    determinants = np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(information)[1]
-    assert _restricted(covariance, left, taken) == pytest.approx(
-        (25 * np.log(size) + determinants, size)
-    )
+    expected = restricted(covariance, taken.T, left)
+    assert _restricted(covariance, left, taken) == pytest.approx(expected)
 
 
 def test_independent_residuals_are_counted() -> None:
@@ -184,9 +176,7 @@ def test_independent_residuals_are_counted() -> None:
 @pytest.mark.nightly
 @pytest.mark.parametrize(("decades", "length"), [(0, 0.04), (3, 0.1)])
 @pytest.mark.parametrize("smooth", [True, False])
-def test_limits_that_allow_for_a_misfit_hold_the_truth(
-    decades: int, length: float, smooth: bool
-) -> None:
+def test_limits_with_a_misfit_hold_the_truth(decades: int, length: float, smooth: bool) -> None:
     """A linear fit of a relaxation whose model lacks a random function of the reading's number.
 
     Only what is certainly no noise counts. Of such limits 95 % are to hold, and at least 87 % do
@@ -212,3 +202,133 @@ def test_limits_that_allow_for_a_misfit_hold_the_truth(
         held.append(away < student.ppf(0.975, freedom))
     assert len(held) > 30
     assert np.mean(held) > (0.93 if smooth else 0.85)
+
+
+NOISE, QUIET = 3.6, 1.2
+
+
+def relaxation(times: Array) -> tuple[Array, Array]:
+    """A Zener solid's modulus and what its fit absorbs; k_p 100, k 80 Pa, tau 20 s of 100 s."""
+    decay = np.exp(-times / 20)
+    slopes = np.stack([np.ones_like(times), decay, decay * times])
+    return 100 + 80 * decay, absorbed(slopes)
+
+
+@pytest.mark.parametrize("readings", [8, 20, 100, 400])
+@pytest.mark.parametrize("decades", [0, 4])
+def test_of_white_noise_both_tests_fail_as_often_as_they_say(readings: int, decades: int) -> None:
+    """Within four standard deviations of 1 % of 2,000 traces, 0.9 %, and an error of a fifth."""
+    even = 100 * np.arange(1, readings + 1) / readings
+    times = np.geomspace(100 * 10.0**-decades, 100, readings) if decades else even
+    _, basis = relaxation(times)
+    steps = steps_of(basis, np.asarray)
+    noise = np.random.default_rng(readings + decades).standard_normal((2000, readings))
+    left = noise - noise @ basis.T @ basis
+    share = (left @ steps.shapes.T / steps.norms) ** 2 / np.sum(left**2, axis=1)[:, None]
+    of_steps = [steps.chance(own) for own in np.max(share, axis=1).tolist()]
+    chances = np.array([of_steps, [compare_halves(own, basis, readings // 2) for own in left]])
+    assert np.mean(chances < LEVEL, axis=1) == pytest.approx(LEVEL, abs=0.011)
+
+
+@pytest.mark.parametrize(("change", "least"), [("jump", 0.58), ("gain", 0.94), ("start", 0.81)])
+def test_steps_are_told_and_timed(change: str, least: float) -> None:
+    """A scan tells 65, 97 and 88 %: of 200 traces no less than three standard errors below."""
+    times = np.arange(1, 101.0)
+    true, basis = relaxation(times)
+    late, early = times > 50, times < 2.5
+    wrong = {"jump": 2 * NOISE * late, "gain": -0.1 * true * late, "start": 5 * NOISE * early}
+    noise = NOISE * np.random.default_rng(3).standard_normal((200, 100))
+    left = wrong[change] + noise
+    left -= left @ basis.T @ basis
+    found = [find_step(own, basis, np.asarray) for own in left]
+    seen = [step for step in found if step and step.chance < FALSE_ALARM]
+    assert len(seen) > least * 200
+    before = np.median([step.before for step in seen])
+    assert before == pytest.approx(2 if change == "start" else 50, abs=1)
+
+
+def test_a_step_is_what_a_fit_with_it_finds() -> None:
+    """Ordinary least squares with one regressor more, and what that leaves."""
+    times = np.arange(1, 41.0) * 2.5
+    true, basis = relaxation(times)
+    trace = true + np.random.default_rng(0).standard_normal(40) + 4.0 * (times > 60)
+    found = find_step(trace - trace @ basis.T @ basis, basis, np.asarray)
+    assert found
+    assert found.before == 24
+    design: Array = np.vstack((basis, np.where(times > 60, 1.0, 0.0))).T
+    amplitudes = np.linalg.lstsq(design, trace, rcond=None)[0]
+    assert found.size == pytest.approx(amplitudes[-1])
+    assert found.left == pytest.approx(trace - design @ amplitudes, abs=1e-9)
+
+
+def test_halves_are_compared_as_chow_does() -> None:
+    """The F test of one fit against two, each with parameters of its own."""
+    times = np.arange(1, 61.0)
+    true, basis = relaxation(times)
+    trace = true * np.where(times > 25, 0.99, 1.0) + np.random.default_rng(1).standard_normal(60)
+
+    def squares(some: slice) -> float:
+        return float(np.linalg.lstsq(basis[:, some].T, trace[some], rcond=None)[1][0])
+
+    apart = squares(slice(25)) + squares(slice(25, None))
+    ratio = (squares(slice(None)) - apart) / 3 / (apart / 54)
+    chance = compare_halves(trace - trace @ basis.T @ basis, basis, 25)
+    assert chance == pytest.approx(fisher.sf(ratio, 3, 54), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [("jump", "change at about 50.5 s"), ("rate", "each fitted by itself, differ")],
+)
+def test_what_changed_is_said(change: str, said: str) -> None:
+    """A jump of three noises; a sample that relaxes twice as fast from 50 s on."""
+    times = np.arange(1, 101.0)
+    true, _ = relaxation(times)
+    faster = 100 + 80 * np.exp(-2.5 - (times - 50) / 9)
+    jump = np.full(100, 3 * QUIET)
+    wrong = {"jump": jump, "rate": faster - true}[change]
+    readings = true + np.where(times > 50, wrong, 0)
+    readings += QUIET * np.random.default_rng(13).standard_normal(100)
+    found = told(times, readings, reads="modulus", model="zener_maxwell")
+    assert found.status == DOUBTFUL
+    assert said in str(found)
+
+
+def test_white_noise_has_a_line_as_often_as_its_level_says() -> None:
+    """Fisher's chance is exact: within four standard deviations of 2 % of 2,000 traces, 1.3 %."""
+    rng, times = np.random.default_rng(0), np.arange(100.0)
+    found = [find_line(rng.standard_normal(100), times) for _ in range(2000)]
+    # The ten lowest of 49 frequencies are not looked at.
+    alarms = np.mean([chance < 0.02 for _, chance, _ in found])
+    assert alarms == pytest.approx(0.02 * 40 / 49, abs=0.012)
+
+
+@pytest.mark.parametrize("frequency", [7.0, 7.03, 21.4])
+def test_a_line_has_the_frequency_and_amplitude_of_its_sine(frequency: float) -> None:
+    """The bound of a frequency is sqrt(6/n) sd / (pi amplitude T), 0.0008 Hz."""
+    times = np.arange(2000) / 100
+    sine = 1.5 * np.sin(2 * np.pi * frequency * times + 1)
+    noise = np.random.default_rng(1).standard_normal(2000)
+    found, chance, basis = find_line(sine + noise, times)
+    assert found == pytest.approx(frequency, abs=0.003)
+    assert chance < 1e-9
+    along = basis @ (sine + noise)
+    assert np.linalg.norm(along) * np.sqrt(2 / 2000) == pytest.approx(1.5, abs=4 * np.sqrt(1e-3))
+    assert np.std(sine + noise - along @ basis) == pytest.approx(1, rel=0.1)
+    assert find_line(sine + noise, times**1.1)[1] == 1
+
+
+def test_hum_is_named_with_its_harmonic_and_counts_no_residual_twice() -> None:
+    """50 Hz of five times the noise and 150 Hz of twice; the limits of the others' noise hold."""
+    times = np.arange(1, 2001) / 1000
+    hum = 0.05 * np.sin(2 * np.pi * 50 * times) + 0.02 * np.sin(2 * np.pi * 150 * times + 1)
+    readings = 1 - 0.5 * np.exp(-times / 0.7) + hum
+    readings += 0.01 * np.random.default_rng(2).standard_normal(len(times))
+    found = told(times, readings, reads="compliance", model="zener_kelvin")
+    assert found.status == DOUBTFUL
+    assert "a line in its spectrum, at 50 Hz (0.05" in found.data["reasons"][0]
+    assert " and 150 Hz (0.02" in found.data["reasons"][0]
+    assert "average the readings over 0.02 s" in found.data["reasons"][0]
+    assert "independent ones" not in str(found)
+    limits = found.to_frame().loc[["k_s", "k_v", "tau_v"]]
+    assert np.all((limits["low"] < [2, 2, 0.7]) & (limits["high"] > [2, 2, 0.7]))

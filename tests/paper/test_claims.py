@@ -12,15 +12,10 @@ from biogrip.physics.models import Published, Sample
 from biogrip.records.rows import read_table, write_arrays
 from tests.helpers.default import seen
 from tests.helpers.places import ROOT
+from workflow.paper import claims
 from workflow.paper.claims import (
-    AROUND,
-    CLOSE,
     ELSEWHERE,
-    FASTER,
-    FEW,
     IN_PART,
-    MOST,
-    NEAR,
     NOT,
     REPLICATED,
     TOLD,
@@ -46,9 +41,9 @@ PRINTED = {"k": 7.0, "k_p": 2.0, "c": 97.0, "c_p": 3.0}
 NAMES = (*TRUE, "c + c_p")
 
 
-def claim(words: str, place: str = "") -> Any:
-    """The only claim at a place that begins with some words."""
-    (found,) = (c for c in CLAIMS if c["words"].startswith(words) and place in c["place"])
+def claim(words: str) -> Any:
+    """The only claim that begins with some words."""
+    (found,) = (c for c in CLAIMS if c["words"].startswith(words))
     return found
 
 
@@ -95,10 +90,8 @@ def identified(table: int, told: str = "determined", *, able: bool = False, **ru
     if able:
         beside = found.assign(**TRUE)
         found = pd.concat([beside, found.assign(reading="able", able=True, encodable=True)])
-    rows = [
-        {"case": "mine", "parameter": name, "quantity": "identified", "encodable": "no"}
-        for name in PRINTED
-    ]
+    known = {"case": "mine", "quantity": "identified", "encodable": "no"}
+    rows = [{**known, "parameter": name} for name in PRINTED]
     verdicts = {"expected_verdict": "determined", "expected_high": np.nan}
     expected = pd.DataFrame({"quantity": NAMES, **verdicts})
     expected.loc[expected["quantity"] == "c", "expected_verdict"] = told
@@ -107,8 +100,8 @@ def identified(table: int, told: str = "determined", *, able: bool = False, **ru
     return Results(seen(cases={"mine": case}), {"values": values})
 
 
-def verdicts_of(words: str, results: Results, place: str = "") -> dict[str, str]:
-    return {what: verdict for what, verdict, _ in judge(claim(words, place), results)}
+def verdicts_of(words: str, results: Results) -> dict[str, str]:
+    return {what: verdict for what, verdict, _ in judge(claim(words), results)}
 
 
 def test_each_quantity_has_a_verdict_of_its_own() -> None:
@@ -117,14 +110,10 @@ def test_each_quantity_has_a_verdict_of_its_own() -> None:
     decades = identified(6, k=k).tables["values"].query("quantity == 'k'")["decades"]
     assert (decades <= 0.5).tolist()[:5] == [False, True, True, True, False]
     judged = judge(claim("catch k_p and k"), identified(6, k=k))
+    said = "Within half a decade of the target end {} of 40 runs."
     assert judged == [
-        *(
-            (f"Table 6, {name}", verdict, f"Within half a decade of the target end {share} runs.")
-            for name, verdict, share in (
-                ("k", IN_PART, "60 % (45 to 74 %) of 40"),
-                ("k_p", REPLICATED, "100 % (91 to 100 %) of 40"),
-            )
-        )
+        ("Table 6, k", IN_PART, said.format("60 % (45 to 74 %)")),
+        ("Table 6, k_p", REPLICATED, said.format("100 % (91 to 100 %)")),
     ]
 
 
@@ -133,9 +122,8 @@ def test_the_reading_that_can_print_them_judges_with_the_text_s_beside_it() -> N
     results = identified(5, able=True, k=np.full(SEEDS, 9.0))
     ((_, verdict, said),) = judge(claim("the error on k is lower"), results)
     assert verdict == NOT
-    assert (
-        "end 0 % (0 to 9 %) of 40 runs; with two digits from 1 100 % (91 to 100 %) of 40." in said
-    )
+    beside = "with two digits from 1 100 % (91 to 100 %) of 40."
+    assert f"end 0 % (0 to 9 %) of 40 runs; {beside}" in said
     own = verdicts_of("the error on k is lower", identified(5, k=np.full(SEEDS, 9.0)))
     assert own == {"Table 5, k": NOT}
 
@@ -227,13 +215,10 @@ def test_one_simpler_model_that_is_refuted_takes_the_cell_model_to_be_known() ->
 def test_what_grows_as_noise_does_is_robust() -> None:
     """Errors that go with the noise, with its square, and not at all but 42 % throughout."""
     noise = np.array([2.0, 5.0, 10.0, 20.0, 40.0])
-    sweep = pd.concat(
-        pd.DataFrame({"case": "a", "of_table": 5, "quantity": name, "row": noise}).assign(
-            error_genetic=errors, bound_percent=noise / 10
-        )
-        for name, errors in (("c", noise / 10), ("k", noise**2), ("k_p", 0 * noise + 42))
-    )
-    tables = {"robustness_noise": sweep}
+    known = {"case": "a", "of_table": 5, "row": noise, "bound_percent": noise / 10}
+    errors = {"c": noise / 10, "k": noise**2, "k_p": 0 * noise + 42}
+    sweep = [{**known, "quantity": name, "error_genetic": own} for name, own in errors.items()]
+    tables = {"robustness_noise": pd.concat(map(pd.DataFrame, sweep))}
     add_columns(tables)
     tables["slopes"]["of_table"] = 5
     robust = dict(claim("highly robust"))
@@ -246,9 +231,8 @@ def test_what_grows_as_noise_does_is_robust() -> None:
 
 def test_what_the_study_lacks_is_another_config_s_to_judge() -> None:
     few = Results(seen(), {})
-    assert judge(claim("highly robust"), few) == [
-        ("", ELSEWHERE, "config/robustness.yaml has what it takes.")
-    ]
+    told = ("", ELSEWHERE, "config/robustness.yaml has what it takes.")
+    assert judge(claim("highly robust"), few) == [told]
     ((_, verdict, said),) = judge(claim("the error on k is lower"), few)
     assert (verdict, said) == (UNDECIDED, "Not here: the study has no table values.")
     ((_, verdict, said),) = judge(claim("good identification"), identified(5))
@@ -277,7 +261,8 @@ def test_every_claim_of_the_published_study_has_a_verdict_and_evidence() -> None
 def test_the_rules_are_told_where_the_table_stands() -> None:
     caption = (ROOT / "workflow" / "report" / "tables" / "claims.rst").read_text(encoding="utf-8")
     rules = " ".join(caption.split())
-    for number in (MOST, FEW, CLOSE, NEAR):
+    for number in (claims.MOST, claims.FEW, claims.CLOSE, claims.NEAR):
         assert f"{100 * number:g} %" in rules
-    for word in (f"within {AROUND}", f"up to {FASTER:g}", "too few runs to tell", TOLD, ELSEWHERE):
-        assert word in rules
+    numbers = f"within {claims.AROUND}", f"up to {claims.FASTER:g}"
+    for words in (*numbers, "too few runs to tell", TOLD, ELSEWHERE):
+        assert words in rules

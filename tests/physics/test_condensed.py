@@ -1,22 +1,26 @@
-"""A few times stand for all: the same sums of squares, gradients and information."""
+"""A few times, and sums of series, stand for all readings."""
+
+import functools
 
 import numpy as np
 import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
-from biogrip.physics.gripper import Gripper
+from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.instruments import GRIPPER
+from biogrip.physics.misfit import SeriesMisfit
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.protocol import join_phases
+from biogrip.physics.protocol import Phase, hold, join_phases, sample_times
 from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
-from tests.helpers.problems import condensed_of, condensed_rows
-from tests.helpers.responses import MODEL_PARAMETERS, PROTOCOLS, log_range, random_samples
+from tests.helpers.problems import condensed_of
+from tests.helpers.responses import PROTOCOLS, log_range, random_samples
 from tests.helpers.responses import SAMPLING_TIMES as TIMES
 
 MAXWELL = MODELS["generalized_maxwell"]
-CELL = np.log([35.0, 12.3, 299.9, 1e-3])
+TRUTH = np.array([[35.0, 12.3, 299.9, 1e-3]])
 _RNG = np.random.default_rng(5)
 DENSE = {
     "uniform": np.linspace(0.0, 400.0, 200_000),
@@ -28,21 +32,21 @@ DENSE = {
 def products(rows: Array, slopes: Array) -> Array:
     """Sum of squares, gradients and information: all that least squares sees."""
     together = np.vstack((rows, slopes))
-    found: Array = together @ together.T
-    return found
+    return together @ together.T
 
 
 def assert_alike(residuals: Residuals, x: Array) -> int:
     """All samples and the rows give the same, to 1e-10 of the trace; so many rows there are."""
-    every, few = residuals(x), condensed_rows(residuals, x)
+    every, (of_rows, *slopes) = residuals(x), residuals.condensed_responses(x[None])[0]
+    few = of_rows - residuals.trace.rows, np.array(slopes)
     scale = np.linalg.norm(every[0]) + np.linalg.norm(every[1])
     assert np.max(np.abs(products(*every) - products(*few))) < 1e-10 * scale**2
     return len(few[0])
 
 
-def posed(gripper: Gripper, model: SampleModel, condensed: Condensed, trace: Array) -> Residuals:
-    torque, time_s = condensed.course, condensed.all_s
-    return Residuals(gripper, model, torque, Trace(time_s, trace, condensed), instrument=GRIPPER)
+def posed(gripper: Gripper, model: SampleModel, rows: Condensed, trace: Array) -> Residuals:
+    given = Trace(rows.all_s, trace, rows)
+    return Residuals(gripper, model, rows.course, given, instrument=GRIPPER)
 
 
 def noise(count: int) -> Array:
@@ -50,30 +54,40 @@ def noise(count: int) -> Array:
 
 
 @pytest.mark.parametrize("nuisance", [False, True])
-@pytest.mark.parametrize("times", TIMES)
+@pytest.mark.parametrize("times", [*TIMES, *DENSE])
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_least_squares_sees_no_difference(
     gripper: Gripper, unequal_gripper: Gripper, protocol: str, times: str, nuisance: bool
 ) -> None:
     """To 1e-10 of the trace, over the whole search range; noise is at least 1e-3 of it."""
-    torque, time_s = join_phases(PROTOCOLS[protocol]), TIMES[times]
-    condensed = condensed_of(torque, time_s, offset=nuisance, drift=nuisance)
-    for arms in (gripper, unequal_gripper):
-        residuals = posed(arms, MAXWELL, condensed, noise(len(time_s)))
-        for sample in random_samples(8, seed=8):
-            rows = assert_alike(residuals, np.log(sample))
-            assert rows <= min(80, len(time_s) + 1)
+    torque, time_s = join_phases(PROTOCOLS[protocol]), (TIMES | DENSE)[times]
+    rows = condensed_of(torque, time_s, offset=nuisance, drift=nuisance)
+    many = times in DENSE
+    samples, most = (TRUTH, 200) if many else (random_samples(8, seed=8), min(80, len(time_s) + 1))
+    for arms in (gripper,) if many else (gripper, unequal_gripper):
+        residuals = posed(arms, MAXWELL, rows, noise(len(time_s)))
+        for sample in samples:
+            assert assert_alike(residuals, np.log(sample)) <= most
 
 
-@pytest.mark.parametrize("protocol", ["steps", "ramps and parabola"])
-@pytest.mark.parametrize("name", MODEL_PARAMETERS)
-def test_of_no_model_it_sees_a_difference(gripper: Gripper, name: str, protocol: str) -> None:
+@functools.cache
+def condensed(protocol: str, device: str) -> Condensed:
+    course = join_phases(PROTOCOLS[protocol], deforms=device == "relaxation")
+    time_s = TIMES["few"] if device == "arms" else TIMES["uneven"][::5]
+    return condensed_of(course, time_s, offset=True)
+
+
+@pytest.mark.parametrize("device", ["arms", "creep", "relaxation"])
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("name", MODELS)
+def test_of_no_model_it_sees_a_difference(
+    gripper: Gripper, name: str, protocol: str, device: str
+) -> None:
     """Rows without slopes are the same, too, but for last bits: they are real numbers."""
-    torque, time_s = join_phases(PROTOCOLS[protocol]), TIMES["few"]
-    condensed = condensed_of(torque, time_s, offset=True)
-    residuals = posed(gripper, MODELS[name], condensed, noise(len(time_s)))
-    middle, rng = np.log(MODEL_PARAMETERS[name]), np.random.default_rng(5)
-    x = np.clip(middle + rng.normal(size=(4, len(middle))), *log_range(MODELS[name]))
+    arms, rows = gripper if device == "arms" else NO_ARMS, condensed(protocol, device)
+    residuals = posed(arms, MODELS[name], rows, noise(len(rows.all_s)))
+    middle, rng = np.log(MODELS[name].example), np.random.default_rng(5)
+    x = np.clip(middle + rng.normal(size=(2, len(middle))), *log_range(MODELS[name]))
     for each in x:
         assert_alike(residuals, each)
     found = residuals.condensed_responses(x)[:, :1]
@@ -81,12 +95,12 @@ def test_of_no_model_it_sees_a_difference(gripper: Gripper, name: str, protocol:
     assert np.all(np.abs(alone - found) <= 1e-12 * np.abs(found).max(axis=2, keepdims=True))
 
 
-@pytest.mark.parametrize("name", [*MODEL_PARAMETERS, "two branches"])
+@pytest.mark.parametrize("name", [*MODELS, "two branches"])
 def test_rows_do_not_depend_on_who_else_is_there(either_gripper: Gripper, name: str) -> None:
     """Byte for byte, for any subset in any order, down to a single one."""
     model = MODELS.get(name, Sample("generalized_maxwell", 2).model)
-    condensed = condensed_of(join_phases(PROTOCOLS["steps"]), TIMES["few"], offset=True)
-    residuals = posed(either_gripper, model, condensed, np.zeros(len(TIMES["few"])))
+    rows = condensed_of(join_phases(PROTOCOLS["steps"]), TIMES["few"], offset=True)
+    residuals = posed(either_gripper, model, rows, np.zeros(len(TIMES["few"])))
     low, high = log_range(model)
     x = np.random.default_rng(3).uniform(low, high, (40, len(low)))
     together = residuals.condensed_responses(x)
@@ -96,10 +110,37 @@ def test_rows_do_not_depend_on_who_else_is_there(either_gripper: Gripper, name: 
         np.testing.assert_array_equal(residuals.condensed_responses(x[chosen]), together[chosen])
 
 
-@pytest.mark.parametrize("times", DENSE)
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_many_readings_are_worth_few_rows(gripper: Gripper, protocol: str, times: str) -> None:
-    torque, time_s = join_phases(PROTOCOLS[protocol]), DENSE[times]
-    condensed = condensed_of(torque, time_s, offset=True)
-    residuals = posed(gripper, MAXWELL, condensed, noise(len(time_s)))
-    assert assert_alike(residuals, CELL) < 200
+PAPER = PROTOCOLS["steps"]
+
+
+@pytest.mark.parametrize(
+    ("phases", "rate_Hz", "level", "rtol"),
+    [
+        # Large sums cancel: eps times (squares summed / squares left), 1e6 for the stiffest samples
+        # under the noise of the first four.
+        (PAPER, 10.0, None, 1e-9),
+        ((hold(300.0, 1.6e-9),), 3.0, None, 1e-9),
+        (PAPER, 1 / 200, None, 1e-9),
+        (PAPER, 1 / 100, None, 1e-9),
+        (PAPER, 10.0, 1e-4, 1e-9),
+        # Against zero the misfit is the response itself: of their way to rest, 1e6 s, the slowest
+        # go a fraction 4e-4; constant and mode cancel to its square.
+        (PAPER, 10.0, 0.0, 1e-8),
+    ],
+)
+def test_sums_of_series_are_those_of_all_residuals(
+    gripper: Gripper, phases: tuple[Phase, ...], rate_Hz: float, level: float | None, rtol: float
+) -> None:
+    """Of a noisy trace or a constant one; parameters that are no numbers have no misfit."""
+    steps = join_phases(phases)
+    time_s = sample_times(steps.end_s, rate_Hz)
+    samples = np.vstack((TRUTH, random_samples(500, 3)))
+    response = step_response(gripper, MAXWELL.network(samples), inertia=False)
+    responses = superpose(response, steps, time_s)
+    noise = np.random.default_rng(1).standard_normal(len(time_s))
+    noisy = responses[0] + 0.1 * np.abs(responses[0]).max() * noise
+    trace = noisy if level is None else np.full(len(time_s), level)
+    misfit = SeriesMisfit(gripper, MAXWELL, steps, 1 / rate_Hz, trace)
+    expected = np.sqrt(np.mean((responses - trace) ** 2, axis=1))
+    found = misfit(np.vstack((samples, np.full(4, np.nan))))
+    np.testing.assert_allclose(found, [*expected, np.nan], rtol=rtol)

@@ -1,11 +1,17 @@
+import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from scipy.linalg import expm
 
+from biogrip.arrays import Array
 from biogrip.errors import BiogripError
+from biogrip.physics import calibration
 from biogrip.physics.gripper import (
+    Arm,
     CombDrive,
     Gripper,
     capacitance_slope,
@@ -13,16 +19,8 @@ from biogrip.physics.gripper import (
     torque,
     voltage,
 )
-from biogrip.physics.models import MODELS
-from biogrip.physics.response import step_response
-from workflow.paper.mechanics import (
-    apparent_modulus,
-    drag_of_arm,
-    drag_of_sample,
-    fringing_of_comb,
-    mass_of_sample,
-    rolling_of_contact,
-)
+from biogrip.physics.noise import Noise, add_noise
+from workflow.paper import mechanics
 
 
 @pytest.mark.parametrize("size_um", [30, 60, 120])
@@ -65,20 +63,6 @@ def test_the_gripper_yields_as_two_springs_in_a_row(unequal_gripper: Gripper) ->
     assert unequal_gripper.jaw_stiffness_N_per_m == pytest.approx(force / opening)
 
 
-def test_unequal_arms_come_to_rest_where_their_springs_hold_the_torques(
-    unequal_gripper: Gripper,
-) -> None:
-    network, b = (
-        MODELS["generalized_maxwell"].network([[20.0, 5.0, 80.0, 1.0]]),
-        unequal_gripper.lever_m,
-    )
-    springs = np.diag([4.4e-7, 5.5e-7]) + 5.0 * b**2
-    rest = np.linalg.solve(springs, [1.0, 1.0])
-    assert step_response(unequal_gripper, network).static[0] == pytest.approx(rest)
-    force = 5.0 * b * rest.sum()
-    assert step_response(unequal_gripper, network, force=True).static[0] == pytest.approx([force])
-
-
 def test_fringing_against_charges_on_two_strips() -> None:
     """Line charges on strips at +-1/2 V, unknown at as many points as the voltage is given."""
     h, g, n = TABLE_2.thickness_m / TABLE_2.finger_gap_m, 1.0, 300
@@ -91,21 +75,23 @@ def test_fringing_against_charges_on_two_strips() -> None:
     potential = (0.5 * np.log(apart**2 + g**2) - own) / (2 * math.pi)
     charge = np.linalg.solve(potential, np.full(n, 0.5)).sum()
     # Palmer's terms are the first two of a series; n segments give three digits.
-    assert 1 + fringing_of_comb(TABLE_2) == pytest.approx(charge * g / h, rel=5e-3)
+    assert 1 + mechanics.fringing_of_comb(TABLE_2) == pytest.approx(charge * g / h, rel=5e-3)
 
 
 def test_drag_of_an_arm_is_summed_along_it(gripper: Gripper) -> None:
     x = np.linspace(0, 1.5e-3, 10_001)
     per_length = 4 * math.pi * 1e-3 / (math.log(1.5e-3 / 40e-6) + 0.84)
     expected = np.trapezoid(per_length * x * x, x)
-    assert drag_of_arm(gripper, 40e-6) == pytest.approx(expected, rel=1e-7, abs=0)
+    assert mechanics.drag_of_arm(gripper, 40e-6) == pytest.approx(expected, rel=1e-7, abs=0)
 
 
 def test_small_things(gripper: Gripper) -> None:
-    assert drag_of_sample(120e-6) == pytest.approx(6 * math.pi * 1e-3 * 60e-6)
-    assert 1e6 * mass_of_sample(100e-6) == pytest.approx(1e9 * 4 / 3 * math.pi * (50e-6) ** 3)
+    assert mechanics.drag_of_sample(120e-6) == pytest.approx(6 * math.pi * 1e-3 * 60e-6)
+    milligrams = 1e6 * mechanics.mass_of_sample(100e-6)
+    assert milligrams == pytest.approx(1e9 * 4 / 3 * math.pi * (50e-6) ** 3)
     # A wheel of 60 um that turns by 3 mrad, on an arm of 1.5 mm.
-    assert rolling_of_contact(gripper, 120e-6, 3e-3) == pytest.approx(60e-6 * 3e-3 / 1.5e-3)
+    rolling = mechanics.rolling_of_contact(gripper, 120e-6, 3e-3)
+    assert rolling == pytest.approx(60e-6 * 3e-3 / 1.5e-3)
 
 
 @pytest.mark.parametrize(("size_m", "strain"), [(30e-6, 0.02), (120e-6, 0.1)])
@@ -115,7 +101,7 @@ def test_against_the_pressure_in_the_contact(size_m: float, strain: float) -> No
     a = math.sqrt(radius * indentation)
     p_0 = 2 * modulus / 0.75 * a / (math.pi * radius)
     force = 2 / 3 * p_0 * math.pi * a**2
-    found = apparent_modulus(force, strain * size_m, size_m)
+    found = mechanics.apparent_modulus(force, strain * size_m, size_m)
     assert found == pytest.approx(modulus, rel=1e-12)
 
 
@@ -148,3 +134,71 @@ def test_voltage_inverts_torque_and_nothing_pushes() -> None:
     np.testing.assert_allclose(voltage(TABLE_2, torque(TABLE_2, volts)), volts, rtol=1e-14)
     with pytest.raises(ValueError, match="only pulls"):
         voltage(TABLE_2, -1e-9)
+
+
+ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)
+TIME_S = np.arange(1001) / 33e3
+CAUSES = (1.6e-9, 2e-13)
+
+
+@pytest.mark.parametrize("damping", [3.3e-12, 1.3266e-10, 9e-10])
+def test_free_motion_is_the_exponential_of_its_matrix(damping: float) -> None:
+    """Of arms that ring, are critically damped, and creep."""
+    arm = dataclasses.replace(ARM, damping_Nms_per_rad=damping)
+    matrix = np.array([[0.0, 1.0], [-4.4e-7 / 1e-14, -damping / 1e-14]])
+    motion = calibration.free_motion(arm, TIME_S, *CAUSES)
+    step, kicked = (motion.step, CAUSES[0], 0.0), (motion.impulse, 0.0, CAUSES[1] / 1e-14)
+    for record, load, rate in (step, kicked):
+        # From the rest at torque over stiffness, as far as the arm begins away from it.
+        rest = np.array([load / 4.4e-7, 0.0])
+        expected = rest + expm(TIME_S[:, None, None] * matrix) @ (np.array([0.0, rate]) - rest)
+        assert np.max(np.abs(record - expected[:, 0])) < 1e-8 * np.abs(record).max()
+
+
+def noisy(arm: Arm, level: float, seed: int, time_s: Array = TIME_S) -> calibration.FreeMotion:
+    motion = calibration.free_motion(arm, time_s, *CAUSES)
+    rng, noise = np.random.default_rng(seed), Noise("gaussian", level, "peak")
+    both = (add_noise(clean, noise, rng) for clean in (motion.step, motion.impulse))
+    return calibration.FreeMotion(time_s, *both)
+
+
+@pytest.mark.parametrize("scale", [0.3, 1.0, 3.0])
+def test_without_noise_the_arm_itself_is_found(scale: float) -> None:
+    arm = Arm(1e-14 * scale, 3.3e-12, 4.4e-7 * scale)
+    record, true = calibration.free_motion(arm, TIME_S, *CAUSES), dataclasses.astuple(arm)
+    # Decay is read off the first two eighths, frequency off a spectrum.
+    np.testing.assert_allclose(calibration._first_guess(record, CAUSES[0]), true, rtol=0.02)
+    found = calibration.calibrate(record, *CAUSES).arm
+    np.testing.assert_allclose(dataclasses.astuple(found), true, rtol=1e-7)
+
+
+@pytest.mark.parametrize("time_s", [TIME_S, TIME_S[:320:5]], ids=["many", "few"])
+def test_uncertainties_are_honest(time_s: Array) -> None:
+    """Over 40 records the errors have the spread that each record's own uncertainty says."""
+    pulls = []
+    for seed in range(40):
+        found = calibration.calibrate(noisy(ARM, 0.05, seed, time_s), *CAUSES)
+        error = np.subtract(dataclasses.astuple(found.arm), dataclasses.astuple(ARM))
+        pulls.append(error / dataclasses.astuple(found.uncertainty))
+    # The standard deviation of 40 draws is known to 11 %, three times that is allowed.
+    np.testing.assert_allclose(np.std(pulls, axis=0), 1.0, rtol=0.34)
+
+
+def test_a_dead_arm_is_no_calibration() -> None:
+    still = calibration.FreeMotion(TIME_S, -np.ones_like(TIME_S), np.ones_like(TIME_S))
+    with pytest.raises(BiogripError, match="does not follow"):
+        calibration.calibrate(still, *CAUSES)
+
+
+def test_calibration_is_written_and_read_back(tmp_path: Path) -> None:
+    found = calibration.calibrate(noisy(ARM, 0.05, 2), *CAUSES)
+    path, nominal = tmp_path / "gripper.yaml", Gripper(1.5e-3, 75.0, ARM, ARM)
+    path.write_text(calibration.calibration_yaml(found, found))
+    read, known = calibration.read_calibrated_arms(path, nominal)
+    expected = found.uncertainty.stiffness_Nm_per_rad
+    assert known["left"]["stiffness_Nm_per_rad"] == pytest.approx(expected, rel=0.05)
+    arms = np.array([dataclasses.astuple(arm) for arm in (read.left, found.arm)])
+    np.testing.assert_allclose(arms[0], arms[1], rtol=1e-6)
+    path.write_text("gripper: {left: 3}")
+    with pytest.raises(BiogripError, match="cannot be read as a calibration"):
+        calibration.read_calibrated_arms(path, nominal)

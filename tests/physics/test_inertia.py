@@ -1,7 +1,8 @@
-"""The ringing of arms, which targets have and fits leave out, and what of it shows in a trace."""
+"""The ringing of arms and what of it shows in a trace; power laws between the jaws."""
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,14 +11,15 @@ from biogrip import library
 from biogrip.arrays import Array
 from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.models import MODELS
-from biogrip.physics.protocol import hold, join_phases
-from biogrip.physics.response import step_response, superpose
+from biogrip.physics.models import MODELS, generalized_maxwell
+from biogrip.physics.protocol import Course, hold, join_phases
+from biogrip.physics.response import LEFT, RIGHT, step_response, superpose
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import VISIBLE, elapsed_s, find_ring, ring, ringing_s
-from tests.helpers.laplace import drawn, rotations
+from tests.helpers.laplace import drawn, rotations, series
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE
 
+STEP, NONE = join_phases((hold(1.0, 1e-9),)), np.zeros((1, 0))
 # Dampers between the jaws end a ring before it is seen; a spring in front of them goes on.
 RINGING = {
     "generalized_maxwell": {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 1e-6},
@@ -34,9 +36,8 @@ def test_an_empty_gripper_rings_like_a_damped_oscillator() -> None:
     time_s: Array = 1e-4 * np.arange(1.0, 1000.0)
     envelope = np.exp(-decay * time_s)
     swing = envelope * (np.cos(omega * time_s) + decay / omega * np.sin(omega * time_s))
-    nothing = Network(np.zeros(1), np.zeros(1), np.zeros((1, 0)), np.zeros((1, 0)))
-    torque = join_phases((hold(1.0, 1e-9),))
-    found = ring(Gripper(1.5e-3, 75.0, arm, arm), nothing, torque, time_s)[0]
+    nothing = Network(np.zeros(1), np.zeros(1), NONE, NONE)
+    found = ring(Gripper(1.5e-3, 75.0, arm, arm), nothing, STEP, time_s)[0]
     expected = 1e-9 / stiffness * (np.exp(-stiffness / damping * time_s) - swing)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * 1e-9 / stiffness)
 
@@ -44,12 +45,10 @@ def test_an_empty_gripper_rings_like_a_damped_oscillator() -> None:
 @pytest.mark.parametrize("stiffness", [0.0, 1e-2, 1.0, 1e2, 1e4])
 def test_rings_are_over_when_they_are_said_to_be(either_gripper: Gripper, stiffness: float) -> None:
     """Even those of a bare spring, from which only the arms' own dampers take energy."""
-    none = np.zeros((1, 0))
-    spring = Network(np.array([stiffness]), np.zeros(1), none, none)
-    step = join_phases((hold(1.0, 1e-9),))
+    spring = Network(np.array([stiffness]), np.zeros(1), NONE, NONE)
     after_s = ringing_s(either_gripper) * np.linspace(1.0, 1.5, 500)
     with_it, without = (
-        superpose(step_response(either_gripper, spring, inertia=inertia), step, after_s)
+        superpose(step_response(either_gripper, spring, inertia=inertia), STEP, after_s)
         for inertia in (True, False)
     )
     assert np.max(np.abs(with_it - without)) < 1e-14 * np.max(np.abs(without))
@@ -65,9 +64,9 @@ def test_arms_that_are_critically_damped(model: str, beyond: float) -> None:
     both = 2 * np.sqrt(inertia * (hinge + 2 * lever**2 * k_p)) * (1 + beyond)
     arm = Arm(inertia, both - 2 * lever**2 * damper, hinge)
     damped = Gripper(1.5e-3, 75.0, arm, arm)
-    torque, times = join_phases((hold(1.0, 1e-9),)), np.geomspace(1e-5, 0.5, 20)
-    found = superpose(step_response(damped, MODELS[model].network(sample)), torque, times)[0]
-    exact = rotations(damped, drawn(model, sample), torque, times, inertia=True)[0]
+    times = np.geomspace(1e-5, 0.5, 20)
+    found = superpose(step_response(damped, MODELS[model].network(sample)), STEP, times)[0]
+    exact = rotations(damped, drawn(model, sample), STEP, times, inertia=True)[0]
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-7 * exact.max())
 
 
@@ -80,20 +79,17 @@ def test_a_ring_shows_by_its_norm_beside_the_noise(gripper: Gripper) -> None:
     """All readings after the one that is named change by less than what counts."""
     time_s = np.random.default_rng(1).permutation(1e-4 * np.arange(1.0, 600.0))
     network = MODEL.sample(RINGING["generalized_maxwell"])
-    torque = join_phases((hold(1.0, 1e-9),))
-    given = gripper, network, torque, time_s
+    given = gripper, network, STEP, time_s
     # A parallel damper that is seen only while it rings does not end the ring.
     free = replace(network, c_p=np.zeros(1))
-    change = np.where(time_s < ringing_s(gripper), ring(gripper, free, torque, time_s)[0], 0.0)
+    change = np.where(time_s < ringing_s(gripper), ring(gripper, free, STEP, time_s)[0], 0.0)
     noise_sd = 0.1 * np.abs(change).max()
     found = find_ring(*given, lambda rows: rows / noise_sd)
     assert found is not None
     assert found.largest == pytest.approx(10.0)
-    norms = [
-        np.linalg.norm(change[time_s > last]) / noise_sd
-        for last in (found.lasts_s, found.lasts_s - 1e-9)
-    ]
-    assert norms[0] <= VISIBLE < norms[1]
+    lasts = found.lasts_s, found.lasts_s - 1e-9
+    after, before = (np.linalg.norm(change[time_s > last]) / noise_sd for last in lasts)
+    assert after <= VISIBLE < before
     least = 0.99 * VISIBLE / np.linalg.norm(change)
     assert find_ring(*given, lambda rows: least * rows) is None
 
@@ -110,8 +106,7 @@ def notes_of(model: str, time_s: Array, level: float, truth: dict[str, float]) -
 
 
 @pytest.mark.parametrize(
-    "model",
-    ["zener_kelvin", pytest.param("generalized_maxwell", marks=pytest.mark.nightly)],
+    "model", ["zener_kelvin", pytest.param("generalized_maxwell", marks=pytest.mark.nightly)]
 )
 def test_who_samples_fast_is_told_to_leave_out_the_first_milliseconds(model: str) -> None:
     """Without these readings nothing is said any more."""
@@ -140,3 +135,71 @@ def test_a_damper_ends_a_ring_if_it_is_seen_afterwards(
 ) -> None:
     time_s = np.unique([start + interval_s * np.arange(1000) for start in (0.0, 200.0)])
     assert len(notes_of(model, time_s, level, truth)) == told
+
+
+# A trace's: soon after each step, and late; and the first milliseconds, with inertia.
+NEAR = np.array([0.1, 0.3, 2.0, 30.0, 199.9, 200.1, 201.0, 260.0, 400.0])
+AT_ONCE = np.geomspace(2e-5, 2e-3, 12)
+SAMPLES = [
+    ("fractional_kelvin_voigt", [0.3, 10.0, 0.4]),
+    ("fractional_kelvin_voigt", [1e-3, 0.05, 0.12]),
+    ("fractional_kelvin_voigt", [20.0, 300.0, 0.85]),
+    ("fractional_maxwell", [10.0, 0.3, 300.0]),
+    ("fractional_maxwell", [0.1, 0.6, 0.4]),
+]
+
+
+@pytest.mark.parametrize(
+    ("model", "sample", "times", "inertia"),
+    [
+        *((*sample, NEAR, inertia) for sample in SAMPLES for inertia in (False, True)),
+        # The contour is wide enough for the ring.
+        ("fractional_kelvin_voigt", [0.3, 0.02, 0.5], AT_ONCE, True),
+    ],
+)
+def test_power_laws_against_inversion(
+    gripper: Gripper, steps: Course, model: str, sample: list[float], times: Array, inertia: bool
+) -> None:
+    """Of the response 1e-6; arms of their own damping and inertia."""
+    exact = rotations(gripper, drawn(model, sample), steps, times, inertia=inertia)[0]
+    response = step_response(gripper, MODELS[model].network(sample), inertia=inertia)
+    atol = 1e-6 * exact.max() if times is AT_ONCE else 0.0
+    np.testing.assert_allclose(superpose(response, steps, times)[0], exact, rtol=1e-6, atol=atol)
+    assert times is NEAR or np.any(np.abs(response.rates.imag) > 1e3)
+
+
+@pytest.mark.parametrize("inertia", [True, False])
+@pytest.mark.parametrize("arms", ["gripper", "unequal_gripper", "damped"])
+def test_three_branches_against_inversion(
+    request: pytest.FixtureRequest, steps: Course, arms: str, inertia: bool
+) -> None:
+    """Of rates in no order; arms in a liquid, too. The contour misses the end of a ring."""
+    damped = Gripper(1.5e-3, 75.0, Arm(1e-14, 3e-10, 4.4e-7), Arm(1.3e-14, 2e-10, 5.5e-7))
+    given: Gripper = damped if arms == "damped" else request.getfixturevalue(arms)
+    k, k_p, c, c_p = [2.0, 5.0, 1.0], 0.2, [30.0, 1e3, 0.3], 0.5
+    network = generalized_maxwell([*k, k_p, *c, c_p])
+
+    def impedance(s: Any) -> Any:
+        return k_p + c_p * s + sum(series(k_j, c_j * s) for k_j, c_j in zip(k, c, strict=True))
+
+    exact = rotations(given, impedance, steps, NEAR, inertia=inertia)
+    response = step_response(given, network, inertia=inertia)
+    for arm in (LEFT, RIGHT):
+        ours = superpose(response, steps, NEAR, arm)[0]
+        np.testing.assert_allclose(ours, exact[arm], rtol=0, atol=1e-10 * exact[arm].max())
+
+
+@pytest.mark.parametrize(("copies", "rtol"), [(2, 1e-10), (6, 1e-9)])
+@pytest.mark.parametrize("inertia", [False, True])
+def test_equal_branches_add_up(
+    gripper: Gripper, steps: Course, inertia: bool, copies: int, rtol: float
+) -> None:
+    """Equal rates are moved apart by 1e-10."""
+    k_p, c_p, k, c = np.array([0.2]), np.array([0.5]), np.array([1.0, 2.0]), np.array([5.0, 400.0])
+    shares = np.full(copies, 1 / copies)
+    many = Network(k_p, c_p, np.kron(shares, k)[None], np.kron(shares, c)[None])
+    ours, theirs = (
+        superpose(step_response(gripper, network, inertia=inertia), steps, NEAR)[0]
+        for network in (many, Network(k_p, c_p, k[None], c[None]))
+    )
+    np.testing.assert_allclose(ours, theirs, rtol=rtol)

@@ -5,154 +5,99 @@ import math
 import numpy as np
 import pytest
 from mpmath import mp, mpf
-from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, displacement_of_tip, rotation_of_tip
 from biogrip.physics.models import damper, generalized_maxwell, kelvin_voigt, maxwell
 from biogrip.physics.nonlinear import correction, nonlinear_rotation
-from biogrip.physics.protocol import (
-    Course,
-    Phase,
-    evaluate,
-    hold,
-    join_phases,
-)
-from biogrip.physics.response import (
-    linear_jaw_force,
-    step_response,
-    superpose,
-)
+from biogrip.physics.protocol import Course, Phase, hold, join_phases
+from biogrip.physics.response import linear_jaw_force, step_response, superpose
 from biogrip.physics.simulation import compute_grip, jaw_force
-from tests.helpers.radau import TOLERANCE, equal_arms, tip
+from tests.helpers.radau import integrated
 from tests.helpers.responses import random_samples
-from tests.physics.test_protocols import TORQUE
 
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)
 OTHER = Arm(1.3e-14, 2.5e-12, 5.5e-7)
-TIMES = np.concatenate((np.geomspace(0.1, 200, 25), 200 + np.geomspace(0.1, 200, 25)))
+# In a liquid, where it lags by a tenth of a second and more.
+SLOW = Arm(1.0e-14, 1e-7, 4.4e-7)
+AFTER = np.geomspace(0.1, np.nextafter(200, 0), 25)
+TIMES = np.concatenate((AFTER, 200 + AFTER))
 
 
-def unequal_arms(gripper: Gripper, sample: Array, torques: list[tuple[float, float]]) -> Array:
-    """Corrected eqs. (1)-(3) without inertia, both arms, by SciPy, to 1e-9 of the peak.
+def rotations_and_force(gripper: Gripper, sample: Array, torque: Course) -> Array:
+    """Of both arms without inertia, and of the jaws."""
+    network = generalized_maxwell(sample)
+    linear = step_response(gripper, network, inertia=False)
+    more = correction(gripper, network, torque)
+    rotations = [superpose(linear, torque, TIMES, arm) + more.at(TIMES, arm) for arm in (0, 1)]
+    force = jaw_force(gripper, network, torque, TIMES, nonlinear=True, inertia=False)
+    return np.vstack((*rotations, force))
 
-    The damper c_p couples the rates: [c_2 + c_p b_2^2, c_p b_2 b_4; ...] phi' = rest.
-    """
-    k, k_p, c, c_p = (float(value) for value in sample)
-    arms = gripper.left, gripper.right
 
-    def slope(_: float, state: Array, tau: float) -> list[float]:
-        (u, v), (b_2, b_4) = zip(*(tip(gripper, phi) for phi in state[:2]), strict=True)
-        y = state[2]
-        force = k_p * (u + v) + k * (u + v - y)
-        rest = [
-            tau - arm.stiffness_Nm_per_rad * phi - b * force
-            for arm, phi, b in zip(arms, state[:2], (b_2, b_4), strict=True)
-        ]
-        m_22 = arms[0].damping_Nms_per_rad + c_p * b_2**2
-        m_44 = arms[1].damping_Nms_per_rad + c_p * b_4**2
-        # Determinant and adjugate without the difference c_p^2 - c_p^2.
-        c_2, c_4 = (arm.damping_Nms_per_rad for arm in arms)
-        determinant = c_2 * c_4 + c_p * (c_2 * b_4**2 + c_4 * b_2**2)
-        mixed = c_p * b_2 * b_4
-        return [
-            (m_44 * rest[0] - mixed * rest[1]) / determinant,
-            (m_22 * rest[1] - mixed * rest[0]) / determinant,
-            k / c * (u + v - y),
-        ]
-
-    state, found, start = np.zeros(3), [], 0.0
-    for end, torque in torques:
-        here = TIMES[(start < TIMES) & (end >= TIMES)]
-        solved = solve_ivp(
-            slope,
-            (start, end),
-            state,
-            "Radau",
-            np.unique(np.append(here, end)),
-            args=(torque,),
-            rtol=TOLERANCE,
-            atol=[1e-15, 1e-15, 1e-18],
-        )
-        found.append(solved.y[:2, : len(here)])
-        state, start = solved.y[:, -1], end
-    return np.concatenate(found, axis=1)
+def drawn(right: Arm, case: int, most: float) -> tuple[Gripper, Course, np.random.Generator]:
+    """Of hat-theta_2 from 40 to 90 degrees, and up to so many times the paper's torque."""
+    rng = np.random.default_rng([50, case])
+    gripper = Gripper(1.5e-3, rng.uniform(40, 90), SLOW if right is SLOW else ARM, right)
+    factor = rng.uniform(1, most)
+    return gripper, join_phases((hold(200.0, 1.6e-9 * factor), hold(200.0, 0.32e-9 * factor))), rng
 
 
 @pytest.mark.parametrize(
     "case", [*range(8), *(pytest.param(n, marks=pytest.mark.nightly) for n in range(8, 50))]
 )
-def test_against_radau(case: int) -> None:
-    """50 random samples, hat-theta_2 from 40 to 90 degrees, up to 20 times the paper's torque."""
-    rng = np.random.default_rng([50, case])
-    gripper = Gripper(1.5e-3, rng.uniform(40, 90), ARM, ARM)
-    sample, factor = random_samples(1, 1000 + case)[0], rng.uniform(1, 20)
-    taus = 1.6e-9 * factor, 0.32e-9 * factor
-    network, torque = (
-        generalized_maxwell(sample),
-        join_phases(tuple(hold(200.0, tau) for tau in taus)),
-    )
-    linear = step_response(gripper, network, inertia=False)
-    ours = superpose(linear, torque, TIMES)[0] + correction(gripper, network, torque).at(TIMES)[0]
-    ends = [(200.0, taus[0]), (400.0, taus[1])]
-    expected = equal_arms(gripper, sample, ends, TIMES, float(np.abs(ours).max()))[0]
+def test_rotations_of_the_whole_search_range_against_radau(case: int) -> None:
+    gripper, torque, _ = drawn(ARM, case, 20)
+    sample = random_samples(1, 1000 + case)[0]
+    ours = rotations_and_force(gripper, sample, torque)[0]
+    expected = integrated(gripper, sample, torque, TIMES, np.abs(ours).max())[0]
     assert np.max(np.abs(ours - expected)) < 1e-7 * np.abs(expected).max()
 
 
-# Samples that Radau follows in a second: in others it takes steps without end, at a residual of
-# the force that rounding does not let it lower.
-@pytest.mark.parametrize("case", [4, 8, 11])
-def test_unequal_arms_against_radau(case: int) -> None:
-    rng = np.random.default_rng([51, case])
-    gripper = Gripper(1.5e-3, rng.uniform(40, 90), ARM, OTHER)
-    sample = 10 ** rng.uniform([-1, -2, 0, -2], [2, 1, 2, 1])
-    factor = 1e-9 * rng.uniform(1, 20)
-    first, second = 1.6 * factor, 0.3 * factor
+@pytest.mark.parametrize(
+    ("right", "case"), [(arm, case) for arm in (ARM, SLOW, OTHER) for case in range(4)]
+)
+def test_rotations_and_force_against_radau(right: Arm, case: int) -> None:
+    """Of stiffer samples Radau's own force is a difference of nearly equal displacements."""
+    gripper, torque, rng = drawn(right, case, 10)
+    sample = 10 ** rng.uniform([-1, -3, 0, -3], [2, 1, 2, 1])
+    *ours, force = rotations_and_force(gripper, sample, torque)
+    *both, expected = integrated(gripper, sample, torque, TIMES, np.max(ours))
+    for one, other in zip(ours, both, strict=False):
+        assert np.max(np.abs(one - other)) < 1e-7 * np.max(both)
+    assert np.max(np.abs(force - expected)) < 1e-6 * np.abs(expected).max()
     network = generalized_maxwell(sample)
-    torque = join_phases((hold(200.0, first), hold(200.0, second)))
-    linear = step_response(gripper, network, inertia=False)
-    found = correction(gripper, network, torque)
-    both = unequal_arms(gripper, sample, [(200.0, first), (400.0, second)])
-    for arm, expected in enumerate(both):
-        ours = superpose(linear, torque, TIMES, arm)[0] + found.at(TIMES, arm)[0]
-        assert np.max(np.abs(ours - expected)) < 1e-7 * np.abs(both).max()
+    linear = jaw_force(gripper, network, torque, TIMES, nonlinear=False, inertia=False)[0]
+    assert np.max(np.abs(force - linear)) > 1e-5 * np.abs(expected).max()
 
 
-def test_with_inertia_against_radau_for_a_damped_gripper() -> None:
-    """Arms that do not ring (quality factor 0.2): Radau integrates eqs. (1)-(3) as they are."""
-    arm = Arm(1.0e-14, 3.3e-10, 4.4e-7)
-    gripper, sample = Gripper(1.5e-3, 50.0, arm, arm), np.array([2.0, 0.05, 20.0, 0.01])
-    network, torque = generalized_maxwell(sample), join_phases((hold(100.0, 1.6e-8),))
-    time_s = np.geomspace(0.1, 100, 40)
+# Arms that do not ring (quality factor 0.2), and none that have inertia; phases of all kinds.
+DAMPED = Arm(1.0e-14, 3.3e-10, 4.4e-7)
+PHASES = Phase(10.0, 0.0, 2e-9), Phase(10.0, 2e-8, -1e-9, 1.6e-10), hold(10.0, 5e-9)
+
+
+@pytest.mark.parametrize(
+    ("arm", "angle_deg", "sample", "phases", "inertia"),
+    [
+        (DAMPED, 50.0, [2.0, 0.05, 20.0, 0.01], (hold(100.0, 1.6e-8),), True),
+        (ARM, 55.0, [2.0, 0.2, 20.0, 1.0], PHASES, False),
+    ],
+)
+def test_inertia_ramps_and_parabolas_against_radau(
+    arm: Arm, angle_deg: float, sample: list[float], phases: tuple[Phase, ...], inertia: bool
+) -> None:
+    gripper, torque = Gripper(1.5e-3, angle_deg, arm, arm), join_phases(phases)
+    network, time_s = generalized_maxwell(sample), np.geomspace(0.1, torque.end_s, 60)
     ours = nonlinear_rotation(gripper, network, torque, time_s)[0]
-    expected = equal_arms(
-        gripper, sample, [(100.0, 1.6e-8)], time_s, 1e-3 * ours.max(), inertia=True
-    )[0]
-    assert np.max(np.abs(ours - expected)) < 1e-7 * ours.max()
+    most = {"max_step_s": np.inf if inertia else 0.2}
+    expected, force = integrated(
+        gripper, np.array(sample), torque, time_s, 1e-3 * ours.max(), inertia=inertia, **most
+    )
+    assert np.max(np.abs(ours - expected)) < (1e-7 if inertia else 1e-6) * ours.max()
     # The nonlinearity is there to be seen.
     linear = superpose(step_response(gripper, network), torque, time_s)[0]
     assert np.max(np.abs(ours - linear)) > 1e-3 * ours.max()
-
-
-def test_ramps_and_parabolas_against_radau() -> None:
-    gripper = Gripper(1.5e-3, 55.0, ARM, ARM)
-    sample = np.array([2.0, 0.2, 20.0, 1.0])
-    phases = Phase(10.0, 0.0, 2e-9), Phase(10.0, 2e-8, -1e-9, 1.6e-10), hold(10.0, 5e-9)
-    torque = join_phases(phases)
-    torques = [
-        (10.0, lambda t: 2e-9 * t),
-        (20.0, lambda t: 2e-8 - 1e-9 * (t - 10) + 8e-11 * (t - 10) ** 2),
-        (30.0, lambda _: 5e-9),
-    ]
-    time_s = np.linspace(0.1, 29.9, 60)
-    expected, force = equal_arms(gripper, sample, torques, time_s, 0.05)
-    network = generalized_maxwell(sample)
-    ours = nonlinear_rotation(gripper, network, torque, time_s)[0]
-    assert np.max(np.abs(ours - expected)) < 1e-6 * np.abs(expected).max()
-    linear = superpose(step_response(gripper, network), torque, time_s)[0]
-    assert np.max(np.abs(ours - linear)) > 1e-3 * np.abs(expected).max()
-    ours = jaw_force(gripper, network, torque, time_s, nonlinear=True, inertia=False)[0]
+    ours = jaw_force(gripper, network, torque, time_s, nonlinear=True, inertia=inertia)[0]
     assert np.max(np.abs(ours - force)) < 1e-6 * np.abs(force).max()
 
 
@@ -172,74 +117,7 @@ def test_too_large_a_torque_is_refused(gripper: Gripper) -> None:
         nonlinear_rotation(gripper, network, join_phases((hold(100.0, 1e-5),)), TIMES[:10])
 
 
-DROPS = np.array([[9.5, 1e-4, 10.0, 1e-4], [1.0, 1e-4, 10.0, 1e-3]])
 CELL = np.array([[35.0, 12.3, 299.9, 1e-3]])
-
-
-@pytest.mark.parametrize("inertia", [False, True])
-@pytest.mark.parametrize(
-    "samples",
-    [
-        np.concatenate((DROPS, CELL, random_samples(20, 5))),
-        np.array([[2.0, 5.0, 1.0, 0.2, 30.0, 1e3, 0.3, 0.5]]),
-    ],
-    ids=["one branch", "three branches"],
-)
-def test_the_arms_equation_closes_under_ramps_and_parabolas(
-    either_gripper: Gripper, samples: Array, inertia: bool
-) -> None:
-    """b F = tau - k phi - c phi' (- I phi'', which is nothing beside these a moment later)."""
-    gripper, network = either_gripper, generalized_maxwell(samples)
-    time_s, arm = np.linspace(0.3, TORQUE.end_s - 0.2, 301), gripper.left
-    response = step_response(gripper, network, inertia=False)
-    rest = evaluate(TORQUE, time_s) - arm.stiffness_Nm_per_rad * superpose(response, TORQUE, time_s)
-    rest -= arm.damping_Nms_per_rad * superpose(response, TORQUE, time_s, rate=True)
-    of_steps = step_response(gripper, network, inertia=inertia, force=True)
-    force = linear_jaw_force(of_steps, TORQUE, time_s)
-    largest = evaluate(TORQUE, time_s).max()
-    np.testing.assert_allclose(
-        gripper.lever_m * force, rest, rtol=0, atol=(3e-6 if inertia else 1e-12) * largest
-    )
-
-
-# Arms in air, and in a liquid where they lag by a tenth of a second and more.
-@pytest.mark.parametrize("damping", [3.3e-12, 1e-7])
-@pytest.mark.parametrize("case", range(4))
-def test_nonlinear_against_radau(case: int, damping: float) -> None:
-    rng = np.random.default_rng([52, case])
-    arm = Arm(1.0e-14, damping, 4.4e-7)
-    gripper = Gripper(1.5e-3, rng.uniform(40, 90), arm, arm)
-    # Of stiffer samples Radau's own force is a difference of nearly equal displacements.
-    sample, factor = 10 ** rng.uniform([-1, -3, 0, -3], [2, 1, 2, 1]), rng.uniform(1, 10)
-    taus = 1.6e-9 * factor, 0.32e-9 * factor
-    torque = join_phases(tuple(hold(200.0, tau) for tau in taus))
-    time_s = np.concatenate((np.geomspace(0.1, 200, 25), 200 + np.geomspace(0.1, 200, 25)))
-    time_s[24] = np.nextafter(200, 0)
-    network = generalized_maxwell(sample)
-    ours = jaw_force(gripper, network, torque, time_s, nonlinear=True, inertia=False)[0]
-    ends = [(200.0, taus[0]), (400.0, taus[1])]
-    _, expected = equal_arms(gripper, sample, ends, time_s, taus[0] / 4.4e-7)
-    assert np.max(np.abs(ours - expected)) < 1e-6 * np.abs(expected).max()
-    linear = jaw_force(gripper, network, torque, time_s, nonlinear=False, inertia=False)[0]
-    assert np.max(np.abs(ours - linear)) > 1e-5 * np.abs(expected).max()
-
-
-def test_nonlinear_force_follows_the_work_of_unequal_arms(unequal_gripper: Gripper) -> None:
-    """Of a bare damper the force's impulse is what it gave way times c_p."""
-    c_p = 20.0
-    torque = join_phases((hold(40.0, 3e-9),))
-    x, weights = np.polynomial.legendre.leggauss(40)
-    edges = np.concatenate(([0.0], np.geomspace(1e-6, 40.0, 40)))
-    half = 0.5 * np.diff(edges)
-    time_s = (edges[:-1, None] + half[:, None] * (1 + x)).ravel()
-    force = jaw_force(unequal_gripper, damper(c_p), torque, time_s, nonlinear=True, inertia=False)
-    impulse = np.sum(half[:, None] * weights * force.reshape(len(half), -1))
-    end, hat = np.array([40.0]), np.radians(unequal_gripper.reference_angle_deg)
-    shortening = 0.0
-    for arm in (0, 1):
-        phi = float(nonlinear_rotation(unequal_gripper, damper(c_p), torque, end, arm)[0, 0])
-        shortening += 2 * 1.5e-3 * np.sin(hat - phi / 2) * np.sin(phi / 2)
-    assert impulse == pytest.approx(c_p * shortening, rel=1e-8)
 
 
 def test_what_is_left_in_the_end(gripper: Gripper) -> None:
@@ -296,3 +174,11 @@ def test_pressed_throughout(gripper: Gripper, steps: Course) -> None:
 def test_no_torque_no_force(gripper: Gripper) -> None:
     grip = compute_grip(gripper, damper(5.0), join_phases((hold(10.0, 0.0),)), nonlinear=False)
     assert (grip.largest_N, grip.lowest_N, grip.pulls_from_s) == (0, 0, None)
+
+
+def test_unequal_arms_rest_where_their_springs_hold_the_torques(unequal_gripper: Gripper) -> None:
+    network, b = generalized_maxwell([20.0, 5.0, 80.0, 1.0]), unequal_gripper.lever_m
+    rest = np.linalg.solve(np.diag([4.4e-7, 5.5e-7]) + 5.0 * b**2, [1.0, 1.0])
+    for force, expected in ((False, rest), (True, [5.0 * b * rest.sum()])):
+        found = step_response(unequal_gripper, network, force=force).static[0]
+        assert found == pytest.approx(np.array(expected))

@@ -1,4 +1,4 @@
-"""The linear response against 50 digits, and exact under ramps and parabolas."""
+"""The linear response against 50 digits; protocols, and zeros between poles."""
 
 import math
 from collections.abc import Callable
@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from scipy.optimize import brentq
 
 from biogrip.arrays import Array
 from biogrip.library import set_up
@@ -27,22 +28,20 @@ from biogrip.physics.protocol import (
     sample_times,
 )
 from biogrip.physics.response import phi_functions, step_response, superpose
-from biogrip.physics.roots import SMALLEST_GAP, separate
+from biogrip.physics.roots import SMALLEST_GAP, interlaced_zeros, separate
 from biogrip.physics.simulation import jaw_force
 from biogrip.study.experiment_blocks import PhaseBlock, ProtocolBlock
 from tests.helpers.responses import exact_50_digits, random_samples
 from tests.physics.test_contact import TABLE_2
 
-PROTOCOL = ProtocolBlock(
-    (
-        PhaseBlock(5.0, torque_Nm=0.0, to_torque_Nm=2e-9),
-        PhaseBlock(10.0, voltage_V=12.0),
-        PhaseBlock(4.0, voltage_V=3.0, to_voltage_V=15.0),
-        PhaseBlock(5.0, torque_Nm=1e-9, to_torque_Nm=2e-10),
-        PhaseBlock(5.0, torque_Nm=0.5e-9),
-    )
+BLOCKS = (
+    PhaseBlock(5.0, torque_Nm=0.0, to_torque_Nm=2e-9),
+    PhaseBlock(10.0, voltage_V=12.0),
+    PhaseBlock(4.0, voltage_V=3.0, to_voltage_V=15.0),
+    PhaseBlock(5.0, torque_Nm=1e-9, to_torque_Nm=2e-10),
+    PhaseBlock(5.0, torque_Nm=0.5e-9),
 )
-TORQUE = join_phases(PROTOCOL.make_phases(GRIPPER, TABLE_2))
+TORQUE = join_phases(ProtocolBlock(BLOCKS).make_phases(GRIPPER, TABLE_2))
 PER_SQUARE_VOLT = float(torque_of_voltage(TABLE_2, 1.0))
 # The protocol's torque until some times, phase by phase.
 WRITTEN_OUT: list[tuple[float, Callable[[float], float]]] = [
@@ -67,10 +66,8 @@ def test_phi_functions_against_50_digits() -> None:
     with mp.workdps(50):
         for order in (1, 2, 3):
             for z in (-1e-12, -1e-3, -0.3, -0.9999, -1.0001, -7.0, -300.0, -1e8):
-                series = mp.exp(mpf(z)) - mp.fsum(
-                    mpf(z) ** k / mp.factorial(k) for k in range(order)
-                )
-                exact = series / mpf(z) ** order
+                first = mp.fsum(mpf(z) ** k / mp.factorial(k) for k in range(order))
+                exact = (mp.exp(mpf(z)) - first) / mpf(z) ** order
                 ours = float(phi_functions(max(order, 1), np.array([z]))[order][0])
                 assert ours == pytest.approx(float(exact), rel=1e-13)
 
@@ -78,27 +75,27 @@ def test_phi_functions_against_50_digits() -> None:
 EVENLY = np.arange(0, 41, 2.0)
 
 
+HELD = (hold(40.0, 1e-9),)
+
+
 @pytest.mark.parametrize(
-    ("name", "phases", "time_s", "offset", "by_series"),
+    ("name", "phases", "time_s", "offset"),
     [
-        ("maxwell", (hold(40.0, 1e-9),), EVENLY, False, True),
-        ("maxwell", (hold(40.0, 1e-9),), np.sqrt(EVENLY), False, False),
-        ("maxwell", (hold(40.0, 1e-9),), EVENLY, True, False),
-        ("maxwell", (hold(3.0, 1e-9), hold(37.0, 2e-9)), EVENLY, False, False),
-        ("maxwell", (ramp(40.0, 0.0, 4e-9),), EVENLY, False, False),
-        ("burgers", (hold(40.0, 1e-9),), EVENLY, False, False),
+        ("maxwell", HELD, EVENLY, False),
+        ("maxwell", HELD, np.sqrt(EVENLY), False),
+        ("maxwell", HELD, EVENLY, True),
+        ("maxwell", (hold(3.0, 1e-9), hold(37.0, 2e-9)), EVENLY, False),
+        ("maxwell", (ramp(40.0, 0.0, 4e-9),), EVENLY, False),
+        ("burgers", HELD, EVENLY, False),
     ],
 )
 def test_no_response_is_needed_of_steps_that_are_sampled_evenly(
-    gripper: Gripper,
-    name: str,
-    phases: tuple[Phase, ...],
-    time_s: Array,
-    offset: bool,
-    by_series: bool,
+    gripper: Gripper, name: str, phases: tuple[Phase, ...], time_s: Array, offset: bool
 ) -> None:
+    """By the sample with one branch, whose readings have no offset: the first alone."""
     experiment = set_up(gripper, phases, Sample(name))
     problem = replace(experiment, offset=offset).of(time_s, np.zeros_like(time_s))
+    by_series = (name, phases, offset) == ("maxwell", HELD, False) and time_s is EVENLY
     misfit = make_misfit(problem.residuals)
     assert isinstance(misfit, SeriesMisfit) == by_series
     assert by_series or misfit == problem.residuals.misfit
@@ -136,9 +133,7 @@ def worst_error(gripper: Gripper, steps: Course, samples: Array) -> float:
     return float(np.max(np.abs(ours - exact) / np.abs(exact).max(axis=2, keepdims=True)))
 
 
-def test_corrected_equations_over_the_whole_search_range(
-    either_gripper: Gripper, steps: Course
-) -> None:
+def test_equations_hold_over_the_whole_search_range(either_gripper: Gripper, steps: Course) -> None:
     """200 chromosomes against 50 digits; 1e-9 of the peak is asked, 1e-11 is held."""
     assert worst_error(either_gripper, steps, random_samples(200, 1)) < 1e-11
 
@@ -170,3 +165,20 @@ def test_coinciding_roots_are_moved_apart_about_their_mean() -> None:
     assert abs(found[0] - found[1]) == pytest.approx(3 * SMALLEST_GAP, rel=1e-6)
     assert found[:2].mean() == pytest.approx(-3.0, rel=1e-12)
     assert found[2] == -1.0
+
+
+RANDOM = np.random.default_rng(0)
+POLES: Array = np.cumsum(RANDOM.lognormal(0, 2, (9, 200)), axis=0)
+POLES[0] = 0.0
+WEIGHTS, LEVEL = RANDOM.lognormal(0, 2, (9, 200)), RANDOM.lognormal(0, 1, 200)
+
+
+def test_zeros_are_those_of_a_bracketing_search() -> None:
+    found = interlaced_zeros(WEIGHTS[:, :3], POLES[:, :3], LEVEL[:3]).from_pole(np.zeros(3))
+    for zeros, weights, poles, level in zip(found.T, WEIGHTS.T, POLES.T, LEVEL, strict=False):
+        ends = [*poles, poles[-1] + 2 * np.sum(weights) / level]
+        for zero, low, high in zip(zeros, ends, ends[1:], strict=False):
+            inside = low * (1 + 1e-12) + 1e-12, high * (1 - 1e-12)
+            given = {"args": (weights, poles, level), "xtol": 1e-14}
+            alone = brentq(lambda x, w, p, b: np.sum(w / (x - p)) - b, *inside, **given)
+            assert zero == pytest.approx(alone, rel=1e-9)

@@ -9,7 +9,6 @@ from biogrip.arrays import Array
 from biogrip.physics import modes
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS
-from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS
 from biogrip.physics.modes import linear_responses, mode_responses
 from biogrip.physics.noise import NoiseModel, Whitening, nuisance_basis
@@ -22,9 +21,8 @@ from biogrip.physics.protocol import (
     ramp,
     with_steps,
 )
-from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.simulation import simulated_response
-from tests.physics.test_condensed import assert_alike
+from tests.physics.test_condensed import assert_alike, posed
 
 RNG = np.random.default_rng(4)
 EVEN: Array = np.arange(251) / 25
@@ -66,9 +64,8 @@ def test_rows_are_followed_whatever_they_are(clock: str) -> None:
     rows_s, values = CLOCKS[clock], RNG.standard_normal(251)
     course = follow_rows(rows_s, values, deforms=False)
     np.testing.assert_allclose(evaluate(course, rows_s), values, atol=1e-11)
-    np.testing.assert_allclose(
-        evaluate(course, rows_s[1:-1] * (1 - 1e-15)), values[1:-1], atol=1e-9
-    )
+    before = evaluate(course, rows_s[1:-1] * (1 - 1e-15))
+    np.testing.assert_allclose(before, values[1:-1], atol=1e-9)
 
 
 def test_a_step_between_two_rows_stands_in_the_middle() -> None:
@@ -102,19 +99,12 @@ def test_lines_are_followed_to_their_corner(corner_s: float) -> None:
     values = np.interp(EVEN, [0.0, corner_s, 10.0], [0.0, 2.0, 0.0])
     course = follow_rows(EVEN, values, deforms=True)
     up, down = 2 / corner_s, -2 / (10 - corner_s)
-    first, last = (
-        int(np.searchsorted(EVEN, corner_s, side="right")) - 1,
-        int(np.searchsorted(EVEN, corner_s)),
-    )
-    np.testing.assert_allclose(rates_at(course, EVEN[[first]])[0], up, atol=1e-4)
-    np.testing.assert_allclose(rates_at(course, EVEN[[last]])[1], down, atol=1e-4)
-    assert course.jumps_s.tolist() == [0.0, *([EVEN[first]] if first == last else [])]
-    away = np.abs(EVEN - corner_s) > 0.05
-    np.testing.assert_allclose(
-        rates_at(course, EVEN[away][1:])[0],
-        np.where(EVEN[away][1:] < corner_s, up, down),
-        atol=1e-4,
-    )
+    rows_s = EVEN[1:-1]
+    before, after = rates_at(course, rows_s)
+    np.testing.assert_allclose(before[rows_s <= corner_s], up, atol=1e-4)
+    np.testing.assert_allclose(after[rows_s >= corner_s], down, atol=1e-4)
+    np.testing.assert_allclose(before[rows_s > corner_s + 0.05], down, atol=1e-4)
+    assert course.jumps_s.tolist() == [0.0, *rows_s[rows_s == corner_s]]
 
 
 def test_a_step_between_two_rows_stays_between_them() -> None:
@@ -136,9 +126,8 @@ def test_times_are_moved_to_changes_that_they_are_but_for_rounding_on() -> None:
     course = join_phases((hold(0.7, 1.0), hold(0.1, 2.0), hold(1.0, 0.0)), deforms=True)
     assert course.time_s[2] != 0.8
     times = np.array([0.1, 0.7, 0.8, 0.9, 0.95, 1.2])
-    assert np.isin(course.snapped(times), course.changes_s).tolist() == [False, True, True] + 3 * [
-        False
-    ]
+    moved = np.isin(course.snapped(times), course.changes_s)
+    assert moved.tolist() == [False, True, True, False, False, False]
     far = times + 1e-8
     np.testing.assert_array_equal(course.snapped(far), far)
 
@@ -195,9 +184,8 @@ def test_a_sample_under_a_recorded_sinusoid_responds_as_under_the_true_one(name:
 @functools.cache
 def condensed(deforms: bool, noise: str) -> Condensed:
     """Rows for readings before the course, at its rows, and beside them."""
-    course = follow_rows(
-        UNEVEN, np.sin(3 * UNEVEN) + 0.02 * RNG.standard_normal(251), deforms=deforms
-    )
+    held = np.sin(3 * UNEVEN) + 0.02 * RNG.standard_normal(251)
+    course = follow_rows(UNEVEN, held, deforms=deforms)
     time_s = np.unique(np.r_[-0.3, -0.1, UNEVEN[1:], RNG.uniform(0, 10, 40)])
     nuisance = nuisance_basis(time_s, offset=noise != "plain", drift=noise != "plain")
     colour = NoiseModel(ar1=0.5, time_s=0.3, flicker=0.0)
@@ -209,22 +197,15 @@ def condensed(deforms: bool, noise: str) -> Condensed:
     ("deforms", "noise"), [(False, "plain"), (True, "drifting"), (True, "coloured")]
 )
 @pytest.mark.parametrize("name", MODELS)
-def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
-    name: str, deforms: bool, noise: str
-) -> None:
+def test_rows_have_the_sums_of_squares_of_readings(name: str, deforms: bool, noise: str) -> None:
     """Slow samples and fast ones; to 1e-10 of the trace, as of steps (test_condensed.py)."""
-    rows, model = condensed(deforms, noise), MODELS[name]
-    moved = np.array([parameter.kind != "exponent" for parameter in model.parameters])
-    rng = np.random.default_rng(3)
-    logs = np.log([model.example]) + 3 * rng.standard_normal((2, len(moved))) * moved
-    for x in logs:
-        true = linear_responses(NO_ARMS, model, rows.course, rows.all_s, np.exp(x)[None])[0, 0]
-        trace = true + 0.01 * (np.ptp(true) or 1.0) * rng.standard_normal(len(true))
-        given = Trace(rows.all_s, trace, rows)
-        residuals = Residuals(NO_ARMS, model, rows.course, given, instrument=GRIPPER)
+    rows, model, rng = condensed(deforms, noise), MODELS[name], np.random.default_rng(3)
+    residuals = posed(NO_ARMS, model, rows, 1e-3 * rng.standard_normal(len(rows.all_s)))
+    moved = [parameter.kind != "exponent" for parameter in model.parameters]
+    for x in np.log([model.example]) + 3 * rng.standard_normal((2, len(moved))) * moved:
         assert_alike(residuals, x)
         left, slopes = residuals(x)
-        scale = float(np.linalg.norm(left) + np.linalg.norm(slopes))
-        gradient, misfit = residuals.gradients(x[None], [residuals])
+        (gradient,), misfit = residuals.gradients(x[None], [residuals])
         assert misfit == pytest.approx(np.sqrt(np.mean(left**2)), rel=1e-9)
-        np.testing.assert_allclose(gradient[0], slopes @ left, atol=1e-9 * scale**2)
+        scale = float(np.linalg.norm(left) + np.linalg.norm(slopes))
+        np.testing.assert_allclose(gradient, slopes @ left, atol=1e-9 * scale**2)

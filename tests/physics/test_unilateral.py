@@ -7,25 +7,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
+from biogrip.physics import models
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.models import (
-    MODELS,
-    damper,
-    generalized_maxwell,
-    kelvin_voigt,
-    liquid_drop,
-    maxwell,
-)
-from biogrip.physics.protocol import (
-    Course,
-    Phase,
-    evaluate,
-    hold,
-    join_phases,
-)
+from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.simulation import jaw_force
-from biogrip.physics.unilateral import UnilateralResponse, _Forcing, unilateral_response
+from biogrip.physics.unilateral import _Forcing, unilateral_response
 from tests.helpers.responses import random_samples
 
 # Slow arms, which an integrator can follow through contact and flight.
@@ -41,68 +28,53 @@ def integrated(
 ) -> tuple[Array, list[float]]:
     """phi_2, phi_4, delta, y and force by SciPy, regime by regime; and when they change."""
     k, k_p, c, c_p = (float(value) for value in sample)
-    arms, b = (gripper.left, gripper.right), gripper.lever_m
-    c_2, c_4 = (arm.damping_Nms_per_rad for arm in arms)
-    k_2, k_4 = (arm.stiffness_Nm_per_rad for arm in arms)
+    b, arms = gripper.lever_m, (gripper.left, gripper.right)
+    _, dampings, stiffnesses = np.transpose([[*vars(arm).values()] for arm in arms])
 
-    def touching_rates(t: float, z: Array) -> tuple[Array, float]:
-        delta, spring = b * (z[0] + z[1]), 0.0
-        spring = k_p * delta + k * (delta - z[3])
-        tau = float(evaluate(torque, t))
-        free = (tau - k_2 * z[0]) / c_2, (tau - k_4 * z[1]) / c_4
-        # phi_i' = free_i - b F/c_i and F = spring + c_p b (phi_2' + phi_4').
-        force = (spring + c_p * b * sum(free)) / (1 + c_p * b * b * (1 / c_2 + 1 / c_4))
-        rates = np.array([free[0] - b * force / c_2, free[1] - b * force / c_4, 0.0, 0.0])
-        rates[2], rates[3] = b * (rates[0] + rates[1]), k / c * (delta - z[3])
-        return rates, force
-
-    def apart_rates(t: float, z: Array) -> Array:
-        tau = float(evaluate(torque, t))
-        damper_rate = k / c * (z[2] - z[3])
-        delta_rate = -(k_p * z[2] + k * (z[2] - z[3])) / c_p if c_p else k / (k + k_p) * damper_rate
-        return np.array(
-            [(tau - k_2 * z[0]) / c_2, (tau - k_4 * z[1]) / c_4, delta_rate, damper_rate]
-        )
+    def motion(t: float, z: Array, touching: bool) -> tuple[Array, float]:
+        rates = (float(evaluate(torque, t)) - stiffnesses * z[:2]) / dampings
+        spring, y_rate, force = k_p * z[2] + k * (z[2] - z[3]), k / c * (z[2] - z[3]), 0.0
+        if touching:
+            # phi_i' = free_i - b F/c_i and F = spring + c_p b (phi_2' + phi_4').
+            force = spring + c_p * b * np.sum(rates)
+            force /= 1 + c_p * b * b * np.sum(1 / dampings)
+            rates = rates - b * force / dampings
+            delta_rate = b * np.sum(rates)
+        else:
+            delta_rate = -spring / c_p if c_p else k / (k + k_p) * y_rate
+        return np.array([*rates, delta_rate, y_rate]), force
 
     def lets_go(t: float, z: Array) -> float:
-        return touching_rates(t, z)[1]
+        return motion(t, z, True)[1]
 
     def meets(t: float, z: Array) -> float:
         return float(z[2] - b * (z[0] + z[1]))
 
     for event in (lets_go, meets):
         event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
-    edges = [*torque.time_s, torque.end_s]
+    given = {"rtol": 1e-12, "atol": [1e-15, 1e-15, 1e-18, 1e-18], "max_step": 0.1}
     z, touching, found, changes = np.zeros(4), True, [], []
-    for start, end in pairwise(edges):
-        here, end = start, np.nextafter(end, 0)
-        if touching and lets_go(start, z) < 0:
+    for here, end in pairwise([*torque.time_s, torque.end_s]):
+        end = np.nextafter(end, 0)
+        if touching and lets_go(here, z) < 0:
             touching = False
-            changes.append(start)
+            changes.append(here)
         while here < end:
-            slope = (lambda t, z: touching_rates(t, z)[0]) if touching else apart_rates
             solved = solve_ivp(
-                slope,
-                (here, end),
-                z,
-                "LSODA",
+                lambda t, z, touching=touching: motion(t, z, touching)[0],
+                *((here, end), z, "LSODA"),
                 events=lets_go if touching else meets,
                 dense_output=True,
-                rtol=1e-12,
-                atol=[1e-15, 1e-15, 1e-18, 1e-18],
-                max_step=0.1,
+                **given,
             )
-            inside = time_s[(time_s >= here) & (time_s < solved.t[-1])]
-            if len(inside):
-                states = solved.sol(inside)
-                pairs = list(zip(inside, states.T, strict=True))
-                forces = [lets_go(*each) if touching else 0.0 for each in pairs]
-                found.append(np.vstack((states, forces)))
+            for t in time_s[(time_s >= here) & (time_s < solved.t[-1])]:
+                state = solved.sol(t)
+                found.append([*state, motion(t, state, touching)[1]])
             here, z = float(solved.t[-1]), solved.y[:, -1]
             if solved.status == 1:
                 touching = not touching
                 changes.append(here)
-    return np.concatenate(found, axis=1), changes
+    return np.transpose(found), changes
 
 
 @pytest.mark.parametrize(
@@ -121,7 +93,7 @@ def test_against_lsoda_with_events(k_p: float, c_p: float, torque: Course, right
     sample = np.array([0.5, k_p, 1.5, c_p])
     time_s = np.linspace(0, torque.end_s, 401)[:-1] + 1e-3
     expected, changes = integrated(gripper, sample, torque, time_s)
-    ours = unilateral_response(gripper, generalized_maxwell(sample), torque, time_s)
+    ours = unilateral_response(gripper, models.generalized_maxwell(sample), torque, time_s)
     states = np.vstack((ours.rotation, ours.shortening_m, ours.dampers_m, ours.jaw_force_N))
     scale = np.abs(expected).max(axis=1, keepdims=True)
     # The integrator's tolerance over some hundred steps and a few events.
@@ -133,13 +105,11 @@ def test_against_lsoda_with_events(k_p: float, c_p: float, torque: Course, right
     assert np.all(ours.jaw_force_N[~ours.touching] == 0)
 
 
-def test_over_the_whole_search_range_the_jaws_never_pull(
-    either_gripper: Gripper, steps: Course
-) -> None:
+def test_over_the_whole_range_the_jaws_never_pull(either_gripper: Gripper, steps: Course) -> None:
     """Up to the first loss of contact it is the bilateral response."""
     time_s = np.concatenate((np.geomspace(1e-3, 200, 40), 200 + np.geomspace(1e-3, 200, 40)))
-    every_model = [model.network([model.example]) for model in MODELS.values()]
-    for network in (*map(generalized_maxwell, random_samples(30, 77)), *every_model):
+    every_model = [model.network([model.example]) for model in models.MODELS.values()]
+    for network in (*map(models.generalized_maxwell, random_samples(30, 77)), *every_model):
         found = unilateral_response(either_gripper, network, steps, time_s)
         both = jaw_force(either_gripper, network, steps, time_s, nonlinear=False, inertia=False)[0]
         assert np.all(found.jaw_force_N >= 0)
@@ -165,23 +135,22 @@ def test_loads_go_on_from_a_later_instant() -> None:
 
 def test_samples_that_lack_elements(gripper: Gripper, steps: Course) -> None:
     time_s = np.array([199.9, 200.1, 400.0])
-    for network in (maxwell([1.0, 10.0]), damper([10.0]), liquid_drop([1.0, 0.0, 10.0])):
+    for network in (
+        models.maxwell([1.0, 10.0]),
+        models.damper([10.0]),
+        models.liquid_drop([1.0, 0.0, 10.0]),
+    ):
         found = unilateral_response(gripper, network, steps, time_s)
         assert found.touching.tolist() == [True, False, False]
         # No spring brings a liquid back.
         assert found.shortening_m[2] == pytest.approx(found.shortening_m[1], rel=1e-12)
-    spring = unilateral_response(gripper, kelvin_voigt([0.05, 0.0]), steps, time_s)
+    spring = unilateral_response(gripper, models.kelvin_voigt([0.05, 0.0]), steps, time_s)
     assert np.all(spring.touching)
 
 
 def test_ends_do_not_depend_on_when_one_looks(gripper: Gripper) -> None:
-    time_s = np.linspace(0, 40, 1000)
-    network = liquid_drop([1.0, 0.1, 10.0])
-
-    def seen(times: Array) -> UnilateralResponse:
-        return unilateral_response(gripper, network, RAMPS, times)
-
-    whole, some = seen(time_s), seen(time_s[::37])
+    time_s, given = np.linspace(0, 40, 1000), (gripper, models.liquid_drop([1.0, 0.1, 10.0]), RAMPS)
+    whole, some = (unilateral_response(*given, times) for times in (time_s, time_s[::37]))
     np.testing.assert_allclose(whole.rotation[:, ::37], some.rotation, rtol=1e-13)
     assert whole.parted_s == some.parted_s
     assert len(whole.parted_s) > 3

@@ -1,18 +1,24 @@
 """CSV files as spreadsheets open them, and as we read them back."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from biogrip.command.outputs import COLUMNS, join_tables
 from biogrip.errors import BiogripError
-from biogrip.records.rows import (
-    as_it_was,
-    escape_formula,
-    read_frame,
-    read_rows,
-    write_rows,
+from biogrip.physics.instruments import GRIPPER
+from biogrip.records.rows import as_it_was, escape_formula, read_frame, read_rows, write_rows
+from biogrip.records.traces import (
+    Measurements,
+    read_measurements,
+    read_target,
+    write_measurements,
+    write_target,
 )
 
 FORMULAS = ("=1+1", "+1+1", "-1+1", "@SUM(A1)", "\t=1", "\r=1", "-x", "=", "'=1", "''=1", "+")
@@ -71,3 +77,79 @@ def test_a_batch_that_lost_a_trace_is_named(tmp_path: Path) -> None:
     write_rows(parts[0], COLUMNS, [["a"] * len(COLUMNS)])
     with pytest.raises(BiogripError, match=r"0-1.csv: found 1 traces, wanted 2"):
         join_tables(parts, tmp_path / "all.csv", 3)
+
+
+TIMES = np.arange(5.0)
+NOT_READ = "hidden", "empty", "gone"
+# Rounding is all that is in the second.
+FORCE = np.array([0.0, -3.1e-23, 1e-6 / 3, -7e-7 / 3, 1e-12 / 7])
+
+
+def written(tmp_path: Path) -> Path:
+    write_target(tmp_path / "t.csv", GRIPPER, TIMES, 1e-9 * np.ones(5), 1e-5 * TIMES / 3, FORCE)
+    return tmp_path / "t.csv"
+
+
+def test_a_target_is_read_back_to_nine_digits(tmp_path: Path) -> None:
+    time_s, torque, rotation = read_target(written(tmp_path), TIMES)
+    np.testing.assert_array_equal(time_s, TIMES)
+    np.testing.assert_array_equal(torque, 1e-9)
+    np.testing.assert_allclose(rotation, 1e-5 * TIMES / 3, rtol=5e-9)
+    force = pd.read_csv(written(tmp_path))["jaw_force_N"].to_numpy()
+    np.testing.assert_allclose(force, FORCE, rtol=0, atol=5e-16)
+    assert force[1] == 0
+    assert ",-0" not in written(tmp_path).read_text()
+
+
+def test_a_damaged_target_is_explained(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    path.write_text(path.read_text().replace("1e-09", "abc", 1))
+    with pytest.raises(BiogripError, match="cannot be read as a target: could not convert string"):
+        read_target(path, TIMES)
+
+
+@pytest.mark.parametrize("lines", [1, 3, 5])
+def test_a_target_that_lost_its_end_is_refused(tmp_path: Path, lines: int) -> None:
+    path = written(tmp_path)
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[: 1 + lines - 1]))
+    with pytest.raises(BiogripError, match=rf"t.csv: found {lines - 1} readings, wanted 5"):
+        read_target(path, TIMES)
+
+
+@pytest.mark.parametrize("known", [{}, {"target": TIMES - 1}, {"sd": TIMES + 0.1}])
+def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> None:
+    """All of them or some, with what is known, bit for bit."""
+    path = tmp_path / "seeds_3-7.npz"
+    traces = {seed: np.random.default_rng(seed).random(5) for seed in (3, 4, 5, 6, 7)}
+    given = replace(Measurements(TIMES, None, traces), **known)
+    write_measurements(path, given)
+    for seeds in (None, [6, 4]):
+        read = read_measurements(path, seeds)
+        assert list(read.readings) == (seeds or list(traces))
+        for seed, trace in read.readings.items():
+            np.testing.assert_array_equal(trace, traces[seed])
+            assert trace.flags.c_contiguous
+        for name in ("time_s", "target", "sd"):
+            np.testing.assert_array_equal(getattr(read, name), getattr(given, name))
+
+
+def test_damaged_measurements_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "m.npz"
+    write_measurements(path, Measurements(TIMES, None, {0: TIMES}))
+    with pytest.raises(BiogripError, match=r"m.npz: has no trace of seed 3"):
+        read_measurements(path, [0, 3])
+    cut, another, changed = (tmp_path / name for name in ("cut.npz", "csv.npz", "changed.npz"))
+    whole = path.read_bytes()
+    cut.write_bytes(whole[:-9])
+    another.write_text("time_s,target\n0,1\n")
+    changed.write_bytes(whole.replace(TIMES.tobytes(), (TIMES + 1).tobytes()))
+    # A comment that hides the arrays after the first; no list of arrays.
+    hidden, empty = bytearray(whole), bytearray(whole)
+    hidden[whole.index(b"PK\1\2") + 33] = 1
+    end = whole.rindex(b"PK\5\6")
+    empty[end + 4 : end + 16] = bytes(12)
+    (tmp_path / "hidden.npz").write_bytes(hidden)
+    (tmp_path / "empty.npz").write_bytes(empty)
+    for file in (cut, another, changed, *(tmp_path / f"{it}.npz" for it in NOT_READ)):
+        with pytest.raises(BiogripError, match=f"{file.name}: cannot be read"):
+            read_measurements(file)

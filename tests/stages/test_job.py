@@ -39,8 +39,7 @@ sweeps:
 
 def told(given: dict[str, Any]) -> dict[str, Any]:
     """As Snakemake keeps it between the workflow and its jobs."""
-    found: dict[str, Any] = json.loads(json.dumps(given))
-    return found
+    return json.loads(json.dumps(given))
 
 
 @pytest.mark.parametrize("key", ["times_s", "experiment", "gripper", "seeds", "title"])
@@ -86,17 +85,9 @@ def test_the_log_has_what_a_user_can_correct_alone_and_else_a_traceback(tmp_path
 
 
 def test_a_default_of_a_case_goes_before_what_the_study_has() -> None:
-    study = default.study_of(
-        """
-instrument: creep
-protocol: {phases: [{duration_s: 9, stress_Pa: 4}]}
-only: [liquid_drop_2]
-cases:
-  liquid_drop_2:
-    instrument: gripper
-    protocol: {phases: [{duration_s: 9, torque_Nm: 1.0e-9}]}
-"""
-    )
+    own = "instrument: gripper, protocol: {phases: [{duration_s: 9, torque_Nm: 1.0e-9}]}"
+    shared = "instrument: creep\nprotocol: {phases: [{duration_s: 9, stress_Pa: 4}]}"
+    study = default.study_of(f"{shared}\nonly: [{NAME}]\ncases: {{{NAME}: {{{own}}}}}")
     told_of = settings(study, ["instrument"], NAME)
     assert case_of(NAME, told_of).block.instrument == study.case(NAME).block.instrument
 

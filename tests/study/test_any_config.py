@@ -1,10 +1,8 @@
 """Whatever a config says: it passes the checks, or ends in one message."""
 
 import re
-from pathlib import Path
 from typing import Any
 
-import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
@@ -17,9 +15,9 @@ from biogrip.study.messages import Schema
 from biogrip.study.source import overlaid, read_config
 from biogrip.study.study import load_study
 from tests.helpers.key_reference import STUDY, leaves
+from tests.helpers.places import CONFIG
 
-DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"
-DEFAULTS = read_config(DEFAULT)
+DEFAULTS = read_config(CONFIG)
 LINE = re.compile(r"[^:]+: .+: (.|\n)+\.")
 # Keys with a value of their own, outside of what the user names.
 SINGLE = {
@@ -69,7 +67,6 @@ def allowed(shape: Schema) -> st.SearchStrategy[Any]:
 
 
 def block_of(path: str, value: Any) -> dict[str, Any]:
-    """The config that has one key."""
     name, _, rest = path.partition(".")
     return {name: block_of(rest, value) if rest else value}
 
@@ -113,7 +110,7 @@ def overlays(draw: st.DrawFn) -> dict[str, Any]:
 @given(overlays())
 def test_any_config_is_used_or_ends_in_one_message(overlay: dict[str, Any]) -> None:
     try:
-        study = load_study(overlaid(DEFAULTS, overlay), [DEFAULT])
+        study = load_study(overlaid(DEFAULTS, overlay), [CONFIG])
     except BiogripError as error:
         event("refused")
         first, *lines = str(error).split("\n")
@@ -124,15 +121,3 @@ def test_any_config_is_used_or_ends_in_one_message(overlay: dict[str, Any]) -> N
         event("used")
         assert study.cases
         assert built(StudyConfig, plain(study.config)) == study.config
-
-
-@settings(max_examples=100, deadline=None, derandomize=True)
-@given(st.sampled_from(sorted(SINGLE)), st.data())
-def test_a_value_out_of_bounds_is_refused_with_its_key(path: str, data: st.DataObject) -> None:
-    if (high := SINGLE[path].get("maximum")) is None:
-        return
-    floats: Any = st.floats(high, exclude_min=True, allow_infinity=False)
-    beyond = st.integers(high + 1) if SINGLE[path].get("type") == "integer" else floats
-    overlay = block_of(path, data.draw(beyond))
-    with pytest.raises(BiogripError, match=re.escape(f": {path}: found ")):
-        load_study(overlaid(DEFAULTS, overlay), [DEFAULT])

@@ -1,20 +1,22 @@
-"""Coverage of intervals and of verdicts, counted by hand."""
+"""Coverage of intervals and of verdicts, counted by hand; tables as files and as published."""
 
+import re
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
-from scipy.stats import f
+from scipy.stats import binomtest
 
 from biogrip.errors import BiogripError
 from biogrip.records.identifications import INTERVALS
-from biogrip.records.rows import write_object
+from biogrip.records.rows import read_rows, write_object
 from biogrip.stages import intervals as stage
 from biogrip.stages import targets
 from biogrip.study.source import overlaid
 from biogrip.tables.coverage import coverage, verdict_counts
+from biogrip.tables.layout import Column, ShownTable, compare, convert, write
 from tests.helpers.default import study_of
 
 CASE = "liquid_drop_2"
@@ -62,10 +64,16 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
     assert [k[f"shown_{name}"] for name in shown] == [2, 1, 0, 1, 1]
     assert [c_p[f"shown_{name}"] for name in shown] == [2, 0, 0, 2, 1]
     assert "bound_percent" not in c_p
+    # A batch that lost its end is refused, whatever is left of it.
+    lines = file.read_text().splitlines(keepends=True)
+    for kept in range(1, len(lines)):
+        file.write_text("".join(lines[:kept]))
+        with pytest.raises(BiogripError, match=r"seeds_0-2.csv: found \d+ rows, wanted .* delete"):
+            coverage(every_other, [target], [file], [])
 
 
 def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
-    """Intervals of shares by the F distribution, as Clopper and Pearson's are in textbooks."""
+    """With the intervals of Clopper and Pearson that SciPy has."""
     empty = ("", "", "", "")
     rows = [
         # Of k = 1 two intervals within a factor of 3, one of which holds it, and one that is wider.
@@ -89,11 +97,9 @@ def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
     assert [row.get("narrow") for row in found.values()] == [None, 2, None]
     determined = found["determined"]
     for count, tried, name in ((3, 5, "reached"), (2, 3, "true")):
-        more = tried - count + 1
-        low = 1 / (1 + more / (count * f.isf(0.975, 2 * count, 2 * more)))
-        odds = (count + 1) / (tried - count) * f.isf(0.025, 2 * (count + 1), 2 * (tried - count))
-        assert determined[f"{name}_from_percent"] == pytest.approx(100 * low)
-        assert determined[f"{name}_to_percent"] == pytest.approx(100 * odds / (1 + odds))
+        ends = [determined[f"{name}_{end}_percent"] for end in ("from", "to")]
+        low, high = binomtest(count, tried).proportion_ci(method="exact")
+        assert ends == pytest.approx([100 * low, 100 * high])
     assert "at 90 %" in made.caption
 
 
@@ -122,17 +128,63 @@ def test_some_seeds_are_judged_in_full(
     assert k["shown_high"] == pytest.approx(k["high"], rel=1e-3)
 
 
-def test_a_batch_that_lost_its_end_is_refused(tmp_path: Path, target: Path) -> None:
-    """Of each number of rows but the whole: a seed, or a quantity of one."""
-    overlay = OVERLAY.replace("0.9}", "0.9, verdicts_every: 2}")
-    expected, file = tmp_path / "expected.json", tmp_path / CASE / "seeds_1-3.csv"
-    write_object(expected, {"quantities": [{"quantity": "k", "verdict": "determined"}]})
-    study = study_of(overlay)
-    stage.estimate(study.case(CASE), range(1, 4), target, expected, [], file)
-    lines = file.read_text().splitlines(keepends=True)
-    assert len(lines) == 1 + 1 + 5 + 1
-    assert coverage(study, [target], [file], []).rows
-    for kept in range(1, len(lines)):
-        file.write_text("".join(lines[:kept]))
-        with pytest.raises(BiogripError, match=r"seeds_1-3.csv: found \d rows, wanted .* delete"):
-            coverage(study, [target], [file], [])
+def written(table: ShownTable, folder: Path) -> list[str]:
+    """Markdown, LaTeX and HTML of a table, which is `t.csv` in a folder."""
+    write(table, folder / "t.csv")
+    for end in ("md", "tex"):
+        (folder / f"t.{end}").write_text(convert(folder / "t.html", f".{end}"))
+    return [(folder / f"t.{end}").read_text() for end in ("md", "tex", "html")]
+
+
+def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
+    columns = Column("case", "Case"), Column("value", "Value", 3), Column("none", "None")
+    rows = [{"case": "a_b", "value": 1234.5678}, {"case": "c & d", "value": -0.0, "none": None}]
+    table = ShownTable("Fifty % of a_b.", columns, [*rows, {"none": float("nan")}])
+    markdown, latex, page = written(table, tmp_path)
+    found = read_rows(tmp_path / "t.csv", ["case", "value", "none"])[1:]
+    assert found == [["a_b", "1234.57", ""], ["c & d", "0", ""], ["", "", ""]]
+    assert "1.23e+03" in markdown
+    assert "None" not in markdown + latex + page
+    assert r"Fifty \% of a\_b." in latex
+    assert "c &amp; d" in page
+
+
+@pytest.mark.parametrize(
+    ("given", "latex"),
+    [
+        (r"dose & \input{x} #2", r"dose \& \textbackslash{}input\{x\} \#2"),
+        ("5$ a day, 10$ a week\n\n50 %", r"5\$ a day, 10\$ a week 50 \%"),
+        ("a|b\nc {y}", r"a|b c \{y\}"),
+        ("<img onerror=x> a_b ~ ^", r"<img onerror=x> a\_b \textasciitilde{} \textasciicircum{}"),
+    ],
+)
+def test_markup_is_text_in_every_format(tmp_path: Path, given: str, latex: str) -> None:
+    """Of a caption, a heading and a cell."""
+    heading = given.replace("\n", " ")
+    table = ShownTable(given, (Column("a", heading),), [{"a": given}])
+    markdown, tex, page = written(table, tmp_path)
+    assert rf"\caption{{{latex}}}" in tex
+    assert not re.search(r"(?<!\\)[#$%&_~^]|\\input", tex)
+    assert [len(re.findall(r"(?<!\\)\|", row)) for row in markdown.splitlines()[-3:]] == [2] * 3
+    assert "<img" not in markdown + page
+    assert read_rows(tmp_path / "t.csv", ["a"])[1:] == [[given]]
+
+
+def test_regenerated_tables_are_the_same_bytes_or_their_lines_are_shown(tmp_path: Path) -> None:
+    published, made = tmp_path / "published", tmp_path / "made"
+    for folder in (published, made):
+        folder.mkdir()
+        (folder / "a.csv").write_text("k,c\n1,2\n3,4\n")
+    write(ShownTable("Text.", (Column("k", "k"),), [{"k": 1.5}]), made / "b.csv")
+    (published / "b.md").write_text("Text.\n\n| k   |\n|:----|\n| 1.5 |\n")
+    files = [made / "a.csv", made / "b.html"]
+    assert compare(published, files).startswith("2 files of tables compared with ")
+    (made / "a.csv").write_text("k,c\n1,2\n3,5\n")
+    (made / "c.csv").write_text("new\n")
+    with pytest.raises(BiogripError) as error:
+        compare(published, [*files, made / "c.csv"])
+    said = str(error.value).splitlines()
+    assert said[0] == f"the regenerated tables differ from {published}."
+    assert said[-3:] == ["-3,4", "+3,5", "c.csv: is not published."]
+    with pytest.raises(BiogripError, match="holds no tables to compare with"):
+        compare(published, [])

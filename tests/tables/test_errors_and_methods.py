@@ -1,4 +1,4 @@
-"""Tables of errors, methods, models and verdicts, recomputed by hand."""
+"""Tables of errors, methods, models, verdicts and printed values, recomputed by hand."""
 
 from pathlib import Path
 from typing import Any
@@ -6,14 +6,29 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import binomtest
 
 from biogrip.fit.problem import METHODS
 from biogrip.physics.models import MODELS, Published, Sample
-from biogrip.records.identifications import MODEL_FITS, columns
+from biogrip.records.identifications import (
+    ALL,
+    MODEL_FITS,
+    basins,
+    columns,
+    near_noise,
+    near_noise_words,
+)
 from biogrip.records.rows import write_object
-from biogrip.tables.cases import errors, errors_of_case, verdicts
+from biogrip.tables.cases import (
+    errors,
+    errors_of_case,
+    interval_of,
+    interval_of_value,
+    value_in_case,
+    verdicts,
+)
 from biogrip.tables.methods import methods, models
-from tests.helpers.default import seen, study_of
+from tests.helpers.default import STUDY, seen, study_of
 
 PAPER = Published(
     table=9,
@@ -66,17 +81,12 @@ def test_error_table_is_the_arithmetic_it_says(eleven_seeds: Path) -> None:
     assert total["median_absolute_error_percent"] == pytest.approx(0.0, abs=1e-12)
     assert np.isnan(rows["k_p"]["median_error_percent"])
     # k = 5 to 10 come near the noise, and 11 to 15 end above it.
-    two = [row for row in made.rows if row["parameter"] == "k"][1:]
-    assert [(row["basin"], row["seeds"], row["median_identified"]) for row in two] == [
-        ("near the noise", 6, 7.5),
-        ("above the noise", 5, 13.0),
-    ]
-    assert [row["p25_identified"] for row in two] == [6.25, 12.0]
+    shown = ("basin", "seeds", "median_identified", "p25_identified")
+    two = [tuple(row[n] for n in shown) for row in made.rows if row["parameter"] == "k"][1:]
+    assert two == [("near the noise", 6, 7.5, 6.25), ("above the noise", 5, 13.0, 12.0)]
 
 
-def test_joined_errors_are_within_the_tolerance_that_their_heading_names(
-    eleven_seeds: Path,
-) -> None:
+def test_joined_errors_are_within_the_tolerance_their_heading_names(eleven_seeds: Path) -> None:
     study = seen(near_noise_tolerance=0.005, cases={"drop": case_of(0.005)})
     made = errors(study, [eleven_seeds])
     # 1.001 and 1.0046.
@@ -88,7 +98,6 @@ def test_joined_errors_are_within_the_tolerance_that_their_heading_names(
 
 
 def study(parameters: dict[str, float], samples: int, *methods: str, seeds: int = 1) -> Any:
-    """Of one case, a drop."""
     known = {"sample": Sample("generalized_maxwell"), "parameters": parameters, "seeds": seeds}
     own = seen(config=seen(methods=methods))
     cases = {"drop": seen(name="drop", samples=samples, study=own, **known)}
@@ -99,10 +108,11 @@ def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> No
     """1.03 has a chi-squared that is 61 above the optimum, and is all that the genes can hold."""
     rows = []
     for seed, genetic, polished in ((0, 1.2, 1.0), (1, 1.0304, 1.0), (2, 1.0306, 0.9)):
-        for method, misfit, n in zip(
-            METHODS_TRIED, (genetic, polished), (9, 10 + seed), strict=True
-        ):
-            rows.append([method, seed, 8.0, 1.0, 3.0, 2.0, misfit, 1.02, n])
+        at = seed, 8.0, 1.0, 3.0, 2.0
+        rows += [
+            ["genetic", *at, genetic, 1.02, 9],
+            ["least_squares", *at, polished, 1.02, 10 + seed],
+        ]
     path = identified(tmp_path / "drop.csv", rows)
     pd.read_csv(path).assign(encodable_misfit=1.03).to_csv(path, index=False)
     parameters = {"k": 10.0, "k_p": 1.0, "c": 4.0, "c_p": 1.0}
@@ -111,10 +121,7 @@ def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> No
     assert (first["seeds"], first["reached_share"]) == (3, pytest.approx(1 / 3))
     assert second["reached_share"] == 1.0
     assert first["encodable_rise"] == second["encodable_rise"] == pytest.approx(60.9)
-    # By Wilson's formula, (p + z^2/2n +- z sqrt(p (1 - p)/n + z^2/4n^2)) / (1 + z^2/n).
-    z2 = 1.959964**2
-    middle, half = 1 / 3 + z2 / 6, np.sqrt(z2) * np.sqrt(2 / 27 + z2 / 36)
-    ends = np.array([middle - half, middle + half]) / (1 + z2 / 3)
+    ends = binomtest(1, 3).proportion_ci(method="wilson")
     np.testing.assert_allclose([first["reached_low"], first["reached_high"]], ends, rtol=1e-6)
     assert second["median_evaluations"] == 11
     assert first["error_percent k"] == pytest.approx(20.0)
@@ -163,22 +170,14 @@ cases:
 
 def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     item = {"unit": "N/m", "value": 2.0, "low": 1.0, "high": 3.0, "excluded": [[1.5, 1.8]]}
-    measured: dict[str, Any] = {
-        "fit": "ok",
-        "confidence": 0.9,
-        "quantities": [
-            {**item, "quantity": "k", "verdict": "determined"},
-            {**item, "quantity": "c + c_p", "verdict": "bounded above", "low": None},
-        ],
-        "trades": [{"members": ["c", "c_p"], "quantity": "c + c_p"}],
-        "notes": [],
-    }
-    expected = {**measured, "quantities": [{**measured["quantities"][0], "high": 4.0}]}
-    files = [tmp_path / "a.json", tmp_path / "b.json"]
-    for file, content in zip(files, (measured, expected), strict=True):
-        write_object(file, content)
+    first = {**item, "quantity": "k", "verdict": "determined"}
+    second = {**item, "quantity": "c + c_p", "verdict": "bounded above", "low": None}
+    told: dict[str, Any] = {"fit": "ok", "confidence": 0.9, "notes": []}
+    told["trades"] = [{"members": ["c", "c_p"], "quantity": "c + c_p"}]
+    write_object(tmp_path / "a.json", {**told, "quantities": [first, second]})
+    write_object(tmp_path / "b.json", {**told, "quantities": [{**first, "high": 4.0}]})
     known = seen(name="x", title="X", parameters={"k": 2.5, "c": 1.0, "c_p": 0.5})
-    table = verdicts(known, files[0], files[1:])
+    table = verdicts(known, tmp_path / "a.json", [tmp_path / "b.json"])
     k, total = table.rows
     assert k["excluded"] == "1.5 to 1.8"
     headings = {column.name: column.heading for column in table.columns}
@@ -188,3 +187,64 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     assert (total["target"], total["value"], total["high"]) == (1.5, None, 3.0)
     assert total["expected_verdict"] is None
     assert "c and c_p trade against each other: determined is c + c_p." in table.caption
+
+
+@pytest.mark.parametrize(
+    ("printed", "target", "error", "ends"),
+    [
+        # 10 (1 - 0.027) to 10 (1 - 0.0255): two digits are too few, for 9.7 errs by 3 %.
+        (9.7, 10.0, "2.6", (9.73, 9.745)),
+        (0.97, 1.0, "2.6", (0.973, 0.9745)),
+        # 35 (1 - 0.062) to 35 (1 - 0.0605).
+        (32.8, 35.0, "6.1", (32.83, 32.8825)),
+        # The error is cut off: rounded, it would be 0.9. 299.9 * 1.009 = 302.5991.
+        (302.5, 299.9, "-0.8", (302.45, 302.5991)),
+        # A sign that belies its value tells no side.
+        (6.7, 9.5, "-29", (6.65, 6.7925)),
+        # No number, or one that the value belies, leaves the value alone.
+        (1e-4, 1e-3, ">100", (5e-5, 2e-4)),
+        (5.5, 10.0, "3", (5.45, 5.6)),
+        (5.5, None, None, (5.45, 5.6)),
+        (5.5, 0.0, "3", (5.45, 5.6)),
+    ],
+)
+def test_a_value_and_its_error_leave_an_interval(
+    printed: float, target: Any, error: Any, ends: tuple[float, float]
+) -> None:
+    assert interval_of(printed, target, error) == pytest.approx(ends, rel=1e-12)
+
+
+def test_a_value_alone_is_rounded_or_cut_off() -> None:
+    assert interval_of_value(0.23) == pytest.approx((0.225, 0.24))
+
+
+def test_of_dampers_that_trade_the_sum_is_ten() -> None:
+    """9.7375 + 0.23, and 9.7375 + 0.25: c has the printed error, c_p none."""
+    for name, value in (("liquid_drop_1", 9.9675), ("liquid_drop_2", 9.9875)):
+        told = value_in_case(STUDY.cases[name], ["c", "c_p"])
+        assert told
+        assert told[0] == pytest.approx(value)
+        assert told[1] < told[0] < told[2]
+    assert value_in_case(STUDY.cases["liquid_drop_1"], ["alpha"]) is None
+
+
+def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:
+    runs = pd.DataFrame({"seed": range(len(misfit)), "misfit": misfit, "noise_rms": noise})
+    return runs.astype({"noise_rms": float})
+
+
+def test_two_basins_have_a_tenth_of_the_runs_each() -> None:
+    """And none is told where the noise is unknown, or absent."""
+    one = basins(found([1.05, 1.01, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), 0.02)
+    assert {name: len(runs) for name, runs in one.items()} == {ALL: 20}
+    two = basins(found([1.05, 1.06, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), 0.02)
+    assert two["above the noise"]["seed"].tolist() == [0, 1]
+    assert two["near the noise"]["seed"].tolist() == list(range(2, 20))
+    for noise in (None, 0.0):
+        assert list(basins(found([3.0, 1.0], [noise, noise]), 0.02)) == [ALL]
+
+
+def test_near_the_noise_is_a_share_of_it() -> None:
+    runs = found([1.019, 1.021, 2.03, 1.0], [1.0, 1.0, 2.0, None])
+    np.testing.assert_array_equal(near_noise(runs, 0.02), [True, False, True, False])
+    assert near_noise_words(0.025) == "within 2.5 % of the noise"

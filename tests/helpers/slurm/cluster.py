@@ -34,13 +34,7 @@ def missing_packages() -> list[str]:
 
 @contextmanager
 def one_node_slurm() -> Iterator[dict[str, str]]:
-    """Run a Slurm with this machine as its one node; gives the environment to reach it.
-
-    Raises
-    ------
-    SlurmError
-        If it does not start, with what its daemons say.
-    """
+    """Run a Slurm with this machine as its one node; gives the environment to reach it."""
     with tempfile.TemporaryDirectory(prefix="biogrip-slurm-") as scratch, ExitStack() as running:
         folder = Path(scratch)
         environment = _configure(folder)
@@ -117,7 +111,6 @@ def _daemon(name: str, environment: dict[str, str], folder: Path) -> Iterator[No
 
 
 def _in_time(command: str, environment: dict[str, str]) -> bool:
-    """Whether a command succeeds before patience is over."""
     give_up = time.monotonic() + PATIENCE_S
     while subprocess.run(command, shell=True, env=environment, capture_output=True).returncode:
         if time.monotonic() > give_up:
