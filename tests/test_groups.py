@@ -15,7 +15,9 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.command.outputs import WRITTEN_BY
 from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
+from biogrip.groups import _bounds
 from biogrip.judging.cells import FEWEST_CELLS, Cell, adjusted, compare, estimate
+from biogrip.judging.verdicts import BOUNDED_ABOVE
 from tests.helpers.identified import identify
 from tests.helpers.places import ROOT
 
@@ -189,6 +191,12 @@ def test_cells_that_are_only_bounded_are_named_with_what_follows(
     assert "too few" in said(rows)
     rows[3] |= {**none, "k verdict": "not determined"}
     assert "(at least 30), so in no mean; that of all cells is higher." in said(rows)
+
+
+def test_as_many_bounds_as_are_few_are_named() -> None:
+    cells = [Cell(f"c{n}", "a", others={"k": (BOUNDED_ABOVE, 7.0 + n)}) for n in range(3)]
+    assert [*_bounds("k", cells[:2], 2)] == ["in c0 (at most 7), c1 (at most 8)"]
+    assert [*_bounds("k", cells, 2)] == ["bounded above in 3 (at most 7 to 9)"]
 
 
 def test_a_median_takes_cells_enough_and_half_of_all() -> None:

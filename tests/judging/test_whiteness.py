@@ -95,6 +95,11 @@ def test_the_cumulative_periodogram_is_kolmogorovs() -> None:
         # SciPy has steps of 1/1999 where there are steps of 1/2000.
         assert uneven(residual, NOTHING) == pytest.approx(expected, rel=0.15, abs=0.02)
     assert uneven(np.ones(3), NOTHING[:, :3]) == 1.0
+    # Half the rate of the readings, at which noise has one degree of freedom, is left out.
+    noise = np.random.default_rng(0).standard_normal(64)
+    alternating = 100 * (-1.0) ** np.arange(64)
+    expected = uneven(noise, NOTHING[:, :64])
+    assert uneven(noise + alternating, NOTHING[:, :64]) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize(("away", "doubted"), [(3.5, False), (8.0, True), (50.0, True)])

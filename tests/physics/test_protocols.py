@@ -18,6 +18,7 @@ from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.misfit import SeriesMisfit, make_misfit
 from biogrip.physics.models import Sample, generalized_maxwell
 from biogrip.physics.protocol import (
+    SWEEP,
     Course,
     Phase,
     evaluate,
@@ -182,3 +183,8 @@ def test_zeros_are_those_of_a_bracketing_search() -> None:
             given = {"args": (weights, poles, level), "xtol": 1e-14}
             alone = brentq(lambda x, w, p, b: np.sum(w / (x - p)) - b, *inside, **given)
             assert zero == pytest.approx(alone, rel=1e-9)
+
+
+def test_a_place_in_a_sweep_names_modulus_and_frequency() -> None:
+    places = [SWEEP.place(omega) for omega in (2.0, -0.5)]
+    assert places == ["2 rad/s (storage)", "0.5 rad/s (loss)"]
