@@ -179,17 +179,14 @@ def fit_any_sample(residuals: Residuals) -> AnySampleFit:
     return fit
 
 
-def spread_rates(
-    first_s: float, last_s: float, a_decade: float = _RATES_A_DECADE, shift: float = 0.0
-) -> Array:
+def spread_rates(first_s: float, last_s: float) -> Array:
     """Return rates of lags in 1/s, ascending, for readings from a first time to a last one.
 
-    On the scale log(1 + r `last_s`) they are even, so many a decade, and may be shifted by a share
-    of their spacing. The slowest lag is a line in time, the fastest a bare spring or damper. There
-    is one on either side of 1/`first_s`.
+    On the scale log(1 + r `last_s`) they are even, so many a decade. The slowest lag is a line in
+    time, the fastest a bare spring or damper. There is one on either side of 1/`first_s`.
     """
-    spacing = np.log(10) / a_decade
-    places = np.arange(shift, np.log1p(_FASTEST * last_s / first_s) / spacing) * spacing
+    spacing = np.log(10) / _RATES_A_DECADE
+    places = np.arange(0.0, np.log1p(_FASTEST * last_s / first_s) / spacing) * spacing
     inner, middle = np.expm1(places[places > 0]) / last_s, 1 / first_s
     ends = _SLOWEST / last_s, _FASTEST / first_s, 1e6 / first_s
     return np.unique(np.concatenate((ends, inner, [middle, middle * (1 + 1e-9)])))
