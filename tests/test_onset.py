@@ -295,6 +295,16 @@ def test_a_ramp_before_the_first_reading_is_said_to_change_values(ramp_s: float)
     assert "ramp" not in notes_on(times, values, config=protocol, **given)[1]
 
 
+def test_a_start_between_0_and_the_first_reading_is_found() -> None:
+    """Of a power law, which no other start fits; it is good to half a per cent with one at 0."""
+    times: Array = 1.0 + 0.02 * np.arange(1000)
+    values = (times - 0.6) ** 0.4 + 0.004 * np.random.default_rng(0).standard_normal(len(times))
+    status, notes = notes_on(times, values, reads="strain", model="power_law", hold=1.0)
+    assert status == "doubtful"
+    (start_s,) = re.findall("If it starts at (.*?) s of the clock, the fit is far better", notes)
+    assert float(start_s) == pytest.approx(0.6, abs=0.005)
+
+
 def test_limits_hold_for_ramps_as_short_as_is_said() -> None:
     """In a ramp before 0 a sample relaxes for half its length, over tau."""
     times: Array = 0.01 * np.arange(1.0, 1001.0)

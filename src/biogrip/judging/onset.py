@@ -229,6 +229,8 @@ class OnsetFits:
         yield from pairwise(edges[max(after - _NEAR, 0) : after + _NEAR].tolist())
 
 
+# Starts from 0 to the first reading that are tried for a better one.
+_BETWEEN = 5
 # Starts that are compared, the last so much of an interval before the first reading.
 _STARTS, _NEAREST = 40, 0.01
 _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
@@ -328,19 +330,20 @@ def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
     time_s, best = fits.time_s, diagnosis.likelihood.best
     later_s, given = 2 * time_s[0] - time_s[1], fits.at(0.0, best)
     rejected = diagnosis.status == REJECTED
-    level, other = chdtri(1, levels.SURELY), given
-    if not rejected:
-        other = fits.at(later_s, best)
-    if rejected or compute_fall(len(time_s), given.misfit, other.misfit) > level:
+    level, white_sd = chdtri(1, levels.SURELY), levels.WHITE * estimate_noise(fits.readings)
+    tried_s = np.linspace(0.0, later_s, _BETWEEN + 1)[1:].tolist()
+    other = min((fits.at(start_s, best) for start_s in tried_s), key=lambda fit: fit.misfit)
+    if rejected:
         other = fits.best(later_s)
+    elif compute_fall(len(time_s), given.misfit, other.misfit) > level:
+        other = fits.near(other)
     alike = _as_good(fits, other)
     starts_s = [min(fit.onset_s for fit in alike), max(fit.onset_s for fit in alike)]
     told = starts_s[1] - starts_s[0] < time_s[1] - time_s[0]
     when = f"at {other.onset_s:.4g} s" if told else "at any time from {:.4g} to {:.4g} s"
     fall = compute_fall(len(time_s), given.misfit, other.misfit)
     found = ""
-    white = other.misfit < levels.WHITE * estimate_noise(fits.readings)
-    if fall > level and 0 < other.onset_s < time_s[0] and white:
+    if fall > level and 0 < other.onset_s < time_s[0] and other.misfit < white_sd:
         found = f"the fit is far better (χ² falls by {plain(fall)})"
         found += "" if told else f", and values hang on it: {_moved(diagnosis, None, alike)}"
     elif not rejected and fall > -chdtri(1, levels.AS_GOOD):
