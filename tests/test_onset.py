@@ -297,7 +297,7 @@ def test_a_ramp_before_the_first_reading_is_said_to_change_values(ramp_s: float)
 
 def test_a_start_between_0_and_the_first_reading_is_found() -> None:
     """Of a power law, which no other start fits; it is good to half a per cent with one at 0."""
-    times: Array = 1.0 + 0.02 * np.arange(1000)
+    times: Array = 1.0 + 0.02 * np.arange(1000.0)
     values = (times - 0.6) ** 0.4 + 0.004 * np.random.default_rng(0).standard_normal(len(times))
     status, notes = notes_on(times, values, reads="strain", model="power_law", hold=1.0)
     assert status == "doubtful"
