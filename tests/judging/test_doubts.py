@@ -192,7 +192,7 @@ def test_noise_that_grows_over_decades_is_weighed_and_its_share_advised() -> Non
     found = told(times, (1 + times / 5) * noise, models, **given)
     assert found.status == DOUBTFUL
     assert "none of the 3 models" in found.data["advice"]
-    (share,) = re.findall(r"weighted by measurement.noise_share (\S+) in", str(found))
+    (share,) = re.findall(r"weighted by noise_share=(\S+?)\.(?:\s|$)", str(found))
     assert float(share) == pytest.approx(0.01, rel=0.2)
     weights = {"measurement": {"noise_share": float(share)}}
     again = told(times, (1 + times / 5) * noise, models, config=weights, **given)
