@@ -224,8 +224,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         numbers = ~np.any(np.isnan(history), axis=1)
         load = _load(path, columns, history[numbers], lines[numbers], units)
         # Nothing tells what came before its first row with a number, nor after the last.
-        first, last = history[numbers][[0, -1], 0]
-        values[(values[:, 0] < first) | (values[:, 0] > last), 1:] = np.nan
+        begins, ends = history[numbers][[0, -1], 0]
+        values[(values[:, 0] < begins) | (values[:, 0] > ends), 1:] = np.nan
     chosen = _chosen(path, sheet, table, columns)
     names_and_units = (
         {"column": table.names[i], "unit": unit} for i, unit in zip(indices, units, strict=True)
