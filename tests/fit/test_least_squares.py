@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit import least_squares, levenberg_marquardt
 from biogrip.fit.least_squares import FINE
 from biogrip.fit.levenberg_marquardt import Minima, Normal, minimize
@@ -116,6 +116,22 @@ def test_of_linear_residuals_the_decrease_is_as_predicted(monkeypatch: pytest.Mo
     assert found.x[0] == pytest.approx([0.5, -0.25], abs=1e-3)
     assert told[0][0] == pytest.approx(told[0][1], rel=1e-2)
     assert told[0][0] > 10
+
+
+class UpTo:
+    """A constraint that no point fulfils beyond a value of the first parameter."""
+
+    def eliminated(self, normal: Normal, x: Array, problem: IntArray) -> tuple[Normal, BoolArray]:
+        return normal, np.zeros(x.shape, dtype=bool)
+
+    def restored(self, x: Array, problem: IntArray, eliminated: BoolArray) -> Array:
+        return np.where(x[:, :1] > 0.4, np.nan, x)
+
+
+def test_a_step_that_is_impossible_is_shortened() -> None:
+    bounds = np.full((1, 2), -2.0), np.full((1, 2), 2.0)
+    found = minimize(linear, np.array([[-1.0, 1.0]]), *bounds, 1e-8, UpTo())  # type: ignore[arg-type]
+    assert 0.3 < found.x[0, 0] <= 0.4
 
 
 TIMES = clean("endothelial_cell")[0]

@@ -171,7 +171,7 @@ def _advance(
     gained = np.where(possible, normal.square_sum - found.square_sum, -np.inf)
     small = tolerance * normal.square_sum
     done = (np.abs(gained) <= small) & (predicted <= small)
-    done |= (np.max(np.abs(step), axis=1) <= _STANDSTILL) | np.all(tried == x, axis=1)
+    done |= (np.max(np.abs(step), axis=1) <= _STANDSTILL) | possible & np.all(tried == x, axis=1)
     _damp(state, gained, predicted)
     better = gained > 0
     state.x = np.where(better[:, None], tried, x)
