@@ -45,10 +45,7 @@ def gripped(times: Array, values: Array, **given: Any) -> TraceResult:
     return told(times, values, config={"protocol": PROTOCOL}, **given)
 
 
-RAMP = (ramp(30.0, 0.0, 1e-9), hold(30.0, 0.3e-9))
-
-
-@pytest.mark.parametrize("phases", [PHASES, RAMP])
+@pytest.mark.parametrize("phases", [PHASES, (ramp(30.0, 0.0, 1e-9), hold(30.0, 0.3e-9))])
 @pytest.mark.parametrize("model", ["generalized_maxwell", "fractional_kelvin_voigt"])
 @pytest.mark.parametrize("options", [{}, {"offset": True, "drift": True}])
 def test_before_the_protocol_nothing_responds(
@@ -57,13 +54,12 @@ def test_before_the_protocol_nothing_responds(
     """Times before it are those of a first phase without torque."""
     own = replace(set_up(STUDY.gripper, phases, Sample(model)), **options)
     padded = replace(own, phases=(hold(8.0, 0.0), *phases))
-    times = np.arange(-40, 301) / 5
+    times, x = np.arange(-40, 301) / 5, np.log(own.model.example)
     values = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
-    x = np.log(own.model.example)
-    one, other = own.of(times, values), padded.of(times + 8.0, values)
-    for got, expected in zip(one.residuals(x), other.residuals(x), strict=True):
+    one, other = own.of(times, values).residuals, padded.of(times + 8.0, values).residuals
+    for got, expected in zip(one(x), other(x), strict=True):
         assert got == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
-    misfits = [problem.residuals.misfit(np.exp(x)[None]) for problem in (one, other)]
+    misfits = [of.misfit(np.exp(x)[None]) for of in (one, other)]
     assert misfits[0] == pytest.approx(misfits[1], rel=1e-9)
 
 
@@ -87,25 +83,14 @@ CLOCKS = {
 @pytest.mark.parametrize("clock", CLOCKS)
 def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
     """Its misfit is no higher than with the onset of the simulation."""
-    times = CLOCKS[clock]
+    times, truth = CLOCKS[clock], {"k": 300.0, "k_p": 200.0, "c": 3000.0}
     protocol = (hold(float(times[-1]), 1.0),)
     creep = set_up(INSTRUMENTS["strain"], protocol, Sample("zener_maxwell"))
-    truth = {"k": 300.0, "k_p": 200.0, "c": 3000.0}
     exact = simulate(creep, truth, times)
     noise = 0.02 * exact.max() * np.random.default_rng(0).standard_normal(len(times))
     fits = OnsetFits(creep, times, exact + noise)
-    best = fits.best(float(times[0]))
-    true = fits.at(0.0, np.log(list(truth.values())))
+    best, true = fits.best(float(times[0])), fits.at(0.0, np.log([*truth.values()]))
     assert best.misfit <= true.misfit * (1 + 1e-9)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("last_s", [1e3, 1e4])
-def test_a_trace_over_many_decades_of_time_has_an_answer(last_s: float) -> None:
-    """A liquid on which no reading of the first decades moves, and exact times."""
-    times = np.geomspace(1e-4, last_s, 81)
-    found = told(times, 1.0 + times, reads="strain", hold=1.0, model="maxwell").to_frame()
-    np.testing.assert_allclose(found["value"], 1.0, rtol=1e-6)
 
 
 @pytest.mark.nightly
@@ -157,10 +142,8 @@ def notes_on(times: Array, values: Array, **given: Any) -> tuple[str, str]:
 
 
 SPACINGS = {
-    "even": np.arange(1, 61.0),
-    "from its first interval": np.arange(5, 61.0),
+    "even, from its first interval": np.arange(5, 61.0),
     "few": np.geomspace(1.0, 1e3, 10),
-    "three decades": np.geomspace(0.06, 60.0, 4000),
     "eight decades": np.geomspace(1e-3, 1e5, 80),
     "three rates": np.r_[np.arange(0.2, 1, 0.01), np.arange(1, 10, 0.1), np.arange(10, 100.0)],
     "at random": np.sort(np.random.default_rng(0).uniform(0, 60, 200)),
@@ -193,18 +176,17 @@ def test_a_late_start_is_advised_with_its_limits_and_with_the_tare() -> None:
     values += 0.3 * np.random.default_rng(2).standard_normal(len(times))
     given: dict[str, Any] = {"reads": "strain", "model": "kelvin_voigt", "hold": 1.0}
     status, notes = notes_on(times, values, **given)
-    assert status == "rejected"
+    assert (status, "drifts" in notes) == ("rejected", False)
     (limits,) = re.findall(r"constant until \S+ s \((\S+) to (\S+)\) of its clock", notes)
     assert float(limits[0]) < 8.7
     assert float(limits[1]) > 8.4
     assert "readings before the start are constant, but 42 and not 0" in notes
-    assert "drifts" not in notes
     found = told(times, values, start="fit", offset=True, **given)
-    assert "not 0" not in str(found)
     low, high = found.data["onset_limits_s"]
     assert low < 8.7
     assert high > 8.4
     assert f"({low:.2f} to {high:.2f}) of the clock, as fitted" in str(found)
+    assert "not 0" not in str(found)
 
 
 @pytest.mark.nightly
@@ -217,21 +199,6 @@ def test_models_are_compared_each_at_its_own_onset() -> None:
     found = told(times, values, models, start="fit", reads="strain", model=models[0], hold=1.0)
     misfits = {row["model"]: row["misfit_rad"] for row in found.data["models"]}
     assert misfits["springpot"] == pytest.approx(0.02, rel=0.15)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("unit_s", [1e-3, 86_400.0])
-def test_a_fitted_onset_lies_between_its_readings_on_any_clock(unit_s: float) -> None:
-    """Log-spaced over five decades on either side, most readings far further apart than there."""
-    apart = np.geomspace(1e-3, 1e2, 60)
-    times = np.r_[-apart[::-3], apart]
-    values = np.where(times > 0, 1000 * np.exp(-np.clip(times, 0, None)), 0.0)
-    values += 5.0 * np.random.default_rng(7).standard_normal(len(times))
-    given: dict[str, Any] = {"reads": "modulus", "model": "maxwell", "start": "fit"}
-    found = told(unit_s * (times + 200), values, **given)
-    ends_s = np.array([found.data["onset_s"], *found.data["onset_limits_s"]])
-    assert np.abs(ends_s / unit_s - 200).max() < 1.5e-3
-    assert found.to_frame().loc["k", "value"] == pytest.approx(1000, rel=0.02)
 
 
 HOLD = np.arange(0.4, 44, 0.4)
@@ -250,48 +217,41 @@ def test_a_clock_may_count_seconds_since_1970() -> None:
 
 
 @pytest.mark.parametrize(
-    ("model", "reads", "clean", "said"),
+    ("model", "reads", "fit", "said"),
     [
-        (
-            "maxwell",
-            "force",
-            2.0 * np.exp(-HOLD / 8),
-            "If it starts at any time from 0 to 16.4 s of the clock, the trace fits as well: k ",
-        ),
-        ("kelvin_voigt", "strain", (1 - np.exp(-HOLD / 8)) / 100, "If it starts at 16 s of the"),
+        ("maxwell", "force", "doubtful", "any time from 0 to 16.4 s of the clock, the trace fits "),
+        ("kelvin_voigt", "strain", "rejected", "16 s of the"),
     ],
 )
 def test_a_hold_on_the_clock_of_the_whole_test_is_not_ok(
-    model: str, reads: str, clean: Array, said: str
+    model: str, reads: str, fit: str, said: str
 ) -> None:
     """Exponentials look alike from any start; where readings show another, advice is that."""
+    left = np.exp(-HOLD / 8)
+    clean, held = (2.0 * left, 1e-3) if reads == "force" else ((1 - left) / 100, 1.0)
     values = clean + 2e-3 * clean.max() * np.random.default_rng(3).standard_normal(len(HOLD))
-    given = {"reads": reads, "model": model, "hold": 1e-3 if reads == "force" else 1.0}
+    given = {"reads": reads, "model": model, "hold": held}
     status, notes = notes_on(HOLD + 16, values, **given)
-    assert status == ("rejected" if model == "kelvin_voigt" else "doubtful")
+    assert (status, "drifts" in notes) == (fit, False)
     assert "The readings begin 16.4 s after the step of the protocol" in notes
-    assert said in notes
-    assert "drifts" not in notes
+    assert f"If it starts at {said}" in notes
     status, notes = notes_on(HOLD + 16, values, start=16.0, **given)
     assert (status, "begin" in notes) == ("ok", False)
 
 
-@pytest.mark.parametrize("ramp_s", [1.0, pytest.param(0.0, marks=pytest.mark.nightly)])
-def test_a_ramp_before_the_first_reading_is_said_to_change_values(ramp_s: float) -> None:
-    """Not where it is told, nor where the first reading comes soon after a step."""
-    times = np.geomspace(1.01 if ramp_s else 1e-3, 200.0, 200)
-    phases = [{"duration_s": 300.0, "strain": 1.0}]
-    if ramp_s:
-        phases[:0] = [{"duration_s": ramp_s, "strain": 0.0, "to_strain": 1.0}]
-    slope = 3.0 * np.expm1(ramp_s / 3.0) / ramp_s if ramp_s else 1.0
-    values = 100 + 200 * slope * np.exp(-times / 3.0)
+def test_a_ramp_before_the_first_reading_is_said_to_change_values() -> None:
+    """Not where it is told."""
+    times = np.geomspace(1.01, 200.0, 200)
+    values = 100 + 600 * np.expm1(1 / 3) * np.exp(-times / 3.0)
     values += 0.5 * np.random.default_rng(0).standard_normal(len(times))
     given = {"reads": "stress", "model": "zener_maxwell"}
     status, notes = notes_on(times, values, hold=1.0, **given)
-    assert (status, "If the load was no step" in notes) == ("ok", bool(ramp_s))
-    if said := re.findall("k would be (.*?) Pa; c", notes):
-        assert float(said[0]) == pytest.approx(200.0, rel=0.02)
-    protocol = {"instrument": "relaxation", "protocol": {"phases": phases}}
+    assert (status, "If the load was no step" in notes) == ("ok", True)
+    (said,) = re.findall("k would be (.*?) Pa; c", notes)
+    assert float(said) == pytest.approx(200.0, rel=0.02)
+    ramped = {"duration_s": 1.0, "strain": 0.0, "to_strain": 1.0}
+    phases = {"phases": [ramped, {"duration_s": 300.0, "strain": 1.0}]}
+    protocol = {"instrument": "relaxation", "protocol": phases}
     assert "If the load was no step" not in notes_on(times, values, config=protocol, **given)[1]
 
 

@@ -13,7 +13,9 @@ from tests.helpers.identified import by_quantity, identified, identify, write_tr
 
 RADIUS_M = 2.5e-6
 STIFF_PA, SOFT_PA, TIME_S = 1200.0, 800.0, 3.0
-SPHERE = ("--sphere", "2.5 um", "--model", "zener_maxwell", "--no-compare")
+SPHERE = ("--sphere", "2.5 um", "--no-compare")
+APPROACH = ["--reading", "force=force_nN", "--load", "indentation_nm", *SPHERE]
+APPROACH += ["--model", "zener_maxwell"]
 
 
 def _approach(time_s: Array, depth_m: float = 5e-7, lasts_s: float = 0.5) -> Array:
@@ -42,10 +44,7 @@ def afm(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_an_approach_and_its_dwell_tell_the_modulus_of_young(afm: Path) -> None:
-    found = identified(
-        *(afm.parent, afm, "--reading", "force=force_nN", "--load", "indentation_nm", *SPHERE),
-        *("--until", "29.9", "--start", "0"),
-    )
+    found = identified(afm.parent, afm, *APPROACH, "--until", "29.9", "--start", "0")
     limits = by_quantity(found)
     for name, true in (("k", STIFF_PA), ("k_p", SOFT_PA), ("tau", TIME_S)):
         # Limits of this noise are 0.2 to 1 % wide.
@@ -57,26 +56,20 @@ def test_an_approach_and_its_dwell_tell_the_modulus_of_young(afm: Path) -> None:
 
 
 def test_a_sphere_that_is_drawn_back_is_noted(afm: Path) -> None:
-    _, said, _ = identify(
-        *(afm, "--reading", "force=force_nN", "--load", "indentation_nm", *SPHERE)
-    )
+    _, said, _ = identify(afm, *APPROACH)
     assert "The contact shrinks from 30 s on" in said
     assert "--until 30" in said
 
 
 def test_a_force_that_is_held_tells_compliances(tmp_path: Path) -> None:
-    # d^1.5 = 9 F J(t)/(16 sqrt(R)), J of a spring of 500 Pa and a Kelvin element of 400 Pa, 2 s.
+    """d^1.5 = 9 F J(t)/(16 sqrt(R)), J of 500 Pa before a Kelvin element of 400 Pa and 2 s."""
     time_s = np.arange(0.1, 20, 0.1)
     compliance = 1 / 500 + (1 - np.exp(-time_s / 2)) / 400
     depth = (9 * 1e-9 * compliance / (16 * np.sqrt(RADIUS_M))) ** (2 / 3)
     depth += np.random.default_rng(6).normal(0, 0.002 * depth.max(), len(time_s))
     trace = write_trace(tmp_path / "held.csv", time_s, 1e6 * depth, header="time_s,depth_um")
-    found = identified(
-        *(tmp_path, trace, "--reading", "displacement=depth_um", "--hold", "1 nN", *SPHERE[:2]),
-        *("--model", "zener_kelvin", "--no-compare"),
-        config="",
-    )
-    limits = by_quantity(found)
+    given = ("--reading", "displacement=depth_um", "--hold", "1 nN", *SPHERE)
+    limits = by_quantity(identified(tmp_path, trace, *given, "--model", "zener_kelvin", config=""))
     for name, true in (("k_s", 500), ("k_v", 400), ("tau_v", 2)):
         assert limits[name]["low"] < true < limits[name]["high"], name
 
@@ -98,21 +91,15 @@ def test_a_number_counts_by_its_power_and_back() -> None:
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ("--sphere 2.5 --hold 1nN", "found '2.5', allowed is a radius with its unit"),
-        ("--sphere 2.5Pa --hold 1nN", "found '2.5Pa', allowed is a radius"),
-        ("--sphere 2um --hold 500", "--hold: found no unit, allowed are m, cm, mm, um"),
-        ("--sphere 2um --hold 1nN", "the unit 'nN' of a"),
-        (
-            "--sphere 2um --reading modulus=force_nN",
-            "goes with a force or an indentation, not with modulus",
-        ),
-        (
-            "--sphere 2um --reading strain=force_nN",
-            "found a sphere and a reading of strain; allowed are a force and an",
-        ),
+        ("2.5 --hold 1nN", "found '2.5', allowed is a radius with its unit"),
+        ("2.5Pa --hold 1nN", "found '2.5Pa', allowed is a radius"),
+        ("2um --hold 500", "--hold: found no unit, allowed are m, cm, mm, um"),
+        ("2um --hold 1nN", "the unit 'nN' of a"),
+        ("2um --reading modulus=force_nN", "goes with a force or an indentation, not with modulus"),
+        ("2um --reading strain=force_nN", "found a sphere and a reading of strain; allowed are a"),
     ],
 )
 def test_what_no_sphere_is_told_by_is_refused(afm: Path, given: str, said: str) -> None:
     reading = () if "--reading" in given else ("--reading", "force=force_nN")
-    status, _, message = identify(afm, *reading, *given.split())
+    status, _, message = identify(afm, *reading, "--sphere", *given.split())
     assert (status, said in message) == (1, True)

@@ -7,14 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
 from biogrip.fit import genetic, genetic_refined
 from biogrip.fit.genetic import GeneticSettings, select
-from biogrip.fit.genome import GeneRange, lowest_encodable, make_genome, nearest_encodable
-from biogrip.fit.problem import Fit, TraceProblem
+from biogrip.fit.genome import (
+    GeneRange,
+    Genome,
+    lowest_encodable,
+    make_genome,
+    nearest_encodable,
+)
+from biogrip.fit.problem import Fit, History, TraceProblem
+from biogrip.physics.misfit import make_misfit
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.sample_model import with_fixed
-from tests.helpers.plain_genetic import decoded, identified
 from tests.helpers.problems import clean, pose_noisy
 
 SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)
@@ -61,6 +67,74 @@ def test_the_best_are_selected_and_the_lowest_genes_of_equals(digits: int) -> No
         np.testing.assert_array_equal(values[population], ranking[population, order])
 
 
+def decoded(genome: Genome, chromosomes: IntArray) -> Array:
+    columns = np.split(chromosomes.T, np.cumsum(genome.sizes)[:-1])
+    words = ([f"{''.join(map(str, d))}e{e - len(d)}" for e, *d in own.T] for own in columns)
+    return np.array([*words], float).T
+
+
+def gene_by_gene(posed: TraceProblem, settings: GeneticSettings, rng: np.random.Generator) -> Fit:
+    """One population by itself, in single precision; of equals the lowest genes are first."""
+    misfit, genome = make_misfit(posed.residuals), posed.genome
+
+    def ranked(everyone: IntArray) -> tuple[IntArray, Array]:
+        ranking = misfit(decoded(genome, everyone)).astype(np.float32)
+        order = np.lexsort((*everyone.T[::-1], ranking))[: settings.survivors]
+        return everyone[order], ranking[order].astype(float)
+
+    def mutated(some: IntArray) -> IntArray:
+        chosen = np.flatnonzero(rng.random(len(some)) < settings.mutation_probability)
+        for _ in range(settings.mutated_genes):
+            gene = rng.integers(genome.genes, size=len(chosen))
+            some[chosen, gene] = rng.integers(genome.low[gene], genome.high[gene], endpoint=True)
+        return some
+
+    survivors, ranking = ranked(genome.draw(settings.population, rng))
+    rows, evaluations = [], settings.population
+    generation = improved = 0
+    while True:
+        rows.append((survivors[0], ranking[0], ranking[len(ranking) // 2], evaluations))
+        waits = generation < settings.min_generations or generation - improved < settings.patience
+        if generation == settings.max_generations or not waits:
+            break
+        generation += 1
+        children = crossed(survivors, settings, rng)
+        if generation >= settings.mutation_start:
+            children = mutated(children)
+            if settings.mutants == "all":
+                others = mutated(survivors[1:].copy())
+                survivors, children = survivors[:1], np.concatenate((children, others))
+        evaluations += len(children)
+        before = ranking[0]
+        survivors, ranking = ranked(np.concatenate((survivors, children)))
+        improved = generation if ranking[0] < before else improved
+    fittest, lowest, median, counts = map(np.array, zip(*rows, strict=True))
+    history = History(lowest, median, decoded(genome, fittest), counts)
+    ended = "stalled" if generation < settings.max_generations else "generation limit"
+    best = history.best_parameters[-1]
+    return Fit(best, float(lowest[-1]), generation, evaluations, ended, history)
+
+
+def crossed(parents: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:
+    wanted, (count, genes) = settings.population - settings.survivors, parents.shape
+    pairs = -(-wanted // 2)
+    if settings.mating == "rank":
+        rank = np.arange(count, 0, -1)
+        drawn = rng.choice(count, size=(pairs, 2), p=rank / rank.sum())
+    else:
+        even = count // 2 * 2
+        rounds = [rng.permutation(count)[:even] for _ in range(-(-2 * pairs // even))]
+        drawn = np.concatenate(rounds)[: 2 * pairs].reshape(pairs, 2)
+    first, last = (
+        min(cut if cut > 0 else genes + cut, genes - 1)
+        for cut in (settings.first_cut, settings.last_cut)
+    )
+    cuts = rng.integers(min(first, last), last, size=pairs, endpoint=True)
+    both = zip(np.vstack((drawn, drawn[:, ::-1])), np.tile(cuts, 2), strict=True)
+    heads = [np.append(parents[one][:cut], parents[other][cut:]) for (one, other), cut in both]
+    return np.array(heads)[:wanted]
+
+
 def posed(count: int, model: Any = MAXWELL, **assumed: Any) -> list[TraceProblem]:
     return pose_noisy(*clean("endothelial_cell"), count, model, **assumed)
 
@@ -85,7 +159,7 @@ def test_populations_are_what_they_are_alone_and_gene_by_gene(name: str) -> None
         problems = posed(5)
     if name == "misfits of their own":
         problems = posed(3, offset=True, drift=True)
-    plain = [content(identified(each, settings, rng_of(n))) for n, each in enumerate(problems)]
+    plain = [content(gene_by_gene(each, settings, rng_of(n))) for n, each in enumerate(problems)]
     everyone = list(range(len(problems)))
     for group in (everyone[::-1], everyone[1:], everyone[:1]):
         rngs = [rng_of(seed) for seed in group]
@@ -118,7 +192,6 @@ def test_any_number_of_digits_is_decoded_as_a_decimal(digits: int, digit: tuple[
     genome = make_genome(MAXWELL, ranges)
     assert genome.genes == 9 + 1 + digits
     chromosomes = genome.draw(300, np.random.default_rng(digits))
-    # Lest numbers were encoded twice.
     assert np.all(chromosomes[:, 1] > 0)
     np.testing.assert_array_equal(genome.decode(chromosomes), decoded(genome, chromosomes))
     ends = genome.decode(np.stack((genome.low, genome.high)))[:, 0]

@@ -1,12 +1,10 @@
-"""What an instrument does to a trace, against least squares with all of it and by symmetries."""
+"""What an instrument does to a trace, by dense matrices and by symmetries."""
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
@@ -15,7 +13,6 @@ from biogrip.fit.least_squares import identify_from
 from biogrip.fit.noise_model_fit import FAR
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit, fit_traces, gripper_functions
-from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, MOST_SAMPLES, Drift, Noise, Outliers, add_noise
 from biogrip.physics.simulation import simulated_response
@@ -26,6 +23,7 @@ POSED = CASE.experiment
 COLOURED = replace(POSED, coloured=True, offset=True, drift=True)
 TIMES = np.linspace(0, POSED.torque.end_s, 801)
 TRUTH = POSED.logs(CASE.parameters)
+ARM, HINGE = POSED.gripper.left, "stiffness_Nm_per_rad"
 
 
 def simulated(gripper: Gripper, x: Array) -> Array:
@@ -59,59 +57,31 @@ def test_white_noise_and_a_known_gripper_leave_the_fit_as_it_is() -> None:
     assert fit.notes() == []
 
 
-def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
-    """SciPy fits both arms' stiffness along, each held by what is known of it.
-
-    Estimates and standard deviations of the logarithms agree to a twentieth of the latter:
-    what is taken for straight is 2 % of a stiffness.
-    """
-    share, level, key = 0.02, float(0.02 * CLEAN.max()), "stiffness_Nm_per_rad"
-    arms = {"left": POSED.gripper.left, "right": POSED.gripper.right}
-    uncertainty = {name: {key: share * getattr(arm, key)} for name, arm in arms.items()}
-    trace = noisy(Noise("gaussian", 0.02, "peak"))
-    fit = fitted(replace(POSED, uncertainty=uncertainty, noise_sd=level), trace)
-    best, low, high = np.log(fit.found.parameters), fit.problem.low, fit.problem.high
-    _, slopes = fit.problem.residuals(best)
+@pytest.mark.parametrize(("every", "known"), [(1, True), (80, False)])
+def test_an_uncertain_gripper_is_a_part_of_the_noise(every: int, known: bool) -> None:
+    """By dense matrices; of ten readings and four parameters six tell the noise."""
+    times, trace = TIMES[40::every], noisy(Noise("gaussian", 0.02, "peak"))[40::every]
+    level = float(0.03 * CLEAN.max()) if known else None
+    experiment = replace(POSED, uncertainty={"left": {HINGE: 9e-9}}, noise_sd=level)
+    fit = fitted(experiment, trace, times)
+    best = np.log(fit.found.parameters)
+    residual, slopes = POSED.of(times, trace).residuals(best)
+    _, own = fit.problem.residuals(best)
+    changes = gripper_functions(experiment, times, fit.found.parameters)
+    noise_sd = level or find(POSED.of(times, trace)).misfit * np.sqrt(10 / 6)
+    inverse = np.linalg.inv(np.eye(len(times)) + changes.T @ changes / noise_sd**2)
     told = [0, 2]  # k and c: nothing is told of c_p, and next to nothing of k_p.
-
-    def residuals(z: Array) -> Array:
-        softer: dict[str, Any] = {
-            name: replace(arm, stiffness_Nm_per_rad=getattr(arm, key) * (1 + share * y))
-            for (name, arm), y in zip(arms.items(), z[4:], strict=True)
-        }
-        gripper = replace(POSED.gripper, **softer)
-        return np.append((simulated(gripper, z[:4]) - trace) / level, z[4:])
-
-    start = np.append(np.clip(best, low + 1e-6, high - 1e-6), [0, 0])
-    bounds = np.append(low, [-5, -5]), np.append(high, [5, 5])
-    both = least_squares(residuals, start, bounds=bounds, x_scale="jac")
-
-    def deviations(rows: Array) -> Array:
-        return np.sqrt(np.diagonal(np.linalg.inv(rows.T @ rows + 1e-6 * np.eye(rows.shape[1]))))
-
-    own, expected = deviations(slopes[told].T / level), deviations(both.jac[:, [*told, 4, 5]])[:2]
-    np.testing.assert_allclose(own, expected, rtol=0.05)
-    assert np.all(own > 1.2 * deviations(both.jac[:-2, told]))
-    assert np.all(np.abs(best - both.x[:4])[told] < 0.05 * expected + 1e-3)
+    expected, found = (slopes @ inverse @ slopes.T)[told], (own @ own.T)[told]
+    np.testing.assert_allclose(found[:, told], expected[:, told], rtol=0.02)
+    steps = (slopes @ inverse @ residual)[told] / np.sqrt(np.diag(expected[:, told]))
+    assert np.all(np.abs(steps) < 0.05 * noise_sd)
 
 
-def test_an_uncertain_gripper_is_held_against_what_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of ten readings and four parameters, six: the noise is the misfit times sqrt(10 / 6)."""
-    uncertainty = {"left": {"stiffness_Nm_per_rad": 1e-8}}
-    experiment, condense = replace(POSED, uncertainty=uncertainty), Experiment.in_noise
-    times, trace = TIMES[40::80], noisy(Noise("gaussian", 0.02, "peak"))[40::80]
-    plain = find(POSED.of(times, trace))
-    over_noise: list[Array] = []
-
-    def condensed(self: Experiment, *given: Any, **more: Any) -> Condensed:
-        over_noise.append(given[2])
-        return condense(self, *given, **more)
-
-    monkeypatch.setattr(Experiment, "in_noise", condensed)
-    fitted(experiment, trace, times)
-    changes = gripper_functions(experiment, times, plain.parameters)
-    first = next(each for each in over_noise if len(each))
-    np.testing.assert_allclose(first, changes / (plain.misfit * np.sqrt(10 / 6)), rtol=1e-9)
+def test_an_uncertain_hinge_is_half_the_difference_of_a_stiffer_and_a_softer_one() -> None:
+    odd, _ = functions({"left": {HINGE: 0.05 * 4.4e-7}})
+    left = (replace(ARM, **{HINGE: 4.4e-7 * (1 + error)}) for error in (0.05, -0.05))
+    above, below = (simulated(replace(POSED.gripper, left=arm), TRUTH) for arm in left)
+    np.testing.assert_allclose(odd, 0.5 * (above - below), rtol=1e-9)
 
 
 def test_noise_is_found_and_said() -> None:

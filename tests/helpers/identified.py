@@ -52,7 +52,6 @@ def by_quantity(found: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def write_trace(path: Path, *columns: Array, header: str = "time_s,rotation_rad") -> Path:
-    """Write a trace as CSV, and return its path."""
     np.savetxt(path, np.column_stack(columns), "%.17g", ",", header=header, comments="")
     return path
 

@@ -15,12 +15,9 @@ from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.config import StudyConfig
 from biogrip.study.messages import Schema, bound, tidy
 
-_NO_DEFAULT = "–"
 _MOST_LISTED = 6
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "maximum": "≤"}
 _WORDS = {"string": "text", "object": "block"}
-
-_Row = tuple[str, str, str, str, str]
 
 
 @cache
@@ -47,25 +44,39 @@ def reference(config: Path) -> str:
     Where a file gives no default it is that of the class.
     """
     defaults = yaml.safe_load(config.read_text(encoding="utf-8"))
-    sections: dict[str, list[_Row]] = {"General": []}
+    sections: dict[str, list[tuple[str, ...]]] = {"General": []}
     for path, schema in leaves(STUDY).items():
         top, *inner = path.split(".")
         inherited = path.startswith("cases.NAME.") and inner[1] in OVERRIDABLE
         if schema.keys and schema.values.node:
             path, schema = f"{path}.NAME", schema.values
-        if not (schema.keys or schema.values.keys or inherited):
-            name = top if inner else "General"
-            sections.setdefault(name, []).append(_row(path, schema, _default(path, defaults)))
-    return "\n\n".join(
-        _section(name, STUDY.inside(name).get("description", ""), rows)
-        for name, rows in sections.items()
-    )
+        if schema.keys or schema.values.keys or inherited:
+            continue
+        default = defaults
+        for part in path.split("."):
+            default = default.get(part) if isinstance(default, Mapping) else None
+        rows = sections.setdefault(top if inner else "General", [])
+        told = schema.get("description", ""), schema.get("unit", "")
+        rows.append((f"`{path}`", *told, _default(schema, default), _allowed(schema)))
+    found = []
+    for name, rows in sections.items():
+        frame = pd.DataFrame(rows, columns=["key", "meaning", "unit", "default", "allowed"])
+        found += [f"### {name}", STUDY.inside(name).get("description", "")]
+        found.append(frame.to_markdown(index=False, disable_numparse=True))
+    return "\n\n".join(filter(None, found))
 
 
-def _default(path: str, defaults: Any) -> Any:
-    for part in path.split("."):
-        defaults = defaults.get(part) if isinstance(defaults, Mapping) else None
-    return defaults
+def _default(schema: Schema, default: Any) -> str:
+    if schema.inside(0).keys and default is not None:
+        return "see `config.yaml`"
+    value = schema.get("default") if default is None else default
+    if value in (None, [], {}):
+        return "–"
+    if isinstance(value, list) and isinstance(value[0], str):
+        shown = f"`[{', '.join(value)}]`"
+        return shown if len(value) <= _MOST_LISTED else f"{len(value)} keys"
+    shown = f"{value:g}" if isinstance(value, float) else str(value)
+    return f"`{shown.lower() if isinstance(value, bool) else shown}`"
 
 
 def file_schema() -> str:
@@ -89,22 +100,6 @@ def _partial(node: Any, name: str = "") -> Any:
         return node.replace(r"\w", r"\w\u00aa-\uffff")
     # Pydantic versions differ in writing integral numbers as int or float.
     return int(node) if isinstance(node, float) and node.is_integer() else node
-
-
-def _section(title: str, text: str, rows: list[_Row]) -> str:
-    frame = pd.DataFrame(rows, columns=["key", "meaning", "unit", "default", "allowed"])
-    table = frame.to_markdown(index=False, disable_numparse=True)
-    return "\n\n".join(part for part in (f"### {title}", text, table) if part)
-
-
-def _row(path: str, schema: Schema, default: Any) -> _Row:
-    if schema.inside(0).keys and default is not None:
-        shown = "see `config.yaml`"
-    else:
-        value = schema.get("default") if default is None else default
-        shown = _NO_DEFAULT if value in (None, [], {}) else _shown(value)
-    text, unit = schema.get("description", ""), schema.get("unit", "")
-    return f"`{path}`", text, unit, shown, _allowed(schema)
 
 
 def _allowed(schema: Schema) -> str:
@@ -134,14 +129,6 @@ def _list_allowed(schema: Schema) -> str:
 
 def _listed(choices: list[str]) -> str:
     return ", ".join(f"`{choice}`" for choice in choices)
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, list) and value and isinstance(value[0], str):
-        shown = f"`[{', '.join(value)}]`"
-        return shown if len(value) <= _MOST_LISTED else f"{len(value)} keys"
-    shown = f"{value:g}" if isinstance(value, float) else str(value)
-    return f"`{shown.lower() if isinstance(value, bool) else shown}`"
 
 
 STUDY = Schema(documented(), documented()["$defs"])

@@ -11,11 +11,10 @@ References
    Transactions on Computers 66 (2017), 1281-1292.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from flint import acb, acb_mat, arb, ctx
+from flint import acb_mat, arb, ctx
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
@@ -52,52 +51,34 @@ def exact_50_digits(gripper: Gripper, parameters: Array, steps: Course, time_s: 
     Of one sample (k, k_p, c, c_p).
     """
     with ctx.workdps(_DIGITS):
-        return _solution(gripper, [arb(float(value)) for value in parameters], steps, time_s)
-
-
-def _solution(gripper: Gripper, parameters: Sequence[arb], steps: Course, time_s: Array) -> Array:
-    k, k_p, c, c_p = parameters
-    b = arb(gripper.arm_length_m) * (arb(gripper.reference_angle_deg) / 180).sin_pi()
-    inertia, damping, stiffness = (
-        [arb(getattr(arm, name)) for arm in (gripper.left, gripper.right)]
-        for name in ("inertia_kgm2", "damping_Nms_per_rad", "stiffness_Nm_per_rad")
-    )
-    # State: phi_2, phi_4, their rates, and the node x between spring k and damper c.
-    # Force on each tip: k (b phi_2 - x) + k_p delta + c_p delta', delta = b (phi_2 + phi_4).
-    force = [(k + k_p) * b, k_p * b, c_p * b, c_p * b, -k]
-    moments = [[b * each for each in force] for _ in range(2)]
-    for arm, own in enumerate(moments):
-        own[arm] += stiffness[arm]
-        own[2 + arm] += damping[arm]
-    arms = [[-each / of for each in own] for own, of in zip(moments, inertia, strict=True)]
-    # k (u_B - x) = c (x' - u_C'), u_B = b phi_2, u_C = -b phi_4.
-    node: list[Any] = [k / c * b, 0, 0, -b, -k / c]
-    a = acb_mat([[0, 0, 1, 0, 0], [0, 0, 0, 1, 0], *arms, node])
-    rates, vectors = a.eig(right=True)
-    seen = acb_mat([[1, 0, 0, 0, 0], force])
-    of_modes = seen * vectors
-    found = [[acb(0)] * len(time_s) for _ in range(2)]
-    for start, height in zip(steps.time_s, steps.changes[:, 0], strict=True):
-        load = acb_mat(5, 1)
-        load[2, 0], load[3, 0] = (arb(float(height)) / own for own in inertia)
-        rest = a.solve(-load)
-        weights, settled = vectors.solve(-rest), seen * rest
-        for i, t in enumerate(time_s):
-            elapsed = arb(float(t)) - arb(float(start))
-            if elapsed >= 0:
-                fading = [[weights[j, 0] * (rates[j] * elapsed).exp()] for j in range(5)]
-                now = settled + of_modes * acb_mat(fading)
-                for row in range(2):
-                    found[row][i] += now[row, 0]
-    return np.array([_checked([value.real for value in own]) for own in found])
-
-
-def _checked(values: Sequence[arb]) -> Array:
-    """As doubles, of what is known to 50 digits of the largest."""
-    both = np.array([(float(value.mid()), float(value.rad())) for value in values])
-    middle, radius = both.T
-    assert radius.max() < 1e-50 * np.abs(middle).max()
-    return middle
+        k, k_p, c, c_p = (arb(float(value)) for value in parameters)
+        b = arb(gripper.arm_length_m) * (arb(gripper.reference_angle_deg) / 180).sin_pi()
+        # State: phi_2, phi_4, their rates, the node x between spring k and damper c, and 1.
+        # Force on each tip: k (b phi_2 - x) + k_p delta + c_p delta', delta = b (phi_2 + phi_4).
+        force: list[Any] = [(k + k_p) * b, k_p * b, c_p * b, c_p * b, -k, 0]
+        arms = []
+        for which, arm in enumerate((gripper.left, gripper.right)):
+            moments: list[Any] = [*(-b * each for each in force[:5]), arb(1)]
+            moments[which] -= arm.stiffness_Nm_per_rad
+            moments[2 + which] -= arm.damping_Nms_per_rad
+            arms.append([each / arm.inertia_kgm2 for each in moments])
+        # k (u_B - x) = c (x' - u_C'), u_B = b phi_2, u_C = -b phi_4.
+        node: list[Any] = [k / c * b, 0, 0, -b, -k / c, 0]
+        a = acb_mat([[0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0], *arms, node, [0] * 6])
+        rates, vectors = a.eig(right=True)
+        loads = [*zip(map(arb, steps.time_s), map(arb, steps.changes[:, 0]), strict=True)]
+        sums = [
+            [sum(load * ((t - at) * rate).exp() for at, load in loads if t >= at) for t in time_s]
+            for rate in rates
+        ]
+        weights = vectors.solve(acb_mat([[0]] * 5 + [[1]]))
+        shown = acb_mat([[1, 0, 0, 0, 0, 0], force]) * vectors
+        for row, weight in enumerate(weights.entries()):
+            sums[row] = [weight * each for each in sums[row]]
+        found = [value.real for value in (shown * acb_mat(sums)).entries()]
+    middle, radius = np.array([(float(it.mid()), float(it.rad())) for it in found]).T
+    assert radius.max() < 1e-50 * np.abs(middle).reshape(2, -1).max(axis=1).min()
+    return middle.reshape(2, -1)
 
 
 def log_range(model: SampleModel) -> tuple[Array, Array]:

@@ -139,7 +139,6 @@ def snakemake(
 def dry_run(
     folder: Path, *arguments: str, config: dict[str, Any], snakefile: Path = ROOT / "Snakefile"
 ) -> Run:
-    """Ask Snakemake what it would run."""
     # Other workers ask in the same folder.
     with NamedTemporaryFile("w", suffix=".yaml") as overlay:
         yaml.safe_dump(config, overlay)

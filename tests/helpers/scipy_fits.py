@@ -3,7 +3,6 @@
 A quantity is held by one stiff residual more, which changes chi^2 by less than a thousandth.
 """
 
-import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -29,19 +28,16 @@ def scipy_fit(
     """
     noise_sd = noise_sd or problem.residuals.noise_scale
 
-    # Rows and slopes of the same point are asked for in turn.
-    @functools.lru_cache(1)
-    def rows(point: bytes) -> tuple[Array, Array]:
-        x = np.frombuffer(point)
+    def rows(x: Array) -> tuple[Array, Array]:
         residual, slopes = problem.residuals(x)
         values, turns = more(x) if more else (np.zeros(0), np.zeros((0, len(x))))
         return np.append(residual / noise_sd, values), np.vstack((slopes.T / noise_sd, turns))
 
     inside = 1e-9 * (problem.high - problem.low)
     found = least_squares(
-        lambda x: rows(x.tobytes())[0],
+        lambda x: rows(x)[0],
         np.clip(start, problem.low + inside, problem.high - inside),
-        lambda x: rows(x.tobytes())[1],
+        lambda x: rows(x)[1],
         (problem.low, problem.high),
         max_nfev=300,
         **dict.fromkeys(("ftol", "xtol", "gtol"), 1e-11),

@@ -19,45 +19,35 @@ from biogrip.judging.doubts import (
     has_fast_noise,
 )
 from biogrip.judging.likelihood import make_likelihood
-from biogrip.library import TraceResult
 from biogrip.physics.noise import AR1, Noise, NoiseModel, Outliers, add_noise
 from tests.helpers.default import seen
 from tests.helpers.identified import told
 from tests.helpers.problems import MODEL, clean, likelihood_of, pose_noisy, posed_for, rotation
 
 
-def examined(parts: dict[str, Any], place: int | None = None) -> str:
+@pytest.mark.parametrize(
+    ("parts", "place", "said"),
+    [
+        ({}, None, ""),
+        ({}, 3, "1 outlier, at 3 s of the protocol"),
+        ({}, 200, "1 outlier, at 200 s of the protocol"),
+        ({"ar1": AR1(0.9, 2.0)}, None, "noise of neighbouring readings, as of noise"),
+        ({"ar1": AR1(0.25, 5.0)}, None, "residuals are correlated"),
+        ({"ar1": AR1(0.2, 30.0)}, None, "The residual wanders"),
+        ({"outliers": Outliers(0.02, 20.0)}, None, "outliers, at "),
+    ],
+)
+def test_what_is_not_white_is_said(parts: dict[str, Any], place: int | None, said: str) -> None:
     """Doubts about noise of a cell's rotation, 2 % of its peak, fitted by its own model."""
     times, response = clean("endothelial_cell")
     noise = Noise("gaussian", 0.02, "peak", **parts)
     trace = add_noise(response, noise, np.random.default_rng(0), times)
     if place is not None:
         trace[place] += response.max()
-    likelihood = likelihood_of(posed_for(MODEL, times, trace))
-    notes = examine_residuals(likelihood).notes
-    return " ".join(note.text for note in notes if note.weight == DOUBT)
-
-
-@pytest.mark.parametrize(
-    ("parts", "said"),
-    [
-        ({}, ""),
-        ({"ar1": AR1(0.9, 2.0)}, "noise of neighbouring readings, as of noise"),
-        ({"ar1": AR1(0.25, 5.0)}, "residuals are correlated"),
-        ({"ar1": AR1(0.2, 30.0)}, "The residual wanders"),
-        ({"outliers": Outliers(0.02, 20.0)}, "outliers, at "),
-    ],
-)
-def test_what_is_not_white_is_said(parts: dict[str, Any], said: str) -> None:
-    doubts = examined(parts)
+    notes = examine_residuals(likelihood_of(posed_for(MODEL, times, trace))).notes
+    doubts = " ".join(note.text for note in notes if note.weight == DOUBT)
     assert said in doubts
     assert bool(doubts) == bool(said)
-
-
-@pytest.mark.parametrize("place", [3, 200])
-def test_one_outlier_is_named_by_its_time(place: int) -> None:
-    times = clean("endothelial_cell")[0]
-    assert examined({}, place).startswith(f"1 outlier, at {times[place]:g} s of the protocol")
 
 
 @pytest.mark.parametrize(("neighbours", "named"), [(1, True), (3, False)])
@@ -97,38 +87,23 @@ TIMES = np.linspace(0.25, 100, 400)
 ZENER: dict[str, Any] = {"reads": "modulus", "model": "zener_maxwell"}
 
 
-@pytest.fixture(scope="module")
-def noisy() -> Array:
-    """Readings with noise of standard deviation 1 in what three parameters leave."""
-    noise = np.random.default_rng(2).standard_normal(400)
-    return 100 + 80 * np.exp(-TIMES / 20) + noise / (np.std(noise) * np.sqrt(400 / 397))
-
-
-@pytest.fixture(scope="module")
-def without_stated_noise(noisy: Array) -> TraceResult:
-    return told(TIMES, noisy, **ZENER)
-
-
 @pytest.mark.parametrize(
     ("times", "weight", "said"),
     [
         (1e-4, DOUBT, "is 10000 times the noise that was given: its value or unit"),
-        (0.5, DOUBT, "is 2 times the noise that was given"),
         (0.85, HARMLESS, "is 1.18 times the noise that was given: limits are too narrow"),
-        (1.0, "", ""),
         (1.5, "", ""),
         (2.5, DOUBT, "The noise that was given is 2.5 times what the fit leaves"),
         (1e5, DOUBT, "The noise that was given is 100000 times"),
     ],
 )
-def test_a_stated_noise_moves_no_optimum_and_is_all_that_is_said(
-    times: float, weight: str, said: str, noisy: Array, without_stated_noise: TraceResult
+def test_a_stated_noise_that_the_fit_does_not_leave_is_told(
+    times: float, weight: str, said: str
 ) -> None:
-    """A scale of the noise scales chi-squared alone; fits end to ten digits."""
-    found, without = told(TIMES, noisy, noise=times, **ZENER), without_stated_noise
-    values = [[each["value"] for each in one.data["quantities"]] for one in (found, without)]
-    assert values[0] == pytest.approx(values[1], rel=1e-9)
-    assert found.data["misfit_rad"] == pytest.approx(without.data["misfit_rad"], rel=1e-12)
+    """Beside a standard deviation of 1 in what three parameters leave."""
+    noise = np.random.default_rng(2).standard_normal(400)
+    noise /= np.std(noise) * np.sqrt(400 / 397)
+    found = told(TIMES, 100 + 80 * np.exp(-TIMES / 20) + noise, noise=times, **ZENER)
     # Of limits that are too narrow, a ramp before the first reading is said to move one.
     notes = [note for note in found.data["notes"] if "ramp" not in note["text"]]
     assert [note["weight"] for note in notes] == [weight] * bool(weight)
@@ -162,10 +137,8 @@ def test_fast_noise_is_neither_smooth_nor_in_one_place(noise: str, fast: bool) -
         # Two standard deviations of the time below it are 8 s, a fiftieth of the trace, or less.
         (0.6, 10.0, 0.1, 0.0, "is correlated over 10 s"),
         (0.6, 10.0, 0.12, 0.0, ""),
-        (0.6, 7.0, 0.0, 0.0, ""),
         (0.4, 100.0, 0.0, 0.0, "is correlated over 100 s"),
         (0.4, 70.0, 0.0, 0.0, ""),
-        (0.3, 400.0, 0.0, 0.0, ""),
         (0.1, 400.0, 0.0, 0.4, "walks at random, 40 % of its variance"),
         (0.1, 400.0, 0.0, 0.3, ""),
         # Odds of two, of which two standard deviations leave 0.54, more than a half, or 0.49.
@@ -201,20 +174,15 @@ def test_noise_that_grows_over_decades_is_weighed_and_its_share_advised() -> Non
     assert np.all((limits["low"] < [1.0, 5.0]) & (limits["high"] > [1.0, 5.0]))
 
 
-@pytest.mark.parametrize(
-    # The smallest is 1.3 times the noise with it: sqrt(1.3^2 - 1) times 0.05 % without.
-    ("lacking", "of_peak"),
-    [(0.06, 0.4), pytest.param(0.005, 0.042, marks=pytest.mark.nightly)],
-)
-def test_limits_of_quiet_traces_allow_for_a_wrong_model(lacking: float, of_peak: float) -> None:
-    """A second branch of a share of the first, six times as slow; noise of 0.05 % of the peak."""
+def test_limits_of_quiet_traces_allow_for_a_wrong_model() -> None:
+    """A second branch of 6 % of the first, six times as slow; noise of 0.05 % of the peak."""
     times = np.linspace(0.1, 60, 600)
-    values = 1500 + 3000 * (np.exp(-times / 2) + lacking * np.exp(-times / 12))
+    values = 1500 + 3000 * (np.exp(-times / 2) + 0.06 * np.exp(-times / 12))
     values += 2.2 * np.random.default_rng(0).standard_normal(600)
     found = told(times, values, ["springpot"], **ZENER)
     assert found.status == DOUBTFUL
     (good,) = re.findall("good to (.+) % of the peak", str(found))
-    assert float(good) == pytest.approx(of_peak, rel=0.2)
+    assert float(good) == pytest.approx(0.4, rel=0.2)
     limits, truth = found.to_frame().loc[["k", "k_p", "c"]], [3000, 1500, 6000]
     assert np.all((limits["low"] < truth) & (limits["high"] > truth))
     assert np.all(limits["high"] < 2 * limits["low"])

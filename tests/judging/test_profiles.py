@@ -22,6 +22,7 @@ from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import hold
 from biogrip.physics.sample_model import with_fixed
 from biogrip.stages.intervals import judge_quantities
+from tests.helpers.identified import told
 from tests.helpers.problems import (
     GRIPPER,
     MODEL,
@@ -137,16 +138,16 @@ def test_the_search_range_determines_no_combination() -> None:
     times = np.linspace(0.0, 400.0, 801)
     noise = 4e-6 * np.random.default_rng(1).standard_normal(len(times))
     problem = posed_for(MODEL, times, rotation(MODEL, SOFT, times) + noise)
-    told = diagnosis_of(problem, MODEL, noise_sd=1e-4)
+    judged = diagnosis_of(problem, MODEL, noise_sd=1e-4)
     series = next(q for q in find_combinations(MODEL, [0, 1]) if q.sense < 0)
     # To first order it is known well enough to be looked at.
-    assert told.likelihood.deviation(series) < 0.5
-    ((one,),) = compute_profiles([told.likelihood], [series])
-    assert (one.low is None, one.high is None, told.trades) == (True, False, [])
+    assert judged.likelihood.deviation(series) < 0.5
+    ((one,),) = compute_profiles([judged.likelihood], [series])
+    assert (one.low is None, one.high is None, judged.trades) == (True, False, [])
     # With one spring as soft as it may be, and the other any, it is lower than any limit.
-    soft, best = problem.low[0], told.likelihood.best
+    soft, best = problem.low[0], judged.likelihood.best
     assert series.log(np.array([soft, *best[1:]])) < soft + 1e-3
-    assert rise_of_held(told.likelihood, QUANTITIES[0], soft, best) < told.likelihood.threshold
+    assert rise_of_held(judged.likelihood, QUANTITIES[0], soft, best) < judged.likelihood.threshold
 
 
 def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
@@ -212,8 +213,8 @@ def test_an_optimum_that_was_missed_is_judged_again() -> None:
     fit = TraceFit(experiment, missed, None, np.zeros(len(times), bool))
     (alike,) = judge_quantities([fit], parameters_and_sum(maxwell), 0.95)
     assert alike.likelihood.misfit == again.likelihood.misfit
-    for one, other in zip(alike.findings, again.findings, strict=True):
-        assert (one.low, one.high) == (other.low, other.high)
+    limits = [[(it.low, it.high) for it in own.findings] for own in (alike, again)]
+    assert limits[0] == limits[1]
     for one, other in zip(right.findings, again.findings, strict=True):
         assert one.verdict == DETERMINED
         assert other.profile.low == pytest.approx(one.profile.low, abs=1e-6)
@@ -247,10 +248,15 @@ def test_a_set_in_two_parts_has_a_gap_that_its_verdict_names() -> None:
     assert find_gaps(values, np.minimum(parabolas(values), 1.005), 1.0) == ()
     assert len(find_gaps(values, np.minimum(parabolas(values), 1.02), 1.0)) == 1
     whole = Profile(values, parabolas(values), 2.0, -3.0, 3.0, np.zeros(4))
-    parts = replace(whole, gaps=(gap,))
-    words = [Finding(QUANTITIES[0], profile, 0.1).words() for profile in (whole, parts)]
-    said = "determined only to 2.6 decades: 7.4 N/m (0.05 to 20)"
-    assert words == [said, f"{said}, except 0.368 to 2.72 N/m"]
+    others: tuple[dict[str, Any], ...] = ({}, {"gaps": (gap,)}, {"high": None}, {"low": None})
+    said = [Finding(QUANTITIES[0], replace(whole, **other), 0.1).words() for other in others]
+    determined = "determined only to 2.6 decades: 7.4 N/m (0.05 to 20)"
+    assert said == [
+        determined,
+        f"{determined}, except 0.368 to 2.72 N/m",
+        "only bounded below: at least 0.05 N/m",
+        "only bounded above: at most 20 N/m",
+    ]
 
 
 @pytest.mark.parametrize(("k_p", "stated"), [(0.0, False), (5.0, True)])
@@ -258,8 +264,8 @@ def test_a_sum_whose_condition_the_best_fit_breaks_is_not_stated(k_p: float, sta
     """A branch of 4 s beside a spring that is declared to be none: the branch takes its part."""
     times, model = clean("liquid_drop_1")[0], with_fixed(MODEL, {"k_p": k_p})
     noise = 3e-6 * np.random.default_rng(0).standard_normal(len(times))
-    told = diagnosis_of(posed_for(model, times, rotation(MODEL, SOFT, times) + noise), model)
-    total = next(each for each in told.findings if each.quantity.label == "c + c_p")
+    judged = diagnosis_of(posed_for(model, times, rotation(MODEL, SOFT, times) + noise), model)
+    total = next(each for each in judged.findings if each.quantity.label == "c + c_p")
     assert (total.verdict == DETERMINED) == stated
     assert ("a branch of the best fit relaxes in" in total.words()) != stated
     if total.low and total.high:
@@ -283,3 +289,43 @@ def test_no_limit_is_said_only_of_what_has_none() -> None:
     assert said[0] == "not determined: the trace sets no limit within the search range"
     assert said[1].startswith("not determined: towards an end of the search range the fit is worse")
     assert said[1].endswith("and a limit takes 10.8)")
+
+
+SOLID = {"k_s": 300.0, "k_v": 200.0, "c_v": 900.0}
+MANY, FEW = np.arange(0.2, 60.0, 0.2), np.arange(0.2, 60.0, 5.0)
+TWO_HALVES = np.where(MANY < 30, 2e-4, 8e-4)
+OFFSET, SD = {"offset": True}, {"sd": TWO_HALVES}
+
+
+def crept(t: Array, k_s: float, k_v: float, c_v: float) -> Array:
+    """The strain under 5 Pa of a spring and a Kelvin-Voigt element in series."""
+    return 5 / k_s + 5 / k_v * (1 - np.exp(-t * k_v / c_v))
+
+
+@pytest.mark.parametrize(
+    ("times", "sd", "given", "limits"),
+    [
+        (FEW, 2e-4, {}, [(292.896, 307.1144), (196.9109, 203.4328), (855.9672, 938.3086)]),
+        (MANY, 2e-4, OFFSET, [(198.0489, 200.8776), (876.6844, 905.8058)]),
+        (MANY, TWO_HALVES, SD, [(298.1084, 304.6402), (198.088, 200.8429), (877.5449, 907.939)]),
+    ],
+    ids=["few", "offset", "sd"],
+)
+def test_limits_are_lmfits(
+    times: Array, sd: float | Array, given: dict[str, Any], limits: list[tuple[float, float]]
+) -> None:
+    """To a relative 3e-5: the root search of lmfit 1.3.4 ends within some 1e-5.
+
+    `conf_interval(fit, fit, p_names=["k_s", "k_v", "c_v"], sigmas=[0.95])` gave the numbers, where
+    `fit` starts from `SOLID` with `min=1e-6`. Deviations are `weights` with `scale_covar=False` and
+    `prob_func=lambda best, it: chi2.cdf(it.chisqr - best.chisqr, 1)`. Beside an offset, one
+    parameter more, nothing is told of k_s.
+    """
+    readings = crept(times, **SOLID) + 3e-3 * (given is OFFSET)
+    readings += sd * np.random.default_rng(0).standard_normal(len(times))
+    held: dict[str, Any] = {"reads": "strain", "hold": 5.0, "model": "zener_kelvin", "start": 0.0}
+    found = told(times, readings, **held, **given).to_frame()
+    if given is OFFSET:
+        assert np.isnan(found.loc["k_s", ["low", "high"]].astype(float)).all()
+    for name, ends in zip(list(SOLID)[-len(limits) :], limits, strict=True):
+        assert found.loc[name, ["low", "high"]].tolist() == pytest.approx(ends, rel=3e-5)

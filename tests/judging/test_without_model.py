@@ -121,22 +121,6 @@ def test_limits_of_creep_with_an_offset() -> None:
         squares, _ = fitted(np.vstack((rows, 1e4 * held)), np.append(readings, 1e4 * end))
         assert (squares - least) / 0.02**2 == pytest.approx(3.841, abs=0.05)
     assert found["J(10 s)"].high is None
-    without = by_name(tell(TIMES, readings - 2, reads="strain", noise_sd=0.02))
-    assert without["J(10 s)"].verdict == DETERMINED
-
-
-def test_what_a_clear_trace_tells_is_right() -> None:
-    """Noise of 1e-5 leaves limits of some 1e-4."""
-    found = by_name(tell(TIMES, zener(TIMES) + noise(1e-3)))
-    product = 0.1j * 20 / (1 + 0.1j * 20)
-    for quantity, value in (
-        ("G(1 s)", zener(np.ones(1))[0]),
-        ("exponent(10 s)", 40 * np.exp(-0.5) / zener(np.array([10.0]))[0]),
-        ("G'(0.1 rad/s)", 100 + 80 * product.real),
-        ("G''(0.1 rad/s)", 80 * product.imag),
-        ("tan delta(0.1 rad/s)", 80 * product.imag / (100 + 80 * product.real)),
-    ):
-        assert found[quantity].value == pytest.approx(value, rel=1e-3)
 
 
 def test_a_gripper_tells_the_stiffness_beside_its_arms() -> None:
@@ -193,16 +177,6 @@ def test_a_ramp_shows_what_a_step_hides() -> None:
     assert low < 1000 < high < 1.2 * low
 
 
-def test_weights_count() -> None:
-    """Readings after 10 s with a hundredth of the noise say what there is then."""
-    sd = np.where(TIMES < 10, 3.6, 0.036)
-    readings = zener(TIMES) + noise(1.0) * sd
-    typical = float(np.sqrt(np.mean(sd**2)))
-    both = tell(TIMES, readings, noise_sd=typical), tell(TIMES, readings, sd=sd)
-    plain, weighted = (np.ptp(between(by_name(each)["G(100 s)"])) for each in both)
-    assert weighted < 0.05 * plain
-
-
 @pytest.mark.parametrize("known", [None, 3.6])
 def test_what_no_linear_sample_does_is_told(known: float | None) -> None:
     """Relaxation that rises again; and, in known noise, what is far too large for it."""
@@ -238,10 +212,9 @@ def test_few_readings_are_no_error(count: int, size: float) -> None:
 
 
 def test_times_at_which_it_is_told() -> None:
-    assert decades(0.1, 100.0) == [0.1, 1.0, 10.0, 100.0]
     assert decades(0.3, 80.0) == [1.0, 10.0]
-    assert decades(12.0, 80.0) == [20.0, 50.0]
     assert decades(3.0, 80.0) == [5.0, 10.0, 20.0, 50.0]
+    assert decades(12.0, 80.0) == [20.0, 50.0]
 
 
 def test_words_are_those_of_a_verdict() -> None:

@@ -22,7 +22,7 @@ from biogrip.physics.protocol import (
     with_steps,
 )
 from biogrip.physics.simulation import simulated_response
-from tests.physics.test_condensed import assert_alike, posed
+from tests.physics.test_residuals import assert_alike, posed
 
 RNG = np.random.default_rng(4)
 EVEN: Array = np.arange(251) / 25
@@ -59,13 +59,15 @@ def test_a_damper_is_not_read_at_a_first_row_that_comes_late() -> None:
     np.testing.assert_array_equal(course.jumps_s, rows_s[:2])
 
 
-@pytest.mark.parametrize("clock", CLOCKS)
-def test_rows_are_followed_whatever_they_are(clock: str) -> None:
-    rows_s, values = CLOCKS[clock], RNG.standard_normal(251)
+@pytest.mark.parametrize("rows_s", [*CLOCKS.values(), np.array([0.0, 1.0, 3.0])])
+def test_rows_are_followed_whatever_they_are(rows_s: Array) -> None:
+    values = RNG.standard_normal(len(rows_s))
     course = follow_rows(rows_s, values, deforms=False)
     np.testing.assert_allclose(evaluate(course, rows_s), values, atol=1e-11)
     before = evaluate(course, rows_s[1:-1] * (1 - 1e-15))
     np.testing.assert_allclose(before, values[1:-1], atol=1e-9)
+    middle = evaluate(course, 0.5 * (rows_s[1:] + rows_s[:-1]))
+    assert len(rows_s) > 3 or middle == pytest.approx(0.5 * (values[1:] + values[:-1]))
 
 
 def test_a_step_between_two_rows_stands_in_the_middle() -> None:
@@ -110,16 +112,10 @@ def test_lines_are_followed_to_their_corner(corner_s: float) -> None:
 def test_a_step_between_two_rows_stays_between_them() -> None:
     values = np.where(EVEN < 3, 1.0, 5.0)
     course = follow_rows(EVEN, values, deforms=False)
-    first = np.searchsorted(EVEN, 3.0) - 1
-    np.testing.assert_array_equal(course.time_s, [0.0, EVEN[first], EVEN[first + 1]])
+    np.testing.assert_array_equal(course.time_s, [0.0, *EVEN[74:76]])
     found = evaluate(course, np.linspace(0, 10, 5001))
     assert (found.min(), found.max()) == (1.0, pytest.approx(5.0, abs=1e-14))
     assert course.steps_s.tolist() == [0.0]
-
-
-def test_few_rows_are_joined_by_lines() -> None:
-    course = follow_rows(np.array([0.0, 1.0, 3.0]), np.array([0.0, 2.0, 0.0]), deforms=False)
-    np.testing.assert_allclose(evaluate(course, [0.5, 1.0, 2.0]), [1.0, 2.0, 1.0])
 
 
 def test_times_are_moved_to_changes_that_they_are_but_for_rounding_on() -> None:
@@ -198,7 +194,7 @@ def condensed(deforms: bool, noise: str) -> Condensed:
 )
 @pytest.mark.parametrize("name", MODELS)
 def test_rows_have_the_sums_of_squares_of_readings(name: str, deforms: bool, noise: str) -> None:
-    """Slow samples and fast ones; to 1e-10 of the trace, as of steps (test_condensed.py)."""
+    """Slow samples and fast ones; to 1e-10 of the trace, as of steps (test_residuals.py)."""
     rows, model, rng = condensed(deforms, noise), MODELS[name], np.random.default_rng(3)
     residuals = posed(NO_ARMS, model, rows, 1e-3 * rng.standard_normal(len(rows.all_s)))
     moved = [parameter.kind != "exponent" for parameter in model.parameters]

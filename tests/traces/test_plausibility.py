@@ -64,14 +64,12 @@ def said(
 @pytest.mark.parametrize("sample", SAMPLES)
 @pytest.mark.parametrize("rate_Hz", [10.0, 0.1])
 @pytest.mark.parametrize("level", [0.0, 0.1, 0.4])
-@pytest.mark.parametrize("seed", [0, 1])
 def test_the_papers_traces_pass_and_not_in_a_wrong_unit_or_mirrored(
-    sample: str, rate_Hz: float, level: float, seed: int
+    sample: str, rate_Hz: float, level: float
 ) -> None:
     times = sample_times(400.0, rate_Hz)
-    clean = trace(SAMPLES[sample], times)
-    kind = ("gaussian", "uniform")[seed]
-    noisy = add_noise(clean, Noise(kind, level, "peak"), np.random.default_rng([7, seed]))
+    noise = Noise("gaussian", level, "peak")
+    noisy = add_noise(trace(SAMPLES[sample], times), noise, np.random.default_rng(7))
     assert said(times, noisy) == ""
     assert said(times, -noisy).startswith(
         f"trace.csv, lines 2 to {len(times) + 1}, column 'rotation_rad': {MIRRORED}, allowed is "
@@ -79,13 +77,14 @@ def test_the_papers_traces_pass_and_not_in_a_wrong_unit_or_mirrored(
         "(then say scale: -1 under measurement)"
     )
     found = f"trace.csv, line {np.argmax(np.abs(noisy)) + 2}, column 'rotation_rad': found "
-    large, small = (said(times, factor * noisy) for factor in (1e3, 1e-3))
-    assert large.startswith(found)
-    assert "allowed is at most 0.00545 rad" in large
-    assert "It would fit if it were 0.001 times (is it in mrad?)" in large
-    assert small.startswith(found)
-    assert "allowed is at least 7.27e-06 rad" in small
-    assert small.endswith("It would fit if it were 1000 times.")
+    for factor, allowed, fits in (
+        (1e3, "allowed is at most 0.00545 rad", "0.001 times (is it in mrad?)"),
+        (1e-3, "allowed is at least 7.27e-06 rad", "1000 times."),
+    ):
+        text = said(times, factor * noisy)
+        assert text.startswith(found)
+        assert allowed in text
+        assert f"It would fit if it were {fits}" in text
 
 
 def test_the_largest_reading_and_the_smoothed_one_are_told() -> None:
@@ -93,43 +92,36 @@ def test_the_largest_reading_and_the_smoothed_one_are_told() -> None:
     values[57] = 7.25
     found = said(TIMES, values)
     assert found.startswith("trace.csv, line 59, column 'rotation_rad': found 7.25 rad as the lar")
-    smoothed = re.search(r"and ([\d.]+) rad as the largest with the noise smoothed out", found)
-    assert smoothed is not None
-    assert float(smoothed[1]) == pytest.approx(3.2, rel=0.15)
+    (smoothed,) = re.findall(r"and ([\d.]+) rad as the largest with the noise smoothed out", found)
+    assert float(smoothed) == pytest.approx(3.2, rel=0.15)
     assert "without any sample the arm turns by 0.00364 rad" in found
-    for factor in (1e9, 1e157, 1e297):
-        assert "allowed is at most 0.00545 rad" in said(TIMES, factor * values)
+    assert "allowed is at most 0.00545 rad" in said(TIMES, 1e297 * values)
 
 
 @pytest.mark.parametrize(
     ("column", "factor", "found", "hint"),
     [
         ("rotation_rad", 1e6, "line ", "1e-06 times (is it in urad?)."),
-        (
-            *("rotation_rad", 180 / np.pi, "line "),
-            "0.001 times (is it in mrad?) or 0.01745 times (is it in deg?).",
-        ),
+        ("rotation_rad", 180 / np.pi, "line ", "0.001 times (is it in mrad?) or 0.01745 times (i"),
         ("rotation_mrad", 1e-3, "line ", "1000 times (is it in rad?) or 17.45 times (is it in d"),
-        ("rotation_mrad", 1e3, "line ", "0.001 times (is it in urad?)."),
         ("rotation_urad", 1e3, "line ", "0.001 times."),
         ("time_s", 1e3, "line 3, column 'time_s': found 1000 s", "0.001 times (is it in ms?)."),
         ("time_ms", 1e-3, "lines 2 to 402, column 'time_ms': found only 0 to 0.4 s", "1000 times"),
-        ("time_s", 1 / 60, "lines 2 to 402, column 'time_s': found only 0 to 6.66667 s", "60 ti"),
         ("time_min", 60.0, "line 9, column 'time_min': found 420 s", "0.01667 times (is it in s?)"),
     ],
 )
 def test_the_unit_that_would_fit_is_named(
     column: str, factor: float, found: str, hint: str
 ) -> None:
-    values = trace(SAMPLES["liquid_drop_1"])
-    if column.startswith("time"):
+    values, of_time = trace(SAMPLES["liquid_drop_1"]), column.startswith("time")
+    if of_time:
         text = said(factor * TIMES, values, Columns(column, "rotation_rad"))
-        assert "400 s" in text
     else:
         text = said(TIMES, factor * values, Columns("time_s", column))
     assert text.startswith(f"trace.csv, {found}")
     assert f"column '{column}'" in text
     assert f"It would fit if it were {hint}" in text
+    assert ("400 s" in text) == of_time
 
 
 def test_a_stiff_sample_passes_if_its_rotation_is_far_above_a_given_noise() -> None:
@@ -151,7 +143,7 @@ def test_a_response_explains_more_than_noise_would(explained: float, responds: b
 
 
 @pytest.mark.parametrize("rate_Hz", [10.0, 0.1])
-@pytest.mark.parametrize("mean", [0.0, 1e-3, -1e-3, 5.0])
+@pytest.mark.parametrize("mean", [0.0, -1e-3, 5.0])
 @pytest.mark.parametrize("sd", [0.0, 1e-9, 1e-4, 1.0])
 def test_noise_about_a_constant_is_no_response(rate_Hz: float, mean: float, sd: float) -> None:
     times = sample_times(400.0, rate_Hz)
@@ -160,10 +152,8 @@ def test_noise_about_a_constant_is_no_response(rate_Hz: float, mean: float, sd: 
         values = mean + sd * np.random.default_rng([5, seed]).standard_normal(len(times))
         text = said(times, values)
         assert text.startswith(where)
-        found = re.search(r", but (\S+) rad throughout, give or take (\S+) rad", text)
-        assert found is not None
-        told = [float(number) for number in found.groups()]
-        assert told == pytest.approx([values.mean(), values.std()], rel=0.05)
+        (told,) = re.findall(r", but (\S+) rad throughout, give or take (\S+) rad", text)
+        assert [*map(float, told)] == pytest.approx([values.mean(), values.std()], rel=0.05)
 
 
 def test_an_offset_is_no_response_no_hindrance_and_no_wrong_sign() -> None:
@@ -196,14 +186,13 @@ def test_what_rounding_leaves_of_a_torque_is_no_response(samples: int) -> None:
 
 def test_the_free_rotation_is_that_of_the_left_arm() -> None:
     """In closed form, with hinges of 0.44 and 0.55 uN m."""
-    for phases, largest in (
-        ((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)), 1.6e-9 / 4.4e-7),
-        ((hold(1.0, -1.6e-9), hold(1.0, 0.32e-9)), 1.6e-9 / 4.4e-7),
-        ((hold(1.0, 0.0), hold(1e-9, 1.6e-9), hold(1.0, 0.0)), 1.6e-9 / 4.4e-7),
-        ((ramp(7.0, 0.0, 1.4e-9),), 1.4e-9 / 4.4e-7),
+    for phases, largest_Nm in (
+        ((hold(1.0, -1.6e-9), hold(1.0, 0.32e-9)), 1.6e-9),
+        ((hold(1.0, 0.0), hold(1e-9, 1.6e-9), hold(1.0, 0.0)), 1.6e-9),
+        ((ramp(7.0, 0.0, 1.4e-9),), 1.4e-9),
     ):
         found = free_rotation(UNEQUAL, join_phases(phases))
-        assert found == pytest.approx(largest, rel=1e-12)
+        assert found == pytest.approx(largest_Nm / 4.4e-7, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -236,8 +225,7 @@ def test_a_share_of_the_protocol_is_enough_wherever_it_is() -> None:
 
 
 PULLING = {
-    "steps": (hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)),
-    "hold": (hold(60.0, 1e-9),),
+    "steps": STUDY.phases,
     "ramp": (ramp(100.0, 0.0, 2e-9), hold(50.0, 0.0)),
     "late": (hold(50.0, 0.0), hold(50.0, 1e-9), hold(100.0, 0.0)),
     "stairs": tuple(hold(40.0, 1e-10 * (step + 1)) for step in range(8)),
@@ -257,12 +245,9 @@ def test_the_sign_of_a_trace_is_told(protocol: str) -> None:
         exponents = np.array([parameter.kind == "exponent" for parameter in model.parameters])
         network = model.network(np.where(exponents, (powers + 2.1) / 4.7, 10**powers))
         times = np.sort(rng.uniform(0, torque.end_s, 500))
-        # The ring is over before any but one in a thousand of the samples.
-        response = step_response(gripper, network, inertia=False)
-        values = superpose(response, torque, times)[0]
-        size = np.abs(values).max()
+        values = superpose(step_response(gripper, network, inertia=False), torque, times)[0]
+        size, offset = np.abs(values).max(), trial % 3 == 0
         values += rng.choice([0.0, 0.05, 0.3]) * size * rng.standard_normal(len(times))
-        offset = bool(trial % 3 == 0)
         values += offset * size * rng.standard_normal()
         given = (SI, gripper, PULLING[protocol])
         good, bad = (said(times, sign * values, *given, offset=offset) for sign in (1, -1))

@@ -2,7 +2,6 @@
 
 import csv
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -106,19 +105,8 @@ def test_a_cell_that_is_neither_a_number_nor_a_gap_is_refused(tmp_path: Path, ce
         assert refusal(path).startswith(f"{place}: found '{shown}', allowed is a finite number, or")
 
 
-ENCODINGS = {
-    "utf-8": "UTF-8",
-    "utf-8-sig": "UTF-8",
-    "utf-16": "UTF-16",
-    "utf-16-be": "UTF-16",
-    "cp1252": "Windows-1252",
-}
-
-
-def encoded(text: str, encoding: str) -> bytes:
-    """UTF-16 has its mark, in either order of the bytes."""
-    mark = BOM_UTF16_BE if encoding == "utf-16-be" else b""
-    return mark + text.encode(encoding)
+ENCODINGS = dict.fromkeys(("utf-8", "utf-8-sig"), "UTF-8")
+ENCODINGS |= dict.fromkeys(("utf-16", "utf-16-be"), "UTF-16") | {"cp1252": "Windows-1252"}
 
 
 SIGNS = [(",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ",")]
@@ -147,7 +135,8 @@ def test_what_pandas_writes_is_read_to_the_last_bit(
     lines = frame.to_csv(index=False, na_rep="NA", lineterminator="\n", **form).splitlines()
     for line in data.draw(st.lists(st.sampled_from(MORE), max_size=3)):
         lines.insert(int(rng.integers(len(lines) + 1)), line)
-    path.write_bytes(encoded("".join(line + line_end for line in lines), encoding))
+    mark = BOM_UTF16_BE if encoding == "utf-16-be" else b""
+    path.write_bytes(mark + "".join(line + line_end for line in lines).encode(encoding))
     found = read_recording(path, Columns("time_s", "angle, left (urad)"))
     assert found.form["encoding"] == ENCODINGS[encoding]
     np.testing.assert_array_equal(found.time_s, times)
@@ -288,55 +277,16 @@ def test_a_byte_that_is_no_text_is_placed_however_late_it_is(tmp_path: Path, new
         assert f", line 5002: found the byte {byte}, allowed is text in UTF-8" in refusal(path)
 
 
-@pytest.mark.parametrize(
-    ("header", "row", "place"),
-    [
-        (f"time_s,rotation,{200_000 * 'x'}", "4,1,2", ", line 1"),
-        ("time_s,rotation_rad", f"4,{200_000 * '1'}", ", line 6"),
-        (",".join(map(str, range(5000))), "4,1", ", line 1"),
-    ],
-    ids=["name", "cell", "names"],
-)
-def test_endless_text_is_refused_in_few_words(
-    tmp_path: Path, header: str, row: str, place: str
-) -> None:
-    path = tmp_path / "t.csv"
-    path.write_text("\n".join([header, *ROWS[:4], row, *ROWS[5:]]))
+@pytest.mark.parametrize("of", ["a name", "a cell", "names"])
+def test_endless_text_is_refused_in_few_words(tmp_path: Path, of: str) -> None:
+    path, names = tmp_path / "t.csv", ",".join(map(str, range(5000)))
+    endless = {"a name": (0, f"time_s,rotation,{200_000 * 'x'}"), "names": (0, names)}
+    line, text = endless.get(of, (5, f"4,{200_000 * '1'}"))
+    rows = ["time_s,rotation_rad", *ROWS]
+    path.write_text("\n".join([*rows[:line], text, *rows[line + 1 :]]))
     said = refusal(path)
-    assert said.startswith(f"{path}{place}")
+    assert said.startswith(f"{path}, line {line + 1}")
     assert len(said) < 1000
-
-
-def damaged(content: bytes, rng: np.random.Generator) -> bytes:
-    """Content with a piece replaced, left out or repeated, and perhaps without its end."""
-    start = int(rng.integers(len(content)))
-    piece = content[start : start + int(rng.integers(1, 60))]
-    others = [rng.bytes(1), b"", 2 * piece, b"\n", b"[step]\n", b'"', b"9", b"Time\t"]
-    end = start + int(rng.choice([1, len(piece)]))
-    made = content[:start] + others[rng.integers(len(others))] + content[end:]
-    return made if rng.integers(2) else made[: int(rng.integers(len(made)))]
-
-
-@pytest.mark.parametrize(
-    "kept",
-    [
-        next(kept for kept in KEPT if kept.get("file") == name and "units" in kept)
-        for name in (None, "anton_paar_intervals.utf16.csv", "trios.txt", "volts.cp1252.csv")
-    ],
-    ids=lambda kept: kept.get("file"),
-)
-def test_a_damaged_file_is_refused_or_leaves_a_trace(kept: dict[str, Any], tmp_path: Path) -> None:
-    content = (FILES / kept.get("file", "plain.csv")).read_bytes()
-    columns, rng = columns_of(kept.get("columns", {})), np.random.default_rng(5)
-    path, read = tmp_path / "t.csv", 0
-    for _ in range(60):
-        path.write_bytes(damaged(content, rng))
-        with suppress(BiogripError):
-            found = read_recording(path, columns)
-            assert np.all(np.diff(found.time_s) > 0)
-            assert np.all(np.isfinite(found.readings))
-            read += 1
-    assert 0 < read < 60
 
 
 # Separator, time and reading of row i, and the numbers that they are; None is refused.
