@@ -32,7 +32,7 @@ def test_what_is_rounded_again_comes_out_as_if_once(value: float, found: float) 
         # Of an instant the nearer limit counts.
         (instant, (8.51, 8.4, 8.63), "8.51 s (8.40 to 8.63)"),
         (instant, (5.0, -17.3, 5.3), "5.00 s (-17.30 to 5.30)"),
-        (instant, (5.0, -17.3, 5.0), "5 s (-17 to 5)"),
+        (instant, (-0.2, -17.3, -0.2), "0 s (-17 to 0)"),
         (instant, (5.0, 5.0, 5.0), "5.0000000 s (5.0000000 to 5.0000000)"),
     ],
 )

@@ -204,6 +204,18 @@ def test_models_are_compared_each_at_its_own_onset() -> None:
 HOLD = np.arange(0.4, 44, 0.4)
 
 
+def test_limits_of_any_sample_hold_whatever_the_fitted_start() -> None:
+    """Creep after a jump looks the same from any start up to the first reading."""
+    values = 5 - 3 * np.exp(-HOLD / 8)
+    values += 5e-3 * np.random.default_rng(5).standard_normal(len(HOLD))
+    given: dict[str, Any] = {"reads": "compliance", "model": "zener_kelvin", "start": "fit"}
+    limits = told(HOLD + 12, values, **given).without_model([1.0, 10.0]).set_index("quantity")
+    found = limits.loc[["J(1 s)", "J(10 s)"], ["low", "high"]].to_numpy()
+    truth = 5 - 3 * np.exp(np.array([-1, -10]) / 8)
+    assert not np.any((truth < found[:, 0]) | (truth > found[:, 1]))
+    assert truth[1] < found[1, 1] < 1.05 * truth[1]
+
+
 def test_a_clock_may_count_seconds_since_1970() -> None:
     """Within the 2e-7 s to which it is read; and without a start that is asked for."""
     values = (1 - np.exp(-HOLD / 8)) / 100

@@ -98,7 +98,7 @@ def instant(time_s: float, low_s: float, high_s: float) -> str:
     """Return a time of any clock and its limits, with two digits of how far the nearer one is."""
     sides = [side_s for side_s in (time_s - low_s, high_s - time_s) if side_s > 0]
     decimals = max(1 - _power(2 * min(sides)), 0) if sides else _MOST_SHOWN
-    time, low, high = (f"{each:.{decimals}f}" for each in (time_s, low_s, high_s))
+    time, low, high = (f"{each:z.{decimals}f}" for each in (time_s, low_s, high_s))
     return f"{time} s ({low} to {high})"
 
 

@@ -13,7 +13,7 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -97,16 +97,23 @@ class Diagnosis:
         Where none gives the trace, as the best of them would be rejected, nothing is told.
         """
         # Imported here, as below: only those who ask for it need it.
-        from biogrip.judging.without_model import KINDS, tell_without_model
+        from biogrip.judging.without_model import KINDS, decades, tell_without_model
 
         residuals, experiment = self.likelihood.problem.residuals, self.experiment
-        found = tell_without_model(
-            residuals,
+        tell = partial(
+            tell_without_model,
             confidence=self.likelihood.confidence,
             noise_sd=experiment.noise_sd if experiment else None,
-            at_s=at_s,
             kinds=KINDS if kinds is None else kinds,
         )
+        found = tell(residuals, at_s=at_s)
+        if self.onset_limits_s and experiment and self.recording:
+            posed, trace = experiment.to_identify(), self.recording
+            starts = (
+                posed.of(trace.time_s - end_s, trace.readings) for end_s in self.onset_limits_s
+            )
+            times = at_s or decades(*found.covered_s)
+            found = found.widened([tell(start.residuals, at_s=times) for start in starts])
         # Beyond the noise.
         far_off = found.misfit**2 - residuals.noise_scale**2 > (FAR_OFF * residuals.peak) ** 2
         hopeless = far_off and not found.is_linear and self.status == REJECTED

@@ -26,7 +26,7 @@ References
 
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -140,6 +140,19 @@ class WithoutModel:
     """False if no linear sample gives this trace, for what the best leaves is no noise."""
     covered_s: tuple[float, float]
     """From when to when after a step there are readings, and so limits on either side."""
+
+    def widened(self, others: Sequence["WithoutModel"]) -> "WithoutModel":
+        """Return it with limits that hold those of others, too, as of other starts."""
+        told = []
+        for own in self.told:
+            every = [own, *(it for of in others for it in of.told if it.quantity == own.quantity)]
+            whole = len(every) > len(others)
+            lows, highs = [it.low for it in every], [it.high for it in every]
+            low = min(filter(None, lows)) if whole and all(lows) else None
+            high = max(filter(None, highs)) if whole and all(highs) else None
+            value = own.value if low and high else None
+            told.append(replace(own, value=value, low=low, high=high))
+        return replace(self, told=told)
 
     def data(self) -> dict[str, Any]:
         """Return it as plain data."""
