@@ -76,3 +76,14 @@ def test_a_rejected_fit_says_only_why() -> None:
     assert found.data["noise_rad"] is None
     for word in ("allow for", "richer", "suits the trace", "intervals", "Limits are"):
         assert word not in str(found)
+
+
+def test_a_springpot_may_be_a_spring() -> None:
+    """With exponents from 0.01 on, this right model would be rejected."""
+    times = np.geomspace(1e-2, 1e4, 40)
+    values = (30 + 100 / np.sqrt(times)) * (1 + 0.01 * np.random.default_rng(1).normal(size=40))
+    given: dict[str, Any] = {"reads": "modulus", "noise_share": 0.01}
+    found = told(times, values, model="springpots_in_parallel", **given)
+    assert found.status == OK
+    low, high = found.to_frame().loc["k_beta", ["low", "high"]]
+    assert 29 < low < 30 < high < 32
