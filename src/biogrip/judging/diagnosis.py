@@ -107,13 +107,9 @@ class Diagnosis:
             kinds=KINDS if kinds is None else kinds,
         )
         found = tell(residuals, at_s=at_s)
-        if self.onset_limits_s and experiment and self.recording:
-            posed, trace = experiment.to_identify(), self.recording
-            starts = (
-                posed.of(trace.time_s - end_s, trace.readings) for end_s in self.onset_limits_s
-            )
-            times = at_s or decades(*found.covered_s)
-            found = found.widened([tell(start.residuals, at_s=times) for start in starts])
+        if self.onset_limits_s:
+            starts, times = map(residuals.later, self.onset_limits_s), decades(*found.covered_s)
+            found = found.widened([tell(start, at_s=at_s or times) for start in starts])
         # Beyond the noise.
         far_off = found.misfit**2 - residuals.noise_scale**2 > (FAR_OFF * residuals.peak) ** 2
         hopeless = far_off and not found.is_linear and self.status == REJECTED
