@@ -150,6 +150,15 @@ def test_the_search_range_determines_no_combination() -> None:
     assert rise_of_held(judged.likelihood, QUANTITIES[0], soft, best) < judged.likelihood.threshold
 
 
+def test_the_search_range_determines_no_relaxation_time() -> None:
+    """A solid flows by a damper above any limit, however well its spring is known."""
+    times = np.arange(0.5, 60, 0.5)
+    values = 5 - 3 * np.exp(-times / 8) + 0.02 * np.random.default_rng(1).normal(size=119)
+    found = told(times, values, reads="compliance", model="burgers").to_frame()
+    assert [*found.loc[["c_s", "tau_s"], "verdict"]] == ["bounded below"] * 2
+    assert found.loc["tau_s", "low"] > 100
+
+
 def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
     """With the best onset alone the damper would be known from below, too."""
     experiment = set_up(GRIPPER, (hold(20.0, 1e-9), hold(40.0, 0.4e-9)), Sample("kelvin_voigt"))

@@ -15,6 +15,8 @@ from biogrip.physics.sample_model import SampleModel
 # Slopes of hinges: a relaxation time of twice the experiment increases chi^2 by some 50, and one
 # a hundredth above that of the next branch by 1.
 _WITHIN, _IN_ORDER = 10.0, 100.0
+# E-folds from an end of a range within which a parameter is at it.
+_AT_END = 1e-6
 
 PROVIDED = "provided that the branch, k and c in series, relaxes within the experiment"
 """Condition of a sum of dampers, in the sentences of tables and pages."""
@@ -94,6 +96,13 @@ class Quantity:
             of_sum = self.sense * log_parameters[list(self.members)]
             slope[list(self.members)] = np.exp(of_sum - np.logaddexp.reduce(of_sum))
         return slope
+
+    def is_at_end(self, log_parameters: Array, low: Array, high: Array, best: float) -> bool:
+        """Return True of a ratio that would be further from a value without a member's range."""
+        members, x = list(self.members), log_parameters
+        outwards = np.multiply(self.sign, np.sign(self.log(x) - best))
+        ends = np.where(outwards > 0, high[members], low[members])
+        return len(self.sign) > 1 and bool(np.any(np.abs(x[members] - ends) < _AT_END))
 
     def range(self, low: Array, high: Array) -> tuple[float, float]:
         """Return its lowest and highest logarithm for log-parameters within bounds.
