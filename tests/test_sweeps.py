@@ -275,6 +275,19 @@ def test_a_relaxation_time_beyond_the_sweep_is_only_bounded() -> None:
     assert found["tau"]["high"] is None or found["tau"]["high"] > 100 * found["tau"]["low"]
 
 
+@pytest.mark.parametrize("count", [3, 4, 5, 6])
+def test_few_frequencies_tell_the_noise(count: int) -> None:
+    """As many lags as readings would leave none, and any sample limits of no width."""
+    omega = np.geomspace(0.1, 10.0, count)
+    values = noisy(moduli("springpot", omega, 600.0, 0.2), seed=5)
+    found = swept(values, omega, model="springpot")
+    assert 0.4 < found.diagnosis.likelihood.misfit / found.data["scatter_rad"] < 2.5
+    shares = re.findall(r"([\d.]+) % of the \w+ modulus", str(found))
+    assert [0.6 < float(share) < 5 for share in shares] == [True, True]
+    limits = found.without_model().dropna(subset=["low", "high"])
+    assert (limits["high"] > 1.01 * limits["low"]).all()
+
+
 @pytest.mark.parametrize(
     ("inertia", "lost", "said"),
     [

@@ -35,6 +35,8 @@ _WIDER = 100.0
 _OUTLYING = 36.0
 # The smooth rotation and the weights are found in turn.
 _ROUNDS = 4
+# Fewest degrees of freedom with which each modulus of a sweep has its own scatter.
+_FREE = 12
 # Share of the readings whose scatter bounds the noise from below, and fewest of them.
 _SMALL, _FEWEST = 0.1, 5
 # Their scatter over that of the share, beyond which there is other noise: chi-squared with five
@@ -243,7 +245,7 @@ def swept_deviations(
 
     They are in proportion to the moduli of the linear sample that is nearest, and `more` is added,
     squared. Without a share, each modulus has that by which its readings over these scatter from
-    one frequency to the next.
+    one frequency to the next; or both have one, if that sample takes most of few readings.
     """
     storage, (shortest_s, longest_s) = is_storage(places), SWEEP.spread_s(places)
     count = int(_RATES_A_DECADE * np.log10(_WIDER**2 * longest_s / shortest_s))
@@ -253,12 +255,30 @@ def swept_deviations(
     for _ in range(_ROUNDS):
         amplitudes, _ = fit_responses(readings / smooth, family / smooth)
         smooth = np.clip(amplitudes @ family, 0.5 * readings, 2.0 * readings)
-    if share is None:
+    free = len(readings) - 2 * count_lags(amplitudes > 0)
+    if share is None and free < max(_FREE, len(readings) / 2):
+        shares = [max(_scatter(places, readings, smooth, free), _ROUNDING)] * 2
+    elif share is None:
         twice = (np.diff((readings / smooth)[of], 2) ** 2 for of in (storage, ~storage))
         usual = (each[each <= _OUTLYING * np.median(each)] for each in twice)
         shares = [max(float(np.sqrt(np.mean(each) / 6)), _ROUNDING) for each in usual]
     sd = np.hypot(np.where(storage, *shares) * smooth, more)
     return sd, dict(zip(("storage", "loss"), shares, strict=True))
+
+
+def _scatter(places: Array, readings: Array, smooth: Array, free: int) -> float:
+    """Return the share by which a sweep's readings scatter about those of a linear sample.
+
+    If no freedom is left, they scatter about parabolas on logarithmic axes.
+    """
+    if free > 0:
+        return float(np.linalg.norm(readings / smooth - 1) / np.sqrt(free))
+    square_sum, x, y = 0.0, np.log(np.abs(places)), np.log(readings)
+    for of in (is_storage(places), ~is_storage(places)):
+        degree = min(2, int(np.sum(of)) - 2)
+        square_sum += float(np.polyfit(x[of], y[of], degree, full=True)[1].sum())
+        free = max(free, 0) + int(np.sum(of)) - degree - 1
+    return float(np.sqrt(square_sum / free))
 
 
 def _least(sizes: Array, rest: Array, share: float) -> float:

@@ -192,6 +192,9 @@ def tell_without_model(
         chance = min(chance, too_large)
         if too_large >= CERTAIN_MISFIT:
             sd, freedom = noise_sd, math.inf
+    elif residuals.free <= fit.taken:
+        # It leaves nothing that tells the noise.
+        sd = max(sd, residuals.noise_scale)
     is_linear = chance >= CERTAIN_MISFIT or times <= TOO_MUCH
     if not is_linear:
         independent, freedom = as_correlated(*left)
