@@ -153,7 +153,7 @@ PER_PA = ("Pa^-1", "Pa**-1", "Pa-1", "Pa\u207b\u00b9")
 UNITS = [
     (TIME_UNITS, TIMES | {"days": 86400.0}),
     (ROTATION.units, ANGLES | dict.fromkeys(("deg", "°"), 0.017453292519943295)),
-    (MODULUS.units, {"Pa": 1.0}),
+    (MODULUS.units, {"Pa": 1.0, "N/m²": 1.0, "N/m^2": 1.0, "kN/m2": 1e3, "N/mm²": 1e6}),
     (COMPLIANCE.units, {"1/kPa": 1e-3, **dict.fromkeys(PER_PA, 1.0)}),
     (STRAIN.units, STRAINS | {"\u00b5\u03b5": 1e-6, "mm/mm": 1.0}),
     (DISPLACEMENT.units, {"\u00b5m": 1e-6, "um": 1e-6}),
@@ -191,7 +191,8 @@ def test_a_unit_is_read_off_a_name_or_a_row_of_units_or_stated(
 @pytest.mark.parametrize(
     ("column", "given", "below", "message"),
     [
-        ("x_s", None, "", "found no unit, neither stated (by HOW) nor"),
+        ("x_y", None, "", "found no unit, neither stated (by HOW) nor"),
+        ("x_uN", None, "", "found the unit 'uN' at the end of the name; allowed"),
         ("phi (mrad) left", None, "", "found no unit"),
         ("phi (rad/s)", None, "", "found the unit 'rad/s' at the end of the name; allowed"),
         ("phi / mm", None, "", "found the unit 'mm' at the end of the name; allowed are rad, mrad"),

@@ -47,6 +47,9 @@ _SPELLED_OUT = {
     "%": ("percent", "pct"),
     "‰": ("permille", "mstrain", "millistrain", "mε"),
     "ppm": ("ustrain", "microstrain", "uε", "um/m"),
+    "Pa": ("n/m2", "n/m^2"),
+    "kPa": ("kn/m2", "kn/m^2"),
+    "MPa": ("n/mm2", "n/mm^2"),
 }
 _IN_BRACKETS = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\}|<([^<>]*)>")
 # What ends a name and is only a unit, and what may be one. After a digit, / is a reciprocal's.
@@ -215,7 +218,8 @@ def unit_of(
         if not end:
             row, how = f"{row}, neither stated (by {said_by}) nor at the end of the name", ""
         # As in G/G0.
-        share = " What is over another modulus is a relative_modulus." * (allowed == MODULUS.units)
+        of_modulus = not end and allowed == MODULUS.units
+        share = " What is over another modulus is a relative_modulus." * of_modulus
         raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.{share}")
     for other, said in ((at_end, "the name"), (in_row, "the row of units")):
         if other not in (None, unit):
@@ -311,10 +315,12 @@ def _unit_at_end(column: str, allowed: Collection[str]) -> str | None:
 
 
 def _said_at_end(column: str) -> str | None:
-    """Return what can be nothing but a unit at the end of a name, or None."""
+    """Return what can be nothing but a unit, or is one, at the end of a name, or None."""
     if _is_ratio(column):
         return None
-    return next((end for end in _endings(column, *_SURELY) if end and not end.isdigit()), None)
+    ends = [end for end in _endings(column, *_SURELY) if end and not end.isdigit()]
+    ends += (end for end in _endings(column, *_PERHAPS) if known_unit(end, _UNITS))
+    return next(iter(ends), None)
 
 
 def _is_pure(column: str) -> bool:
