@@ -239,7 +239,7 @@ def test_what_cannot_be_used_is_named_once_and_at_once(
         ("--start", "soon", "found 'soon', allowed is a number of seconds, or fit"),
         ("--hold", "0", "allowed is a number, and not 0"),
         *(("--hold", text, "allowed is a number, or one with") for text in ("nan", "much")),
-        ("--hold", "5,0", "a decimal comma? Allowed is a point"),
+        ("--hold", "-5,0%", "a decimal comma? Allowed is a point"),
         ("--set", "a.b=[1", "a.b: not valid YAML: "),
         ("--set", "a.b=1:30", "a.b: found 1:30, which YAML reads in base 60"),
     ],
