@@ -30,6 +30,8 @@ from biogrip.physics.protocol import Course, evaluate
 from biogrip.traces.columns import TIME_UNITS
 from biogrip.traces.reader import Recording
 
+# Distance from the median, over that of all but a tenth, of what is no reading.
+_APART = 100.0
 # Relative tolerance, since times are written with few digits.
 _TIME_SLACK = 1e-5
 _LAG_SHARES = (1e-9, 0.03, 0.1, 0.3, 1.0, 10.0)
@@ -92,7 +94,14 @@ def check_recording(
     # Without any scatter nothing tells noise from sample.
     counts = len(responses), len(trace) - used
     if is_constant or np.ptp(trace) == 0 or not _responds(trace, nuisance, least, *counts):
-        unit = f" {read.unit}".rstrip()
+        unit, off = f" {read.unit}".rstrip(), np.abs(trace - np.median(trace))
+        usual = _APART * np.quantile(off, 0.9)
+        for sample in np.flatnonzero(off > usual)[: int(usual > 0)]:
+            raise BiogripError(
+                f"{recording.place(sample, recording.read.reading)}: found {trace[sample]:.6g}"
+                f"{unit}, far from nearly all others, and no response to the {controlled} beside "
+                "it; allowed are readings. What is none has no number in its cell."
+            )
         raise BiogripError(
             f"{where}: found no response to the {controlled}, but {plain(trace.mean())}{unit} "
             f"throughout, give or take {plain(trace.std(), 2)}{unit}; allowed is a {read.name} "
@@ -160,12 +169,12 @@ def _check_times(recording: Recording, torque: Course) -> None:
     if fits(1.0):
         return
     hint = _other_units(recording.units[0], TIME_UNITS, fits)
+    if not hint and onset_s is None:
+        how = "--start says when, in s, or --start fit finds it"
+        if not columns.by_options:
+            how = "start_s under measurement says when, or fit_start: true finds it"
+        hint = f" If the protocol starts at another time of the clock than 0, {how}."
     for sample in np.flatnonzero((time_s < earliest) | (time_s > end_s + slack))[:1]:
-        if not hint and onset_s is None:
-            how = "--start says when, or --start fit finds it"
-            if not columns.by_options:
-                how = "start_s under measurement says when, or fit_start: true finds it"
-            hint = f" If the protocol starts at another time of the clock than 0, {how}."
         raise BiogripError(
             f"{recording.place(sample, columns.time)}: found "
             f"{clock_s[sample]:.12g} s, allowed is the protocol's time, {begins:g} to "
