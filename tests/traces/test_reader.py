@@ -89,6 +89,7 @@ NO_NUMBERS = ("abc", "1_0", "1.2.3", "0x1", "--", "1 2", "inf", "-1e999", "\0", 
 def test_a_row_with_a_gap_is_left_out_and_counted(tmp_path: Path) -> None:
     gaps = [row for gap in GAPS for row in (f"2.5,{gap}", f"{gap},1")]
     text = "\n".join(["time_s,rotation_rad", *ROWS[:3], *gaps, "# note", "", "  ", *ROWS[3:]])
+    text += "\n\nEnd of data\n"
     (tmp_path / "t.csv").write_text(text.replace("nan, ,1", "nan,1"))
     found = read_recording(tmp_path / "t.csv", PLAIN)
     assert found.gaps == len(gaps)
@@ -342,7 +343,10 @@ def test_a_clock_goes_on_after_midnight_and_after_a_change_of_its_zone(tmp_path:
     hours = [("02", m, "+02:00") for m in range(50, 60)] + [("02", m, "+01:00") for m in range(10)]
     rows = [f"2026-10-25T{h}:{m:02}:00{zone},{m}" for h, m, zone in hours]
     path.write_text("\n".join(["t,G_Pa", *rows]))
-    assert np.ptp(read_recording(path, columns).time_s) == 19 * 60
+    found = read_recording(path, columns)
+    assert np.ptp(found.time_s) == 19 * 60
+    start = "Times are dates, from the first, when the protocol is taken to start."
+    assert start in found.remarks()
     # Dates that fall, of two tests in one file, are no midnight.
     rows = [f"2026-10-{day}T12:00:{s:02},{s}" for day in (26, 25) for s in range(20)]
     path.write_text("\n".join(["t,G_Pa", *rows]))

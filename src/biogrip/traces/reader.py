@@ -44,7 +44,8 @@ _CAUSES = {
     "high frequencies: correct for it, or leave these rows out (--until). Of a liquid it may be "
     "noise.",
     "loss modulus": " The sample would give energy instead of losing it: the phase has the wrong "
-    "sign or an offset, or the loss is below the noise.",
+    "sign or an offset, or the loss is below the noise: then leave these rows out (--from, "
+    "--until, or no number in the cell).",
 }
 _PLURALS = {"time": "times", "frequency": "frequencies"}
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
@@ -154,7 +155,8 @@ class Recording:
                 "is between thousands, numbers are 1000 times as large."
             )
         if "clock" in form:
-            said.append(f"Times are {form['clock']}.")
+            begins = ", when the protocol is taken to start" * form["clock"].startswith("dates")
+            said.append(f"Times are {form['clock']}{begins * (self.onset_s is None)}.")
         if self.at_steps:
             times = ", ".join(f"{time_s:.6g} s" for time_s in self.at_steps)
             said.append(

@@ -315,7 +315,11 @@ def _tables(sheet: Sheet, columns: Columns) -> list[Table]:
     """Return all tables in the order of the file."""
     found = (_header(sheet, at, columns) for at in sheet.headers)
     tables = [table for table in found if table is not None]
-    ends = [0, *(_end(sheet, *pair) for pair in pairwise(tables)), len(sheet.cells)]
+    last = len(sheet.cells)
+    # Words below the last row.
+    while last and sheet.widths[last - 1] == 1 and not sheet.cells[last - 1, 0][:1].isdigit():
+        last -= 1
+    ends = [0, *(_end(sheet, *pair) for pair in pairwise(tables)), last]
     return [
         replace(table, end=end, title=_title(sheet, start, table))
         for table, (start, end) in zip(tables, pairwise(ends), strict=False)
