@@ -98,14 +98,20 @@ def test_scatter_that_readings_do_not_follow_is_smoothed_out(
     assert said.endswith("from 0 s (column stress_Pa, 400 rows).")
 
 
-def test_limits_allow_for_a_step_anywhere_between_two_rows(tmp_path: Path) -> None:
-    """A Zener solid's creep, in closed form, under a step to 5 Pa that a log of 1 s has."""
+@pytest.mark.parametrize("at_s", [(9.05,), (9.0, 60.0)])
+def test_limits_allow_for_steps_anywhere_between_two_rows(
+    tmp_path: Path, at_s: tuple[float, ...]
+) -> None:
+    """A Zener solid's creep and recovery, in closed form, under 5 Pa that a log of 1 s has."""
     log_s = np.arange(100.0)
-    since = np.maximum(log_s - 9.05, 0.0)
-    strain = 5 * np.where(since > 0, 1 / 500 + (1 - np.exp(-since / 10)) / 300, 0.0)
-    strain += np.random.default_rng(5).normal(0, 1e-4, len(log_s))
+    strain = np.random.default_rng(6).normal(0, 1e-4, len(log_s))
+    stress = np.zeros(len(log_s))
+    for sign, step_s in zip((1, -1), at_s, strict=False):
+        since = np.maximum(log_s - step_s, 0.0)
+        crept = 1 / 500 + (1 - np.exp(-since / 10)) / 300
+        strain += np.where(log_s >= step_s, sign * 5 * crept, 0.0)
+        stress += np.where(log_s >= step_s, sign * 5.0, 0.0)
     model = Setting("--model", ("sample", "model"), "zener_kelvin")
-    stress = np.where(since > 0, 5.0, 0.0)
     recording, case = read_trace(loaded(tmp_path / "log.csv", log_s, strain, stress, more=[model]))
     alone = replace(case.judged_experiment, models=(), cheap_models=False)
     diagnosis = identify(recording, alone)
@@ -118,7 +124,7 @@ def test_limits_allow_for_a_step_anywhere_between_two_rows(tmp_path: Path) -> No
     # By as much as the step may be earlier or later; the retardation time does not hang on it.
     assert 0.1 < width[0] < 0.3
     assert width[3] < 0.05
-    assert trace_data(diagnosis)["limits"].startswith("Limits allow for 1 step of the stress any")
+    assert trace_data(diagnosis)["limits"].startswith(f"Limits allow for {len(at_s)} step")
 
 
 @pytest.mark.parametrize("first_s", [0.5, 0.0])

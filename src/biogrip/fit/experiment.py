@@ -66,7 +66,7 @@ class Experiment:
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
     ``gripper`` itself; ``share`` of the ``torque``; and of the ``steps`` of a record, by their
-    number from 0, when each came."""
+    number from 0, when each came, and of all by -1."""
     fit_start: bool = False
     """True if the time at which the protocol started is fitted along (`judging.onset`)."""
     record: Array | None = field(default=None, compare=False)
@@ -173,12 +173,17 @@ class Experiment:
             if error and key != _NOT_FITTED
         ]
 
-    def with_step(self, number: int, later_s: float) -> "Experiment":
-        """Return an experiment of which a step of the record comes later by some s."""
+    def with_step(self, number: int, later: float) -> "Experiment":
+        """Return an experiment of which a step of the record comes later by some s.
+
+        The last, with the number -1, is of all steps, by so many of their standard deviations.
+        """
         assert self.record is not None
-        record = self.record.copy()
-        row = np.flatnonzero(np.diff(record[:, 0]) == 0)[number]
-        record[[row, row + 1], 0] += later_s
+        *errors_s, _ = self.uncertainty["steps"].values()
+        record, first = self.record.copy(), np.flatnonzero(np.diff(self.record[:, 0]) == 0)
+        moved_s = later * (np.array(errors_s) if number < 0 else np.eye(len(first))[number])
+        record[first, 0] += moved_s
+        record[first + 1, 0] += moved_s
         return replace(self, record=record)
 
     @property

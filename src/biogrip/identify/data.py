@@ -137,7 +137,7 @@ def _what_limits_include(experiment: Experiment) -> str:
     said = []
     if instrument.has_jaws and keys:
         said.append(f"Limits include uncertainties of the gripper: {', '.join(keys)}.")
-    if steps := len(known) - len(keys):
+    if steps := max(len(known) - len(keys) - 1, 0):
         said.append(
             f"Limits allow for {counted(steps, 'step')} of the {controlled} anywhere between the "
             f"two rows of its record; otherwise the {exact} is taken as exact."
