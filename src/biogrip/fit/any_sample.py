@@ -256,29 +256,17 @@ def swept_deviations(
         amplitudes, _ = fit_responses(readings / smooth, family / smooth)
         smooth = np.clip(amplitudes @ family, 0.5 * readings, 2.0 * readings)
     free = len(readings) - 2 * count_lags(amplitudes > 0)
-    if share is None and free < max(_FREE, len(readings) / 2):
-        shares = [max(_scatter(places, readings, smooth, free), _ROUNDING)] * 2
-    elif share is None:
-        twice = (np.diff((readings / smooth)[of], 2) ** 2 for of in (storage, ~storage))
+    if share is None:
+        # If it takes all of a few, these scatter about lines on logarithmic axes.
+        about, order = readings / smooth - 1 if free > 0 else np.log(readings), len(readings) > 4
+        twice = (np.diff(about[of], 1 + order) ** 2 for of in (storage, ~storage))
         usual = (each[each <= _OUTLYING * np.median(each)] for each in twice)
         shares = [max(float(np.sqrt(np.mean(each) / 6)), _ROUNDING) for each in usual]
+        if free < max(_FREE, len(readings) / 2):
+            one = np.sum(about**2) / free if free > 0 else np.mean(np.square(shares))
+            shares = [max(float(np.sqrt(one)), _ROUNDING)] * 2
     sd = np.hypot(np.where(storage, *shares) * smooth, more)
     return sd, dict(zip(("storage", "loss"), shares, strict=True))
-
-
-def _scatter(places: Array, readings: Array, smooth: Array, free: int) -> float:
-    """Return the share by which a sweep's readings scatter about those of a linear sample.
-
-    If no freedom is left, they scatter about parabolas on logarithmic axes.
-    """
-    if free > 0:
-        return float(np.linalg.norm(readings / smooth - 1) / np.sqrt(free))
-    square_sum, x, y = 0.0, np.log(np.abs(places)), np.log(readings)
-    for of in (is_storage(places), ~is_storage(places)):
-        degree = min(2, int(np.sum(of)) - 2)
-        square_sum += float(np.polyfit(x[of], y[of], degree, full=True)[1].sum())
-        free = max(free, 0) + int(np.sum(of)) - degree - 1
-    return float(np.sqrt(square_sum / free))
 
 
 def _least(sizes: Array, rest: Array, share: float) -> float:

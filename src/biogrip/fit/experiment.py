@@ -174,16 +174,12 @@ class Experiment:
         ]
 
     def with_step(self, number: int, later: float) -> "Experiment":
-        """Return an experiment of which a step of the record comes later by some s.
-
-        The last, with the number -1, is of all steps, by so many of their standard deviations.
-        """
+        """Return one whose step comes later by some s; or all, -1, by so many of their errors."""
         assert self.record is not None
         *errors_s, _ = self.uncertainty["steps"].values()
         record, first = self.record.copy(), np.flatnonzero(np.diff(self.record[:, 0]) == 0)
         moved_s = later * (np.array(errors_s) if number < 0 else np.eye(len(first))[number])
-        record[first, 0] += moved_s
-        record[first + 1, 0] += moved_s
+        record[[first, first + 1], 0] += moved_s
         return replace(self, record=record)
 
     @property

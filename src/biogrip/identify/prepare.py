@@ -34,8 +34,6 @@ from biogrip.traces.reader import Recording
 _CLEAREST, _MARGIN = 1e5, 10.0
 # Smallest and largest exponents of ten of search ranges.
 _LEAST_EXPONENT, _MOST_EXPONENT = -16, 18
-# Of exponents of springpots: a hundredth changes a modulus by 11 % in five decades.
-_FROM_A_SPRING = -3, 0
 
 _FLOWS = {"damper": "c_p", "maxwell": "c", "burgers": "c_s"}
 
@@ -213,7 +211,8 @@ def ranges_of(experiment: Experiment, time_s: Array, readings: Array) -> dict[st
     short_s, long_s = experiment.torque.spread_s(time_s)
     dampers = _decades(low * short_s, high * long_s)
     springpots = _decades(low * min(short_s, 1.0), high * max(long_s, 1.0))
-    springs, exponents = _decades(low, high), GeneRange(_FROM_A_SPRING, (1, 9))
+    # A springpot with the exponent 0.01 is no spring: it changes by 11 % in five decades.
+    springs, exponents = _decades(low, high), GeneRange((-3, 0), (1, 9))
     return {"k": springpots, "k_p": springs, "c": dampers, "c_p": dampers, "alpha": exponents}
 
 

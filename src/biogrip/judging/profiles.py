@@ -219,8 +219,8 @@ def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
             slowest_s = None
         problem = fits.likelihoods[fits.trace[index]].problem
         quantity = fits.quantities[index % len(fits.quantities)]
-        of_range = [quantity.is_at_end(own, problem.low, problem.high, best) for own in x]
-        low, high = (None if np.any(of_range & (values == end)) else end for end in (low, high))
+        made = values[quantity.at_end(x, problem.low, problem.high, best)]
+        low, high = (None if end in made else end for end in (low, high))
         if slowest_s is not None:
             low, high, gaps, certainty = None, None, (), None
         found.append(

@@ -9,14 +9,13 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, BoolArray
 from biogrip.physics.sample_model import SampleModel
 
 # Slopes of hinges: a relaxation time of twice the experiment increases chi^2 by some 50, and one
 # a hundredth above that of the next branch by 1.
 _WITHIN, _IN_ORDER = 10.0, 100.0
-# E-folds from an end of a range within which a parameter is at it.
-_AT_END = 1e-6
+_AT_END = 1e-6  # E-folds from an end of a range.
 
 PROVIDED = "provided that the branch, k and c in series, relaxes within the experiment"
 """Condition of a sum of dampers, in the sentences of tables and pages."""
@@ -97,12 +96,12 @@ class Quantity:
             slope[list(self.members)] = np.exp(of_sum - np.logaddexp.reduce(of_sum))
         return slope
 
-    def is_at_end(self, log_parameters: Array, low: Array, high: Array, best: float) -> bool:
-        """Return True of a ratio that would be further from a value without a member's range."""
-        members, x = list(self.members), log_parameters
-        outwards = np.multiply(self.sign, np.sign(self.log(x) - best))
-        ends = np.where(outwards > 0, high[members], low[members])
-        return len(self.sign) > 1 and bool(np.any(np.abs(x[members] - ends) < _AT_END))
+    def at_end(self, log_parameters: Array, low: Array, high: Array, best: float) -> BoolArray:
+        """Tell where, (n,), a ratio would be further from its best value but for a range's end."""
+        x, members = log_parameters[:, self.members], [*self.members]
+        outwards = np.sign(np.sum(x * self.sign, axis=1) - best)[:, None] * self.sign
+        beyond = np.abs(x - np.where(outwards > 0, high[members], low[members])) < _AT_END
+        return np.any(beyond, axis=1) & (len(self.sign) > 1)
 
     def range(self, low: Array, high: Array) -> tuple[float, float]:
         """Return its lowest and highest logarithm for log-parameters within bounds.

@@ -146,12 +146,10 @@ class WithoutModel:
         told = []
         for own in self.told:
             every = [own, *(it for of in others for it in of.told if it.quantity == own.quantity)]
-            whole = len(every) > len(others)
-            lows, highs = [it.low for it in every], [it.high for it in every]
-            low = min(filter(None, lows)) if whole and all(lows) else None
-            high = max(filter(None, highs)) if whole and all(highs) else None
-            value = own.value if low and high else None
-            told.append(replace(own, value=value, low=low, high=high))
+            lows, highs = np.array([(it.low, it.high) for it in every], dtype=float).T
+            ends = [lows.min(), highs.max()] if len(every) > len(others) else [np.nan, np.nan]
+            low, high = (None if np.isnan(end) else float(end) for end in ends)
+            told.append(replace(own, value=own.value if low and high else None, low=low, high=high))
         return replace(self, told=told)
 
     def data(self) -> dict[str, Any]:

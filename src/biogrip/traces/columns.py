@@ -47,9 +47,7 @@ _SPELLED_OUT = {
     "%": ("percent", "pct"),
     "‰": ("permille", "mstrain", "millistrain", "mε"),
     "ppm": ("ustrain", "microstrain", "uε", "um/m"),
-    "Pa": ("n/m2", "n/m^2"),
-    "kPa": ("kn/m2", "kn/m^2"),
-    "MPa": ("n/mm2", "n/mm^2"),
+    **{"Pa": ("n/m2", "n/m^2"), "kPa": ("kn/m2", "kn/m^2"), "MPa": ("n/mm2", "n/mm^2")},
 }
 _IN_BRACKETS = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\}|<([^<>]*)>")
 # What ends a name and is only a unit, and what may be one. After a digit, / is a reciprocal's.
@@ -217,9 +215,8 @@ def unit_of(
         how = f", or state one by {said_by}"
         if not end:
             row, how = f"{row}, neither stated (by {said_by}) nor at the end of the name", ""
-        # As in G/G0.
-        of_modulus = not end and allowed == MODULUS.units
-        share = " What is over another modulus is a relative_modulus." * of_modulus
+        of_moduli = not end and allowed == MODULUS.units
+        share = " What is over another modulus, as G/G0, is a relative_modulus." * of_moduli
         raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.{share}")
     for other, said in ((at_end, "the name"), (in_row, "the row of units")):
         if other not in (None, unit):
