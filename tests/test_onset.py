@@ -127,7 +127,7 @@ def test_readings_before_the_onset_tell_the_zero() -> None:
 def test_a_clock_outside_the_protocol_is_refused() -> None:
     times, values = late(2)
     for earlier_s, start, message in (
-        (ONSET_S, None, 'found -8.07 s, .* start says when, or start="fit" finds it.'),
+        (ONSET_S, None, 'found -8.07 s, .* start says when, be it 0, or start="fit" finds it.'),
         (0.0, -5.0, "found 55.2 s, allowed is the protocol's time, -5 to 55 s."),
     ):
         with pytest.raises(BiogripError, match=message):

@@ -156,7 +156,7 @@ UNITS = [
     (ROTATION.units, ANGLES | dict.fromkeys(("deg", "°"), 0.017453292519943295)),
     (MODULUS.units, {"Pa": 1.0, "N/m²": 1.0, "N/m^2": 1.0, "kN/m2": 1e3, "N/mm²": 1e6}),
     (COMPLIANCE.units, {"1/kPa": 1e-3, **dict.fromkeys(PER_PA, 1.0)}),
-    (STRAIN.units, STRAINS | {"\u00b5\u03b5": 1e-6, "mm/mm": 1.0}),
+    (STRAIN.units, STRAINS | {"\u00b5\u03b5": 1e-6, "mm/mm": 1.0, "mm/m": 1e-3}),
     (DISPLACEMENT.units, {"\u00b5m": 1e-6, "um": 1e-6}),
     (FORCE.units, {"kgf": 9.80665, "kN": 1e3, "MN": 1e6}),
     (TORQUE.units, {"mN m": 1e-3, "mN\u00b7m": 1e-3, "uNm": 1e-6}),

@@ -170,10 +170,10 @@ def _check_times(recording: Recording, torque: Course) -> None:
         return
     hint = _other_units(recording.units[0], TIME_UNITS, fits)
     if not hint and onset_s is None:
-        how = "--start says when, in s, or --start fit finds it"
+        how = "--start says when, be it 0, or --start fit finds it"
         if not columns.by_options:
-            how = "start_s under measurement says when, or fit_start: true finds it"
-        hint = f" If the protocol starts at another time of the clock than 0, {how}."
+            how = "start_s under measurement says when, be it 0, or fit_start: true finds it"
+        hint = f" If the protocol starts after readings, or not at 0 of the clock, {how}."
     for sample in np.flatnonzero((time_s < earliest) | (time_s > end_s + slack))[:1]:
         raise BiogripError(
             f"{recording.place(sample, columns.time)}: found "

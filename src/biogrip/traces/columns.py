@@ -45,7 +45,7 @@ _SPELLED_OUT = {
     "deg": ("degree", "degrees"),
     "1": ("-", "\u2212", "\u2013", "in/in", "mm/mm", "m/m", "um/um", "nm/nm"),
     "%": ("percent", "pct"),
-    "‰": ("permille", "mstrain", "millistrain", "mε"),
+    "‰": ("permille", "mstrain", "millistrain", "mε", "mm/m"),
     "ppm": ("ustrain", "microstrain", "uε", "um/m"),
     **{"Pa": ("n/m2", "n/m^2"), "kPa": ("kn/m2", "kn/m^2"), "MPa": ("n/mm2", "n/mm^2")},
 }
