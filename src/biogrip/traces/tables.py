@@ -169,10 +169,9 @@ def _read_lines(path: Path) -> tuple[str, list[str]]:
         except UnicodeDecodeError as error:
             start = error.start
     line = len(_LINE_END.split(content[:start].decode(codec)))
-    saved = ", as a sheet that is saved as CSV" * content.startswith(b"PK")
     raise BiogripError(
         f"{place(path, line)}: found the byte 0x{content[start]:02x}, allowed is text in UTF-8, "
-        f"UTF-16 or Windows-1252{saved}."
+        f"UTF-16 or Windows-1252{', as a sheet saved as CSV' * content.startswith(b'PK')}."
     )
 
 
