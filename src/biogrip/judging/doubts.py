@@ -226,16 +226,16 @@ def _misfit(
 def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     """Return what is wrong where a misfit is some times the noise, by what any sample leaves."""
     fit = fit_any_sample(residuals)
-    other = fit.sd / scale
+    other, left = fit.sd / scale, fit.left_of_readings()
     least = plain(other, 2)
     gives, culprits = "gives this trace under this protocol", "load, clock, contact or drift"
-    left = fit.left_of_readings()
     if residuals.course.sweeps:
         gives, culprits = "has both moduli (Kramers-Kronig)", find_inertia(residuals, *left)
     noises = counted(least, "noise")
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
     if correlated(*left)[1] >= levels.FALSE_ALARM:
-        return inadequate
+        far = f"single readings are far off, as no linear sample leaves less than {noises}"
+        return far if other > levels.TOO_MUCH and times < other * levels.TOO_MUCH else inadequate
     if other * levels.TOO_MUCH < times:
         return f"{inadequate}; what that leaves is of {culprits}"
     nearest = f"the nearest leaves {least} times the noise, and that is correlated"
