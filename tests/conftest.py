@@ -6,15 +6,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Else every job that a test starts would compile all the source code for itself.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser
 
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.protocol import Course, Phase, hold, join_phases
-from tests.helpers.browser import chromium, executable
+from tests.helpers.browser import Opened, chromium, executable
 from tests.helpers.identified import FEW
 from tests.helpers.required import cannot_run
 from tests.helpers.runs import built_once, run_tiny
@@ -57,6 +58,20 @@ def browser() -> Iterator[Browser]:
         cannot_run("BIOGRIP_REQUIRE_CHROMIUM", "Chromium is missing: apt-get install chromium")
     with chromium() as started:
         yield started
+
+
+@pytest.fixture
+def visit(browser: Browser) -> Iterator[Callable[..., Opened]]:
+    """Opens pages, which must have no problems, and closes them."""
+    pages: list[Opened] = []
+
+    def opened(*given: Any, **context: Any) -> Opened:
+        pages.append(Opened(browser, *given, **context))
+        return pages[-1]
+
+    yield opened
+    for page in pages:
+        page.close()
 
 
 @pytest.fixture(scope="session")

@@ -22,33 +22,20 @@ from biogrip.cli import main
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
 from biogrip.fit.problem import identifier, silent
-from biogrip.page.answers import (
-    rows_beside_the_paper,
-    say_what_claims_are,
-    say_what_the_study_gives,
-    say_what_traces_tell,
-    say_which_method_finds_it,
-)
+from biogrip.page import answers
 from biogrip.physics.models import ALIASES, MAXWELL_MODELS
 from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import share_in_words
 from biogrip.records.rows import read_table
 from biogrip.terminal import QUIET
-from tests.helpers.default import study_of
+from tests.helpers.default import STUDY, study_of
 from tests.helpers.key_reference import file_schema, reference
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH, ROOT
 from tests.published_numbers import renewed_numbers
 from workflow.paper.claims import Results, add_columns, judge_all
 
-PUBLISHED = ROOT / "results" / "published"
-MEASURED = PUBLISHED / "measured"
-
-_CASES = {
-    "endothelial_cell": "the cell",
-    "liquid_drop_1": "drop 1",
-    "liquid_drop_2": "drop 2",
-}
+_CASES = {"endothelial_cell": "the cell", "liquid_drop_1": "drop 1", "liquid_drop_2": "drop 2"}
 _JUDGED_IN_NOISE = (
     (("liquid_drop_1", "liquid_drop_2"), "c + c_p"),
     (("liquid_drop_2",), "k"),
@@ -65,13 +52,12 @@ _MEASURED = {
 }
 
 
-def config_keys() -> str:
-    """Tables of every config key."""
-    return reference(ROOT / "config" / "config.yaml")
+def _path(name: str, overlay: str = "") -> Path:
+    """Of a table of the published study, or of one of its overlays."""
+    return ROOT / "results" / "published" / overlay / "tables" / f"{name}.csv"
 
 
 def sample_models() -> str:
-    """Models of springs and dampers: parameters, titles, and usual names."""
     return _table(
         {"model": f"`{model.name}`", "is": model.title}
         | {"parameters": ", ".join(parameter.name for parameter in model.parameters)}
@@ -85,14 +71,12 @@ _SLOW = 1000
 
 
 def paper_against_study() -> str:
-    """Tables 5 to 7 beside this study, of the published runs under interpretations."""
-    beside = read_table(PUBLISHED / "readings" / "tables" / "tables_5_to_7.csv")
-    return _table(iter(rows_beside_the_paper(beside, _CASES)))
+    beside = read_table(_path("tables_5_to_7", "readings"))
+    return _table(iter(answers.rows_beside_the_paper(beside, _CASES)))
 
 
 def readings_compared() -> str:
-    """What each interpretation can print, how likely it does, and when it last improves."""
-    table = read_table(PUBLISHED / "readings" / "tables" / "readings.csv")
+    table = read_table(_path("readings", "readings"))
 
     def likelihood(row: dict[str, str], end: str) -> str:
         value, error = (float(row[f"likelihood{name}{end}"]) for name in ("", "_error"))
@@ -119,76 +103,52 @@ def readings_compared() -> str:
 
 
 def choices() -> str:
-    """What each interpretation does to the headlines."""
-    table = pd.read_csv(PUBLISHED / "readings" / "tables" / "readings_found.csv")
-
-    def percent(rows: pd.DataFrame, case: str, name: str) -> str:
-        (value,) = rows[rows["case"] == case][name]
-        return f"{value:.2g} %"
-
+    table = pd.read_csv(_path("readings_found", "readings"))
+    errors = {
+        "error of k, cell": ("k", "endothelial_cell"),
+        "of k, drop 2": ("k", "liquid_drop_2"),
+        "of c + c_p, drop 1": ("c + c_p", "liquid_drop_1"),
+        "of c + c_p, drop 2": ("c + c_p", "liquid_drop_2"),
+    }
     rows = []
     for reading, mine in table.groupby("reading", sort=False):
-        (cell,) = mine[mine["case"] == "endothelial_cell"].to_dict("records")
-        shares = (100 * cell[f"near_noise_{end}"] for end in ("share", "from", "to"))
-        rows.append(
-            {"interpretation": str(reading), "runs": str(cell["seeds"])}
-            | {"cell near the noise": "{:.0f} % ({:.0f} to {:.0f} %)".format(*shares)}
-            | {"error of k, cell": percent(mine, "endothelial_cell", "error_percent k")}
-            | {"of k, drop 2": percent(mine, "liquid_drop_2", "error_percent k")}
-            | {
-                f"of c + c_p, drop {n}": percent(mine, f"liquid_drop_{n}", "error_percent c + c_p")
-                for n in (1, 2)
-            }
-        )
+        own = mine.set_index("case")
+        row = {"interpretation": str(reading), "runs": str(own["seeds"]["endothelial_cell"])}
+        row |= {"cell near the noise": _share(own.loc["endothelial_cell"], "near_noise")}
+        for heading, (quantity, case) in errors.items():
+            row[heading] = f"{own.loc[case, f'error_percent {quantity}']:.2g} %"
+        rows.append(row)
     return _table(iter(rows))
-
-
-def traces_told() -> str:
-    """What traces of the paper's protocol determine, of 500 each."""
-    coverage = read_table(PUBLISHED / "coverage" / "tables" / "coverage.csv")
-    return say_what_traces_tell(coverage, _CASES)
 
 
 def protocols_compared() -> str:
-    """What traces under the paper's protocol and others tell."""
-    table = pd.read_csv(PUBLISHED / "repaired" / "tables" / "protocols.csv")
-    rows = []
-    for row in table.to_dict("records"):
-        shares = (100 * row[f"enough_{end}"] for end in ("share", "from", "to"))
-        rows.append(
-            {"sample and protocol": row["case"], "quantity": row["quantity"]}
-            | {"lowest jaw force (µN)": f"{row['lowest_force_uN']:.2g}"}
-            | {"noise (µrad)": f"{row['noise_urad']:.3g}", "bound": f"{row['bound_percent']:.2g} %"}
-            | {f"within 10 % of {row['seeds']}": "{:.0f} % ({:.0f} to {:.0f} %)".format(*shares)}
-        )
-    return _table(iter(rows))
+    table = pd.read_csv(_path("protocols", "repaired"))
+    return _table(
+        {"sample and protocol": row["case"], "quantity": row["quantity"]}
+        | {"lowest jaw force (µN)": f"{row['lowest_force_uN']:.2g}"}
+        | {"noise (µrad)": f"{row['noise_urad']:.3g}", "bound": f"{row['bound_percent']:.2g} %"}
+        | {f"within 10 % of {row['seeds']}": _share(row, "enough")}
+        for row in table.to_dict("records")
+    )
 
 
 # Tables that judge claims by 500 traces, or over levels of noise, and the published study of each.
-_JUDGING = {
-    "coverage": "coverage",
-    "robustness_noise": "robustness",
-    "robustness_gripper": "robustness",
-}
-_OF_THEM = {"slopes": "robustness"}
-"""Tables that are made of these."""
+_JUDGING = {"coverage": "coverage"}
+_JUDGING |= dict.fromkeys(("robustness_noise", "robustness_gripper"), "robustness")
 
 
 def _claims() -> list[dict[str, str]]:
     """Return the claims in their order, each row with the verdict that the most runs decide."""
-    tables = {
-        name: pd.read_csv(PUBLISHED / study / "tables" / f"{name}.csv")
-        for name, study in _JUDGING.items()
-    }
+    tables = {name: pd.read_csv(_path(name, study)) for name, study in _JUDGING.items()}
     add_columns(tables)
-    numbers = {case.name: case.published.table for case in study_of().cases.values()}
+    numbers = {case.name: case.published.table for case in STUDY.cases.values()}
     for table in tables.values():
         table["of_table"] = table["case"].map(numbers).astype("Int64")
     every = yaml.safe_load((ROOT / "workflow" / "paper" / "claims.yaml").read_text("utf-8"))
-    told = [claim for claim in every if claim.get("rows", {}).get("table") in _JUDGING | _OF_THEM]
-    rows = [dict(row) for row in judge_all(told, Results(study_of(), tables), "").rows]
+    told = [claim for claim in every if claim.get("rows", {}).get("table") in {*_JUDGING, "slopes"}]
+    rows = [dict(row) for row in judge_all(told, Results(STUDY, tables), "").rows]
     for name in ("readings", ""):
-        rows += read_table(PUBLISHED / name / "tables" / "claims.csv")
+        rows += read_table(_path("claims", name))
     found: dict[str, dict[str, dict[str, str]]] = {claim["words"]: {} for claim in every}
     for row in rows:
         if row["verdict"] != "judged elsewhere" and not row["evidence"].startswith("Not here"):
@@ -199,51 +159,29 @@ def _claims() -> list[dict[str, str]]:
 
 
 def claims_judged() -> str:
-    """The claims, each row with the verdict that the most runs decide."""
     names = ("claim", "place", "of", "verdict", "evidence")
     return _table({name: row[name].replace("|", r"\|") for name in names} for row in _claims())
 
 
-def claims_counted() -> str:
-    """How many claims have each verdict."""
-    return say_what_claims_are(_claims())
-
-
 def answer() -> str:
-    """What the study found, in sentences as on its page."""
-    tables = PUBLISHED / "tables"
-    methods = read_table(tables / "methods.csv")
-    study = study_of()
-    own = study.shown_method.title
-    titles = {case.name: case.title for case in study.cases.values()}
-    sentences = (
-        say_what_the_study_gives(methods, own, titles, "Run again, the paper's", 1.0),
-        say_which_method_finds_it(methods, own),
-    )
-    return "\n".join(f"- {sentence}" for sentence in sentences)
+    methods = read_table(_path("methods"))
+    own, titles = STUDY.shown_method.title, {case.name: case.title for case in STUDY.cases.values()}
+    given = answers.say_what_the_study_gives(methods, own, titles, "Run again, the paper's", 1.0)
+    return f"- {given}\n- {answers.say_which_method_finds_it(methods, own)}"
 
 
 def measured() -> str:
-    """Published values of measured traces beside ours."""
-    models = pd.read_csv(MEASURED / "tables" / "models.csv").sort_values("median_delta_bic")
+    models = pd.read_csv(_path("models", "measured")).sort_values("median_delta_bic")
     rows = []
     for sample, published in _MEASURED.items():
-        verdicts = read_table(MEASURED / "tables" / f"verdicts_{sample}.csv")
+        verdicts = read_table(_path(f"verdicts_{sample}", "measured"))
         found = {row["quantity"]: row for row in verdicts}
         best = models[models["case"] == sample]["model"].iloc[0]
-        for number, (quantity, value) in enumerate(published.items()):
-            own = found[quantity]
-            row = {
-                "sample": sample.replace("_", " "),
-                "fit": own["fit"],
-                "quantity": with_unit(quantity, own["unit"]),
-                "published": f"{value:.5g}",
-                "ours, 95 % limits": _limits_of(own),
-                "lowest BIC": best,
-            }
-            rows.append(
-                row | (dict.fromkeys(("sample", "fit", "lowest BIC"), "") if number else {})
-            )
+        for quantity, value in published.items():
+            own, first = found[quantity], quantity == next(iter(published))
+            row = {"sample": sample.replace("_", " ") * first, "fit": own["fit"] * first}
+            row |= {"quantity": with_unit(quantity, own["unit"]), "published": f"{value:.5g}"}
+            rows.append(row | {"ours, 95 % limits": _limits_of(own), "lowest BIC": best * first})
     return _table(iter(rows))
 
 
@@ -256,26 +194,22 @@ def _limits_of(row: dict[str, str]) -> str:
 
 
 def errors_by_noise() -> str:
-    """What the genetic algorithm errs by, and the bound, at several levels of noise."""
-    table = pd.read_csv(PUBLISHED / "robustness" / "tables" / "robustness_noise.csv")
+    table = pd.read_csv(_path("robustness_noise", "robustness"))
     rows = []
     for cases, quantity in _JUDGED_IN_NOISE:
         ours = table[table["case"].isin(cases) & (table["quantity"] == quantity)]
         row = {"quantity": f"{quantity} of {_CASES[cases[0]] if len(cases) == 1 else 'both drops'}"}
         for level in (2, 10, 40):
             of = ours[ours["row"] == level]
-            error, bound = (
-                _range(of[it], ".2g", " %") for it in ("error_genetic", "bound_percent")
-            )
-            row[f"{level} % noise"] = f"{error} ({bound})"
+            error, bound = (of[it] for it in ("error_genetic", "bound_percent"))
+            row[f"{level} % noise"] = f"{_range(error, '.2g', ' %')} ({_range(bound, '.2g', ' %')})"
         near = 100 * ours[ours["row"] == 2]["near_noise_genetic"]
         rows.append(row | {"runs near a noise of 2 %": _range(near, ".0f", " %")})
     return _table(iter(rows))
 
 
 def methods_compared() -> str:
-    """How often each method reaches what genes can encode, its rise, and the responses it takes."""
-    table = pd.read_csv(PUBLISHED / "tables" / "methods.csv")
+    table = pd.read_csv(_path("methods"))
     rows = [
         {"method": method}
         | {
@@ -295,28 +229,26 @@ def methods_compared() -> str:
 
 def slow_branch() -> str:
     """In how many traces of drop 1 a damper far above the truth fits as well as the best."""
-    case, slow = (
-        study_of(f"cases: {{liquid_drop_1: {{fixed: {fixed}}}}}").case("liquid_drop_1")
-        for fixed in ("{}", f"{{c: {_SLOW}}}")
-    )
-    posed = case.experiment.to_identify(), slow.experiment.to_identify()
-    time_s = case.times_s
-    given = case.gripper, case.network, case.torque, time_s
-    (target,) = simulated_response(*given, nonlinear=False)
-    seeds = range(case.seeds)
-    rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in seeds]
+    case = STUDY.case("liquid_drop_1")
+    slow = study_of(f"cases: {{liquid_drop_1: {{fixed: {{c: {_SLOW}}}}}}}").case(case.name)
+    time_s, seeds = case.times_s, range(case.seeds)
+    (target,) = simulated_response(case.gripper, case.network, case.torque, time_s, nonlinear=False)
+    rngs = [stream(STUDY.study_seed, case.name, seed, "noise") for seed in seeds]
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
     identify = identifier("least_squares", case.block.least_squares)
-    free, held = (
-        np.array([each.misfit for each in identify(it.of_each(time_s, traces), rngs, silent)])
-        for it in posed
-    )
+    posed = (each.experiment.to_identify().of_each(time_s, traces) for each in (case, slow))
+    free, held = (np.array([it.misfit for it in identify(each, rngs, silent)]) for each in posed)
     limit = chi2.ppf(case.confidence, 1)
     fits = int(np.sum(len(time_s) * ((held / free) ** 2 - 1) < limit))
     return (
         f"With c fixed at {_SLOW:,} N s/m, a hundred times the truth, χ² of drop 1 rises by less "
         f"than {limit:.3g} in {share_in_words(fits, len(seeds))} of {len(seeds)} traces."
     )
+
+
+def _share(row: Any, name: str) -> str:
+    share, low, high = (100 * row[f"{name}_{end}"] for end in ("share", "from", "to"))
+    return f"{share:.0f} % ({low:.0f} to {high:.0f} %)"
 
 
 def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
@@ -327,51 +259,41 @@ def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
 
 
 @cache
-def _example(*options: str) -> tuple[str, dict[str, Any]]:
+def example(*options: str) -> tuple[str, dict[str, Any]]:
     """What `biogrip identify` prints of the example, under options of the command, and its JSON."""
     quiet = mock.patch.dict("os.environ", {QUIET: "1"})
     with TemporaryDirectory() as folder, redirect_stdout(StringIO()) as said, quiet:
         main(["identify", str(EXAMPLE), "--output", f"{folder}/found.json", *options])
-        found = json.loads(Path(folder, "found.json").read_text(encoding="utf-8"))
-    lines = said.getvalue().replace(f"{ROOT}/", "").splitlines()[:-1]
-    text = "\n".join(textwrap.indent(textwrap.fill(line, 136), "    ") for line in lines)
-    return text, found
+        return said.getvalue(), json.loads(Path(folder, "found.json").read_text(encoding="utf-8"))
 
 
-def printed_example() -> str:
-    """What `biogrip identify` prints of the example."""
-    return _example()[0]
+def printed_example(*options: str) -> str:
+    lines = example(*options)[0].replace(f"{ROOT}/", "").splitlines()[:-1]
+    return "\n".join(textwrap.indent(textwrap.fill(line, 136), "    ") for line in lines)
 
 
 def identified_example() -> str:
     """What it prints of the quantities, beside the truth, since the example is simulated."""
-    text, found = _example()
     truth = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]["sample"]
     del truth["model"]
     made = ", ".join(f"{name} = {in_digits(value)}" for name, value in truth.items())
     missed = ""
-    for q in found["quantities"]:
+    for q in example()[1]["quantities"]:
         low, high = q["low"] or 0.0, q["high"] or np.inf
         if not low <= (true := truth.get(q["quantity"], low)) <= high:
             side, limit = ("upper", high) if true > high else ("lower", low)
             missed += f", but for {q['quantity']}, whose {side} limit is {in_digits(limit, 4)}"
-    told = _quantities(text).partition("    Any linear sample")[0].rstrip()
+    told = _quantities().partition("    Any linear sample")[0].rstrip()
     return f"{told}\n\nTrue are {made}. The limits hold these{missed}."
 
 
-def shorter_arms() -> str:
-    """What it prints of the quantities with arms that are shorter by a fifth."""
-    return _quantities(_example("--no-compare", "--set", "gripper.arm_length_m=1.2e-3")[0])
-
-
-def _quantities(text: str) -> str:
-    lines = [line.removeprefix("    ") for line in text.splitlines()]
+def _quantities(*options: str) -> str:
+    lines = [line.removeprefix("    ") for line in printed_example(*options).splitlines()]
     told = (line for line in lines if line.startswith(("  ", "Any linear sample")))
     return "\n".join(f"    {line.removeprefix('  ')}" for line in told)
 
 
 def folders() -> str:
-    """Packages of the library, by what they say of themselves."""
     told = {
         file.parent.name: str(ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))))
         for file in sorted((ROOT / "src" / "biogrip").glob("*/__init__.py"))
@@ -402,34 +324,36 @@ def _table(rows: Iterator[dict[str, str]]) -> str:
     return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))
 
 
-PARTS: dict[Path, dict[str, Callable[[], str]]] = {
-    ROOT / "docs" / "reference" / "config.md": {"keys": config_keys},
-    ROOT / "README.md": {"answer": answer, "example": identified_example},
-    ROOT / "CONTRIBUTING.md": {"folders": folders},
-    ROOT / "docs" / "tutorial.md": {"printed": printed_example, "shorter": shorter_arms},
-    ROOT / "docs" / "reference" / "command.md": {"help": command_help},
-    ROOT / "docs" / "models.md": {"models": sample_models},
-    ROOT / "docs" / "identifiability.md": {"slow": slow_branch, "methods": methods_compared},
-    ROOT / "docs" / "measured.md": {"measured": measured},
-    ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
-    ROOT / "docs" / "claims.md": {"claims": claims_judged},
-    ROOT / "docs" / "reproduction.md": {
-        "claims": claims_counted,
+_COVERAGE = _path("coverage", "coverage")
+_SHORTER = "--no-compare", "--set", "gripper.arm_length_m=1.2e-3"
+PARTS: dict[str, dict[str, Callable[[], str]]] = {
+    "docs/reference/config.md": {"keys": lambda: reference(ROOT / "config" / "config.yaml")},
+    "README.md": {"answer": answer, "example": identified_example},
+    "CONTRIBUTING.md": {"folders": folders},
+    "docs/tutorial.md": {"printed": printed_example, "shorter": lambda: _quantities(*_SHORTER)},
+    "docs/reference/command.md": {"help": command_help},
+    "docs/models.md": {"models": sample_models},
+    "docs/identifiability.md": {"slow": slow_branch, "methods": methods_compared},
+    "docs/measured.md": {"measured": measured},
+    "docs/robustness.md": {"errors": errors_by_noise},
+    "docs/claims.md": {"claims": claims_judged},
+    "docs/reproduction.md": {
+        "claims": lambda: answers.say_what_claims_are(_claims()),
         "results": paper_against_study,
         "readings": readings_compared,
         "choices": choices,
-        "told": traces_told,
+        "told": lambda: answers.say_what_traces_tell(read_table(_COVERAGE), _CASES),
         "protocols": protocols_compared,
     },
 }
 """Parts of documents that are written, by what."""
 
 SCHEMA = ROOT / "config" / "schema.json"
-GENERATED = (
-    SCHEMA,
+DOCUMENTS = [
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "config/README.md")),
     *sorted((ROOT / "docs").rglob("*.md")),
-)
+]
+GENERATED = [SCHEMA, *DOCUMENTS]
 
 
 def renewed(path: Path) -> str:
@@ -437,7 +361,7 @@ def renewed(path: Path) -> str:
     if path == SCHEMA:
         return file_schema()
     text = path.read_text(encoding="utf-8")
-    for name, content in PARTS.get(path, {}).items():
+    for name, content in PARTS.get(str(path.relative_to(ROOT)), {}).items():
         match = re.search(
             rf"<!-- {name}: begin[^\n]*-->\n(.*)<!-- {name}: end -->", text, re.DOTALL
         )

@@ -3,24 +3,18 @@ from pathlib import Path
 
 import pytest
 
-from tests.generated_docs import GENERATED, renewed
+from tests.generated_docs import DOCUMENTS, GENERATED, renewed
 from tests.helpers.default import study_of
 from tests.helpers.places import ROOT
 
 # Its tables and their text are written by benchmarks.levels.
 WRITTEN = ROOT / "docs" / "levels.md"
-DOCUMENTS = [
-    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "config/README.md")),
-    *sorted((ROOT / "docs").rglob("*.md")),
-]
 NOT_PROSE = re.compile(
     r"<!-- (\w+): begin.*?<!-- \1: end -->|<!--.*?-->|^ *```.*?^ *```$|^    [^\n]*$", re.S | re.M
 )
-"""Generated parts, marks of generated numbers, files and commands."""
 
 
 def words(text: str) -> int:
-    """How many words there are: what blanks part, with a letter or a digit."""
     return sum(any(map(str.isalnum, word)) for word in text.split())
 
 
@@ -34,10 +28,7 @@ def test_what_is_written_by_hand_is_short() -> None:
 
 @pytest.mark.parametrize(
     "document",
-    [
-        pytest.param(path, marks=[pytest.mark.nightly] if path.name == "tutorial.md" else [])
-        for path in GENERATED
-    ],
+    [pytest.param(it, marks=[pytest.mark.nightly][it.name != "tutorial.md" :]) for it in GENERATED],
     ids=lambda path: str(path.relative_to(ROOT)),
 )
 def test_generated_parts_are_up_to_date(document: Path) -> None:
@@ -63,9 +54,7 @@ def test_promises_are_kept_by_tests_that_there_are() -> None:
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_links_lead_somewhere(path: Path) -> None:
-    """To a file: the site has no page of a folder, and is not built where one is linked."""
     text = path.read_text(encoding="utf-8")
     links = re.findall(r"\]\(([^)#]*)(?:#[^)]*)?\)", text)
-    # What is above the first # of a link is empty where it leads to another part of the text.
     own = [link for link in links if link and "://" not in link]
     assert [link for link in own if not (path.parent / link).is_file()] == []

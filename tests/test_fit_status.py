@@ -1,22 +1,10 @@
-"""Fits that are rejected determine nothing, and right set-ups are ok."""
-
 from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.judging.doubts import (
-    DOUBT,
-    DOUBTFUL,
-    HARMLESS,
-    OK,
-    REJECTED,
-    REJECTION,
-    Note,
-    compute_status,
-    find_reasons,
-    order_notes,
-)
+from biogrip.judging import doubts
+from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION, Note
 from biogrip.library import Sample, TraceResult, set_up, simulate
 from biogrip.physics.protocol import hold
 from tests.helpers.identified import told
@@ -43,16 +31,15 @@ def identified(clean: Array, **given: Any) -> TraceResult:
 
 def test_the_heaviest_note_decides() -> None:
     light, middle, heavy = (Note(weight, weight) for weight in (HARMLESS, DOUBT, REJECTION))
-    assert compute_status([]) == compute_status([light]) == OK
-    assert compute_status([light, middle]) == DOUBTFUL
-    assert compute_status([middle, heavy, light]) == REJECTED
-    assert order_notes([light, heavy, middle]) == [heavy, middle, light]
-    assert find_reasons([light]) == []
-    assert find_reasons([middle, heavy, light]) == [REJECTION]
+    assert doubts.compute_status([]) == doubts.compute_status([light]) == OK
+    assert doubts.compute_status([light, middle]) == DOUBTFUL
+    assert doubts.compute_status([middle, heavy, light]) == REJECTED
+    assert doubts.order_notes([light, heavy, middle]) == [heavy, middle, light]
+    assert doubts.find_reasons([light]) == []
+    assert doubts.find_reasons([middle, heavy, light]) == [REJECTION]
 
 
 def test_a_parameter_at_the_end_of_its_range_is_named() -> None:
-    """What the other parameters then are, is not what they are in truth."""
     ranges = {"k_p": {"exponent": [-3, -1], "digit": [1, 9]}}
     narrow = identified(RIGHT, config={"search_range": ranges})
     assert narrow.status == REJECTED
@@ -61,7 +48,6 @@ def test_a_parameter_at_the_end_of_its_range_is_named() -> None:
 
 
 def test_a_rejected_fit_says_only_why() -> None:
-    """Simpler models and doubts about limits speak of results that it lacks."""
     gap = np.where(np.arange(len(TIMES)) == 700, np.nan, response(220.0))
     found = identified(gap, models=["kelvin_voigt", "liquid_drop"])
     assert found.status == REJECTED
@@ -87,3 +73,15 @@ def test_a_springpot_may_be_a_spring() -> None:
     assert found.status == OK
     low, high = found.to_frame().loc["k_beta", ["low", "high"]]
     assert 29 < low < 30 < high < 32
+
+
+def test_that_no_model_is_adequate_is_said() -> None:
+    """Of a master curve of four processes and an equilibrium."""
+    times, curve = np.logspace(-1, 6, 46), np.full(46, 5e5)
+    for strength_Pa, relaxation_s in ((3e8, 0.3), (8e7, 30.0), (2e7, 3e3), (3e6, 1e5)):
+        curve += strength_Pa * np.exp(-times / relaxation_s)
+    curve *= 1 + 0.02 * np.random.default_rng(4).standard_normal(46)
+    given = {"reads": "modulus", "model": "zener_maxwell", "noise_share": 0.02}
+    found = told(times, curve, ["zener_maxwell", "generalized_maxwell_2"], **given).data
+    assert (found["fit"], found["preferred_model"]) == ("rejected", None)
+    assert found["advice"].startswith("None of the 2 models tried is adequate: the best of them, ")

@@ -1,49 +1,20 @@
-"""The gripper and its limits: its uncertainty in what is said, and samples far stiffer or softer.
-
-So are ranges, which follow from a trace.
-"""
-
 import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.identify.prepare import for_trace, ranges_of
+from biogrip.identify.prepare import ranges_of
 from biogrip.library import simulate
-from biogrip.traces.columns import Columns
-from biogrip.traces.reader import recording_of_arrays
 from tests.helpers.default import STUDY, study_of
 
-CASE = STUDY.cases["liquid_drop_2"]
-TIMES = np.linspace(0.0, 400.0, 801)
 
-
-def simulated(parameters: dict[str, float]) -> Array:
-    """A trace with noise of 1 % of its peak."""
-    clean = simulate(CASE.experiment, parameters, TIMES)
-    return clean + 0.01 * clean.max() * np.random.default_rng(1).standard_normal(len(TIMES))
-
-
-def test_a_torque_is_uncertain_by_percent() -> None:
-    study = study_of("gripper: {uncertainty: {torque_percent: 3.0, left: {inertia_kgm2: 1e-15}}}")
-    expected = {"left": {"inertia_kgm2": 1e-15}, "torque": {"share": 0.03}}
-    assert study.case("liquid_drop_1").experiment.uncertainty == expected
-
-
-def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met() -> None:
+def test_a_torque_is_uncertain_by_percent_and_a_size_sets_the_angle() -> None:
     """From 150 to 30 um each jaw moves by 60 um, on a circle of 1.5 mm."""
-    case = study_of("cases: {liquid_drop_2: {sample: {size_m: 30e-6}}}").case("liquid_drop_2")
+    text = "{gripper: {uncertainty: {torque_percent: 3.0, left: {inertia_kgm2: 1e-15}}}, "
+    text += "cases: {liquid_drop_2: {sample: {size_m: 30e-6}}}}"
+    found = study_of(text).case("liquid_drop_2").experiment
+    assert found.uncertainty == {"left": {"inertia_kgm2": 1e-15}, "torque": {"share": 0.03}}
     angle = np.degrees(np.arccos(np.cos(np.radians(75)) + 60e-6 / 1.5e-3))
-    assert case.experiment.gripper.reference_angle_deg == pytest.approx(angle)
-
-
-def test_ranges_follow_from_a_trace_and_given_ones_stay() -> None:
-    case = study_of("search_range: {c: {exponent: [-4, 8]}}").case("liquid_drop_2")
-    columns = Columns("time_s", "rotation_rad")
-    trace = recording_of_arrays(columns, TIMES, 1e-3 * simulated(CASE.parameters))
-    ranges = for_trace(case.judged_experiment, trace).ranges
-    of_trace = ranges_of(case.experiment, TIMES, trace.readings)
-    assert ranges["k"] == of_trace["k"] != STUDY.ranges["k"]
-    assert ranges["c"].exponent == (-4, 8)
+    assert found.gripper.reference_angle_deg == pytest.approx(angle)
 
 
 @pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1", "liquid_drop_2"])

@@ -1,5 +1,3 @@
-"""Groups of cells: estimates against known ones, promises by simulation, and what is said."""
-
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,7 +15,6 @@ from biogrip.command.outputs import WRITTEN_BY
 from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
 from biogrip.groups import _bounds
 from biogrip.judging.cells import FEWEST_CELLS, Cell, adjusted, compare, estimate
-from biogrip.judging.verdicts import BOUNDED_ABOVE
 from tests.helpers.identified import identify
 from tests.helpers.places import ROOT
 
@@ -31,43 +28,25 @@ VACCINE = np.array(
         (-0.0173, 0.0714),
     ]
 ).T
-SPREAD, RATIO = 0.3, 1.5
 Said = Callable[..., str]
+Rows = list[dict[str, str]]
 HEADER = ["trace", "dish", "cell", "fit", "confidence", "k verdict", "k value (N/m)"]
 HEADER += ["k low (N/m)", "k high (N/m)", "failed", WRITTEN_BY]
+DAYS = ["trace", "day", *HEADER[1:]]
 
 
-def test_a_published_mean_is_found() -> None:
-    """DerSimonian and Laird's, and Hartung and Knapp's error, as statsmodels 0.14 has them:
-    `combine_effects(..., method_re="chi2")`, `mean_effect_re` and `sd_eff_w_re_hksj`.
-    """
+def test_published_means_and_p_values_are_found() -> None:
+    """As statsmodels' `combine_effects(..., method_re="chi2")` has it, by Hartung and Knapp."""
     found = estimate(VACCINE[0], np.sqrt(VACCINE[1]))
     assert found.mean == pytest.approx(-0.714084, rel=1e-5)
     assert found.error == pytest.approx(0.180691, rel=1e-5)
     assert found.freedom == 12
-
-
-def test_limits_are_never_closer_than_the_errors_say() -> None:
-    """Of values that agree by chance: of one error, that over the root of their number."""
+    # Of values that agree by chance: of one error, that over the root of their number.
     found = estimate(np.full(4, 0.3), np.full(4, 0.2))
     assert (found.mean, found.error) == pytest.approx((0.3, 0.1))
-
-
-def test_p_values_are_adjusted_by_holm() -> None:
-    """Wright, Biometrics 48 (1992), 1005-1013: 0.01 to 0.04 of four."""
+    # Holm's p values by Wright, Biometrics 48 (1992), 1005-1013: 0.01 to 0.04 of four.
     assert adjusted([0.04, 0.01, 0.03, 0.02]) == pytest.approx([0.06, 0.04, 0.06, 0.06])
-    assert adjusted([0.2]) == [0.2]
-    assert adjusted([]) == []
-
-
-def dish(rng: np.random.Generator, group: str, cells: int, error: float, mean: float) -> list[Cell]:
-    """Cells whose logarithms scatter, and are known with errors that differ from cell to cell."""
-    errors = error * np.exp(0.5 * rng.standard_normal(cells))
-    values = mean + SPREAD * rng.standard_normal(cells) + errors * rng.standard_normal(cells)
-    return [
-        Cell(f"{group}{n}", group, known={"k": own})
-        for n, own in enumerate(zip(values.tolist(), errors.tolist(), strict=True))
-    ]
+    assert (adjusted([0.2]), adjusted([])) == ([0.2], [])
 
 
 @pytest.mark.parametrize(("cells", "error"), [(5, 0.03), (6, 0.1), (12, 0.1), (12, 0.3)])
@@ -76,8 +55,13 @@ def test_limits_hold_the_truth_and_equal_dishes_seldom_differ(cells: int, error:
     rng = np.random.default_rng(7)
     medians, ratios, false = [], [], 0
     for _ in range(500):
-        for ratio in (1.0, RATIO):
-            pair = dish(rng, "a", cells, error, 0.0) + dish(rng, "b", cells, error, np.log(ratio))
+        for ratio in (1.0, 1.5):
+            pair = []
+            for group, mean in (("a", 0.0), ("b", np.log(ratio))):
+                errors = error * np.exp(0.5 * rng.standard_normal(cells))
+                values = mean + np.hypot(0.3, errors) * rng.standard_normal(cells)
+                known = zip(values.tolist(), errors.tolist(), strict=True)
+                pair += [Cell(f"{group}{n}", group, known={"k": it}) for n, it in enumerate(known)]
             found = compare(pair, ["a", "b"], 0.95)
             row = found["k", "b"]
             if ratio == 1.0:
@@ -92,7 +76,7 @@ def test_limits_hold_the_truth_and_equal_dishes_seldom_differ(cells: int, error:
     assert false <= 0.06 * 500
 
 
-def rows_of(values: Array, group: str, **more: str) -> list[dict[str, str]]:
+def rows_of(values: Array, group: str, **more: str) -> Rows:
     """Rows as `identify` writes them, of determined values with errors of 5 %."""
     return [
         {
@@ -105,29 +89,23 @@ def rows_of(values: Array, group: str, **more: str) -> list[dict[str, str]]:
     ]
 
 
-def written(folder: Path, rows: Sequence[dict[str, str]], header: Sequence[str] = HEADER) -> Path:
+def written(folder: Path, rows: Rows, header: Sequence[str] = HEADER) -> Path:
     pd.DataFrame(rows, columns=header).to_csv(folder / "found.csv", index=False)
     return folder / "found.csv"
 
 
 @pytest.fixture
 def said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
-    def say(
-        rows: Sequence[dict[str, str]],
-        *options: str,
-        header: Sequence[str] = HEADER,
-        methods: bool = False,
-    ) -> str:
-        found = str(written(tmp_path, rows, header))
-        assert main(["groups", found, "--by", "dish", *options]) == 0
-        table, _, paragraph = capsys.readouterr().out.partition("\nFor a paper:")
-        return paragraph if methods else table
+    def say(rows: Rows, *options: str, header: Sequence[str] = (), part: int = 0) -> str:
+        found = written(tmp_path, rows, header or (DAYS if "day" in rows[0] else HEADER))
+        assert main(["groups", str(found), "--by", "dish", *options]) == 0
+        return capsys.readouterr().out.split("\nFor a paper:")[part]
 
     return say
 
 
 @pytest.fixture
-def rows() -> list[dict[str, str]]:
+def rows() -> Rows:
     rng = np.random.default_rng(1)
     return [
         *rows_of(20 * np.exp(0.1 * rng.standard_normal(5)), "left"),
@@ -135,25 +113,22 @@ def rows() -> list[dict[str, str]]:
     ]
 
 
-def test_what_is_left_out_is_named(said: Said, rows: list[dict[str, str]]) -> None:
+def test_what_is_left_out_is_named(said: Said, rows: Rows) -> None:
     plain = said(rows)
     assert "10 cells, 95 % limits" in plain
     assert "Without" not in plain
-    more = [
-        {**rows[0], "trace": "slipped.csv", "fit": "rejected", "k verdict": "fit rejected"},
-        {"trace": "gone.csv", "dish": "left", "fit": "failed", "failed": "not there"},
-        {**rows[0], "trace": "odd.csv", "dish": ""},
-    ]
-    found = said([*rows, *more])
+    more = {
+        "the fit is rejected": {"fit": "rejected", "k verdict": "fit rejected"},
+        "not identified": {"fit": "failed", "failed": "not there"},
+        "nothing under dish": {"dish": ""},
+    }
+    found = said([*rows, *({**rows[0], "trace": why} | own for why, own in more.items())])
     assert found.startswith(plain.rstrip())
-    assert "Left out, the fit is rejected: slipped.csv." in found
-    assert "Left out, not identified: gone.csv." in found
-    assert "Left out, nothing under dish: odd.csv." in found
+    for why in more:
+        assert f"Left out, {why}: {why}." in found
 
 
-def test_a_rejected_model_leaves_what_any_linear_sample_shows(
-    said: Said, rows: list[dict[str, str]]
-) -> None:
+def test_a_rejected_model_leaves_what_any_linear_sample_shows(said: Said, rows: Rows) -> None:
     """Of the model the same numbers as of any sample; a trace that no sample gives has neither."""
     free = {name: name.replace("k ", "G(1 s) ") for name in HEADER[5:9]}
     every = [row | {name: row[own] for own, name in free.items()} for row in rows]
@@ -168,9 +143,7 @@ def test_a_rejected_model_leaves_what_any_linear_sample_shows(
     assert "Used only whatever the model, as their fits are rejected: left0.csv." in found
 
 
-def test_cells_that_are_only_bounded_are_named_with_what_follows(
-    said: Said, rows: list[dict[str, str]]
-) -> None:
+def test_cells_that_are_only_bounded_are_named_with_what_follows(said: Said, rows: Rows) -> None:
     none = {"k value (N/m)": "", "k low (N/m)": "", "k high (N/m)": ""}
     rows[0] |= {**none, "k verdict": "bounded below", "k low (N/m)": "30"}
     rows[1] |= {**none, "k verdict": "not determined"}
@@ -193,12 +166,6 @@ def test_cells_that_are_only_bounded_are_named_with_what_follows(
     assert "(at least 30), so in no mean; that of all cells is higher." in said(rows)
 
 
-def test_as_many_bounds_as_are_few_are_named() -> None:
-    cells = [Cell(f"c{n}", "a", others={"k": (BOUNDED_ABOVE, 7.0 + n)}) for n in range(3)]
-    assert [*_bounds("k", cells[:2], 2)] == ["in c0 (at most 7), c1 (at most 8)"]
-    assert [*_bounds("k", cells, 2)] == ["bounded above in 3 (at most 7 to 9)"]
-
-
 def test_a_median_takes_cells_enough_and_half_of_all() -> None:
     known = [Cell(f"{n}", "a", known={"k": (0.1 * n, 0.1)}) for n in range(4)]
     others = [Cell(f"o{n}", "a", others={"k": ("bounded above", 1.0)}) for n in range(5)]
@@ -206,9 +173,10 @@ def test_a_median_takes_cells_enough_and_half_of_all() -> None:
     assert "median" in compare(known[:FEWEST_CELLS], ["a"], 0.95)["k", "a"]
     assert "median" in compare(known + others[:4], ["a"], 0.95)["k", "a"]
     assert "median" not in compare(known + others, ["a"], 0.95)["k", "a"]
+    assert [*_bounds("k", others[:2], 2)] == ["in o0 (at most 1), o1 (at most 1)"]
 
 
-def test_what_doubtful_cells_change_is_said(said: Said, rows: list[dict[str, str]]) -> None:
+def test_what_doubtful_cells_change_is_said(said: Said, rows: Rows) -> None:
     plain = said(rows).partition("\n")[2]
     odd = rows_of(np.array([90.0]), "right", fit="doubtful", trace="odd.csv")
     found = said([*rows, *odd])
@@ -216,7 +184,7 @@ def test_what_doubtful_cells_change_is_said(said: Said, rows: list[dict[str, str
     assert without == plain
 
 
-def test_traces_of_a_cell_are_averaged(said: Said, rows: list[dict[str, str]]) -> None:
+def test_traces_of_a_cell_are_averaged(said: Said, rows: Rows) -> None:
     """By the inverse squares of their errors; a cell's name may stand in two groups."""
     for number, row in enumerate(rows):
         row["cell"] = f"c{number % 5}"
@@ -231,16 +199,13 @@ def test_traces_of_a_cell_are_averaged(said: Said, rows: list[dict[str, str]]) -
     assert both.replace("11 traces", "10 traces") == f"{alone}Averages of several traces: c0 (2).\n"
 
 
-def test_several_groups_are_compared_with_the_first(
-    tmp_path: Path, said: Said, rows: list[dict[str, str]]
-) -> None:
-    third = rows_of(np.array([19.0, 21.0, 20.0, 22.0]), "third")
-    table = tmp_path / "compared.csv"
+def test_several_groups_are_compared_with_the_first(tmp_path: Path, said: Said, rows: Rows) -> None:
+    table, third = tmp_path / "compared.csv", rows_of(np.array([19.0, 21.0, 20.0, 22.0]), "third")
+    said(rows, "--csv", str(table))
+    two = pd.read_csv(table)
     said(rows + third, "--csv", str(table))
     found = pd.read_csv(table).set_index("group")
-    two = tmp_path / "two.csv"
-    said(rows, "--csv", str(two))
-    assert found.loc["right", "p"] == pytest.approx(2 * pd.read_csv(two)["p"][1], rel=1e-4)
+    assert found.loc["right", "p"] == pytest.approx(2 * two["p"][1], rel=1e-4)
     assert np.isnan(found.loc["left", "ratio"])
     assert found.loc["third", "unit"] == "N/m"
     assert found["cells"].tolist() == [5, 5, 4]
@@ -250,17 +215,12 @@ def test_several_groups_are_compared_with_the_first(
 def test_identify_and_groups_say_the_same_of_a_cell(
     tmp_path: Path, few: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """From traces to the comparison: both springs of treated cells are 1.5 times as stiff, and the
-    arms slipped in b5.
-    """
+    """Both springs of treated cells are 1.5 times as stiff, and the arms slipped in b5."""
     monkeypatch.chdir(ROOT)
     folder = tmp_path / "dishes"
     shutil.copytree(ROOT / "data" / "dishes", folder)
     options = "--config", few, "--csv", tmp_path / "found.csv", "--no-compare"
-    status, printed, _ = identify(folder / "cells.tsv", "--model", "liquid_drop", *options)
-    assert status == 0
-    told = {line.split()[0]: line.split()[1] for line in printed.splitlines()[2:15]}
-    assert [name for name, fit in told.items() if fit != "ok"] == [str(folder / "b5.csv")]
+    assert identify(folder / "cells.tsv", "--model", "liquid_drop", *options)[0] == 0
     table = str(tmp_path / "compared.csv")
     given = ["--by", "treatment", "--unit", "dish", "--csv", table]
     assert main(["groups", str(tmp_path / "found.csv"), *given]) == 0
@@ -274,9 +234,6 @@ def test_identify_and_groups_say_the_same_of_a_cell(
     for quantity, ratio in (("k", 1.5), ("k_p", 1.5), ("c", 1.0)):
         row = ratios.loc[quantity]
         assert row["ratio_low"] < ratio < row["ratio_high"]
-
-
-# Dishes.
 
 
 def in_dishes(
@@ -315,7 +272,7 @@ def test_enough_dishes_tell_a_ratio(scatter: float, ratio: float, dishes: int) -
     assert 0.74 <= differ(scatter, ratio, units=True, dishes=(dishes, dishes)) / 400 <= 0.9
 
 
-def of_dishes(rng: np.random.Generator, dishes: Sequence[int], **more: str) -> list[dict[str, str]]:
+def of_dishes(rng: np.random.Generator, dishes: Sequence[int], **more: str) -> Rows:
     """Rows of two treatments whose dishes and cells are numbered anew: 1, 2, ... in each."""
     return [
         row | {"trace": f"{group}{dish}{n}", "dish": group, "day": f"{dish}", "cell": f"{n}"} | more
@@ -325,13 +282,10 @@ def of_dishes(rng: np.random.Generator, dishes: Sequence[int], **more: str) -> l
     ]
 
 
-DAYS = ["trace", "day", *HEADER[1:]]
-
-
 def test_units_are_compared_by_the_t_test_of_their_means(tmp_path: Path, said: Said) -> None:
     """Errors of all cells are alike, so that a unit's mean is a plain one; SciPy has the test."""
     rows, table = of_dishes(np.random.default_rng(5), (3, 4)), tmp_path / "compared.csv"
-    found = said(rows, "--unit", "day", "--csv", str(table), header=DAYS)
+    found = said(rows, "--unit", "day", "--csv", str(table))
     assert "35 traces, 35 cells, 7 units (day), 95 % limits" in found
     assert "15 of 15" in found
     assert "In several groups: 0, 1, 2. Each counts there as another one" in found
@@ -345,11 +299,10 @@ def test_units_are_compared_by_the_t_test_of_their_means(tmp_path: Path, said: S
     assert told[["ratio_low", "ratio_high"]].to_numpy() == pytest.approx(limits, rel=1e-3)
     assert told["median"] == pytest.approx(np.exp(means["right"].mean()), rel=1e-3)
     assert told["scatter_of_units"] == pytest.approx(means["right"].std(), rel=1e-2)
-    # Columns may have been moved.
     moved = said(rows, "--unit", "day", header=sorted(DAYS))
     assert moved.splitlines()[:5] == found.splitlines()[:5]
     # Without --unit it is said what that would change; cells of the same number are averaged.
-    plain = said(rows, header=DAYS)
+    plain = said(rows)
     assert "35 traces, 10 cells" in plain
     assert "These differ in day: if cells are numbered anew in each, --unit day takes" in plain
 
@@ -358,10 +311,10 @@ def test_a_column_that_nests_tells_cells_apart_and_is_named(said: Said) -> None:
     rows = of_dishes(np.random.default_rng(6), (3, 3))
     for row in rows:
         row["day"] = f"{row['dish']} {row['day']}"
-    found = said(rows, header=DAYS)
+    found = said(rows)
     assert "30 traces, 30 cells, 95 % limits" in found
     assert "Averages" not in found
-    with_unit = said(rows, "--unit", "day", header=DAYS)
+    with_unit = said(rows, "--unit", "day")
     assert "In several groups" not in with_unit
     p, here = (text.splitlines()[4].split()[-1] for text in (with_unit, found))
     assert (
@@ -372,16 +325,16 @@ def test_a_column_that_nests_tells_cells_apart_and_is_named(said: Said) -> None:
 
 def test_of_fewer_than_two_units_a_group_nothing_is_told_but_means(said: Said) -> None:
     rows = of_dishes(np.random.default_rng(7), (3, 1))
-    lines = said(rows, "--unit", "day", header=DAYS).splitlines()
+    lines = said(rows, "--unit", "day").splitlines()
     assert "(" in lines[3].split("15 of 15")[1]
     median = np.exp(np.mean(np.log([float(row["k value (N/m)"]) for row in rows[15:]])))
     assert lines[4].split()[-4:] == [f"{median:.3g}", "cannot", "be", "told"]
-    turned = said(rows[::-1], "--unit", "day", header=DAYS).splitlines()
+    turned = said(rows[::-1], "--unit", "day").splitlines()
     assert turned[3].split()[-1] == f"{median:.3g}"
     assert turned[4].endswith("cannot be told")
     for row in rows:
         row["day"] = row["dish"]
-    assert "with --unit day whether groups differ cannot be told." in said(rows, header=DAYS)
+    assert "with --unit day whether groups differ cannot be told." in said(rows)
 
 
 def test_a_quantity_that_no_cell_determines_takes_a_line(said: Said) -> None:
@@ -403,13 +356,12 @@ def test_limits_of_traces_without_noise_may_be_equal(said: Said) -> None:
         row |= dict.fromkeys(("k low (N/m)", "k high (N/m)"), row["k value (N/m)"])
         row["day"] = f"{number % 3}"
     assert "1.00 (0.90 to 1.11)  1" in said(rows)
-    again = said(rows, "--unit", "day", header=DAYS)
+    again = said(rows, "--unit", "day")
     assert again.splitlines()[4].split()[-1] == "1"
 
 
-@pytest.mark.parametrize(
-    ("by", "name", "value", "said"),
-    [
+def test_another_table_is_refused_with_its_place(tmp_path: Path, capsys: Any) -> None:
+    for by, name, value, said in (
         ("dich", "", "", "Did you mean 'dish'?"),
         ("dish", "trace", None, "found no column 'trace'"),
         ("cell", "", "", "found limits of no trace of a group"),
@@ -421,42 +373,25 @@ def test_limits_of_traces_without_noise_may_be_equal(said: Said) -> None:
         ("dish", "k verdict", "certain", "allowed is determined, bounded below"),
         ("dish", "fit", "good", "allowed is ok, doubtful, rejected, failed"),
         ("dish", "confidence", "95", "allowed is a number from 0.5 to 0.99"),
-    ],
-)
-def test_what_identify_does_not_write_is_refused_with_its_place(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    by: str,
-    name: str,
-    value: str | None,
-    said: str,
-) -> None:
-    rows = rows_of(np.array([20.0, 21.0, 22.0]), "left")
-    rows[1][name] = str(value)
-    header = [column for column in HEADER if value is not None or column != name]
-    assert main(["groups", str(written(tmp_path, rows, header)), "--by", by]) == 1
-    error = capsys.readouterr().err
-    if said.startswith("allowed"):
-        said = f"found.csv, row 3 (left1.csv), {name}: found '{value}'; {said}"
-    assert said in error
-    assert error.count("\n") == 1
+    ):
+        rows = rows_of(np.array([20.0, 21.0, 22.0]), "left")
+        rows[1][name] = str(value)
+        header = [column for column in HEADER if value is not None or column != name]
+        assert main(["groups", str(written(tmp_path, rows, header)), "--by", by]) == 1
+        error = capsys.readouterr().err
+        where = f"found.csv, row 3 (left1.csv), {name}: found '{value}'; "
+        assert where * said.startswith("allowed") + said in error
+        assert error.count("\n") == 1
 
 
-@pytest.mark.parametrize("cut", [1, 10, 40])
-def test_a_table_that_lost_its_end_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], cut: int
-) -> None:
+def test_a_table_that_lost_its_end_is_refused(tmp_path: Path, capsys: Any) -> None:
     """A last row that is whole needs no end of its line."""
     found = written(tmp_path, rows_of(np.array([20.0, 21.0, 22.0]), "left"))
     whole = found.read_text()
-    found.write_text(whole.removesuffix("\n"))
-    assert main(["groups", str(found), "--by", "dish"]) == 0
-    found.write_text(whole[: whole.rindex(",") - cut])
-    assert main(["groups", str(found), "--by", "dish"]) == 1
-    assert "found.csv: found " in capsys.readouterr().err
-
-
-# The paragraph.
+    for end, status in ((-1, 0), (whole.rindex(",") - 1, 1), (whole.rindex(",") - 40, 1)):
+        found.write_text(whole[:end])
+        assert main(["groups", str(found), "--by", "dish"]) == status
+        assert ("found.csv: found " in capsys.readouterr().err) == status
 
 
 def test_the_methods_say_what_was_compared_with_its_numbers(said: Said) -> None:
@@ -468,7 +403,7 @@ def test_the_methods_say_what_was_compared_with_its_numbers(said: Said) -> None:
     rows[1] |= {"fit": "rejected", "reasons": "The misfit is 4.5 times the noise: it is none."}
     rows[2] |= {"methods": set_up.replace("5 Pa", "7 Pa")}
     header = [*DAYS[:-2], "methods", "reasons", *DAYS[-2:]]
-    found = said(rows, "--unit", "day", header=header, methods=True)
+    found = said(rows, "--unit", "day", header=header, part=1)
     text, latex = (" ".join(it.split()) for it in found.split("As LaTeX:"))
     assert text.startswith(
         "The strain was recorded under 5 Pa (1 likewise with other numbers). Limits hold with "
@@ -479,15 +414,9 @@ def test_the_methods_say_what_was_compared_with_its_numbers(said: Said) -> None:
     assert "Welch's t test (Lord et al., Journal of Cell Biology 219 (2020), e202001064)" in text
     assert r"95 \% confidence" in latex
     about = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    version, year = about["version"], str(about["date-released"])[:4]
-    assert text.endswith(
-        f"Computed with biogrip {version} ({about['authors'][0]['name']}, {about['title']}: how "
-        "well a MEMS microgripper identifies the viscoelastic parameters of a cell, version "
-        f"{version}, {year})."
-    )
-
-
-# The figure.
+    who = f"{about['authors'][0]['name']}, {about['title']}: how well a MEMS"
+    assert f"Computed with biogrip {about['version']} ({who}" in text
+    assert text.endswith(f", version {about['version']}, {about['date-released'].year}).")
 
 
 def test_a_figure_is_the_same_bytes_again(tmp_path: Path, said: Said) -> None:
@@ -497,7 +426,7 @@ def test_a_figure_is_the_same_bytes_again(tmp_path: Path, said: Said) -> None:
     for name in ("cells.png", "cells.pdf"):
         drawn = []
         for _ in range(2):
-            said(rows, "--unit", "day", "--plot", str(tmp_path / name), header=DAYS)
+            said(rows, "--unit", "day", "--plot", str(tmp_path / name))
             drawn.append((tmp_path / name).read_bytes())
         assert drawn[0] == drawn[1]
 

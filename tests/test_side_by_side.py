@@ -1,5 +1,3 @@
-"""Jobs side by side: results in the jobs' order, errors, and kills that cost no other job."""
-
 import os
 import signal
 import time
@@ -11,8 +9,6 @@ from biogrip.command.side_by_side import side_by_side
 
 
 def test_results_come_in_order_and_of_what_was_killed_none() -> None:
-    """Of results that fill the pipe."""
-
     def work(job: int) -> Any:
         time.sleep(0.05 * (job % 3 == 0))
         if job == 2:
@@ -26,8 +22,6 @@ def test_results_come_in_order_and_of_what_was_killed_none() -> None:
 
 
 def test_an_error_is_raised_and_nothing_waits_for_ever() -> None:
-    """Others that are at work then have results that nobody reads."""
-
     def work(job: int) -> bytes:
         if job == 1:
             raise ValueError("of job 1")

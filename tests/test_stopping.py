@@ -1,5 +1,3 @@
-"""A command that is stopped ends at once, wherever the signal finds it."""
-
 import signal
 import subprocess
 import sys
@@ -76,7 +74,6 @@ def test_a_link_in_the_place_of_a_scratch_file_is_not_followed(tmp_path: Path) -
 
 
 def test_what_is_ignored_stays_so(tmp_path: Path) -> None:
-    """As what a script runs in the background ignores SIGINT."""
     code = f"import signal; signal.signal({signal.SIGINT}, signal.SIG_IGN)"
     code += BEGIN + f"os.kill(os.getpid(), {signal.SIGINT}); print('goes on')"
     assert ended(code, tmp_path) == (0, "goes on\n", "")

@@ -1,5 +1,3 @@
-"""`biogrip identify` of few and strange readings: an answer or one message."""
-
 import subprocess
 import sys
 from pathlib import Path
@@ -21,24 +19,19 @@ def modulus(times: Array, values: Array, model: str, *models: str, **given: Any)
     return told(times, values, models, reads="modulus", model=model, **given)
 
 
-@pytest.mark.parametrize(
-    ("times", "values", "model", "said"),
-    [
+def test_what_tells_nothing_is_refused_in_one_message() -> None:
+    for times, values, model, said in (
         (SINCE[:10], NOISY[:10], "generalized_maxwell_5", "found 10 readings for 12 unknown"),
         (SINCE[:3], NOISY[:3], "kelvin_voigt", "found 3 rows with a number"),
         (SINCE, np.full(400, 1.0), "zener_maxwell", "but 1 Pa throughout"),
         (SINCE, np.zeros(400), "zener_maxwell", "but 0 Pa throughout"),
         (1e-12 * SINCE, NOISY, "zener_maxwell", "Is the unit of time right?"),
         (1e12 * SINCE, NOISY, "zener_maxwell", "Is the unit of time right?"),
-    ],
-)
-def test_what_tells_nothing_is_refused_in_one_message(
-    times: Array, values: Array, model: str, said: str
-) -> None:
-    with pytest.raises(BiogripError) as error:
-        modulus(times, values, model)
-    assert said in str(error.value)
-    assert "\n" not in str(error.value)
+    ):
+        with pytest.raises(BiogripError) as error:
+            modulus(times, values, model)
+        assert said in str(error.value)
+        assert "\n" not in str(error.value)
 
 
 # Without noise, in another unit, and very many.
@@ -71,7 +64,6 @@ def test_strange_readings_are_answered_and_saturated_ones_told(
 
 
 def test_readings_that_are_averaged_or_left_out_are_counted() -> None:
-    """Of a rounded clock, up to a last second."""
     clock = np.floor(SINCE)[20:]
     config = {"measurement": {"average_repeated": True, "until_s": 15}}
     found = modulus(clock, NOISY[20:], "zener_maxwell", config=config)

@@ -1,5 +1,3 @@
-"""`biogrip identify` with tables: a row says what options and config say of one trace."""
-
 import csv
 import json
 import os
@@ -9,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from biogrip.command import files as command
 from biogrip.command.outputs import read_result, write_result
@@ -20,39 +17,30 @@ from tests.helpers.default import STUDY
 from tests.helpers.identified import identify as run
 from tests.helpers.identified import write_trace
 
-SHORT = {"phases": [{"duration_s": 100.0, "torque_Nm": 2e-9}]}
-TIME = "measurement", "time"
-FEW = {"least_squares": {"candidates": 50, "starts": 2}, "model_selection": {"models": []}}
-TABLE = [
-    ["file", "dish", "protocol.phases", "measurement.time", "gripper.arm_length_m"],
-    ["usual.csv", "left", "", "", ""],
-    ["other.csv", "right", "[{duration_s: 100.0, torque_Nm: 2e-9}]", "t_s", "3e-3"],
-]
+FEW = "least_squares: {candidates: 50, starts: 2}\nmodel_selection: {models: []}\n"
+HEADER = "file|dish|protocol.phases|measurement.time|gripper.arm_length_m"
+PHASES = "[{duration_s: 100.0, torque_Nm: 2e-9}]"
+OTHER = f"other.csv|right|{PHASES}|t_s|3e-3"
 
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder, worked in: a trace of the usual protocol, one of another, a table and a config."""
-    rng = np.random.default_rng(4)
-    for name, column, phases, end in (
-        ("usual", "time_s", STUDY.phases, 400),
-        ("other", "t_s", (hold(100.0, 2e-9),), 100),
-    ):
-        times = np.linspace(0, end, 81)
+    rng, other = np.random.default_rng(4), (hold(100.0, 2e-9),)
+    for name, column, phases in (("usual", "time_s", STUDY.phases), ("other", "t_s", other)):
         experiment = set_up(STUDY.gripper, phases, Sample("kelvin_voigt"))
+        times = np.linspace(0, experiment.torque.end_s, 81)
         clean = simulate(experiment, {"k_p": 10.0, "c_p": 300.0}, times)
         measured = clean + 0.05 * clean.max() * rng.standard_normal(len(times))
-        header = f"{column},rotation_rad"
-        write_trace(tmp_path / f"{name}.csv", times, measured, header=header)
-    write(tmp_path / "cells.tsv", TABLE)
-    (tmp_path / "few.yaml").write_text(yaml.safe_dump(FEW))
+        write_trace(tmp_path / f"{name}.csv", times, measured, header=f"{column},rotation_rad")
+    write(tmp_path / "cells.tsv", HEADER, "usual.csv|left|||", OTHER)
+    (tmp_path / "few.yaml").write_text(FEW)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def write(path: Path, rows: list[list[str]], separator: str = "\t") -> None:
-    with path.open("w", newline="") as stream:
-        csv.writer(stream, delimiter=separator).writerows(rows)
+def write(path: Path, *rows: str) -> None:
+    path.write_text("\n".join(rows).replace("|", "\t") + "\n")
 
 
 def identify(*arguments: str) -> tuple[int, str, str]:
@@ -78,71 +66,53 @@ def refused(path: Path) -> list[str]:
 
 def test_a_row_says_what_options_and_config_say_of_one_trace(here: Path) -> None:
     _, other = read_table(here / "cells.tsv")
-    said = {"protocol": SHORT, "gripper": {"arm_length_m": 3e-3}}
-    (here / "lab.yaml").write_text(yaml.safe_dump(said))
-    asked = Asked(other.trace, here / "lab.yaml", (Setting("--time", TIME, "t_s"),))
+    lab = f"protocol: {{phases: {PHASES}}}\ngripper: {{arm_length_m: 3e-3}}\n"
+    (here / "lab.yaml").write_text(lab)
+    time = Setting("--time", ("measurement", "time"), "t_s")
+    asked = Asked(other.trace, here / "lab.yaml", (time,))
     assert case_of(other).block == case_of(asked).block
 
 
 def test_a_trace_may_stand_beside_a_table_that_does_not_name_it(here: Path) -> None:
     assert "the same file to be written twice" in identify("cells.tsv", "other.csv")[2]
-    write(here / "cells.tsv", [TABLE[0], TABLE[2]])
+    write(here / "cells.tsv", HEADER, OTHER)
     status, printed, _ = identify("usual.csv", "cells.tsv", "--csv", "found.csv")
     assert status == 0
-    # What is not so of all traces is said of each.
     assert "\nusual.csv: Assumed: the default study's gripper and the default study's" in printed
     assert "other.csv: Assumed" not in printed
-    columns = ["trace", "dish", "fit", "confidence"]
-    assert list(listed()[0])[:3] == columns[:3]
-    assert [[row[name] for name in columns] for row in listed()] == [
-        ["usual.csv", "", "ok", "0.95"],
-        ["other.csv", "right", "ok", "0.95"],
-    ]
+    rows = Path("found.csv").read_text().splitlines()
+    starts = ["trace,dish,fit,", "usual.csv,,ok,", "other.csv,right,ok,"]
+    assert [row[: len(start)] for row, start in zip(rows, starts, strict=True)] == starts
 
 
-@pytest.mark.parametrize(
-    ("name", "separator", "column"),
-    [
-        *(("c.tsv", "\t", "file"), ("c.csv", ",", "File"), ("c.txt", ";", "file_name")),
-        *(("c.tsv", "\t", name) for name in ("File name", "filename", "path", "Trace")),
-    ],
-)
-def test_a_table_is_told_by_its_column_of_files(
-    tmp_path: Path, name: str, separator: str, column: str
-) -> None:
+def test_a_table_is_told_by_its_column_of_files(tmp_path: Path) -> None:
     """Also as Excel writes it: a mark of the byte order, empty lines and columns, no last cells."""
     # Of another name than `file` the first trace is there.
     (tmp_path / "d1").mkdir()
     (tmp_path / "d1" / "a.csv").touch()
-    path = tmp_path / name
-    text = f"\ufeff{column}|dish||fixed.c_p|'cell, no'\n"
-    text += "d1/a.csv|left|||\n\n|||\nb.csv||| 0\nc.csv|NA\n"
-    path.write_text(text.replace("|", separator).replace("'", '"'), encoding="utf-8")
-    assert is_table(Asked(path))
-    setting = Setting(f"{path}, line 5, column 'fixed.c_p'", ("fixed", "c_p"), 0)
-    assert [(row.place, row.trace, row.settings, row.copied) for row in read_table(path)] == [
-        (f"{path}, line {line}", tmp_path / trace, settings, {"dish": dish, "cell, no": ""})
-        for line, trace, settings, dish in (
-            (2, "d1/a.csv", (), "left"),
-            (5, "b.csv", (setting,), ""),
-            (6, "c.csv", (), "NA"),
-        )
-    ]
+    for name, separator, column in (
+        *(("c.tsv", "\t", "file"), ("c.csv", ",", "File"), ("c.txt", ";", "file_name")),
+        *(("c.tsv", "\t", name) for name in ("File name", "filename", "path", "Trace")),
+    ):
+        path = tmp_path / name
+        text = f"\ufeff{column}|dish||fixed.c_p|'cell, no'\n"
+        text += "d1/a.csv|left|||\n\n|||\nb.csv||| 0\nc.csv|NA\n"
+        path.write_text(text.replace("|", separator).replace("'", '"'), encoding="utf-8")
+        assert is_table(Asked(path))
+        own = Setting(f"{path}, line 5, column 'fixed.c_p'", ("fixed", "c_p"), 0)
+        told = (2, "d1/a.csv", (), "left"), (5, "b.csv", (own,), ""), (6, "c.csv", (), "NA")
+        assert [(row.place, row.trace, row.settings, row.copied) for row in read_table(path)] == [
+            (f"{path}, line {line}", tmp_path / trace, settings, {"dish": dish, "cell, no": ""})
+            for line, trace, settings, dish in told
+        ]
 
 
 def test_traces_side_by_side_are_a_row_each(here: Path) -> None:
-    """Each with the options of its row, and results by its column's name."""
     times, readings = np.loadtxt(here / "usual.csv", delimiter=",", skiprows=1).T
     write_trace(Path("both.csv"), times, readings, 2 * readings, header="time_s,A 1,A/2")
     fixed = "k=0.001 c=0.001 c_p=150"
-    write(
-        here / "wells.tsv",
-        [
-            ["file", "reading", "model", "fix", "well"],
-            ["both.csv", "rotation=A 1", "", "", "x"],
-            ["both.csv", "A/2", "generalized_maxwell", fixed, "y"],
-        ],
-    )
+    rows = "both.csv|rotation=A 1|||x", f"both.csv|A/2|generalized_maxwell|{fixed}|y"
+    write(here / "wells.tsv", "file|reading|model|fix|well", *rows)
     unit = "--set", "measurement.rotation_unit=rad"
     assert identify("wells.tsv", "--csv", "found.csv", *unit)[0] == 0
     one, other = listed()
@@ -157,9 +127,8 @@ def test_traces_side_by_side_are_a_row_each(here: Path) -> None:
 
 def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
     path = tmp_path / "cells.tsv"
-    header = ["file", "dish", "dish", "fit", "k value", "measurement.skip"]
-    rows = ["a.csv", *[""] * 4, "1:30"], ["./a.csv", *[""] * 4, "[1"], ["a.csv", *[""] * 4, "[1"]
-    write(path, [header, *rows])
+    rows = "a.csv|||||1:30", "./a.csv|||||[1", "a.csv|||||[1"
+    write(path, "file|dish|dish|fit|k value|measurement.skip", *rows)
     lines = [line.removeprefix(f"{path}, line ") for line in refused(path)]
     below = [lines.pop(4).split(":")[:2] for _ in range(2)]
     assert lines == [
@@ -172,74 +141,63 @@ def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
         "once, or a column 'reading' that tells which, as in strain=COLUMN.",
     ]
     assert below == [[f"{n}, column 'measurement.skip'", " not valid YAML"] for n in (3, 4)]
-    write(path, [["file", "fixed.c"], *([f"{number}.csv", "[1"] for number in range(30))])
+    write(path, "file|fixed.c", *(f"{number}.csv|[1" for number in range(30)))
     assert refused(path)[10:] == ["... and 20 more."]
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
+def test_text_that_is_no_table_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "cells.csv"
+    for text, said in (
         ("fil,dish\na.csv,1\n", "line 1: found no column 'file' among fil, dish; allowed is one"),
         ("file\n", "found no traces, allowed is a row for each."),
         ("file,dish\n,left\n", "line 2, column 'file': found nothing, allowed is a trace."),
         ("file\na.csv,left\n", "line 2: found 2 cells in the row, allowed are the header's 1."),
         ("file\n\udcff\n", "cannot be read as a table: "),
-    ],
-)
-def test_text_that_is_no_table_is_refused(tmp_path: Path, text: str, said: str) -> None:
-    path = tmp_path / "cells.csv"
-    path.write_text(text, errors="surrogateescape")
-    (line,) = refused(path)
-    assert line.startswith(str(path))
-    assert said in line
+    ):
+        path.write_text(text, errors="surrogateescape")
+        (line,) = refused(path)
+        assert line.startswith(str(path))
+        assert said in line
 
 
 def test_settings_that_cannot_be_used_are_said_at_once(here: Path) -> None:
-    header = ["file", "measurement.noise_rad", "fixed.k_s", "sample.model", "measurment.skip"]
-    rows = [["usual.csv", "-1", "", "maxwel", "2"], ["other.csv", "", "2", "", ""]]
-    write(here / "cells.tsv", [header, *rows])
+    header = "file|measurement.noise_rad|fixed.k_s|sample.model|measurment.skip"
+    write(here / "cells.tsv", header, "usual.csv|-1||maxwel|2", "other.csv||2||")
     status, _, error = identify("cells.tsv")
     assert status == 1
-    lines = error.splitlines()
-    assert [line.removeprefix("biogrip: ").partition(" Allowed")[0] for line in lines] == [
-        "cells.tsv, line 2, column 'measurement.noise_rad': measurement.noise_rad: found -1, "
-        "allowed is at least 1e-15 and at most 1e+12 rad.",
-        "cells.tsv, line 2, column 'sample.model': sample.model: found 'maxwel'. Did you mean "
-        "'maxwell'?",
-        "cells.tsv, line 2, column 'measurment.skip': measurment: unknown key. Did you mean "
-        "'measurement'?",
-        "cells.tsv, line 3, column 'fixed.k_s': fixed.k_s: is no parameter of the sample, which "
-        "has k_p, c_p. Did you mean 'k_p'?",
+    said = [
+        "line 2, column 'measurement.noise_rad': measurement.noise_rad: found -1, allowed is",
+        "line 2, column 'sample.model': sample.model: found 'maxwel'. Did you mean 'maxwell'?",
+        "line 2, column 'measurment.skip': measurment: unknown key. Did you mean 'measurement'",
+        "line 3, column 'fixed.k_s': fixed.k_s: is no parameter of the sample, which has k_p",
     ]
+    lines = [line.partition("cells.tsv, ")[2] for line in error.splitlines()]
+    assert [line[: len(own)] for line, own in zip(lines, said, strict=True)] == said
     assert not list(here.glob("*.json"))
 
 
-@pytest.mark.parametrize(
-    ("hold", "said"),
-    [
+def test_what_was_held_is_refused_with_its_place(here: Path) -> None:
+    for held, said in (
         ("soon", "line 2, column 'hold': found 'soon', allowed is a number"),
         ("5 soon", "line 2, column 'hold': found the unit 'soon' of a stress, allowed are Pa"),
         ("", "line 2: --hold: is missing; allowed is the stress in Pa"),
-    ],
-)
-def test_what_was_held_is_refused_with_its_place(here: Path, hold: str, said: str) -> None:
-    write(here / "cells.tsv", [["file", "hold"], ["usual.csv", hold]])
-    assert said in identify("cells.tsv", "--reading", "strain=rotation_rad")[2]
+    ):
+        write(here / "cells.tsv", "file|hold", f"usual.csv|{held}")
+        assert said in identify("cells.tsv", "--reading", "strain=rotation_rad")[2]
 
 
 def test_traces_of_a_command_read_one_quantity(here: Path) -> None:
-    lab = {"instrument": "relaxation", "protocol": {"phases": [{"duration_s": 400, "strain": 1}]}}
-    (here / "few.yaml").write_text(yaml.safe_dump(lab))
-    header = ["file", "measurement.modulus", "measurement.stress"]
-    write(here / "cells.tsv", [header, ["usual.csv", "G", ""], ["other.csv", "", "S"]])
+    phases = "{phases: [{duration_s: 400, strain: 1}]}"
+    (here / "few.yaml").write_text(f"instrument: relaxation\nprotocol: {phases}\n")
+    header = "file|measurement.modulus|measurement.stress"
+    write(here / "cells.tsv", header, "usual.csv|G|", "other.csv||S")
     said = "cells.tsv, line 3: found a reading of stress, but a reading of modulus before"
     assert said in identify("cells.tsv")[2]
 
 
 def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
-    rows = [["file", "dish"], ["gone.csv", "lost"], ["usual.csv", "left"]]
     for few in (3, 2):
-        write(here / "cells.tsv", rows[:few])
+        write(here / "cells.tsv", *("file|dish", "gone.csv|lost", "usual.csv|left")[:few])
         given = ("--csv", "found.csv", "--report", "page.html")
         status, printed, _ = identify("cells.tsv", *given)
         assert status == 1
@@ -251,38 +209,28 @@ def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
         assert "<td>lost</td>" in (here / "page.html").read_text()
 
 
-def killed_with(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Kill every process that is to identify a trace, with all others of its batch."""
-    whole = command.identify_batch
-
-    def identify_batch(asked: Any, outputs: Any, *, drawn: bool) -> Any:
-        if any(own.trace.name == name for own in asked):
-            os.kill(os.getpid(), signal.SIGKILL)
-        return whole(asked, outputs, drawn=drawn)
-
-    monkeypatch.setattr(command, "identify_batch", identify_batch)
-    # All are one batch.
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
-
-
 def test_a_killed_process_costs_a_batch_its_trace_alone(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And what is done is not done again: the next run says and writes what a first would."""
+    whole = command.identify_batch
+
+    def killed(asked: Any, outputs: Any, *, drawn: bool) -> Any:
+        if any(own.trace.name == "other.csv" for own in asked):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return whole(asked, outputs, drawn=drawn)
+
     undisturbed = identify("cells.tsv", "--csv", "first.csv")
     results = {name: found(name) for name in ("usual.csv", "other.csv")}
-    (here / "usual.identified.json").unlink()
-    (here / "other.identified.json").unlink()
+    for path in here.glob("*.json"):
+        path.unlink()
     with monkeypatch.context() as patched:
-        killed_with("other.csv", patched)
+        # Killed is every process that is to identify that trace, with all others of its batch.
+        patched.setattr(command, "identify_batch", killed)
+        patched.setattr(os, "sched_getaffinity", lambda _: {0})
         status, printed, said = identify("cells.tsv", "--csv", "found.csv")
     assert status == 1
-    assert said.splitlines() == [
-        "biogrip: a process was killed, perhaps because memory ran out; its traces are identified "
-        "one by one.",
-        "1 of 2: usual.csv",
-        "2 of 2: other.csv",
-    ]
+    assert "its traces are identified one by one." in said
     assert "other.csv: a process was killed, perhaps because memory ran out, twice" in printed
     assert [row["fit"] for row in listed()] == [results["usual.csv"]["fit"], "failed"]
     assert not (here / "other.identified.json").exists()
@@ -300,43 +248,35 @@ def test_a_killed_process_costs_a_batch_its_trace_alone(
 
 
 def test_a_result_is_made_from_trace_config_and_options(tmp_path: Path) -> None:
-    """What is taken from a JSON file, as its digest tells."""
     trace, config = tmp_path / "a.csv", tmp_path / "few.yaml"
     at = Setting("--at", ("identifiability", "at_s"), [10])
     made_from = set()
-    for text, keys, settings in (
-        ("time_s,rotation_rad\n0,1\n", "", ()),
-        ("time_s,rotation_rad\n0,2\n", "", ()),
-        ("time_s,rotation_rad\n0,2\n", "seeds: 9", ()),
-        ("time_s,rotation_rad\n0,2\n", "seeds: 9", (at,)),
-    ):
-        trace.write_text(text)
+    for value, keys, own in ((1, "", ()), (2, "", ()), (2, "a: 9", ()), (2, "a: 9", (at,))):
+        trace.write_text(f"time_s,rotation_rad\n0,{value}\n")
         config.write_text(keys)
-        made_from.add(command._made_from(Asked(trace, config, settings)))
+        made_from.add(command._made_from(Asked(trace, config, own)))
     assert len(made_from) == 4
 
 
-@pytest.mark.parametrize(("reads", "unit"), [("strain", ""), ("displacement", "_m")])
-def test_results_in_any_unit_are_read_as_they_were_written(
-    tmp_path: Path, reads: str, unit: str
-) -> None:
-    data = {"reads": {"quantity": reads}, "noise_rad": 1.5, "notes": [{"drift_rad_per_s": None}]}
-    data |= {"assumed": {"noise_rad": 1 / 3}}
-    write_result(tmp_path / "a.json", data, "this")
-    written = json.loads((tmp_path / "a.json").read_text())
-    assert (written[f"noise{unit}"], written.pop("assumed")) == (1.5, data["assumed"])
-    assert "_rad" not in json.dumps(written)
-    assert read_result(tmp_path / "a.json", "this") == data
-    with pytest.raises(BiogripError, match="its digest is another one"):
-        read_result(tmp_path / "a.json", "that")
-    (tmp_path / "a.json").write_text((tmp_path / "a.json").read_text().replace("1.5", "1.6"))
-    with pytest.raises(BiogripError, match="its digest is another one"):
-        read_result(tmp_path / "a.json", "this")
+def test_results_in_any_unit_are_read_as_they_were_written(tmp_path: Path) -> None:
+    for reads, unit in (("strain", ""), ("displacement", "_m")):
+        data = {"reads": {"quantity": reads}, "noise_rad": 1.5, "assumed": {"noise_rad": 1 / 3}}
+        data |= {"notes": [{"drift_rad_per_s": None}]}
+        write_result(tmp_path / "a.json", data, "this")
+        written = json.loads((tmp_path / "a.json").read_text())
+        assert (written[f"noise{unit}"], written.pop("assumed")) == (1.5, data["assumed"])
+        assert "_rad" not in json.dumps(written)
+        assert read_result(tmp_path / "a.json", "this") == data
+        text = (tmp_path / "a.json").read_text()
+        for changed, digest in ((text, "that"), (text.replace("1.5", "1.6"), "this")):
+            (tmp_path / "a.json").write_text(changed)
+            with pytest.raises(BiogripError, match="its digest is another one"):
+                read_result(tmp_path / "a.json", digest)
 
 
 def test_what_a_row_says_goes_before_options(here: Path) -> None:
-    keys = ["measurement.start_s", "fixed.c_p", "sample.model", "measurement.noise_rad"]
-    write(here / "cells.tsv", [["file", *keys], ["usual.csv", "0", "200", "", "2e-6"]])
+    header = "file|measurement.start_s|fixed.c_p|sample.model|measurement.noise_rad"
+    write(here / "cells.tsv", header, "usual.csv|0|200||2e-6")
     options = ("--start", "fit", "--fix", "c_p=100", "--noise", "1e-6", "--drift")
     assert identify("cells.tsv", *options)[0] == 0
     data = found("usual.csv")
@@ -346,66 +286,51 @@ def test_what_a_row_says_goes_before_options(here: Path) -> None:
     assert "onset_s" not in data
 
 
-@pytest.mark.parametrize(
-    ("text", "settings"),
-    [
-        *((text, {}) for text in ("", "time_s,rotation_rad\n1,2\n", "profile\n1\n", "\0\xff")),
-        ("time_s,rotation_rad,file\n0,1,run7\n1,2,run7\n", {}),
-        ("t,file,phi_rad\n0,run7,1\n1,run7,2\n", {"time": "t", "rotation": "phi_rad"}),
-        ("path,C:/data/run7.dat\ntime_s,rotation_rad\n0,1\n", {}),
-    ],
-)
-def test_a_trace_is_no_table_though_it_has_a_column_of_files(
-    tmp_path: Path, text: str, settings: dict[str, str]
-) -> None:
+def test_a_trace_is_no_table_though_it_has_a_column_of_files(tmp_path: Path) -> None:
     path = tmp_path / "c.csv"
-    path.write_text(text)
-    given = (Setting("--x", ("measurement", key), it) for key, it in settings.items())
+    plain = "", "time_s,rotation_rad\n1,2\n", "profile\n1\n", "\0\xff"
+    named = "time_s,rotation_rad,file\n0,1,run7\n", "path,C:/run7.dat\ntime_s,rotation_rad\n0,1\n"
+    for text in plain + named:
+        path.write_text(text)
+        assert not is_table(Asked(path))
+    path.write_text("t,file,phi_rad\n0,run7,1\n1,run7,2\n")
+    keys = {"time": "t", "rotation": "phi_rad"}
+    given = (Setting("--x", ("measurement", key), it) for key, it in keys.items())
     assert not is_table(Asked(path, settings=tuple(given)))
 
 
-def test_an_option_is_a_column_too(tmp_path: Path) -> None:
+def test_an_option_is_a_column_too_and_words_are_no_setting(tmp_path: Path) -> None:
     path = tmp_path / "cells.csv"
-    path.write_text(
-        "file,hold,Start,noise-model,model,stress_Pa\na.csv,10,fit,coloured,maxwell,10\n"
-    )
+    names = "file,hold,Start,noise-model,model,stress_Pa"
+    path.write_text(f"{names}\na.csv,10,fit,coloured,maxwell,10\n")
     (own,) = read_table(path)
-    assert {setting.path: setting.value for setting in own.settings} == {
-        ("--hold",): 10,
-        ("measurement", "fit_start"): True,
-        ("measurement", "noise_model"): "coloured",
-        ("sample", "model"): "maxwell",
-    }
+    assert [(".".join(setting.path), setting.value) for setting in own.settings] == [
+        *(("--hold", 10), ("measurement.fit_start", True)),
+        *(("measurement.noise_model", "coloured"), ("sample.model", "maxwell")),
+    ]
     assert own.copied == {"stress_Pa": "10"}
+    alike = ["arm_length_m", "stress_Pa", "noise (rad)", "start_s"]
+    others = ["length_um", "passage", "day", "time_h"]
+    path.write_text(f"file,{','.join(alike + others)}\na.csv{',low' * len(alike)},12,3,4,5\n")
+    assert list(read_table(path)[0].copied) == alike + others
 
 
 @pytest.mark.parametrize(
-    ("name", "cell", "meant"),
+    ("meant", "names", "cell"),
     [
-        ("arm_length_m", "1", "gripper.arm_length_m"),
-        ("Arm length", "1", "gripper.arm_length_m"),
-        ("arm_lenght_m", "1", "gripper.arm_length_m"),
-        ("gripper_arm_length_m", "1", "gripper.arm_length_m"),
-        *((name, "1", "hold") for name in ("stress_Pa", "hold_Pa", "hodl", "pressure_mbar")),
-        *(("Force (pN)", "1", "hold"), ("stress", "8 Pa", "hold")),
-        *(("noise (rad)", "1", "noise"), ("noize", "1", "noise"), ("start_s", "1", "start")),
-        *(("modle", "zener_kelvin", "model"), ("sample type", "sls", "model")),
-        ("noise_modle", "coloured", "noise_model"),
+        ("gripper.arm_length_m", ("arm_length_m", "Arm length", "gripper_arm_lenght_m"), "1"),
+        ("hold", ("stress_Pa", "hold_Pa", "hodl", "pressure_mbar", "Force (pN)"), "1"),
+        *(("hold", ["stress"], "8 Pa"), ("start", ["start_s"], "1")),
+        *(("noise", ["noise (rad)", "noize"], "1"), ("noise_model", ["noise_modle"], "coloured")),
+        ("model", ["modle", "sample type"], "sls"),
     ],
 )
 def test_what_looks_like_a_setting_is_not_copied_beside_the_result(
-    tmp_path: Path, name: str, cell: str, meant: str
+    tmp_path: Path, meant: str, names: list[str], cell: str
 ) -> None:
     path = tmp_path / "cells.csv"
-    path.write_text(f"file,{name}\na.csv,{cell}\n")
-    assert refused(path) == [
-        f"{path}, line 1, column '{name}': looks like a setting and is none; allowed is '{meant}' "
-        "for a column that sets it, in SI units, or a name unlike a setting's."
-    ]
-
-
-@pytest.mark.parametrize("name", ["arm_length_m", "stress_Pa", "noise (rad)", "start_s"])
-def test_words_are_no_setting_nor_are_names_of_other_things(tmp_path: Path, name: str) -> None:
-    path = tmp_path / "cells.csv"
-    path.write_text(f"file,{name},length_um,passage,day,time_h\na.csv,low,12,3,4,5\n")
-    assert list(read_table(path)[0].copied) == [name, "length_um", "passage", "day", "time_h"]
+    for name in names:
+        path.write_text(f"file,{name}\na.csv,{cell}\n")
+        said = f"looks like a setting and is none; allowed is '{meant}' for a column that sets it, "
+        said += "in SI units, or a name unlike a setting's."
+        assert refused(path) == [f"{path}, line 1, column '{name}': {said}"]

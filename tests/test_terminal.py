@@ -1,9 +1,6 @@
-"""What reaches a terminal: nothing that it obeys but our own, and nothing where it is closed."""
-
 import json
 import re
 import shlex
-import shutil
 from pathlib import Path
 
 import pytest
@@ -11,8 +8,7 @@ import pytest
 from biogrip import terminal
 from biogrip.cli import _parser, main
 from biogrip.terminal import visible, visible_lines
-from tests.helpers.identified import identify
-from tests.helpers.places import EXAMPLE
+from tests.helpers.identified import identify, write_drop
 
 # A colour, the title of a window, a line that is cleared, text that runs from right to left.
 HOSTILE = "\x1b[31m\x9b2J\x1b]0;x\x07\r\u202ea\x7f"
@@ -31,22 +27,19 @@ def test_text_is_shown_as_it_is_but_for_what_a_terminal_obeys() -> None:
     assert all(visible(chr(number)).isprintable() for number in obeyed)
 
 
-@pytest.mark.parametrize(
-    ("header", "row", "said"),
-    [
+def test_a_message_shows_what_was_found(tmp_path: Path) -> None:
+    trace = tmp_path / f"a{HOSTILE}\nb.csv"
+    for header, row, said in (
         ("time_s,rotation_rad", f"1,{FOUND}", f"found '{visible(FOUND)}'"),
         (f"time_s,{FOUND}", "1,2", f"The file has: time_s, {visible(FOUND)}"),
-    ],
-)
-def test_a_message_shows_what_was_found(tmp_path: Path, header: str, row: str, said: str) -> None:
-    trace = tmp_path / f"a{HOSTILE}\nb.csv"
-    trace.write_text(f"{header}\n{row}\n", newline="\n")
-    status, _, error = identify(trace)
-    assert status == 1
-    assert error.startswith(f"biogrip: {visible(trace)}, line ")
-    assert said in error
-    assert not OBEYED.search(error)
-    assert error.count("\n") == 1
+    ):
+        trace.write_text(f"{header}\n{row}\n", newline="\n")
+        status, _, error = identify(trace)
+        assert status == 1
+        assert error.startswith(f"biogrip: {visible(trace)}, line ")
+        assert said in error
+        assert not OBEYED.search(error)
+        assert error.count("\n") == 1
 
 
 def test_what_was_typed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
@@ -60,7 +53,7 @@ def test_what_was_typed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
 def test_names_of_traces_are_shown_wherever_they_are_said(tmp_path: Path, few: Path) -> None:
     page = tmp_path / "page.html"
     good, bad, absent = (tmp_path / f"{name}{HOSTILE}\n.csv" for name in ("good", "bad", "absent"))
-    shutil.copy(EXAMPLE, good)
+    write_drop(good, 0)
     bad.write_text("time_s,rotation_rad\n1,high\n")
     options = ("--config", few, "--model", "maxwell")
     several = identify(good, bad, good, absent, *options, "--report", page)
@@ -77,30 +70,23 @@ def test_names_of_traces_are_shown_wherever_they_are_said(tmp_path: Path, few: P
     assert f">{visible(good)}<" in page.read_text()
 
 
-def test_progress_and_warnings_are_shown(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(terminal, "_EVERY_S", 0.0)
-    with terminal.Progress(HOSTILE, 1) as told:
-        told.doing(f"cell {HOSTILE}")
-        told.done()
-    terminal.warn(f"{HOSTILE}: a note")
-    for text in capsys.readouterr():
-        assert visible(HOSTILE) in text or not text
-        assert not OBEYED.search(text)
-
-
 @pytest.mark.parametrize("alone", [True, False])
-def test_a_commands_progress_is_no_output(
+def test_progress_is_shown_and_that_of_a_command_is_no_output(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], alone: bool
 ) -> None:
     """A job's is: its log has what goes to standard error."""
     monkeypatch.setattr(terminal, "_EVERY_S", 0.0)
-    with terminal.Progress("a", 1, live=alone) as told:
+    with terminal.Progress(HOSTILE, 1, live=alone) as told:
         told.done()
     shown = capsys.readouterr()
     seen, empty = (shown.err, shown.out) if alone else (shown.out, shown.err)
-    assert (seen, empty) == ("a: 1 of 1 done\n", "")
+    assert (seen, empty) == (f"{visible(HOSTILE)}: 1 of 1 done\n", "")
+    with terminal.Progress("a", 1) as told:
+        told.doing(f"cell {HOSTILE}")
+    terminal.warn(f"{HOSTILE}: a note")
+    for text in capsys.readouterr():
+        assert visible(HOSTILE) in text or not text
+        assert not OBEYED.search(text)
 
 
 @pytest.mark.parametrize("command", ["identify", "groups", "design"])

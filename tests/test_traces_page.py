@@ -1,8 +1,5 @@
-"""The page of identified traces: what it says and draws, and in a real browser its table."""
-
 import base64
 import re
-import shutil
 from dataclasses import replace
 from html import unescape
 from io import BytesIO
@@ -18,7 +15,7 @@ from biogrip.command.outputs import Outcome
 from biogrip.command.page import beyond, common, draw_traces, write_page
 from biogrip.command.settings import Asked, Setting
 from biogrip.command.words import columns_of, for_a_paper
-from tests.helpers.browser import Opened
+from tests.helpers.identified import write_drop
 from tests.helpers.places import EXAMPLE
 
 HOSTILE = "</script><b onclick=x>&amp;"
@@ -30,20 +27,16 @@ def example(few: Path) -> Outcome:
 
 
 def made_up(of: dict[str, Any], number: int) -> dict[str, Any]:
-    """A trace of a dish: the same one with values of its own, some doubtful or rejected."""
-    factor = 1 + 0.1 * (number * 7 % 12)
+    factor, none = 1 + 0.1 * (number * 7 % 12), {"low": None, "high": None}
     fit = {3: "doubtful", 8: "rejected"}.get(number, "ok")
+    of_k: dict[int, Any] = {5: {"high": None, "verdict": "bounded below"}}
+    of_k |= {6: none | {"verdict": "not determined"}}
     quantities = []
     for item in of["quantities"]:
-        own = item | {name: item[name] and factor * item[name] for name in ("value", "low", "high")}
-        if fit == "rejected":
-            own |= {"low": None, "high": None, "verdict": "fit rejected"}
-        elif item["quantity"] == "k" and number == 5:
-            own |= {"high": None, "verdict": "bounded below"}
-        elif item["quantity"] == "k" and number == 6:
-            own |= {"low": None, "high": None, "verdict": "not determined"}
-        quantities.append(own)
-    reasons = ["Something is odd."] if fit != "ok" else []
+        own = item | {name: item[name] and factor * item[name] for name in ("value", *none)}
+        own |= of_k.get(number, {}) if item["quantity"] == "k" else {}
+        quantities.append(own | (none | {"verdict": "fit rejected"} if number == 8 else {}))
+    reasons = ["Something is odd."] * (fit != "ok")
     said = {"fit": fit, "quantities": quantities, "reasons": reasons}
     return {**of, "trace": f"dish/{number}.csv", **said}
 
@@ -67,7 +60,6 @@ def page(dish: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path: Path) -> None:
-    """Then come lines for a paper and pictures; LaTeX and assumptions are folded."""
     write_page(example, tmp_path / "page.html")
     text = unescape((tmp_path / "page.html").read_text())
     parts = ("Fit ok", "What the trace tells", "For a paper", "its best fit", "Profile likelihoods")
@@ -78,11 +70,8 @@ def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path
     assert "search_range:" in text
     assert "search_range:" not in unfolded
     assert r"95\,\%" not in unfolded
-    (told,) = example.found
-    lines = for_a_paper(told)
-    assert len(lines) == 6
-    for line, _ in lines:
-        assert f"<p>{line}</p>" in text
+    lines = for_a_paper(example.found[0])
+    assert len(lines) == sum(f"<p>{line}</p>" in text for line, _ in lines) == 6
     assert r"$k_{p} = 5.01\,\mathrm{N/m}$ (95\,\% profile-likelihood interval $" in text
 
 
@@ -101,10 +90,9 @@ def test_pictures_are_small_and_in_the_page(page: Path) -> None:
 
 def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
     """Groups are of the column with the fewest words, units of one that puts cells together."""
-    names = [each["trace"] for each in dish.found]
     words = {
-        name: {"day": f"{number % 4}", "drug": "ab"[number % 2], "size": f"{number}"}
-        for number, name in enumerate(names)
+        each["trace"]: {"day": f"{number % 4}", "drug": "ab"[number % 2], "size": f"{number}"}
+        for number, each in enumerate(dish.found)
     }
     drawn, said = draw_traces(replace(dish, copied=words), columns_of(dish.found))
     assert said == "Groups: drug. Large marks: means of each day."
@@ -115,7 +103,7 @@ def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
     assert len(points) == 12 - 2
     assert sum(line.get_marker() == "^" for line in points) == 1
     assert sum(line.get_markerfacecolor() == "white" for line in points) == 1
-    words[names[0]] = {"other": "of another table"}
+    words[dish.found[0]["trace"]] = {"other": "of another table"}
     assert draw_traces(replace(dish, copied=words), columns_of(dish.found))[0].axes
     drawn, said = draw_traces(dish, columns_of(dish.found))
     assert said == "Cells are taken for independent."
@@ -132,20 +120,17 @@ def test_what_all_share_is_said_once() -> None:
 
 
 def test_the_methods_have_the_numbers_of_the_study(page: Path) -> None:
-    """Gripper and protocol are the default study's; two of the made-up traces are left out."""
     text = unescape(page.read_text()).partition("Methods, for a paper</h2>\n<p>")[2]
     said = text.partition("</p>")[0].replace("\u00a0", " ")
-    assert said.rpartition(" Computed with biogrip 1.0.0")[0] == (
-        "The rotation of an arm of a microgripper was recorded under a torque of 1.6·10⁻⁹ N m for "
-        "200 s, then of 3.2·10⁻¹⁰ N m for 200 s. Its arms of 0.0015 m have a stiffness of "
-        "4.4·10⁻⁷ N m/rad, and stand at 75 degrees. The model (generalized Maxwell-Wiechert) was "
-        "fitted by least squares; the noise was taken from the scatter of neighbouring readings. "
-        "Intervals are 95 % profile-likelihood limits. Limits are statistical only: the gripper is "
-        "taken as exact. Where one limit alone is given, it holds with 97.5 % confidence, "
-        "one-sided. The value of c + c_p holds provided the branch relaxes within the experiment. "
+    for words in (
+        "a torque of 1.6·10⁻⁹ N m for 200 s, then of 3.2·10⁻¹⁰ N m for 200 s. Its arms of 0.0015 m "
+        "have a stiffness of 4.4·10⁻⁷ N m/rad, and stand at 75 degrees. The model (generalized "
+        "Maxwell-Wiechert) was fitted by least squares; the noise was taken from the scatter",
+        "holds with 97.5 % confidence, one-sided. The value of c + c_p holds provided the branch",
         "11 of 13 traces were used, 1 of them with a doubtful fit. Rejected: 1 (dish/8.csv: "
-        "Something is odd). Not identified: 1 (bad.csv: found 'high')."
-    )
+        "Something is odd). Not identified: 1 (bad.csv: found 'high'). Computed with biogrip 1.0.0",
+    ):
+        assert words in said
     latex = text.partition("<pre>")[2].partition("</pre>")[0]
     assert r"$1.6 \times 10^{-9}$ N m" in latex
     assert r"95 \% profile-likelihood" in latex
@@ -155,7 +140,9 @@ def test_the_methods_have_the_numbers_of_the_study(page: Path) -> None:
 def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(
     few: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    traces = [Path(shutil.copy(EXAMPLE, tmp_path / name)) for name in ("a.csv", "b.csv")]
+    traces = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for trace in traces:
+        write_drop(trace, 0)
     monkeypatch.setattr(command, "MOST_DRAWN", 1)
     model = [Setting("--model", ("sample", "model"), "maxwell")]
     assert command.identify_files(traces, few, model, report=tmp_path / "page.html") == 0
@@ -165,26 +152,14 @@ def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(
     assert 'href="#trace-' not in text
 
 
-# In a browser.
-
-
-@pytest.fixture
-def opened(browser: Any, page: Path) -> Any:
-    found = Opened(browser, page)
-    yield found
-    assert (found.problems, found.asked) == ([], [])
-    found.context.close()
-
-
-def test_the_table_sorts_by_a_heading_and_its_names_are_text(opened: Opened) -> None:
-    page = opened.page
-    heads = page.locator("table.traces > thead th")
+def test_the_table_sorts_by_a_heading_and_its_names_are_text(visit: Any, page: Path) -> None:
+    opened = visit(page).page
+    heads = opened.locator("table.traces > thead th")
     column = heads.all_inner_texts().index("k (N/m)")
 
-    def cells(index: int) -> list[str]:
-        rows = "[...document.querySelectorAll('.traces tbody tr')]"
-        texts: list[str] = page.evaluate(f"{rows}.map(row => row.cells[{index}]?.innerText)")
-        return texts
+    def cells(index: int) -> Any:
+        texts = f"rows => rows.map(row => row.cells[{index}]?.innerText)"
+        return opened.locator(".traces tbody tr").evaluate_all(texts)
 
     def numbers() -> list[float]:
         """Of those that have one: not the rejected one, and two more."""
@@ -200,37 +175,30 @@ def test_the_table_sorts_by_a_heading_and_its_names_are_text(opened: Opened) -> 
     assert heads.nth(column).get_attribute("aria-sort") == "descending"
     assert numbers() == ascending[::-1]
     heads.nth(1).locator("button").click()
-    assert page.locator("th[aria-sort]").count() == 1
-    # By number, not by letter.
+    assert opened.locator("th[aria-sort]").count() == 1
     names = [text for text in cells(1) if text.startswith("dish/")]
     assert names == [f"dish/{number}.csv" for number in range(11)]
     assert sorted(cells(1)) == sorted(given)
-    assert "13 traces: 10 ok, 1 doubtful, 1 rejected, 1 not identified." in page.inner_text("body")
-    # Names are text, and lead to their traces.
-    link = page.locator(".traces tbody a", has_text=HOSTILE)
-    link.click()
-    assert page.locator("#trace-12 h2").inner_text() == HOSTILE
-    assert page.locator("b").count() == 0
-    assert HOSTILE in str(page.locator("#trace-12 img").first.get_attribute("alt"))
+    body = opened.inner_text("body")
+    assert "13 traces: 10 ok, 1 doubtful, 1 rejected, 1 not identified." in body
+    opened.locator(".traces tbody a", has_text=HOSTILE).click()
+    assert opened.locator("#trace-12 h2").inner_text() == HOSTILE
+    assert opened.locator("b").count() == 0
+    assert HOSTILE in str(opened.locator("#trace-12 img").first.get_attribute("alt"))
 
 
 def test_sixty_traces_are_two_screens_and_six_sheets(
-    browser: Any, dish: Outcome, tmp_path: Path
+    visit: Any, dish: Outcome, tmp_path: Path
 ) -> None:
-    """Pictures of each are folded, and not printed; the table is no wider than the screen."""
     (pictures,) = {tuple(own) for own in dish.pictures.values()}
     traces = [made_up(dish.found[0], 20 + number) for number in range(60)]
-    names = [each["trace"] for each in traces]
-    copied = {name: {"cell": name, "dish": f"d{n % 6}"} for n, name in enumerate(names)}
-    every = Outcome(traces, {}, {name: [*pictures] for name in names}, copied)
+    words = {each["trace"]: {"dish": f"d{n % 6}"} for n, each in enumerate(traces)}
+    every = Outcome(traces, {}, {name: [*pictures] for name in words}, words)
     write_page(every, tmp_path / "page.html")
-    opened = Opened(browser, tmp_path / "page.html", viewport={"width": 1400, "height": 900})
+    opened = visit(tmp_path / "page.html", viewport={"width": 1400, "height": 900})
     assert opened.page.evaluate("document.documentElement.scrollHeight") <= 2 * 900
-    table = opened.page.locator(".screen")
-    assert table.evaluate("it => it.scrollWidth <= it.clientWidth")
-    printed = opened.page.pdf(format="A4")
-    assert 1 <= len(re.findall(rb"/Type /Page\b", printed)) <= 6
-    opened.context.close()
+    assert opened.page.locator(".screen").evaluate("it => it.scrollWidth <= it.clientWidth")
+    assert 1 <= len(re.findall(rb"/Type /Page\b", opened.page.pdf(format="A4"))) <= 6
 
 
 @pytest.mark.parametrize(
@@ -238,13 +206,11 @@ def test_sixty_traces_are_two_screens_and_six_sheets(
     [("light", []), pytest.param("dark", ["color-contrast"], marks=pytest.mark.nightly)],
 )
 def test_anybody_can_use_it(
-    browser: Any, dish: Outcome, tmp_path: Path, scheme: Any, rules: list[str]
+    visit: Any, dish: Outcome, tmp_path: Path, scheme: Any, rules: list[str]
 ) -> None:
-    """On a phone, whose reader moves tables sideways, never the page; and on paper."""
     page = tmp_path / "page.html"
-    # One of each fit.
     write_page(replace(dish, found=[dish.found[number] for number in (0, 3, 8)]), page)
-    opened = Opened(browser, page, color_scheme=scheme, viewport={"width": 400, "height": 800})
+    opened = visit(page, color_scheme=scheme, viewport={"width": 400, "height": 800})
     assert opened.barriers(*rules) == []
     assert opened.page.evaluate("document.documentElement.scrollWidth") <= 400
     opened.page.emulate_media(media="print")
@@ -252,4 +218,3 @@ def test_anybody_can_use_it(
     assert opened.page.evaluate("document.documentElement.scrollWidth") <= 718
     paper = opened.page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert paper == "rgb(255, 255, 255)"
-    opened.context.close()

@@ -36,6 +36,10 @@ class Opened:
         self.page.on("request", self._requested)
         self.page.goto(page.as_uri() + fragment)
 
+    def close(self) -> None:
+        assert (self.problems, self.asked) == ([], [])
+        self.context.close()
+
     def _said(self, message: Any) -> None:
         if message.type == "error":
             self.problems.append(message.text)

@@ -1,5 +1,3 @@
-"""Verdicts on the paper's claims: the rules, and what they make of runs written by hand."""
-
 from pathlib import Path
 from typing import Any
 
@@ -9,67 +7,37 @@ import pytest
 import yaml
 
 from biogrip.physics.models import Published, Sample
-from biogrip.records.rows import read_table, write_arrays
+from biogrip.records.rows import write_arrays
 from tests.helpers.default import seen
 from tests.helpers.places import ROOT
 from workflow.paper import claims
-from workflow.paper.claims import (
-    ELSEWHERE,
-    IN_PART,
-    NOT,
-    REPLICATED,
-    TOLD,
-    TOO_FEW,
-    UNDECIDED,
-    Results,
-    add_columns,
-    by_interval,
-    compared,
-    in_words,
-    judge,
-    judge_all,
-    judge_rows,
-    read_runs,
-    values_of,
-)
+from workflow.paper.claims import ELSEWHERE, IN_PART, NOT, REPLICATED, TOLD, TOO_FEW, UNDECIDED
 
 CLAIMS = yaml.safe_load((ROOT / "workflow/paper/claims.yaml").read_text(encoding="utf-8"))
 SEEDS = 40
 HALF = np.arange(SEEDS) < SEEDS // 2
 TRUE = {"k": 8.0, "k_p": 2.0, "c": 100.0, "c_p": 1e-3}
 PRINTED = {"k": 7.0, "k_p": 2.0, "c": 97.0, "c_p": 3.0}
-NAMES = (*TRUE, "c + c_p")
 
 
 def claim(words: str) -> Any:
-    """The only claim that begins with some words."""
     (found,) = (c for c in CLAIMS if c["words"].startswith(words))
     return found
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "verdict"),
-    [
-        *((0.9, 1.0, REPLICATED), (0.89, 1.0, TOO_FEW), (0.11, 0.89, IN_PART)),
-        *((0.05, 0.89, TOO_FEW), (0.0, 0.1, NOT), (0.0, 0.11, TOO_FEW), (0.0, 1.0, TOO_FEW)),
-    ],
-)
-def test_only_whole_intervals_decide(low: float, high: float, verdict: str) -> None:
-    assert by_interval(low, high) == verdict
-
-
-def test_shares_of_runs_have_limits() -> None:
-    """Wilson's for 23 of 50, by hand: 33 to 60 %."""
-    assert in_words(23, 50) == "46 % (33 to 60 %) of 50"
+def test_only_whole_intervals_decide() -> None:
+    told = {(0.9, 1.0): REPLICATED, (0.89, 1.0): TOO_FEW, (0.11, 0.89): IN_PART, (0.0, 0.1): NOT}
+    told |= dict.fromkeys(((0.05, 0.89), (0.0, 0.11), (0.0, 1.0)), TOO_FEW)
+    assert {ends: claims.by_interval(*ends) for ends in told} == told
 
 
 def test_a_number_that_the_paper_rounds_may_be_five_percent_off() -> None:
-    told = {"quantity": "voltage for 1.6e-09 N m", "paper": "about 17", "unit": "V"}
-    rows = [told | {"this_study": volts} for volts in (17.84, 17.86, 16.0)]
-    tables = {"evidence": pd.DataFrame([*rows, told | {"quantity": "arm", "this_study": 17.0}])}
-    add_columns(tables)
-    assert tables["evidence"]["as_printed"].tolist()[:3] == [True, False, False]
-    assert tables["evidence"]["as_printed"].isna().tolist() == [False, False, False, True]
+    rows = pd.DataFrame({"this_study": [17.84, 17.86, 16.0, 17.0]})
+    rows = rows.assign(paper="about 17", unit="V")
+    rows["quantity"] = [*3 * ["voltage for 1.6e-09 N m"], "arm"]
+    claims.add_columns({"evidence": rows})
+    assert rows["as_printed"].tolist()[:3] == [True, False, False]
+    assert np.isnan(rows["as_printed"][3])
 
 
 def case_of(table: int) -> Any:
@@ -79,7 +47,7 @@ def case_of(table: int) -> Any:
     return seen(name="mine", seeds=3, title="Mine", noise=seen(level=0.1), study=study, **known)
 
 
-def identified(table: int, told: str = "determined", *, able: bool = False, **runs: Any) -> Results:
+def identified(table: int, told: str = "determined", *, able: bool = False, **runs: Any) -> Any:
     """Of runs at the truth but for what is given for each seed; by the able reading, or not.
 
     Of the able reading's runs, those of the text's encoding stand beside, all at the truth.
@@ -91,17 +59,17 @@ def identified(table: int, told: str = "determined", *, able: bool = False, **ru
         beside = found.assign(**TRUE)
         found = pd.concat([beside, found.assign(reading="able", able=True, encodable=True)])
     known = {"case": "mine", "quantity": "identified", "encodable": "no"}
-    rows = [{**known, "parameter": name} for name in PRINTED]
-    verdicts = {"expected_verdict": "determined", "expected_high": np.nan}
-    expected = pd.DataFrame({"quantity": NAMES, **verdicts})
-    expected.loc[expected["quantity"] == "c", "expected_verdict"] = told
-    tables = {"printed_values": pd.DataFrame(rows), "verdicts_mine": expected}
-    values = values_of(case, found.reset_index(drop=True), tables).assign(of_table=table)
-    return Results(seen(cases={"mine": case}), {"values": values})
+    expected = pd.DataFrame({"quantity": [*TRUE, "c + c_p"], "expected_high": np.nan})
+    verdicts = expected["quantity"].replace("c", told)
+    expected["expected_verdict"] = verdicts.where(verdicts == told, "determined")
+    printed = pd.DataFrame({"parameter": [*PRINTED], **known})
+    tables = {"printed_values": printed, "verdicts_mine": expected}
+    values = claims.values_of(case, found.reset_index(drop=True), tables).assign(of_table=table)
+    return claims.Results(seen(cases={"mine": case}), {"values": values})
 
 
-def verdicts_of(words: str, results: Results) -> dict[str, str]:
-    return {what: verdict for what, verdict, _ in judge(claim(words), results)}
+def verdicts_of(words: str, results: claims.Results) -> dict[str, str]:
+    return {what: verdict for what, verdict, _ in claims.judge(claim(words), results)}
 
 
 def test_each_quantity_has_a_verdict_of_its_own() -> None:
@@ -109,7 +77,7 @@ def test_each_quantity_has_a_verdict_of_its_own() -> None:
     k = np.resize([8 / 3.17, 8 / 3.16, 8, 25.2, 25.4], SEEDS)
     decades = identified(6, k=k).tables["values"].query("quantity == 'k'")["decades"]
     assert (decades <= 0.5).tolist()[:5] == [False, True, True, True, False]
-    judged = judge(claim("catch k_p and k"), identified(6, k=k))
+    judged = claims.judge(claim("catch k_p and k"), identified(6, k=k))
     said = "Within half a decade of the target end {} of 40 runs."
     assert judged == [
         ("Table 6, k", IN_PART, said.format("60 % (45 to 74 %)")),
@@ -120,7 +88,7 @@ def test_each_quantity_has_a_verdict_of_its_own() -> None:
 def test_the_reading_that_can_print_them_judges_with_the_text_s_beside_it() -> None:
     """All of the text's runs are right, none of the other's; errors of k are 12 %."""
     results = identified(5, able=True, k=np.full(SEEDS, 9.0))
-    ((_, verdict, said),) = judge(claim("the error on k is lower"), results)
+    ((_, verdict, said),) = claims.judge(claim("the error on k is lower"), results)
     assert verdict == NOT
     beside = "with two digits from 1 100 % (91 to 100 %) of 40."
     assert f"end 0 % (0 to 9 %) of 40 runs; {beside}" in said
@@ -135,7 +103,7 @@ def test_identified_values_are_judged_where_traces_determine_them() -> None:
         **{"Table 7, k": REPLICATED, "Table 7, k_p": REPLICATED, "Table 7, c": UNDECIDED},
         **{"Table 7, c_p": IN_PART, "Table 7, c + c_p": REPLICATED},
     }
-    rows = {(row["reading"], row["quantity"]): row for row in compared(values).rows}
+    rows = {(row["reading"], row["quantity"]): row for row in claims.compared(values).rows}
     assert rows["able", "k"]["verdict"] == REPLICATED
     assert rows["text", "k"]["verdict"] == "its genes lack the value"
     assert rows["able", "c"]["verdict"] == UNDECIDED
@@ -144,24 +112,17 @@ def test_identified_values_are_judged_where_traces_determine_them() -> None:
     assert told == pytest.approx([0, 18.75])
     assert rows["able", "k"]["median_error_percent"] == pytest.approx(11.25)
     # By the text's encoding no run could be near, which is another config's to judge.
-    elsewhere = judge(claim("identified values"), identified(7))
+    elsewhere = claims.judge(claim("identified values"), identified(7))
     assert elsewhere == [("", ELSEWHERE, "config/readings.yaml has what it takes.")]
-
-
-def test_the_sum_of_dampers_may_be_right_where_c_is_not() -> None:
-    c = np.linspace(5, 60, SEEDS)
-    found = verdicts_of("identify with small error", identified(6, c=c, c_p=100.0 - c))
-    assert found == {"Table 6, c": NOT, "Table 6, c + c_p": REPLICATED}
 
 
 def test_both_are_right_in_the_runs_in_which_each_is() -> None:
     c = np.where(HALF, 100.0, 1.0)
-    judged = judge(claim("generally able"), identified(6, k=np.where(HALF, 1.0, 8.0), c=c))
+    judged = claims.judge(claim("generally able"), identified(6, k=np.where(HALF, 1.0, 8.0), c=c))
     assert judged[0][:2] == ("Table 6, k and c", NOT)
 
 
 def test_runs_are_read_at_generations_and_with_their_last_improvement(tmp_path: Path) -> None:
-    """With the generation as the value of every parameter."""
     at = [*(0, 10, 19, 30, 40), *(0, 10, 19), *(0, 10, 19)]
     misfits = [*(5.0, 4.0, 4.0, 3.0, 3.0), *(5.0, 5.0, 5.0), *(9.0, 1.0, 1.5)]
     columns = {p.column: at for p in case_of(5).sample.model.parameters}
@@ -172,7 +133,7 @@ def test_runs_are_read_at_generations_and_with_their_last_improvement(tmp_path: 
     known |= {"generations": 9, "evaluations": 9, "stop_reason": "stalled"}
     last = pd.DataFrame(columns).groupby("seed", as_index=False).last().assign(**known)
     last.to_csv(tmp_path / "f.csv", index=False)
-    runs = read_runs(case_of(5), tmp_path / "f.csv", tmp_path / "h.npz")
+    runs = claims.read_runs(case_of(5), tmp_path / "f.csv", tmp_path / "h.npz")
     assert runs[""]["last_improvement"].tolist() == [30, 0, 10]
     assert runs[""]["near_noise"].all()
     assert runs[" at 20"]["k"].tolist() == [19, 19, 19]
@@ -182,15 +143,15 @@ def test_convergence_is_judged_by_the_interval_of_the_median() -> None:
     """Around 60 are 50 to 70; of 41 runs in order the limits are the 14th and the 28th."""
     for shift, verdict in ((0, REPLICATED), (15, TOO_FEW), (40, NOT)):
         rows = pd.DataFrame({"last_improvement": np.arange(40, 81) + shift, "of_table": 5})
-        results = Results(seen(), {"runs": rows})
+        results = claims.Results(seen(), {"runs": rows})
         told = results, "{low:g} to {high:g}", "runs"
-        ((_, found, said),) = judge_rows(*told, around=["last_improvement", 60])
+        ((_, found, said),) = claims.judge_rows(*told, around=["last_improvement", 60])
         assert (found, said) == (verdict, f"{53 + shift} to {67 + shift}")
 
 
 def test_jaws_that_would_have_to_pull_hold_one_sample_in_three() -> None:
     forces = {"lowest_force_uN": [0.2, 0.3, -0.7, -0.6], "of_table": [5, 5, 6, 7]}
-    grip = Results(seen(), {"mechanics": pd.DataFrame(forces)})
+    grip = claims.Results(seen(), {"mechanics": pd.DataFrame(forces)})
     found = verdicts_of("in order to maintain", grip)
     assert found == {"Table 5": REPLICATED, "Table 6": NOT, "Table 7": NOT}
 
@@ -206,56 +167,25 @@ def test_one_simpler_model_that_is_refuted_takes_the_cell_model_to_be_known() ->
         )
     ]
     tables = {"models": pd.DataFrame(rows)}
-    add_columns(tables)
-    found = judge(claim("nor the specific"), Results(seen(), tables))
+    claims.add_columns(tables)
+    found = claims.judge(claim("nor the specific"), claims.Results(seen(), tables))
     assert [verdict for _, verdict, _ in found] == [NOT, REPLICATED, REPLICATED]
     assert "refute 1 of 2 simpler models" in found[0][2]
 
 
-def test_what_grows_as_noise_does_is_robust() -> None:
-    """Errors that go with the noise, with its square, and not at all but 42 % throughout."""
-    noise = np.array([2.0, 5.0, 10.0, 20.0, 40.0])
-    known = {"case": "a", "of_table": 5, "row": noise, "bound_percent": noise / 10}
-    errors = {"c": noise / 10, "k": noise**2, "k_p": 0 * noise + 42}
-    sweep = [{**known, "quantity": name, "error_genetic": own} for name, own in errors.items()]
-    tables = {"robustness_noise": pd.concat(map(pd.DataFrame, sweep))}
-    add_columns(tables)
-    tables["slopes"]["of_table"] = 5
-    robust = dict(claim("highly robust"))
-    robust["rows"] = robust["rows"] | {"of": [5]}
-    found = judge(robust, Results(seen(), tables))
-    assert [verdict for _, verdict, _ in found] == [REPLICATED, NOT, REPLICATED]
-    # Of Gaussian errors of one bound the median is 0.6745 bounds.
-    assert "power of 1 (1 to 1), from 0.2 % at 2 % to 4 % at 40 %; it is 1.5 times" in found[0][2]
-
-
 def test_what_the_study_lacks_is_another_config_s_to_judge() -> None:
-    few = Results(seen(), {})
+    few = claims.Results(seen(), {})
     told = ("", ELSEWHERE, "config/robustness.yaml has what it takes.")
-    assert judge(claim("highly robust"), few) == [told]
-    ((_, verdict, said),) = judge(claim("the error on k is lower"), few)
+    assert claims.judge(claim("highly robust"), few) == [told]
+    ((_, verdict, said),) = claims.judge(claim("the error on k is lower"), few)
     assert (verdict, said) == (UNDECIDED, "Not here: the study has no table values.")
-    ((_, verdict, said),) = judge(claim("good identification"), identified(5))
+    ((_, verdict, said),) = claims.judge(claim("good identification"), identified(5))
     assert (verdict, said) == (UNDECIDED, "Not here: the study has no case of Table 7.")
-
-
-def test_what_nothing_can_contradict_is_only_told() -> None:
     runs = pd.DataFrame({"of_table": [5], "last_improvement": [70]})
-    ((_, verdict, _),) = judge(claim("the best fit solution"), Results(seen(), {"runs": runs}))
-    assert verdict == TOLD
-    (row,) = judge_all([claim("the best fit solution")], Results(seen(), {"runs": runs}), "").rows
+    told_only = claim("the best fit solution"), claims.Results(seen(), {"runs": runs})
+    assert claims.judge(*told_only)[0][1] == TOLD
+    (row,) = claims.judge_all([told_only[0]], told_only[1], "").rows
     assert [*row] == ["claim", "place", "of", "verdict", "evidence"]
-
-
-def test_every_claim_of_the_published_study_has_a_verdict_and_evidence() -> None:
-    rows = read_table(ROOT / "results" / "published" / "tables" / "claims.csv")
-    told = dict.fromkeys((row["place"], row["claim"]) for row in rows)
-    assert list(told) == [(claim["place"], claim["words"]) for claim in CLAIMS]
-    verdicts = {REPLICATED, IN_PART, NOT, TOO_FEW, UNDECIDED, TOLD, ELSEWHERE}
-    assert {row["verdict"] for row in rows} <= verdicts
-    # A sentence, which stands alone in its cell.
-    assert [row for row in rows if not row["evidence"].endswith(".")] == []
-    assert [row for row in rows if row["evidence"].startswith("Not here")] == []
 
 
 def test_the_rules_are_told_where_the_table_stands() -> None:

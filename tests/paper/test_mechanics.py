@@ -1,5 +1,3 @@
-"""Tables of what the gripper does to a sample, of the paper's numbers, and of readings, by hand."""
-
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,6 +8,7 @@ import pandas as pd
 import pytest
 from matplotlib.axes import Axes
 
+from biogrip import library
 from biogrip.fit.genome import GeneRange
 from biogrip.physics.gripper import torque
 from biogrip.physics.models import MODELS, Published, Sample
@@ -19,40 +18,26 @@ from biogrip.stages.targets import measure, simulate
 from biogrip.study.study import Study
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import ROOT
+from workflow.paper import readings
 from workflow.paper.evidence import evidence, printed_values, sampling_evidence
 from workflow.paper.linearisation import DIFFERENCES, linearisation
 from workflow.paper.mechanics import contact_loss, left_out, mechanics
 from workflow.paper.protocols import draw_protocols, protocols
-from workflow.paper.readings import (
-    able,
-    found_by_readings,
-    log_likelihood,
-    log_likelihood_of_generations,
-    printable,
-    read,
-    readings,
-)
 from workflow.paper.readings_of_case import identify_readings
 
 
 def test_springs_alone_tell_what_statics_says() -> None:
-    """A spring of the gripper's own stiffness halves what rigid jaws would be pressed with.
-
-    What creeps under another instrument is in no jaws.
-    """
+    """A spring of the gripper's own stiffness halves what rigid jaws would be pressed with."""
     own = STUDY.gripper.jaw_stiffness_N_per_m
-    study = study_of(
-        f"""
-        only: [spring, sized, crept]
-        cases:
-          crept:
-            instrument: creep
-            sample: {{model: kelvin_voigt, k_p: {own!r}, c_p: 0}}
-            protocol: {{phases: [{{duration_s: 60, force_N: 1.0e-9}}]}}
-          spring: {{sample: {{model: kelvin_voigt, k_p: {own!r}, c_p: 0}}}}
-          sized: {{sample: {{model: kelvin_voigt, k_p: 0.05, c_p: 0, size_m: 90e-6}}}}
-        """
-    )
+    crept = "instrument: creep, protocol: {phases: [{duration_s: 60, force_N: 1.0e-9}]}"
+    sample = f"sample: {{model: kelvin_voigt, k_p: {own!r}, c_p: 0}}"
+    study = study_of(f"""
+only: [spring, sized, crept]
+cases:
+  crept: {{{crept}, {sample}}}
+  spring: {{{sample}}}
+  sized: {{sample: {{model: kelvin_voigt, k_p: 0.05, c_p: 0, size_m: 90e-6}}}}
+""")
     small, large, sized = mechanics(study.of(study.gripped)).rows
     force = 0.5 * 1.6e-9 / STUDY.gripper.lever_m
     assert [row["size_um"] for row in (small, large, sized)] == pytest.approx([30, 120, 90])
@@ -118,11 +103,7 @@ def test_a_sample_that_is_lost_at_once_tells_nothing() -> None:
     phases = "{duration_s: 5, torque_Nm: 1.6e-9}, {duration_s: 300, torque_Nm: 0}"
     brief = "only: [brief]\ncases: {brief: {sample: {model: damper, c_p: 9.0}}}"
     found = rows_of(f"measurement: {{rate_Hz: 0.1}}\nprotocol: {{phases: [{phases}]}}\n{brief}")
-    assert found["brief", "c_p"]["until_lost"] is None
-    assert found["brief", "misfit"]["until_lost"] is None
-
-
-CASES: Any = STUDY.of(STUDY.published)
+    assert [row["until_lost"] for row in found.values()] == [None, None]
 
 
 def test_distances_of_printed_values_are_shares_of_them() -> None:
@@ -146,33 +127,24 @@ def test_the_voltage_of_the_full_stroke_turns_a_free_arm_by_it() -> None:
 
 
 def test_errors_are_held_against_bounds_of_what_the_traces_determine() -> None:
-    rows = sampling_evidence(CASES).rows
-    assert [(row["case"], row["parameter"]) for row in rows] == [
-        *(("endothelial_cell", name) for name in ("k", "k_p", "c")),
-        *(("liquid_drop_1", name) for name in ("k", "c + c_p")),
-        *(("liquid_drop_2", name) for name in ("k", "c + c_p")),
-        *(("all", name) for name in ("error / bound", "rates (Hz)")),
-    ]
+    made = sampling_evidence(STUDY.of(STUDY.published))
+    rows = pd.DataFrame(made.rows).set_index(["case", "parameter"])
+    told, (over, rates) = rows[:-2], (row for _, row in rows[-2:].iterrows())
+    determined = "k k_p c", "k c + c_p", "k c + c_p", "error / bound rates (Hz)"
+    assert " ".join(rows.index.get_level_values(1)) == " ".join(determined)
     # c + c_p of Table 6 is 9.7375 + 0.23, c by its error; 100 (10.0001 - 9.9675) / 10.0001
-    assert rows[4]["paper_error_percent"] == pytest.approx(0.325997, rel=1e-5)
-    names = [name for name in rows[0] if name.startswith("bound_percent")]
-    errors = np.array([row["paper_error_percent"] for row in rows[:-2]])
-    for name in names:
-        bounds = np.array([row[name] for row in rows[:-2]])
-        assert rows[-2][name] == pytest.approx(np.sqrt(np.mean((errors / bounds) ** 2)))
+    errors = told["paper_error_percent"]
+    assert errors["liquid_drop_1", "c + c_p"] == pytest.approx(0.325997, rel=1e-5)
+    bounds = told.filter(like="bound_percent")
+    expected = np.sqrt((bounds.rdiv(errors, axis=0) ** 2).mean())
+    assert over[expected.index].tolist() == pytest.approx(expected.tolist())
     # Middle 95 % of chi-squared of seven: 1.690 to 16.013; at 10 Hz it is seven times the square.
-    at_10_Hz = 7 * rows[-2]["bound_percent_10_Hz"] ** 2
-    ends = [rows[-1][f"paper_error_{end}_percent"] for end in ("from", "to")]
+    at_10_Hz = 7 * over["bound_percent_10_Hz"] ** 2
+    ends = [rates[f"paper_error_{end}_percent"] for end in ("from", "to")]
     assert ends == pytest.approx([10 * 1.690 / at_10_Hz, 10 * 16.013 / at_10_Hz], rel=1e-3)
-    for row in rows[:-2]:
-        # Infinite where so few samples carry no information.
-        bounds = np.array([row[name] for name in names])
-        told = bounds[np.isfinite(bounds)]
-        assert np.all(told[:-1] / told[1:] > 2)
-        # Ten times the samples, from 1 to 10 Hz; elsewhere times are too coarse, or so fine that
-        # more is seen of k.
-        if np.isfinite(bounds[1]):
-            assert bounds[1] / bounds[2] == pytest.approx(np.sqrt(10), rel=0.05)
+    # Ten times the samples, from 1 to 10 Hz; infinite where so few carry no information.
+    change = (bounds["bound_percent_1_Hz"] / bounds["bound_percent_10_Hz"]).replace(np.inf, np.nan)
+    np.testing.assert_allclose(change.dropna(), np.sqrt(10), rtol=0.05)
 
 
 REPAIRED = study_of((ROOT / "config" / "repaired.yaml").read_text(encoding="utf-8"))
@@ -182,7 +154,6 @@ K = (9.0, 9.5, 10.0, 12.0)
 
 @pytest.fixture
 def files(tmp_path: Path) -> list[Path]:
-    """Another protocol's file first."""
     made = []
     for name in ("liquid_drop_1_alternated", "liquid_drop_1"):
         path = tmp_path / name / "least_squares" / "seeds_0-3.csv"
@@ -194,25 +165,6 @@ def files(tmp_path: Path) -> list[Path]:
     return made
 
 
-def response(x: Any, train: list[tuple[float, float]], t: Any) -> Any:
-    """Rotation of equal arms without inertia under (duration, torque), of log k, log c alone.
-
-    From phi/tau (s) = (k + c s) / ((C s + K) (k + c s) + u k c s), u = 2 (l sin 75 deg)^2.
-    """
-    k, c = np.exp(x)
-    u = 2 * (1.5e-3 * np.sin(np.radians(75))) ** 2
-    stiff, damped = 4.4e-7 + 1e-4 * u, 3.3e-12 + 1e-4 * u
-    poles = np.roots([damped * c, damped * k + stiff * c + u * k * c, stiff * k])
-    slope = 2 * damped * c * poles + damped * k + stiff * c + u * k * c
-    parts, phi, start, before = (k + c * poles) / (poles * slope), 0 * t, 0.0, 0.0
-    for duration, load in train:
-        since = np.maximum(t - start, 0)
-        step = 1 / stiff + sum(r * np.exp(p * since) for r, p in zip(parts, poles, strict=True))
-        phi = phi + (load - before) * np.where(t >= start + 1e-9 * (start > 0), step, 0)
-        start, before = start + duration, load
-    return phi
-
-
 def test_protocols_are_compared_by_bounds_and_by_shares(files: list[Path]) -> None:
     rows = [row for row in protocols(REPAIRED, files).rows if row["quantity"] == "k"]
     paper, other = rows
@@ -220,9 +172,14 @@ def test_protocols_are_compared_by_bounds_and_by_shares(files: list[Path]) -> No
     assert other["case"] == "Liquid drop, case 1, alternated"
     assert paper["lowest_force_uN"] < 0 < other["lowest_force_uN"]
     assert (other["seeds"], other["enough_share"], other["readings"]) == (4, 0.75, 4001)
-    train, t = [(5.0, 1.6e-9), (5.0, 0.2e-9)], np.linspace(0, 10, 4001)
+    case = REPAIRED.case("liquid_drop_1_alternated")
     x, h = np.log([9.5, 10.0]), 1e-4 * np.eye(2)
-    j = np.array([(response(x + e, train, t) - response(x - e, train, t)) / 2e-4 for e in h])
+
+    def read(logs: Any) -> Any:
+        values = dict(zip(("k", "c"), np.exp(logs), strict=True))
+        return library.simulate(case.experiment, case.parameters | values, np.linspace(0, 10, 4001))
+
+    j = np.array([(read(x + e) - read(x - e)) / 2e-4 for e in h])
     own = 100 * np.sqrt(np.linalg.inv(j @ j.T)[0, 0]) * 3.18e-4
     # A reading at the instant of a step may count before or after it.
     assert other["bound_percent"] == pytest.approx(own, rel=5e-3)
@@ -252,27 +209,19 @@ readings:
 """
 
 
-@pytest.mark.parametrize(
-    ("reading", "exactly"),
-    [
-        # Written out by hand: of 32.8, 12.3, 302.5, 1e-4; 6.7, 5.6e-5, 9.7, 0.23; 0.97, 5.6e-5,
-        # 9.7, 0.25 two digits have six; zeros add 1e-4, a third digit 32.8 and 12.3, a zero in
-        # front of it 5.6e-5 twice, a fourth digit 302.5.
-        *(("two", 6), ("two_others", 7), ("two_from_0", 7), ("three_others", 9)),
-        *(("three_from_0", 11), ("four_others", 10), ("four_from_0", 12)),
-    ],
-)
-def test_printed_values_are_counted_that_genes_hold(reading: str, exactly: int) -> None:
-    counts = printable(ALL, reading)
-    assert (counts["values"], counts["exactly"]) == (12, exactly)
-    assert counts["with_error"] <= counts["rounded"] >= counts["exactly"]
-
-
-def test_four_digits_with_zeros_in_front_can_print_all() -> None:
-    assert able(ALL) == "four_from_0"
-    assert printable(ALL, "four_from_0")["with_error"] == 12
-    # 9.73 to 9.745 takes a third digit, 32.83 to 32.8825 a fourth.
-    assert printable(ALL, "two")["with_error"] < printable(ALL, "three_from_0")["with_error"] < 12
+def test_printed_values_are_counted_that_genes_hold() -> None:
+    """Written out by hand: of 32.8, 12.3, 302.5, 1e-4; 6.7, 5.6e-5, 9.7, 0.23; 0.97, 5.6e-5, 9.7,
+    0.25 two digits have six; zeros add 1e-4, a third digit 32.8 and 12.3, a zero in front of it
+    5.6e-5 twice, a fourth digit 302.5. 9.73 to 9.745 takes a third, 32.83 to 32.8825 a fourth.
+    """
+    exactly = {"two": 6, "two_others": 7, "two_from_0": 7, "three_others": 9, "three_from_0": 11}
+    exactly |= {"four_others": 10, "four_from_0": 12}
+    counts = {reading: readings.printable(ALL, reading) for reading in exactly}
+    assert {reading: own["exactly"] for reading, own in counts.items()} == exactly
+    for reading, own in counts.items():
+        assert own["with_error"] <= own["rounded"] >= own["exactly"]
+        assert (own["values"], own["with_error"] == 12) == (12, reading == "four_from_0")
+    assert readings.able(ALL) == "four_from_0"
 
 
 # k, k_p, c, c_p, misfit, noise, stop, last improvement of each seed of drop 2: the paper has
@@ -288,32 +237,32 @@ def given(tmp_path: Path) -> tuple[Study, Any]:
     rows += [(CASE, "other", n, *run) for n, run in enumerate((HIT, FAR, FAR, FAR))]
     READINGS.write(tmp_path / f"{CASE}.csv", rows)
     study = study_of(FEW)
-    return study, read(study, [tmp_path / f"{CASE}.csv"])
+    return study, readings.read(study, [tmp_path / f"{CASE}.csv"])
 
 
 def test_a_likelihood_is_the_mean_of_kernels(given: tuple[Study, Any]) -> None:
     """A run that is one width of 5 % away counts exp(-1/2); at twice the width exp(-1/8)."""
     study, found = given
     one = np.array([1, np.exp(-0.5), np.exp(-0.5), 1])
-    mean, error = log_likelihood(study, found, "printed", 1.0)
+    mean, error = readings.log_likelihood(study, found, "printed", 1.0)
     assert mean == pytest.approx(np.log10(one.mean()), abs=1e-3)
     # The delta method: deviation of the mean over the mean, in decades.
     deviation = one.std(ddof=1) / 2 / one.mean() / np.log(10)
     assert error == pytest.approx(deviation, rel=1e-2)
-    wide, _ = log_likelihood(study, found, "printed", 2.0)
+    wide, _ = readings.log_likelihood(study, found, "printed", 2.0)
     assert wide == pytest.approx(np.log10((1 + np.exp(-1 / 8)) / 2), abs=1e-3)
-    of_generations, _ = log_likelihood_of_generations(study, found, "other")
+    of_generations, _ = readings.log_likelihood_of_generations(study, found, "other")
     assert of_generations == pytest.approx(np.log10(1 / 4), abs=1e-6)
 
 
 def test_readings_are_compared_with_the_first_that_prints_most(given: tuple[Study, Any]) -> None:
     study, found = given
-    first, second = readings(study, found).rows
+    first, second = readings.readings(study, found).rows
     assert (first["likelihood"], first["likelihood_error"]) == (0, 0)
     assert second["likelihood"] == pytest.approx(np.log10(0.25 / 0.803), abs=2e-3)
     # Three far runs of four: a quarter of the mean, but no more than four runs tell.
     assert second["verdict"] == "not told apart"
-    of_first, of_second = found_by_readings(study, found).rows
+    of_first, of_second = readings.found_by_readings(study, found).rows
     assert (of_first["near_noise_share"], of_second["near_noise_share"]) == (1, 0.25)
     # Within 2.7 % in k and 0.26 % in c + c_p; the other two miss k by 2.4 %.
     assert (of_first["as_close_share"], of_second["as_close_share"]) == (1, 0.25)
@@ -351,5 +300,6 @@ def test_one_that_changes_nothing_finds_what_the_study_finds(tmp_path: Path) -> 
         np.testing.assert_array_equal(same[column], ours[column])
     for name in ("three", "uniform", "slow"):
         assert set(rows[rows["reading"] == name]["misfit"]) != set(same["misfit"]), name
-    titles = [row["reading"] for row in found_by_readings(study, read(study, [interpreted])).rows]
+    found = readings.found_by_readings(study, readings.read(study, [interpreted])).rows
+    titles = [row["reading"] for row in found]
     assert titles == ["as printed", "patient", "three digits", "uniform noise", "slow"]

@@ -1,6 +1,5 @@
-"""What a job is told: the keys of the config that its rule names, and a batch of seeds."""
-
 import json
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,18 +9,8 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.records.rows import seeds_of
-from biogrip.stages.job import (
-    CASE_KEYS,
-    STUDY_KEYS,
-    batch_names,
-    case_of,
-    keys_of_cases,
-    logged,
-    settings,
-    study_of,
-)
-from tests.helpers import default
-from tests.helpers.default import STUDY
+from biogrip.stages import job
+from tests.helpers.default import STUDY, study_of
 
 NAME = "liquid_drop_2"
 SWEPT = """
@@ -38,13 +27,12 @@ sweeps:
 
 
 def told(given: dict[str, Any]) -> dict[str, Any]:
-    """As Snakemake keeps it between the workflow and its jobs."""
     return json.loads(json.dumps(given))
 
 
 @pytest.mark.parametrize("key", ["times_s", "experiment", "gripper", "seeds", "title"])
 def test_what_the_rule_does_not_name_cannot_be_read(key: str) -> None:
-    case = case_of(NAME, told(settings(STUDY, ["sample", "measurement.noise"], NAME)))
+    case = job.case_of(NAME, told(job.settings(STUDY, ["sample", "measurement.noise"], NAME)))
     assert case.block.sample == STUDY.cases[NAME].block.sample
     assert case.noise == STUDY.cases[NAME].noise
     with pytest.raises(AttributeError, match="not among the keys that the rule names"):
@@ -52,15 +40,15 @@ def test_what_the_rule_does_not_name_cannot_be_read(key: str) -> None:
 
 
 def test_all_keys_give_the_study_and_its_cases_back() -> None:
-    """The points of sweeps are cases, too; what the study gives is the study's."""
-    study = default.study_of(SWEPT)
-    whole = [key for key in STUDY_KEYS if key != "cases"]
-    again = study_of(told(settings(study, [*whole, *keys_of_cases(study, *CASE_KEYS)])))
+    study = study_of(SWEPT)
+    whole = [key for key in job.STUDY_KEYS if key != "cases"]
+    whole += job.keys_of_cases(study, *job.CASE_KEYS)
+    again = job.study_of(told(job.settings(study, whole)))
     assert again.plain == study.plain
     assert (list(again.cases), list(again.points)) == (list(study.cases), list(study.points))
-    keys = [*CASE_KEYS, "study_seed", "seeds", "methods", "actuator"]
+    keys = [*job.CASE_KEYS, "study_seed", "seeds", "methods", "actuator"]
     for name in (*study.cases, *study.points):
-        was, case = study.case(name), case_of(name, told(settings(study, keys, name)))
+        was, case = study.case(name), job.case_of(name, told(job.settings(study, keys, name)))
         for known in ("title", "sample", "noise", "experiment", "parameters", "seeds"):
             assert getattr(case, known) == getattr(was, known)
         np.testing.assert_array_equal(case.times_s, was.times_s)
@@ -71,12 +59,12 @@ def test_all_keys_give_the_study_and_its_cases_back() -> None:
 
 def test_the_log_has_what_a_user_can_correct_alone_and_else_a_traceback(tmp_path: Path) -> None:
     log = tmp_path / "job.log"
-    job = SimpleNamespace(log=[str(log)])
-    with pytest.raises(SystemExit) as ended, logged(job):
+    ran = SimpleNamespace(log=[str(log)])
+    with pytest.raises(SystemExit) as ended, job.logged(ran):
         raise BiogripError("a.csv: cannot be read.")
     assert ended.value.code == 1
     assert log.read_text() == "biogrip: a.csv: cannot be read.\n"
-    with pytest.raises(ZeroDivisionError), logged(job):
+    with pytest.raises(ZeroDivisionError), job.logged(ran):
         print(1 // 0)
     said = log.read_text()
     assert said.startswith("Traceback (most recent call last):")
@@ -87,14 +75,13 @@ def test_the_log_has_what_a_user_can_correct_alone_and_else_a_traceback(tmp_path
 def test_a_default_of_a_case_goes_before_what_the_study_has() -> None:
     own = "instrument: gripper, protocol: {phases: [{duration_s: 9, torque_Nm: 1.0e-9}]}"
     shared = "instrument: creep\nprotocol: {phases: [{duration_s: 9, stress_Pa: 4}]}"
-    study = default.study_of(f"{shared}\nonly: [{NAME}]\ncases: {{{NAME}: {{{own}}}}}")
-    told_of = settings(study, ["instrument"], NAME)
-    assert case_of(NAME, told_of).block.instrument == study.case(NAME).block.instrument
+    study = study_of(f"{shared}\nonly: [{NAME}]\ncases: {{{NAME}: {{{own}}}}}")
+    told_of = job.settings(study, ["instrument"], NAME)
+    assert job.case_of(NAME, told_of).block.instrument == study.case(NAME).block.instrument
 
 
-@pytest.mark.parametrize("seeds", [1, 7, 24, 25, 60])
-@pytest.mark.parametrize("size", [1, 3, 25, 1000])
-def test_every_seed_is_in_one_batch_and_full_ones_stay(seeds: int, size: int) -> None:
-    plan = batch_names(seeds, size)
-    assert [seed for batch in plan for seed in seeds_of(batch)] == list(range(seeds))
-    assert set(plan[: seeds // size]) <= set(batch_names(seeds + 1, size))
+def test_every_seed_is_in_one_batch_and_full_ones_stay() -> None:
+    for seeds, size in product((1, 7, 24, 25, 60), (1, 3, 25, 1000)):
+        plan = job.batch_names(seeds, size)
+        assert [seed for batch in plan for seed in seeds_of(batch)] == list(range(seeds))
+        assert set(plan[: seeds // size]) <= set(job.batch_names(seeds + 1, size))

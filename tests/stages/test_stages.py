@@ -1,4 +1,3 @@
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +9,10 @@ from biogrip.errors import BiogripError
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import Phase, hold, join_phases, sample_times
-from biogrip.records.traces import read_target
-from biogrip.stages import identification as identifications
+from biogrip.records.traces import read_measurements, read_target
 from biogrip.stages import targets as target
+from biogrip.stages.identification import experiment_for
 from tests.helpers.default import STUDY, seen, study_of
-from tests.helpers.identified import FEW
 from tests.helpers.places import EXAMPLE
 
 
@@ -60,18 +58,11 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     assert np.max(np.abs(rotation - bilateral)[until]) < 1e-5 * rotation.max()
 
 
-def test_all_stages_weight_the_readings(tmp_path: Path) -> None:
-    """They find the same optimum, with the noise that is known."""
-    file = f"{{file: {EXAMPLE}, time: time_s, rotation: rotation_rad, noise_share: 0.1}}"
-    mine = f"cases: {{mine: {{sample: {{model: liquid_drop}}, measurement: {file}}}}}"
-    case = study_of(f"{FEW}{mine}").cases["mine"]
-    traces, verdicts = tmp_path / "t.npz", tmp_path / "v.json"
-    target.record(case, EXAMPLE, traces)
-    identifications.judge(case, traces, [], verdicts)
-    judged = json.loads(verdicts.read_text())
-    assert judged["threshold"] == pytest.approx(3.8415, abs=1e-4)
-    outputs = [tmp_path / name for name in ("p.csv", "h.npz")]
-    identifications.identify(case, "least_squares", range(1), traces, [], *outputs)
-    (found,) = pd.read_csv(outputs[0]).itertuples()
-    assert found.misfit == pytest.approx(judged["misfit"], rel=1e-4)
-    assert found.k_N_per_m == pytest.approx(judged["quantities"][0]["value"], rel=1e-3)
+def test_all_stages_weight_the_readings_of_a_recorded_trace(tmp_path: Path) -> None:
+    keys = f"{{file: {EXAMPLE}, time: time_s, rotation: rotation_rad, noise_share: 0.1}}"
+    mine = f"cases: {{mine: {{sample: {{model: liquid_drop}}, measurement: {keys}}}}}"
+    case = study_of(mine).cases["mine"]
+    target.record(case, EXAMPLE, tmp_path / "t.npz")
+    found = experiment_for(case.experiment, read_measurements(tmp_path / "t.npz", [0]), [])
+    assert found.sd is not None
+    assert found.noise_sd == pytest.approx(np.sqrt(np.mean(found.sd**2)))

@@ -1,5 +1,3 @@
-"""Whatever a config says: it passes the checks, or ends in one message."""
-
 import re
 from typing import Any
 
@@ -27,7 +25,7 @@ SINGLE = {
     and path.partition(".")[0] not in ("cases", "sweeps", "protocol")
     and "[]" not in path
 }
-OF_A_CASE = sorted(path for path in SINGLE if path.partition(".")[0] in OVERRIDABLE)
+OF_A_CASE = [path for path in SINGLE if path.partition(".")[0] in OVERRIDABLE]
 
 JUNK = st.one_of(
     st.none(),
@@ -42,7 +40,6 @@ JUNK = st.one_of(
 
 
 def allowed(shape: Schema) -> st.SearchStrategy[Any]:
-    """Values that a key may have by itself."""
     if shape.options:
         return st.one_of(*(allowed(option) for option in shape.options))
     if choices := shape.get("enum"):
@@ -72,32 +69,20 @@ def block_of(path: str, value: Any) -> dict[str, Any]:
 
 
 @st.composite
-def some_keys(draw: st.DrawFn, paths: list[str], *, junk: bool) -> dict[str, Any]:
-    """A few keys changed, one of them to nonsense if need be."""
-    config: dict[str, Any] = {}
-    for path in draw(st.lists(st.sampled_from(paths), max_size=3, unique=True)):
-        value = draw(allowed(SINGLE[path]))
-        config = overlaid(config, block_of(path, value))
-    if junk:
-        path = draw(st.sampled_from(paths))
+def overlays(draw: st.DrawFn) -> dict[str, Any]:
+    name = draw(st.sampled_from(["unit", "title", "label", "my-case_1", "x" * 65]))
+    model = draw(st.sampled_from(sorted(MODELS)))
+    parameters = {name: draw(st.floats(1e-6, 1e6)) for name in MODELS[model].names}
+    config = block_of(f"cases.{name}.sample", {"model": model, **parameters})
+    shapes = SINGLE | {f"cases.{name}.{path}": SINGLE[path] for path in OF_A_CASE}
+    for path in draw(st.lists(st.sampled_from(sorted(shapes)), max_size=4, unique=True)):
+        config = overlaid(config, block_of(path, draw(allowed(shapes[path]))))
+    if draw(st.booleans()):
+        path = draw(st.sampled_from(sorted(shapes)))
         # At the key, in a block above it, or under a name that is like it.
         parts = path.split(".")[: draw(st.integers(1, path.count(".") + 1))]
         odd = ".".join(parts) + draw(st.sampled_from(["", "", "x"]))
         config = overlaid(config, block_of(odd, draw(JUNK)))
-    return config
-
-
-@st.composite
-def overlays(draw: st.DrawFn) -> dict[str, Any]:
-    """Some keys of the study, and perhaps a case with keys of its own."""
-    wrong = draw(st.sampled_from(["", "", "study", "case"]))
-    config = draw(some_keys(sorted(SINGLE), junk=wrong == "study"))
-    if draw(st.booleans()):
-        case = draw(some_keys(OF_A_CASE, junk=wrong == "case"))
-        model = draw(st.sampled_from(sorted(MODELS)))
-        parameters = {name: draw(st.floats(1e-6, 1e6)) for name in MODELS[model].names}
-        name = draw(st.sampled_from(["unit", "title", "label", "my-case_1", "x" * 65]))
-        config["cases"] = {name: {**case, "sample": {"model": model, **parameters}}}
     return config
 
 

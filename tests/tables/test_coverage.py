@@ -1,12 +1,8 @@
-"""Coverage of intervals and of verdicts, counted by hand; tables as files and as published."""
-
 import re
-from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from scipy.stats import binomtest
 
 from biogrip.errors import BiogripError
@@ -14,7 +10,6 @@ from biogrip.records.identifications import INTERVALS
 from biogrip.records.rows import read_rows, write_object
 from biogrip.stages import intervals as stage
 from biogrip.stages import targets
-from biogrip.study.source import overlaid
 from biogrip.tables.coverage import coverage, verdict_counts
 from biogrip.tables.layout import Column, ShownTable, compare, convert, write
 from tests.helpers.default import study_of
@@ -46,9 +41,8 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
         (CASE, "k_p", 0, 0.1, "", "", "", "bounded above", "", 1.05e-4),
         (CASE, "k_p", 2, 0.1, "", "", "", "not determined", "", ""),
     ]
-    # Of c nothing is said.
-    for seed, quantity in product((0, 2), ("c", "c + c_p")):
-        rows.append((CASE, quantity, seed, 0.1, "", "", "", "not determined", "", ""))
+    untold = 0.1, "", "", "", "not determined", "", ""
+    rows += [(CASE, quantity, seed, *untold) for seed in (0, 2) for quantity in ("c", "c + c_p")]
     file = tmp_path / CASE / "seeds_0-2.csv"
     INTERVALS.write(file, rows)
     every_other = study_of(OVERLAY.replace("0.9}", "0.9, verdicts_every: 2}"))
@@ -73,7 +67,6 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
 
 
 def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
-    """With the intervals of Clopper and Pearson that SciPy has."""
     empty = ("", "", "", "")
     rows = [
         # Of k = 1 two intervals within a factor of 3, one of which holds it, and one that is wider.
@@ -85,51 +78,37 @@ def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
     ]
     file = tmp_path / CASE / "seeds_0-4.csv"
     INTERVALS.write(file, rows)
-    k_alone = f"cases: {{{CASE}: {{fixed: {{k_p: 0, c: 1, c_p: 0}}}}}}"
-    overlay = overlaid(yaml.safe_load(OVERLAY), yaml.safe_load(k_alone))
-    overlay["identifiability"]["verdicts_every"] = 1
-    made = verdict_counts(study_of(yaml.safe_dump(overlay)), [file])
+    overlay = OVERLAY.replace("0.9}", "0.9, verdicts_every: 1}")
+    alone = f"liquid_drop_1: null, {CASE}: {{fixed: {{k_p: 0, c: 1, c_p: 0}}}}"
+    made = verdict_counts(study_of(overlay.replace("liquid_drop_1: null", alone)), [file])
     found = {row["verdict"]: row for row in made.rows}
     assert list(found) == ["bounded above", "determined", "not determined"]
     assert [row["reached"] for row in found.values()] == [1, 3, 1]
     assert {row["seeds"] for row in found.values()} == {5}
     assert [row.get("true") for row in found.values()] == [0, 2, None]
     assert [row.get("narrow") for row in found.values()] == [None, 2, None]
-    determined = found["determined"]
     for count, tried, name in ((3, 5, "reached"), (2, 3, "true")):
-        ends = [determined[f"{name}_{end}_percent"] for end in ("from", "to")]
-        low, high = binomtest(count, tried).proportion_ci(method="exact")
-        assert ends == pytest.approx([100 * low, 100 * high])
+        ends = [found["determined"][f"{name}_{end}_percent"] / 100 for end in ("from", "to")]
+        assert ends == pytest.approx(binomtest(count, tried).proportion_ci(method="exact"))
     assert "at 90 %" in made.caption
 
 
-@pytest.mark.parametrize(
-    ("every", "seeds", "judged"),
-    [(5, (4, 7), [5]), pytest.param(10, (9, 11), [10], marks=pytest.mark.nightly)],
-)
-def test_some_seeds_are_judged_in_full(
-    tmp_path: Path, target: Path, every: int, seeds: tuple[int, int], judged: list[int]
-) -> None:
-    """One in five by default, whatever the batch, and with the limits that whole profiles have."""
-    overlay = OVERLAY if every == 5 else OVERLAY.replace("0.9}", f"0.9, verdicts_every: {every}}}")
+def test_some_seeds_are_judged_in_full(tmp_path: Path, target: Path) -> None:
     expected = tmp_path / "expected.json"
     write_object(expected, {"quantities": [{"quantity": "k", "verdict": "determined"}]})
-    case = study_of(overlay).case(CASE)
-    stage.estimate(case, range(*seeds), target, expected, [], tmp_path / "i.csv")
+    case = study_of(OVERLAY.replace("0.9}", "0.9, verdicts_every: 3}")).case(CASE)
+    stage.estimate(case, range(2, 5), target, expected, [], tmp_path / "i.csv")
     found = INTERVALS.read(tmp_path / "i.csv")
-    assert set(found["seed"]) == set(range(*seeds))
+    assert set(found["seed"]) == {2, 3, 4}
     whole = found[found["verdict"].notna()]
-    assert whole["seed"].tolist() == list(np.repeat(judged, 5))
-    assert whole["quantity"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"] * len(judged)
-    assert whole["low"].notna().tolist() == [True, False, False, False, False] * len(judged)
+    assert whole["seed"].tolist() == [3] * 5
+    assert whole["quantity"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"]
+    assert whole["low"].notna().tolist() == [True, False, False, False, False]
     k = whole.iloc[0]
-    # There is but one basin.
-    assert k["shown_low"] == pytest.approx(k["low"], rel=1e-3)
-    assert k["shown_high"] == pytest.approx(k["high"], rel=1e-3)
+    assert k[["shown_low", "shown_high"]].tolist() == pytest.approx([k["low"], k["high"]], rel=1e-3)
 
 
 def written(table: ShownTable, folder: Path) -> list[str]:
-    """Markdown, LaTeX and HTML of a table, which is `t.csv` in a folder."""
     write(table, folder / "t.csv")
     for end in ("md", "tex"):
         (folder / f"t.{end}").write_text(convert(folder / "t.html", f".{end}"))
@@ -149,25 +128,21 @@ def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
     assert "c &amp; d" in page
 
 
-@pytest.mark.parametrize(
-    ("given", "latex"),
-    [
+def test_markup_is_text_in_every_format(tmp_path: Path) -> None:
+    for given, latex in (
         (r"dose & \input{x} #2", r"dose \& \textbackslash{}input\{x\} \#2"),
         ("5$ a day, 10$ a week\n\n50 %", r"5\$ a day, 10\$ a week 50 \%"),
         ("a|b\nc {y}", r"a|b c \{y\}"),
         ("<img onerror=x> a_b ~ ^", r"<img onerror=x> a\_b \textasciitilde{} \textasciicircum{}"),
-    ],
-)
-def test_markup_is_text_in_every_format(tmp_path: Path, given: str, latex: str) -> None:
-    """Of a caption, a heading and a cell."""
-    heading = given.replace("\n", " ")
-    table = ShownTable(given, (Column("a", heading),), [{"a": given}])
-    markdown, tex, page = written(table, tmp_path)
-    assert rf"\caption{{{latex}}}" in tex
-    assert not re.search(r"(?<!\\)[#$%&_~^]|\\input", tex)
-    assert [len(re.findall(r"(?<!\\)\|", row)) for row in markdown.splitlines()[-3:]] == [2] * 3
-    assert "<img" not in markdown + page
-    assert read_rows(tmp_path / "t.csv", ["a"])[1:] == [[given]]
+    ):
+        heading = given.replace("\n", " ")
+        table = ShownTable(given, (Column("a", heading),), [{"a": given}])
+        markdown, tex, page = written(table, tmp_path)
+        assert rf"\caption{{{latex}}}" in tex
+        assert not re.search(r"(?<!\\)[#$%&_~^]|\\input", tex)
+        assert [len(re.findall(r"(?<!\\)\|", row)) for row in markdown.splitlines()[-3:]] == [2] * 3
+        assert "<img" not in markdown + page
+        assert read_rows(tmp_path / "t.csv", ["a"])[1:] == [[given]]
 
 
 def test_regenerated_tables_are_the_same_bytes_or_their_lines_are_shown(tmp_path: Path) -> None:

@@ -1,5 +1,3 @@
-"""Tables of errors, methods, models, verdicts and printed values, recomputed by hand."""
-
 from pathlib import Path
 from typing import Any
 
@@ -10,39 +8,23 @@ from scipy.stats import binomtest
 
 from biogrip.fit.problem import METHODS
 from biogrip.physics.models import MODELS, Published, Sample
-from biogrip.records.identifications import (
-    ALL,
-    MODEL_FITS,
-    basins,
-    columns,
-    near_noise,
-    near_noise_words,
-)
+from biogrip.records.identifications import ALL, MODEL_FITS, basins, columns, near_noise
 from biogrip.records.rows import write_object
-from biogrip.tables.cases import (
-    errors,
-    errors_of_case,
-    interval_of,
-    interval_of_value,
-    value_in_case,
-    verdicts,
-)
+from biogrip.tables import cases
 from biogrip.tables.methods import methods, models
 from tests.helpers.default import STUDY, seen, study_of
 
-PAPER = Published(
-    table=9,
-    identified={"k": 9.0, "k_p": 1.0, "c": 3.0, "c_p": 2.0},
-    error_percent={"k": "10", "k_p": "-", "c": "25", "c_p": ">100"},
-)
-METHODS_TRIED = ("genetic", "least_squares")
+FOUND = {"k": 9.0, "k_p": 1.0, "c": 3.0, "c_p": 2.0}
+ERRORS = dict(zip(FOUND, ("10", "-", "25", ">100"), strict=True))
+PAPER = Published(table=9, identified=FOUND, error_percent=ERRORS)
 TRUE = {"k": 8.0, "k_p": 0.0, "c": 4.0, "c_p": 1.0}
 
 
-def identified(path: Path, rows: list[list[Any]]) -> Path:
+def identified(path: Path, rows: list[list[Any]], **more: float) -> Path:
     """Write identifications of a drop: method, seed, parameters, misfit, noise, evaluations."""
     rows = [["drop", *row[:-1], 60, row[-1], "stalled"] for row in rows]
-    pd.DataFrame(rows, columns=columns(MODELS["generalized_maxwell"])).to_csv(path, index=False)
+    frame = pd.DataFrame(rows, columns=columns(MODELS["generalized_maxwell"]))
+    frame.assign(**more).to_csv(path, index=False)
     return path
 
 
@@ -65,7 +47,7 @@ def case_of(near_noise_tolerance: float = 0.02) -> Any:
 
 
 def test_error_table_is_the_arithmetic_it_says(eleven_seeds: Path) -> None:
-    made = errors_of_case(case_of(), eleven_seeds)
+    made = cases.errors_of_case(case_of(), eleven_seeds)
     rows = {row["parameter"]: row for row in made.rows if row["basin"] == "all"}
     assert list(rows) == ["k", "k_p", "c", "c_p", "c + c_p"]
     k, total = rows["k"], rows["c + c_p"]
@@ -88,20 +70,18 @@ def test_error_table_is_the_arithmetic_it_says(eleven_seeds: Path) -> None:
 
 def test_joined_errors_are_within_the_tolerance_their_heading_names(eleven_seeds: Path) -> None:
     study = seen(near_noise_tolerance=0.005, cases={"drop": case_of(0.005)})
-    made = errors(study, [eleven_seeds])
-    # 1.001 and 1.0046.
+    made = cases.errors(study, [eleven_seeds])
     assert made.rows[0]["near_noise_share"] == pytest.approx(2 / 11)
     assert made.columns[-3].heading == "Share within 0.5 % of the noise"
-    # Numbers where the paper has any.
     printed = {row["parameter"]: row["paper_error_percent"] for row in made.rows}
     assert printed == {"k": 10.0, "k_p": "-", "c": 25.0, "c_p": ">100", "c + c_p": 0.0}
 
 
 def study(parameters: dict[str, float], samples: int, *methods: str, seeds: int = 1) -> Any:
     known = {"sample": Sample("generalized_maxwell"), "parameters": parameters, "seeds": seeds}
-    own = seen(config=seen(methods=methods))
-    cases = {"drop": seen(name="drop", samples=samples, study=own, **known)}
-    return seen(cases=cases, identifiers=METHODS, optimum_tolerance=1.0, near_noise_tolerance=0.02)
+    own, near = seen(config=seen(methods=methods)), {"near_noise_tolerance": 0.02}
+    drop = seen(name="drop", samples=samples, study=own, **known)
+    return seen(cases={"drop": drop}, identifiers=METHODS, optimum_tolerance=1.0, **near)
 
 
 def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> None:
@@ -109,14 +89,13 @@ def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> No
     rows = []
     for seed, genetic, polished in ((0, 1.2, 1.0), (1, 1.0304, 1.0), (2, 1.0306, 0.9)):
         at = seed, 8.0, 1.0, 3.0, 2.0
-        rows += [
-            ["genetic", *at, genetic, 1.02, 9],
-            ["least_squares", *at, polished, 1.02, 10 + seed],
-        ]
-    path = identified(tmp_path / "drop.csv", rows)
-    pd.read_csv(path).assign(encodable_misfit=1.03).to_csv(path, index=False)
+        rows.append(["genetic", *at, genetic, 1.02, 9])
+        rows.append(["least_squares", *at, polished, 1.02, 10 + seed])
+    path = identified(tmp_path / "drop.csv", rows, encodable_misfit=1.03)
     parameters = {"k": 10.0, "k_p": 1.0, "c": 4.0, "c_p": 1.0}
-    first, second = methods(study(parameters, 1000, *METHODS_TRIED, seeds=3), [path]).rows
+    first, second = methods(
+        study(parameters, 1000, "genetic", "least_squares", seeds=3), [path]
+    ).rows
     # 1000 ((1.0304 / 1.03)^2 - 1) = 0.78, the only one of at most 1; 1.0306 has 1.17.
     assert (first["seeds"], first["reached_share"]) == (3, pytest.approx(1 / 3))
     assert second["reached_share"] == 1.0
@@ -126,11 +105,9 @@ def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> No
     assert second["median_evaluations"] == 11
     assert first["error_percent k"] == pytest.approx(20.0)
     assert first["error_percent c + c_p"] == pytest.approx(0.0)
-
-
-def test_the_lowest_known_may_be_the_truth(tmp_path: Path) -> None:
-    path = identified(tmp_path / "d.csv", [["genetic", 0, 8.0, 1.0, 3.0, 2.0, 1.1, 1.0, 100]])
-    pd.read_csv(path).assign(encodable_misfit=1.1).to_csv(path, index=False)
+    # The lowest known may be the truth.
+    row = ["genetic", 0, 8.0, 1.0, 3.0, 2.0, 1.1, 1.0, 100]
+    path = identified(tmp_path / "d.csv", [row], encodable_misfit=1.1)
     (made,) = methods(study(TRUE, 100, "genetic"), [path]).rows
     assert made["median_rise"] == pytest.approx(100 * (1.1**2 - 1))
 
@@ -177,7 +154,7 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     write_object(tmp_path / "a.json", {**told, "quantities": [first, second]})
     write_object(tmp_path / "b.json", {**told, "quantities": [{**first, "high": 4.0}]})
     known = seen(name="x", title="X", parameters={"k": 2.5, "c": 1.0, "c_p": 0.5})
-    table = verdicts(known, tmp_path / "a.json", [tmp_path / "b.json"])
+    table = cases.verdicts(known, tmp_path / "a.json", [tmp_path / "b.json"])
     k, total = table.rows
     assert k["excluded"] == "1.5 to 1.8"
     headings = {column.name: column.heading for column in table.columns}
@@ -189,9 +166,8 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     assert "c and c_p trade against each other: determined is c + c_p." in table.caption
 
 
-@pytest.mark.parametrize(
-    ("printed", "target", "error", "ends"),
-    [
+def test_a_value_and_its_error_leave_an_interval() -> None:
+    for printed, target, error, ends in (
         # 10 (1 - 0.027) to 10 (1 - 0.0255): two digits are too few, for 9.7 errs by 3 %.
         (9.7, 10.0, "2.6", (9.73, 9.745)),
         (0.97, 1.0, "2.6", (0.973, 0.9745)),
@@ -206,26 +182,19 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
         (5.5, 10.0, "3", (5.45, 5.6)),
         (5.5, None, None, (5.45, 5.6)),
         (5.5, 0.0, "3", (5.45, 5.6)),
-    ],
-)
-def test_a_value_and_its_error_leave_an_interval(
-    printed: float, target: Any, error: Any, ends: tuple[float, float]
-) -> None:
-    assert interval_of(printed, target, error) == pytest.approx(ends, rel=1e-12)
-
-
-def test_a_value_alone_is_rounded_or_cut_off() -> None:
-    assert interval_of_value(0.23) == pytest.approx((0.225, 0.24))
+    ):
+        assert cases.interval_of(printed, target, error) == pytest.approx(ends, rel=1e-12)
 
 
 def test_of_dampers_that_trade_the_sum_is_ten() -> None:
     """9.7375 + 0.23, and 9.7375 + 0.25: c has the printed error, c_p none."""
     for name, value in (("liquid_drop_1", 9.9675), ("liquid_drop_2", 9.9875)):
-        told = value_in_case(STUDY.cases[name], ["c", "c_p"])
+        told = cases.value_in_case(STUDY.cases[name], ["c", "c_p"])
         assert told
         assert told[0] == pytest.approx(value)
         assert told[1] < told[0] < told[2]
-    assert value_in_case(STUDY.cases["liquid_drop_1"], ["alpha"]) is None
+    assert cases.value_in_case(STUDY.cases["liquid_drop_1"], ["alpha"]) is None
+    assert cases.interval_of_value(0.23) == pytest.approx((0.225, 0.24))
 
 
 def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:
@@ -242,9 +211,5 @@ def test_two_basins_have_a_tenth_of_the_runs_each() -> None:
     assert two["near the noise"]["seed"].tolist() == list(range(2, 20))
     for noise in (None, 0.0):
         assert list(basins(found([3.0, 1.0], [noise, noise]), 0.02)) == [ALL]
-
-
-def test_near_the_noise_is_a_share_of_it() -> None:
     runs = found([1.019, 1.021, 2.03, 1.0], [1.0, 1.0, 2.0, None])
     np.testing.assert_array_equal(near_noise(runs, 0.02), [True, False, True, False])
-    assert near_noise_words(0.025) == "within 2.5 % of the noise"

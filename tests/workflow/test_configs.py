@@ -1,5 +1,3 @@
-"""Configs of every kind, and such as stop a run before any job with one message."""
-
 import re
 from pathlib import Path
 
@@ -28,11 +26,8 @@ LATER = [f"identifications/{case}/genetic/seeds_0-0.csv" for case in CASES]
 
 @pytest.mark.parametrize("made", [FIRST, pytest.param(LATER, marks=pytest.mark.nightly)])
 def test_every_kind_of_case_is_made(tmp_path: Path, made: list[str]) -> None:
-    """What a simulated case is told is enough for its first jobs."""
     files = [f"results/{file}" for file in made]
-    run = snakemake(tmp_path, "--", *files, config=CONFIG)
-    assert run.status == 0, run.output
-    assert [file for file in files if not (tmp_path / file).is_file()] == []
+    snakemake(tmp_path, "--", *files, config=CONFIG)
 
 
 def test_a_study_writes_in_its_folder_alone(tmp_path: Path) -> None:
@@ -40,16 +35,13 @@ def test_a_study_writes_in_its_folder_alone(tmp_path: Path) -> None:
     here.mkdir()
     (here / "my.yaml").write_text(yaml.safe_dump(CONFIG))
     given = ("-s", ROOT / "Snakefile", "-j1", "--configfile", "my.yaml", "--directory", mine)
-    run = called(here, *given, "--", "results/targets/crept.csv")
-    assert run.status == 0, run.output
-    assert (mine / "results/targets/crept.csv").is_file()
+    called(here, *given, "--", "results/targets/crept.csv")
     assert [file.name for file in here.iterdir()] == ["my.yaml"]
 
 
 def test_a_wrong_config_stops_with_one_message(tmp_path: Path) -> None:
     wrong = {"seedz": 3, "methods": ["gentic"]}
-    run = snakemake(tmp_path, "-n", "--config", "onyl=x", "seeds=0", config=wrong)
-    assert run.status == 1
+    run = snakemake(tmp_path, "-n", "--config", "onyl=x", "seeds=0", config=wrong, status=1)
     for said in (
         "overlay.yaml, line 3: seedz: unknown key. Did you mean 'seeds'?",
         "overlay.yaml, line 2: methods[0]: found 'gentic'. Did you mean 'genetic'?",
@@ -71,34 +63,23 @@ def test_another_clone_is_not_run_with_the_code_and_config_of_this_one(
     assert seeds == 1
     file.write_text(text)
     (tmp_path / "linked").symlink_to("second")
-    refused = snakemake(tmp_path, "-n", snakefile=snakefile)
-    assert refused.status == 1
+    refused = snakemake(tmp_path, "-n", snakefile=snakefile, status=1)
     assert f"The rules are those of {tmp_path / 'second'}, but the code" in refused.output
     assert f"{ROOT / 'src' / 'biogrip'}, from which biogrip is installed" in refused.output
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "linked" / "src"))
     planned = snakemake(tmp_path, "-n", snakefile=snakefile)
-    assert planned.status == 0, planned.output
     assert {*re.findall(r"measurements/\w+/(\w+-\d+)", planned.output)} == {"seeds_0-6"}
 
 
 def test_what_changes_no_result_is_no_other_study(tmp_path: Path) -> None:
-    """Batches as `profiles/slurm` has them, say: all that is published is made and compared."""
     keys = "batch_size=9", "pdf=true"
-    run = snakemake(tmp_path, "-n", "--quiet", "rules", "--config", *keys, "--", "check")
-    assert run.status == 0, run.output
+    asked = "check", "results/figures/comb.pdf"
+    run = snakemake(tmp_path, "-n", "--quiet", "rules", "--config", *keys, "--", *asked)
     assert run.jobs["tables"] == run.jobs["claims"] == run.jobs["check"] == 1
 
 
-def test_figures_for_print_are_made_where_they_are_asked_for(tmp_path: Path) -> None:
-    file = "results/figures/comb.pdf"
-    run = snakemake(tmp_path, "-n", "--config", "pdf=true", "--", file)
-    assert run.jobs == {"gripper_figures": 1}
-
-
 def test_what_has_no_name_has_nothing_published(tmp_path: Path) -> None:
-    """Nothing is compared with, and nothing replaced, where only a command line says the config."""
-    run = snakemake(tmp_path, "-k", "--config", "seeds=2", "--", "check", "publish")
-    assert run.status == 1
+    snakemake(tmp_path, "-k", "--config", "seeds=2", "--", "check", "publish", status=1)
     for name, said in (("check", "no tables to compare"), ("publish", "nothing in whose place")):
         log = (tmp_path / "results" / "logs" / f"{name}.log").read_text()
         assert "published/unnamed" in log

@@ -1,5 +1,3 @@
-"""The study as a module of somebody else's workflow, and deployed from a clone."""
-
 import os
 import shutil
 import sys
@@ -9,14 +7,9 @@ import pytest
 import yaml
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import SMALL, Run, called, ran
+from tests.helpers.runs import ONE_CASE, Run, called, ran
 
-CONFIG = SMALL | {
-    "seeds": 1,
-    "methods": ["genetic"],
-    "identifiability": {"coverage_seeds": 0},
-    "only": ["liquid_drop_2"],
-}
+CONFIG = ONE_CASE | {"seeds": 1}
 ERRORS = "results/tables/errors_liquid_drop_2.csv"
 MODULE = f"""
 module biogrip:
@@ -29,16 +22,7 @@ def host(folder: Path, text: str, *arguments: str) -> Run:
     return called(folder, "-j2", "--workflow-profile", "none", *arguments)
 
 
-def test_without_config_it_is_the_papers_study(tmp_path: Path) -> None:
-    text = MODULE + "use rule * from biogrip as biogrip_*\n"
-    run = host(tmp_path, text, "-n", "--quiet", "rules", "--", "biogrip_all")
-    assert run.status == 0, run.output
-    for rule in ("biogrip_claims", "biogrip_identification"):
-        assert rule in run.output
-
-
 def test_rules_are_changed_under_a_prefix_and_the_host_is_as_it_was(tmp_path: Path) -> None:
-    """With a config of the host's, and resources and outputs of its own."""
     (tmp_path / "host.yaml").write_text("samples: {1: a, 2: b}\n")
     text = f"""
 configfile: "host.yaml"
@@ -62,13 +46,11 @@ rule mine:
     shell: "command -v python > {{output}}"
 """
     run = host(tmp_path, text, "--", "elsewhere/liquid_drop_2/seeds_0-0.npz", "mine.txt")
-    assert run.status == 0, run.output
     assert "Measuring with 4321 MB" in run.output
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         *(".snakemake", "Snakefile", "elsewhere", "host.yaml", "mine.txt", "sub")
     ]
     assert (tmp_path / "sub/results/targets/liquid_drop_2.csv").is_file()
-    # The host's rules find what they found before.
     assert (tmp_path / "mine.txt").read_text().strip() == shutil.which(
         "python", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}"
     )
@@ -78,13 +60,11 @@ rule mine:
 def test_it_is_deployed_from_a_clone_and_runs_a_case(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By snakedeploy, as the catalogue of workflows tells its readers to."""
     pytest.importorskip("snakedeploy")
     clone, place = tmp_path / "clone", tmp_path / "place"
-    assert ran(tmp_path, "git", "clone", "-q", ROOT, clone).status == 0
+    ran(tmp_path, "git", "clone", "-q", ROOT, clone)
     branch = ran(clone, "git", "branch", "--show-current").output.strip()
-    run = ran(tmp_path, "snakedeploy", "deploy-workflow", clone, place, "--branch", branch)
-    assert run.status == 0, run.output
+    ran(tmp_path, "snakedeploy", "deploy-workflow", clone, place, "--branch", branch)
     (place / "config" / "config.yaml").write_text(yaml.safe_dump(CONFIG))
     # Of a clone it names the Snakefile without the folder; of a server it names the server, too.
     text = (place / "workflow" / "Snakefile").read_text()
@@ -92,6 +72,5 @@ def test_it_is_deployed_from_a_clone_and_runs_a_case(
     text = text.replace('"workflow/Snakefile"', f'"{clone}/workflow/Snakefile"')
     monkeypatch.setenv("PYTHONPATH", str(clone / "src"))
     for arguments in (("-n",), ("--", ERRORS)):
-        run = host(place, text, *arguments)
-        assert run.status == 0, run.output
+        host(place, text, *arguments)
     assert (place / ERRORS).is_file()

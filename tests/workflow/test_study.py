@@ -1,5 +1,3 @@
-"""What a study writes, from its targets to its page."""
-
 import json
 import re
 from pathlib import Path
@@ -7,12 +5,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.image import imread
 
-from biogrip.figures.style import COLUMN_IN
-from biogrip.physics.models import generalized_maxwell
-from biogrip.physics.response import step_response, superpose
-from tests.helpers.problems import GRIPPER, TORQUE
+from tests.helpers.problems import MODEL, rotation
 from tests.helpers.runs import TINY, snakemake
 
 CASE = "liquid_drop_2"
@@ -21,25 +15,18 @@ QUANTITIES = ["k", "k_p", "c", "c_p", "c + c_p"]
 PARAMETERS = ["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"]
 
 
-def test_identifications_have_a_row_for_each_method_and_seed(tiny: Path) -> None:
-    """Whose misfit is the last of its history."""
+def test_identifications_are_what_their_own_traces_give(tiny: Path) -> None:
     results = tiny / "results"
-    found = pd.read_csv(results / "identifications" / f"{CASE}.csv")
-    assert found["method"].unique().tolist() == METHODS
-    assert found["seed"].tolist() == [0, 1] * 2
+    every = pd.read_csv(results / "identifications" / f"{CASE}.csv")
+    assert every["method"].unique().tolist() == METHODS
+    assert every["seed"].tolist() == [0, 1] * 2
     history = pd.DataFrame(dict(np.load(results / "histories" / f"{CASE}.npz")))
     last = history.groupby(["method", "seed"], sort=False)["best_misfit"].last()
-    np.testing.assert_allclose(last.to_numpy(), found["misfit"], rtol=1e-6)
-
-
-def test_the_last_row_is_what_its_own_trace_gives(tiny: Path) -> None:
-    """Misfit and noise in the file, recomputed from the files alone."""
-    results = tiny / "results"
-    found = pd.read_csv(results / "identifications" / f"{CASE}.csv").iloc[-1]
+    np.testing.assert_allclose(last.to_numpy(), every["misfit"], rtol=1e-6)
+    found = every.iloc[-1]
     measured = np.load(results / "measurements" / CASE / "seeds_0-1.npz")
     target, trace = measured["target"], measured["traces"][1]
-    response = step_response(GRIPPER, generalized_maxwell(found[PARAMETERS].to_numpy(float)))
-    fitted = superpose(response, TORQUE, measured["time_s"])[0]
+    fitted = rotation(MODEL, found[PARAMETERS].to_numpy(float), measured["time_s"])
     misfit = np.sqrt(np.mean((fitted - trace) ** 2))
     assert misfit == pytest.approx(found["misfit"], rel=1e-6)
     noise = trace - target
@@ -71,23 +58,12 @@ def test_a_recorded_trace_has_verdicts_and_no_errors(tiny: Path) -> None:
     assert total["low"] < found < total["high"]
 
 
-def test_every_figure_comes_as_a_picture(tiny: Path) -> None:
-    """In dots that are not seen on a page."""
-    pictures = sorted((tiny / "results" / "figures").glob("*.png"))
-    # Seven of the study, nine of the simulated case, six of the recorded one.
-    assert len(pictures) == 22
-    for path in pictures:
-        assert imread(path).shape[1] >= 200 * COLUMN_IN
-
-
 def test_snakemakes_report_shows_tables_figures_and_pages(tiny: Path, tmp_path: Path) -> None:
     report = tmp_path / "report.html"
-    run = snakemake(tiny, "--report", report, config=TINY)
-    assert run.status == 0, run.output
+    snakemake(tiny, "--report", report, config=TINY)
     page = report.read_text()
     front = page.partition("workflow_desc = ")[2]
     described, _ = json.JSONDecoder().raw_decode(front)
-    # The front page has the answers; the page itself would make the report half as large again.
     told = (tiny / "results" / "answers.html").read_text()
     answers = re.findall("<p>(.*)</p>", told)
     assert len(answers) == 4
