@@ -317,7 +317,9 @@ def _tables(sheet: Sheet, columns: Columns) -> list[Table]:
     tables = [table for table in found if table is not None]
     last = len(sheet.cells)
     # Words below the last row.
-    while last and sheet.widths[last - 1] == 1 and not sheet.cells[last - 1, 0][:1].isdigit():
+    while (
+        last and sheet.widths[last - 1] == 1 and not re.match(r"[-+.]*\d", sheet.cells[last - 1, 0])
+    ):
         last -= 1
     ends = [0, *(_end(sheet, *pair) for pair in pairwise(tables)), last]
     return [
