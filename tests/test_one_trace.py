@@ -71,6 +71,8 @@ def test_a_declared_offset_and_drift_are_fitted_along() -> None:
     assert found.data["offset_rad"] == pytest.approx(5e-4, abs=1e-4)
     assert found.data["drift_rad_per_s"] == pytest.approx(1e-6, abs=1e-6)
     assert "χ² falls" not in str(found)
+    exact = told(times, response + 5e-4 + 1e-6 * times, offset=True, drift=True).data
+    assert exact["drift_rad_per_s"] == pytest.approx(1e-6, rel=1e-3)
 
 
 def test_options_are_keys_of_the_config_and_the_last_one_counts(tmp_path: Path) -> None:

@@ -180,7 +180,7 @@ def test_a_late_start_is_advised_with_its_limits_and_with_the_tare() -> None:
     (limits,) = re.findall(r"constant until \S+ s \((\S+) to (\S+)\) of its clock", notes)
     assert float(limits[0]) < 8.7
     assert float(limits[1]) > 8.4
-    assert "readings before the start are constant, but 42 and not 0" in notes
+    assert "The 16 readings before the start are constant, but 42 and not 0" in notes
     found = told(times, values, start="fit", offset=True, **given)
     low, high = found.data["onset_limits_s"]
     assert low < 8.7

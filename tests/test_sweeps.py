@@ -270,7 +270,9 @@ def test_a_relaxation_time_beyond_the_sweep_is_only_bounded() -> None:
     assert told_of.diagnosis.likelihood.problem.residuals.duration_s == pytest.approx(1 / OMEGA[0])
     assert "as they scatter from one frequency" in str(told_of)
     said = "In oscillation storage and loss moduli were recorded over frequency."
-    assert said in set_up_in_words(told_of.data)
+    words = set_up_in_words(told_of.data)
+    assert said in words
+    assert any("Intervals are 95 %" in each for each in words)
     found = by_quantity(told_of.data)
     assert found["tau"]["high"] is None or found["tau"]["high"] > 100 * found["tau"]["low"]
 

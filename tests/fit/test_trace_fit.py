@@ -12,9 +12,9 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_from
 from biogrip.fit.noise_model_fit import FAR
 from biogrip.fit.problem import Fit, TraceProblem
-from biogrip.fit.trace_fit import TraceFit, fit_traces, gripper_functions
+from biogrip.fit.trace_fit import TraceFit, _alike, fit_traces, gripper_functions
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.noise import AR1, MOST_SAMPLES, Drift, Noise, Outliers, add_noise
+from biogrip.physics.noise import AR1, MOST_SAMPLES, Drift, Noise, NoiseModel, Outliers, add_noise
 from biogrip.physics.simulation import simulated_response
 from tests.helpers.default import STUDY
 
@@ -45,6 +45,14 @@ def fitted(experiment: Experiment, trace: Array, times: Array = TIMES) -> TraceF
 
 def noisy(noise: Noise, seed: int = 0) -> Array:
     return add_noise(CLEAN, noise, np.random.default_rng([seed, 3]), TIMES)
+
+
+def test_noise_models_are_alike_if_shares_and_times_are() -> None:
+    """Of a time, its logarithm counts, by its share."""
+    one = NoiseModel(0.5, 20.0, 0.1)
+    assert _alike(one, replace(one, time_s=20.3, flicker=0.102))
+    assert not _alike(one, replace(one, time_s=20.5))
+    assert not _alike(one, replace(one, flicker=0.111))
 
 
 def test_white_noise_and_a_known_gripper_leave_the_fit_as_it_is() -> None:
