@@ -11,7 +11,14 @@ from scipy.stats import chi2
 
 from biogrip.arrays import Array
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
-from biogrip.judging.without_model import LEVEL, Told, WithoutModel, decades, tell_without_model
+from biogrip.judging.without_model import (
+    _ADDED,
+    LEVEL,
+    Told,
+    WithoutModel,
+    decades,
+    tell_without_model,
+)
 from biogrip.library import Sample, set_up
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import INSTRUMENTS
@@ -209,6 +216,24 @@ def test_few_readings_are_no_error(count: int, size: float) -> None:
     for each in tell(time_s, creeps, reads="strain").told:
         if each.low is not None and each.high is not None:
             assert each.low <= (each.value or 0.0) <= each.high
+
+
+def test_what_lags_add_at_4_s() -> None:
+    """Of rates whose product with the time is 1 and 2."""
+    one, two = np.exp([-1.0, -2.0])
+    added = {name: of(4.0, np.array([0.25, 0.5])).tolist() for name, of in _ADDED.items()}
+    assert added == {
+        "left": pytest.approx([one, two]),
+        "yielded": pytest.approx([1 - one, 1 - two]),
+        "per second": pytest.approx([0.25 * one, 0.5 * two]),
+        "per e-fold": pytest.approx([one, 2 * two]),
+        "lasting": [1, 0],
+        "flowing": [0.25, 0],
+        "all": [1, 1],
+        "slow": pytest.approx([0.5, 0.2]),
+        "fast": pytest.approx([0.5, 0.8]),
+        "lost": pytest.approx([0.5, 0.4]),
+    }
 
 
 def test_times_at_which_it_is_told() -> None:
