@@ -255,18 +255,34 @@ def swept_deviations(
     for _ in range(_ROUNDS):
         amplitudes, _ = fit_responses(readings / smooth, family / smooth)
         smooth = np.clip(amplitudes @ family, 0.5 * readings, 2.0 * readings)
-    free = len(readings) - 2 * count_lags(amplitudes > 0)
     if share is None:
-        # If it takes all of a few, these scatter about lines on logarithmic axes.
-        about, order = readings / smooth - 1 if free > 0 else np.log(readings), len(readings) > 4
-        twice = (np.diff(about[of], 1 + order) ** 2 for of in (storage, ~storage))
-        usual = (each[each <= _OUTLYING * np.median(each)] for each in twice)
-        shares = [max(float(np.sqrt(np.mean(each) / 6)), _ROUNDING) for each in usual]
-        if free < max(_FREE, len(readings) / 2):
-            one = np.sum(about**2) / free if free > 0 else np.mean(np.square(shares))
-            shares = [max(float(np.sqrt(one)), _ROUNDING)] * 2
+        shares = _swept_shares(readings, smooth, storage, 2 * count_lags(amplitudes > 0))
     sd = np.hypot(np.where(storage, *shares) * smooth, more)
     return sd, dict(zip(("storage", "loss"), shares, strict=True))
+
+
+def _swept_shares(readings: Array, smooth: Array, storage: BoolArray, taken: int) -> list[float]:
+    """Return the shares of storage and loss modulus by which they scatter about smooth ones.
+
+    These have taken some degrees of freedom from the readings, (n_samples,).
+    """
+    free, apart = len(readings) - taken, readings / smooth - 1
+    if free >= max(_FREE, len(readings) / 2):
+        return [_scatter(apart[of]) for of in (storage, ~storage)]
+    if free > 0:
+        square = float(np.sum(apart**2)) / free
+    else:
+        # Smooth ones take all of a few, which scatter about lines on logarithmic axes.
+        logs = np.log(readings)
+        square = float(np.mean([_scatter(logs[of]) ** 2 for of in (storage, ~storage)]))
+    return [max(float(np.sqrt(square)), _ROUNDING)] * 2
+
+
+def _scatter(values: Array) -> float:
+    """Return the standard deviation of values by how they differ from neighbours, but outliers."""
+    squares = np.diff(values, min(len(values) - 1, 2)) ** 2
+    usual = squares[squares <= _OUTLYING * np.median(squares)]
+    return max(float(np.sqrt(np.mean(usual) / 6)), _ROUNDING)
 
 
 def _least(sizes: Array, rest: Array, share: float) -> float:

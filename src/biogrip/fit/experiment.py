@@ -65,8 +65,8 @@ class Experiment:
     """True if the noise of a trace may be autocorrelated, see `fit_traces`."""
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
-    ``gripper`` itself; ``share`` of the ``torque``; and of the ``steps`` of a record, by their
-    number from 0, when each came, and of all by -1."""
+    ``gripper`` itself; ``share`` of the ``torque``; of the ``steps`` of a record, by their number
+    from 0, when each came, in s; and ``share`` of these, by which ``all steps`` come later."""
     fit_start: bool = False
     """True if the time at which the protocol started is fitted along (`judging.onset`)."""
     record: Array | None = field(default=None, compare=False)
@@ -173,13 +173,11 @@ class Experiment:
             if error and key != _NOT_FITTED
         ]
 
-    def with_step(self, number: int, later: float) -> "Experiment":
-        """Return one whose step comes later by some s; or all, -1, by so many of their errors."""
+    def with_steps_later(self, later_s: Array) -> "Experiment":
+        """Return an experiment whose record's steps come later by some s, (n_steps,)."""
         assert self.record is not None
-        *errors_s, _ = self.uncertainty["steps"].values()
         record, first = self.record.copy(), np.flatnonzero(np.diff(self.record[:, 0]) == 0)
-        moved_s = later * (np.array(errors_s) if number < 0 else np.eye(len(first))[number])
-        record[[first, first + 1], 0] += moved_s
+        record[[first, first + 1], 0] += later_s
         return replace(self, record=record)
 
     @property

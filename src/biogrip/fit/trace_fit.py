@@ -38,13 +38,17 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
     uncertain property, then those of second.
     """
     network = experiment.searched.network(parameters)
+    errors_s = experiment.uncertainty.get("steps", {})
 
     def rotation(part: str = "", key: str = "", error: float = 0.0) -> Array:
         gripper, torque = experiment.gripper, experiment.torque
         if part == "torque":
             torque = torque.times(1 + error)
         elif part == "steps":
-            torque = experiment.with_step(int(key), error).torque
+            later_s = np.array([error if key == number else 0.0 for number in errors_s])
+            torque = experiment.with_steps_later(later_s).torque
+        elif part == "all steps":
+            torque = experiment.with_steps_later(error * np.array([*errors_s.values()])).torque
         elif part == "gripper":
             gripper = replace(gripper, **{key: getattr(gripper, key) + error})
         elif part:

@@ -132,12 +132,12 @@ def _what_limits_include(experiment: Experiment) -> str:
     """Return a sentence on the part that uncertainties of gripper and protocol have in limits."""
     instrument, controlled = experiment.instrument, experiment.instrument.controlled.name
     exact = "gripper" if instrument.has_jaws else controlled
-    known = [(part, key) for part, key, _ in experiment.uncertain]
-    keys = [f"{part}.{key}".removesuffix(".share") for part, key in known if part != "steps"]
+    known = [(part, key) for part, key, _ in experiment.uncertain if not part.endswith("steps")]
+    keys = [f"{part}.{key}".removesuffix(".share") for part, key in known]
     said = []
     if instrument.has_jaws and keys:
         said.append(f"Limits include uncertainties of the gripper: {', '.join(keys)}.")
-    if steps := max(len(known) - len(keys) - 1, 0):
+    if steps := len(experiment.uncertainty.get("steps", {})):
         said.append(
             f"Limits allow for {counted(steps, 'step')} of the {controlled} anywhere between the "
             f"two rows of its record; otherwise the {exact} is taken as exact."

@@ -96,7 +96,8 @@ def check_recording(
     if is_constant or np.ptp(trace) == 0 or not _responds(trace, nuisance, least, *counts):
         unit, off = f" {read.unit}".rstrip(), np.abs(trace - np.median(trace))
         usual = _APART * np.quantile(off, 0.9)
-        for sample in np.flatnonzero(off > usual)[: int(usual > 0)]:
+        if 0 < usual < np.max(off):
+            sample = int(np.argmax(off > usual))
             raise BiogripError(
                 f"{recording.place(sample, recording.read.reading)}: found {trace[sample]:.6g}"
                 f"{unit}, far from nearly all others, and no response to the {controlled} beside "

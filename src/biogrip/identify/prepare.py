@@ -59,9 +59,10 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
 
         record, uncertain_s = with_steps(experiment.record)
         steps = {str(number): error for number, error in enumerate(uncertain_s.tolist())}
-        # A log may write all of them alike, as in the first row after each.
-        steps |= {"-1": 1.0} if steps else {}
         uncertainty = {**experiment.uncertainty, "steps": steps}
+        if steps:
+            # A log may write all of them alike, as in the first row after each.
+            uncertainty["all steps"] = {"share": 1.0}
         experiment = replace(experiment, record=record, uncertainty=uncertainty)
     recording = _checked(recording, experiment)
     if experiment.record is not None:

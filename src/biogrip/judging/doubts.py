@@ -234,8 +234,9 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     noises = counted(least, "noise")
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
     if correlated(*left)[1] >= levels.FALSE_ALARM:
-        far = f"single readings are far off, as no linear sample leaves less than {noises}"
-        return far if other > levels.TOO_MUCH and times < other * levels.TOO_MUCH else inadequate
+        if other > levels.TOO_MUCH and times < other * levels.TOO_MUCH:
+            return f"single readings are far off, as no linear sample leaves less than {noises}"
+        return inadequate
     if other * levels.TOO_MUCH < times:
         return f"{inadequate}; what that leaves is of {culprits}"
     nearest = f"the nearest leaves {least} times the noise, and that is correlated"

@@ -219,7 +219,7 @@ def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
             slowest_s = None
         problem = fits.likelihoods[fits.trace[index]].problem
         quantity = fits.quantities[index % len(fits.quantities)]
-        made = values[quantity.at_end(x, problem.low, problem.high, best)]
+        made = values[quantity.at_end(x, problem.low, problem.high, values > best)]
         low, high = (None if end in made else end for end in (low, high))
         if slowest_s is not None:
             low, high, gaps, certainty = None, None, (), None

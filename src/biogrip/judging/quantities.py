@@ -15,7 +15,8 @@ from biogrip.physics.sample_model import SampleModel
 # Slopes of hinges: a relaxation time of twice the experiment increases chi^2 by some 50, and one
 # a hundredth above that of the next branch by 1.
 _WITHIN, _IN_ORDER = 10.0, 100.0
-_AT_END = 1e-6  # E-folds from an end of a range.
+# E-folds from an end of a range at which a parameter counts as at it.
+_AT_END = 1e-6
 
 PROVIDED = "provided that the branch, k and c in series, relaxes within the experiment"
 """Condition of a sum of dampers, in the sentences of tables and pages."""
@@ -96,12 +97,17 @@ class Quantity:
             slope[list(self.members)] = np.exp(of_sum - np.logaddexp.reduce(of_sum))
         return slope
 
-    def at_end(self, log_parameters: Array, low: Array, high: Array, best: float) -> BoolArray:
-        """Tell where, (n,), a ratio would be further from its best value but for a range's end."""
-        x, members = log_parameters[:, self.members], [*self.members]
-        outwards = np.sign(np.sum(x * self.sign, axis=1) - best)[:, None] * self.sign
-        beyond = np.abs(x - np.where(outwards > 0, high[members], low[members])) < _AT_END
-        return np.any(beyond, axis=1) & (len(self.sign) > 1)
+    def at_end(self, log_parameters: Array, low: Array, high: Array, above: BoolArray) -> BoolArray:
+        """Tell where, (n,), a ratio would be further from its best value but for a range's end.
+
+        Log-parameters are (n, n_parameters), their ranges' ends (n_parameters,); the ratio is above
+        its best value or below, (n,).
+        """
+        members = list(self.members)
+        rises = above[:, None] == (np.array(self.sign) > 0)
+        ends = np.where(rises, high[members], low[members])
+        at_end = np.abs(log_parameters[:, members] - ends) < _AT_END
+        return np.any(at_end, axis=1) & (len(self.sign) > 1)
 
     def range(self, low: Array, high: Array) -> tuple[float, float]:
         """Return its lowest and highest logarithm for log-parameters within bounds.

@@ -47,7 +47,9 @@ _SPELLED_OUT = {
     "%": ("percent", "pct"),
     "‰": ("permille", "mstrain", "millistrain", "mε", "mm/m"),
     "ppm": ("ustrain", "microstrain", "uε", "um/m"),
-    **{"Pa": ("n/m2", "n/m^2"), "kPa": ("kn/m2", "kn/m^2"), "MPa": ("n/mm2", "n/mm^2")},
+    "Pa": ("n/m2", "n/m^2"),
+    "kPa": ("kn/m2", "kn/m^2"),
+    "MPa": ("n/mm2", "n/mm^2"),
 }
 _IN_BRACKETS = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\}|<([^<>]*)>")
 # What ends a name and is only a unit, and what may be one. After a digit, / is a reciprocal's.

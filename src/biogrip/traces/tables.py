@@ -53,6 +53,7 @@ _OTHERWISE = re.compile(r"[,;\t][\"\s]|[\"\s][,;\t]")
 _QUOTED = re.compile(r'^\s*"(.*)"\s*$')
 _WIDE_GAP = re.compile(r"\s{2,}|\t")
 # Begins like a row of numbers.
+_NUMBER = re.compile(r"[-+.]*\d")
 _ROW = re.compile(r'[\s",;]*[-+]?[.\d][\d.,:eE+-]*[\s",;]')
 # Numbers with points or commas, and of these such whose marks may be between thousands.
 _MARKED = re.compile(r"[-+]?\d*[.,][\d.,]*(?:[eE][-+]?\d+)?")
@@ -315,17 +316,19 @@ def _tables(sheet: Sheet, columns: Columns) -> list[Table]:
     """Return all tables in the order of the file."""
     found = (_header(sheet, at, columns) for at in sheet.headers)
     tables = [table for table in found if table is not None]
-    last = len(sheet.cells)
-    # Words below the last row.
-    while (
-        last and sheet.widths[last - 1] == 1 and not re.match(r"[-+.]*\d", sheet.cells[last - 1, 0])
-    ):
-        last -= 1
-    ends = [0, *(_end(sheet, *pair) for pair in pairwise(tables)), last]
+    ends = [0, *(_end(sheet, *pair) for pair in pairwise(tables)), _last_end(sheet)]
     return [
         replace(table, end=end, title=_title(sheet, start, table))
         for table, (start, end) in zip(tables, pairwise(ends), strict=False)
     ]
+
+
+def _last_end(sheet: Sheet) -> int:
+    """Return the end of the last table, above words that stand alone on their lines."""
+    end = len(sheet.cells)
+    while end and sheet.widths[end - 1] == 1 and not _NUMBER.match(sheet.cells[end - 1, 0]):
+        end -= 1
+    return end
 
 
 def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
