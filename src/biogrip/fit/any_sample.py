@@ -279,7 +279,7 @@ def _swept_shares(readings: Array, smooth: Array, storage: BoolArray, taken: int
 
 
 def _scatter(values: Array) -> float:
-    """Return the standard deviation of values by how they differ from neighbours, but outliers."""
+    """Return the standard deviation of values by differences of neighbours, without outliers."""
     squares = np.diff(values, min(len(values) - 1, 2)) ** 2
     usual = squares[squares <= _OUTLYING * np.median(squares)]
     return max(float(np.sqrt(np.mean(usual) / 6)), _ROUNDING)
