@@ -230,7 +230,7 @@ def _add_settings(parser: Any, outputs: Callable[[Any], None] | None = None) -> 
             group.add_argument("--config", type=Path, help=text)
         if title == "the sample":
             of_key = {"dest": "model_selection.models", "nargs": 0, "const": []}
-            text = "do not try other models, which takes most of the time"
+            text = "do not try other models, which takes long where none fits"
             group.add_argument("--no-compare", action=_Set, help=text, **of_key)
             if outputs:
                 outputs(parser.add_argument_group("output"))
@@ -249,7 +249,7 @@ def _identify_parser(stages: Any) -> None:
         """identify sweep.csv --reading "storage=G' (Pa)" --reading "loss=G'' (Pa)" """
         "--frequency 'f (Hz)' --model power_law",
         "identify cells.tsv --config my_gripper.yaml --csv found.csv",
-        cost="A trace takes seconds, most of them for comparing the sample models: --no-compare.",
+        cost="A trace takes seconds, or longer where no model fits it (--no-compare).",
     )
     _add_settings(identify, _add_outputs)
 

@@ -120,7 +120,7 @@ def test_limits_allow_for_steps_anywhere_between_two_rows(
         stress += np.where(log_s >= step_s, sign * 5.0, 0.0)
     model = Setting("--model", ("sample", "model"), "zener_kelvin")
     recording, case = read_trace(loaded(tmp_path / "log.csv", log_s, strain, stress, more=[model]))
-    alone = replace(case.judged_experiment, models=(), cheap_models=False)
+    alone = replace(case.judged_experiment, models=(), usual_models=False)
     diagnosis = identify(recording, alone)
     assert diagnosis.status == "ok"
     width = []

@@ -387,9 +387,10 @@ def preferred_in_words(found: Mapping[str, Any]) -> list[str]:
     lowest = min(found["models"] or [], key=lambda row: row["delta_bic"], default=None)
     if not found["preferred_model"] or lowest is None:
         return []
+    count = len(found["models"]) + len(found["models_spared"])
     return [
-        f"Of {len(found['models'])} models that were compared, that of the lowest BIC is "
-        f"another: {lowest['title']}."
+        f"Of {count} models that were compared, that of the lowest BIC is another: "
+        f"{lowest['title']}."
     ]
 
 

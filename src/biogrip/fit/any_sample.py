@@ -145,6 +145,11 @@ class AnySampleFit:
         scale = self.lags.residuals.noise_scale
         return float(np.linalg.norm(self.left)) * scale / float(np.sqrt(self.free))
 
+    @property
+    def misfit(self) -> float:
+        """RMS misfit."""
+        return self.sd * float(np.sqrt(self.free / self.lags.residuals.samples))
+
     def left_of_readings(self) -> tuple[Array, Array]:
         """Return what it leaves of the readings, (n_samples,), and a basis of what it absorbs."""
         own, lags, residuals = self.amplitudes > 0, self.lags, self.lags.residuals

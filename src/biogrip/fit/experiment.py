@@ -82,8 +82,8 @@ class Experiment:
     """True if traces follow this experiment: neither start, offset, drift nor model are doubted."""
     models: tuple[str, ...] = ()
     """Sample models to compare, as in `CANDIDATES`."""
-    cheap_models: bool = True
-    """True to compare power laws, too, where that takes little time."""
+    usual_models: bool = True
+    """True to compare power laws, too, and to spare models that cannot suit the trace better."""
     least_squares: LeastSquaresSettings = field(
         default_factory=lambda: LeastSquaresSettings(candidates=1000, starts=16)
     )

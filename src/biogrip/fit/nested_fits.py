@@ -43,6 +43,10 @@ _TIMES = 6
 _MOST_ROUNDS = 3
 
 Answers = list[Fit]
+Fits = dict[str, dict[int, Fit]]
+"""Fits by candidate and index of the trace."""
+Worth = Callable[[str, int, Fits], bool]
+"""Tells of a candidate, a trace, and the fits so far, if it is worth another."""
 
 
 def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> Answers:
@@ -86,42 +90,52 @@ def fit_models(
     problems: Mapping[str, Sequence[TraceProblem]],
     settings: LeastSquaresSettings,
     rngs: Mapping[str, Sequence[np.random.Generator]],
-    done: Callable[[], None],
+    done: Callable[[], None] = lambda: None,
     near: Mapping[str, Array] | None = None,
-) -> dict[str, Answers]:
-    """Fit nested models to traces by least squares, and return the best fit to each trace.
+    worth: Worth = lambda name, trace, found: True,
+) -> Fits:
+    """Fit nested models to traces by least squares; return the best fits, by model and trace.
 
     By candidate, the problems of the same traces are given, a random generator for each, and
     additional starts, (n_traces, n_parameters); `done` is called after every model. Parameters
     found may be zero or infinite. A fit worse than a nested model's within its own range has not
-    converged.
+    converged. Models are fitted in the order of their numbers of parameters, each to the traces
+    that are `worth` it.
     """
-    found: dict[str, Answers] = {}
-    for name in sorted(problems, key=lambda each: len(CANDIDATES[each].model.names)):
+    found: Fits = {}
+    for name in sorted(problems, key=_cost):
+        which = [trace for trace in range(len(problems[name])) if worth(name, trace, found)]
         further = []
-        for trace, problem in enumerate(problems[name]):
-            longest_s = problem.residuals.duration_s
-            of_contained = _of_contained(name, found, trace, longest_s)
+        for trace in which:
+            problem = problems[name][trace]
+            of_contained = _of_contained(name, found, trace, problem.residuals.duration_s)
             points = [within_range(start, problem) for start in of_contained]
             points += [near[name][trace]] if near and name in near else []
             further.append(np.reshape(points, (-1, len(problem.low))))
         own, (fewer, few) = settings, _FEWER
         if CANDIDATES[name].model.power_law:
             own = LeastSquaresSettings(-(-own.candidates // fewer), -(-own.starts // few))
-        found[name] = identify_many(problems[name], own, rngs[name], silent, further)
-        found[name] = deepen(problems[name], found[name])
+        found[name] = {}
+        if which:
+            posed, random = [problems[name][it] for it in which], [rngs[name][it] for it in which]
+            fits = deepen(posed, identify_many(posed, own, random, silent, further))
+            found[name] = dict(zip(which, fits, strict=True))
         done()
     _fit_again(problems, found)
     _take_simpler(problems, found)
     return {name: found[name] for name in problems}
 
 
-def _of_contained(
-    name: str, found: Mapping[str, Answers], trace: int, longest_s: float
-) -> Iterator[Array]:
+def _cost(name: str) -> tuple[int, bool]:
+    """Return what models are fitted in the order of: parameters, and if it is a power law."""
+    model = CANDIDATES[name].model
+    return len(model.names), model.power_law
+
+
+def _of_contained(name: str, found: Fits, trace: int, longest_s: float) -> Iterator[Array]:
     """Yield nested optima as starts; what has vanished is noticeable, or hardly noticeable."""
     kinds = np.array([parameter.kind for parameter in CANDIDATES[name].model.parameters])
-    for inner in different_in(name, found):
+    for inner in different_in(name, [other for other in found if trace in found[other]]):
         parameters = as_richer(name, inner, found[inner][trace].parameters)
         gone = (kinds != "exponent") & ((parameters == 0) | ~np.isfinite(parameters))
         for times in _AWAY if gone.any() else (1.0,):
@@ -141,7 +155,7 @@ def _usual(kind: str, kinds: Array, values: Array, there: BoolArray, longest_s: 
     return float(np.exp(np.mean(np.log(others)))) * relaxation_s
 
 
-def _fit_again(problems: Mapping[str, Sequence[TraceProblem]], found: dict[str, Answers]) -> None:
+def _fit_again(problems: Mapping[str, Sequence[TraceProblem]], found: Fits) -> None:
     """Fit again, in place, models that fit worse than a nested one within their range."""
     for _ in range(_MOST_ROUNDS):
         news = False
@@ -158,9 +172,7 @@ def _fit_again(problems: Mapping[str, Sequence[TraceProblem]], found: dict[str, 
             break
 
 
-def _take_simpler(
-    problems: Mapping[str, Sequence[TraceProblem]], found: dict[str, Answers]
-) -> None:
+def _take_simpler(problems: Mapping[str, Sequence[TraceProblem]], found: Fits) -> None:
     """Replace, in place, a richer model's result by a nested model's better optimum."""
     for name, inner, trace in _worse(found):
         simpler = found[inner][trace]
@@ -171,13 +183,12 @@ def _take_simpler(
         )
 
 
-def _worse(found: Mapping[str, Answers]) -> Iterator[tuple[str, str, int]]:
+def _worse(found: Fits) -> Iterator[tuple[str, str, int]]:
     """Yield model, nested model and trace where the nested one fits better; simple ones first."""
     for name in found:
         for inner in contained_in(name, found):
-            pairs = zip(found[name], found[inner], strict=True)
-            for trace, (answer, simpler) in enumerate(pairs):
-                if _digits(simpler.misfit) < _digits(answer.misfit):
+            for trace in filter(found[inner].__contains__, found[name]):
+                if _digits(found[inner][trace].misfit) < _digits(found[name][trace].misfit):
                     yield name, inner, trace
 
 
@@ -298,17 +309,20 @@ def one_branch_more(tried: Sequence[FittedModel], *, adequate: bool = True) -> s
     return None if name in {each.candidate for each in tried} else name
 
 
-def advice(tried: Sequence[FittedModel], chosen: str, *, adequate: bool = True) -> str:
+def advice(
+    tried: Sequence[FittedModel], chosen: str, *, adequate: bool = True, spared: int = 0
+) -> str:
     """State in a sentence whether BIC prefers another of the models tried, if adequate, to one."""
+    count = len(tried) + spared
     own, best = _own_and_best(tried, chosen)
     title = own.model.title[0].upper() + own.model.title[1:]
     if best is own:
-        return f"{title}: none of the {len(tried)} models tried suits the trace better."
+        return f"{title}: none of the {count} models tried suits the trace better."
     named = f"{best.model.title} (--model {best.candidate})"
     lower = f"with a BIC lower by {plain(own.delta_bic)}"
     if not adequate:
         return (
-            f"None of the {len(tried)} models tried is adequate: the best of them, {named}, "
+            f"None of the {count} models tried is adequate: the best of them, {named}, "
             f"{lower}, leaves more than noise, too."
         )
     if preferred_simpler(tried, chosen):
@@ -331,6 +345,8 @@ class FittedModels:
     """Fit of each by its name, in the same order."""
     adequate: bool = True
     """False if that of the model which BIC prefers is rejected for what it leaves."""
+    spared: tuple[str, ...] = ()
+    """Models that were not fitted: their BIC could not be lower by `WORTH_A_MENTION`."""
 
     @property
     def lead(self) -> float:
@@ -358,10 +374,17 @@ class FittedModels:
             }
             for each in self.tried
         ]
-        said = rows and (not rejected or fits_far_better(self.tried, self.chosen))
-        words = advice(self.tried, self.chosen, adequate=self.adequate) if said else None
+        words = None
+        if rows and (not rejected or fits_far_better(self.tried, self.chosen)):
+            more = len(self.spared)
+            words = advice(self.tried, self.chosen, adequate=self.adequate, spared=more)
         best = preferred(self.tried, self.chosen) if rows and self.adequate else None
-        return {"models": rows, "preferred_model": best, "advice": words}
+        return {
+            "models": rows,
+            "models_spared": [CANDIDATES[name].model.title for name in self.spared],
+            "preferred_model": best,
+            "advice": words,
+        }
 
 
 def vanished(candidate: str, answer: Fit) -> list[str]:

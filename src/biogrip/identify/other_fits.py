@@ -16,10 +16,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
+from biogrip.arrays import Array
 from biogrip.digits import p_value, plain
+from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.nested_fits import (
+    WORTH_A_MENTION,
+    Fits,
     FittedModels,
+    Worth,
+    aic_and_bic,
     fit_models,
     is_within,
     one_branch_more,
@@ -63,6 +69,8 @@ from biogrip.traces.reader import Recording
 _MOST_SAMPLES = 50_000
 # Most terms of the instrument that are fitted along: an offset and a drift.
 _TERMS = 2
+# Accuracy, as a share, of the least misfit of any sample.
+_ROUNDING = 1e-6
 # Each of the others would take half a second to five; they are tried where the config names them.
 _POWER_LAWS = ["fractional_kelvin_voigt", "fractional_maxwell"]
 
@@ -95,21 +103,18 @@ def models_tried(
 ) -> list[FittedModels]:
     """Fit several sample models to each trace, all of the same chosen model and budget.
 
-    Best fits so far are among the starts.
+    Best fits so far are among the starts. Branches are added until a further one does not help. Of
+    the usual models those are spared that cannot suit the trace better than one that is fitted.
     """
-    chosen = traces[0][1].sample.candidate
-    candidates = [_candidates(own[1], fit) for own, fit in zip(traces, fits, strict=True)]
-    every = [FittedModels(chosen) for _ in traces]
-    for names in filter(None, dict.fromkeys(candidates)):
-        which = [index for index, own in enumerate(candidates) if own == names]
-        own = [(traces[index], fits[index], diagnoses[index]) for index in which]
-        found = _tried(own, names)
-        # Branches are added until a further one does not help.
-        while more := {_one_branch_more(*each) for each in zip(own, found, strict=True)} - {None}:
-            names = (*names, *sorted(name for name in more if name))
-            found = _tried(own, names)
-        for index, models in zip(which, found, strict=True):
-            every[index] = models
+    every = [FittedModels(traces[0][1].sample.candidate) for _ in traces]
+    names = [_candidates(own[1], fit) for own, fit in zip(traces, fits, strict=True)]
+    while left := dict.fromkeys(filter(None, names)):
+        for some in left:
+            which = [index for index, own in enumerate(names) if own == some]
+            own = [(traces[index], fits[index], diagnoses[index]) for index in which]
+            for index, each, found in zip(which, own, _tried(own, some), strict=True):
+                more = _one_branch_more(each, found)
+                every[index], names[index] = found, (*some, more) if more else ()
     return every
 
 
@@ -119,9 +124,11 @@ _Own = tuple[Trace, TraceFit, Diagnosis]
 def _one_branch_more(own: _Own, models: FittedModels) -> str | None:
     """Return the model with one branch more than the best one, if it was not tried and may be."""
     (_, experiment), fit, _ = own
-    if not experiment.cheap_models:
+    if not experiment.usual_models:
         return None
     name = one_branch_more(models.tried, adequate=models.adequate)
+    if name in models.spared:
+        return None
     return name if name and len(CANDIDATES[name].model.names) <= _most(experiment, fit) else None
 
 
@@ -141,24 +148,53 @@ def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
         for name in names
     }
     near = {chosen: np.array([diagnosis.likelihood.best for _, _, diagnosis in own])}
-    found = fit_models(problems, first.least_squares, streams, lambda: None, near=near)
+    found = fit_models(problems, first.least_squares, streams, near=near, worth=_worth(own))
     every = []
     for place, ((recording, experiment), fit, diagnosis) in enumerate(own):
-        posed = {name: problems[name][place] for name in names}
-        answers = {name: found[name][place] for name in names}
+        answers = {name: found[name][place] for name in names if place in found[name]}
+        posed = {name: problems[name][place] for name in answers}
         if experiment.fit_start and not experiment.coloured:
             answers = {
                 name: _at_own_onset(recording, experiment, name, posed[name], answer)
                 for name, answer in answers.items()
             }
         misfits = _misfits(diagnosis, posed, answers)
-        tried = ranked(list(names), misfits, fit.problem.residuals.samples)
+        tried = ranked([*answers], misfits, fit.problem.residuals.samples)
         best = preferred(tried, chosen) or chosen
         # What a fit leaves that is not rejected has been looked at.
         adequate = best == chosen and diagnosis.status != REJECTED
         adequate = adequate or _leaves_noise(experiment, posed[best], answers[best])
-        every.append(FittedModels(chosen, tried, answers, adequate))
+        spared = tuple(name for name in names if name not in answers)
+        every.append(FittedModels(chosen, tried, answers, adequate, spared))
     return every
+
+
+def _worth(own: Sequence[_Own]) -> Worth:
+    """Return what tells if a model of so many parameters could have a BIC that is clearly lowest.
+
+    No linear sample fits better than the best of any, see `fit_any_sample`. That is not asked where
+    the config names the models, misfits are weighted or each has a start of its own, nor believed
+    where a model fits better.
+    """
+    least = [
+        None
+        if experiment.fit_start or not experiment.usual_models or _growth(diagnosis) is not None
+        else fit_any_sample(fit.problem.residuals).misfit
+        for (_, experiment), fit, diagnosis in own
+    ]
+
+    def worth(name: str, trace: int, found: Fits) -> bool:
+        (_, experiment), fit, diagnosis = own[trace]
+        chosen, limit = experiment.sample.candidate, least[trace]
+        misfits = {chosen: diagnosis.likelihood.misfit}
+        misfits |= {other: found[other][trace].misfit for other in found if trace in found[other]}
+        if name == chosen or limit is None or limit > min(misfits.values()) * (1 + _ROUNDING):
+            return True
+        sizes = [len(CANDIDATES[each].model.names) for each in (name, *misfits)]
+        bic = aic_and_bic([limit, *misfits.values()], fit.problem.residuals.samples, sizes)[1]
+        return bool(bic[0] < np.min(bic[1:]) - WORTH_A_MENTION)
+
+    return worth
 
 
 def _leaves_noise(experiment: Experiment, problem: TraceProblem, answer: Fit) -> bool:
@@ -173,21 +209,26 @@ def _leaves_noise(experiment: Experiment, problem: TraceProblem, answer: Fit) ->
     return compute_status(examine_residuals(likelihood).notes) != REJECTED
 
 
-def _misfits(
-    diagnosis: Diagnosis, problems: Mapping[str, TraceProblem], answers: Mapping[str, Fit]
-) -> list[float]:
-    """Return misfits of models; in noise that clearly grows those of weighted fits, to first order.
+def _growth(diagnosis: Diagnosis) -> Array | None:
+    """Return the growth of the noise with the response, of each reading, if it clearly grows.
 
     Noise that grows by a rejected fit is its misfit.
     """
-    misfits = [answer.misfit for answer in answers.values()]
     residuals, best = diagnosis.likelihood.problem.residuals, diagnosis.likelihood.best
     if diagnosis.status == REJECTED:
-        return misfits
+        return None
     growth = compute_growth(
         residuals.left(best), residuals.response(best), residuals.trace.rounding
     )
-    if compare_extremes(growth) <= CLEARLY:
+    return growth if compare_extremes(growth) > CLEARLY else None
+
+
+def _misfits(
+    diagnosis: Diagnosis, problems: Mapping[str, TraceProblem], answers: Mapping[str, Fit]
+) -> list[float]:
+    """Return misfits of models; in noise that clearly grows of weighted fits, to first order."""
+    misfits = [answer.misfit for answer in answers.values()]
+    if (growth := _growth(diagnosis)) is None:
         return misfits
     for place, (name, problem) in enumerate(problems.items()):
         left, slopes = problem.residuals(within_range(answers[name].parameters, problem))
@@ -227,7 +268,7 @@ def _candidates(experiment: Experiment, fit: TraceFit) -> tuple[str, ...]:
     shortest_s, longest_s = experiment.torque.spread_s(residuals.trace.time_s)
     few = residuals.samples <= _MOST_SAMPLES and longest_s <= LONGEST_S * experiment.unit_s
     few &= shortest_s >= SHORTEST_S * experiment.unit_s
-    if few and experiment.cheap_models:
+    if few and experiment.usual_models:
         every |= dict.fromkeys(_POWER_LAWS)
     most = _most(experiment, fit)
     found = tuple(it for it in every if len(CANDIDATES[it].model.names) <= most or it == chosen)

@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import chdtri, stdtrit
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array, IntArray, parts
 from biogrip.digits import instant, plain
 from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
@@ -43,6 +43,8 @@ _LAGS_A_DECADE = 2
 _DELAYS = 65
 # Most readings that an estimate takes of the whole trace, and as many of what the grid spans.
 _MOST_READINGS = 2000
+# Numbers formed together, which should fit a processor's cache.
+_NUMBERS_AT_ONCE = 400_000
 # Least share of the protocol that has to be after the onset.
 _LEAST_AFTER = 0.02
 # Readings after the latest onset, beside one for each parameter.
@@ -76,12 +78,18 @@ def _estimate(
     """Return the onset, and the mean square that is left."""
     torque, last = problem.torque, len(time_s) - 1
     shortest = float(np.min(np.diff(time_s)))
-    responses = lag_course(torque, spread_lags(torque, time_s, _LAGS_A_DECADE))
+    lags = spread_lags(torque, time_s, _LAGS_A_DECADE)
+    responses = lag_course(torque, lags)
 
-    def square_sum(onset_s: float, some: IntArray) -> float:
+    def square_sums(onsets_s: Array, some: IntArray) -> list[float]:
         nuisance = nuisance_basis(time_s[some], offset=offset, drift=problem.drift)
-        own = without(nuisance, responses(time_s[some] - onset_s))
-        return fit_responses(without(nuisance, readings[some]), own)[1]
+        trace, sums = without(nuisance, readings[some]), list[float]()
+        for few in parts(len(onsets_s), max(1, _NUMBERS_AT_ONCE // (len(lags) * len(some)))):
+            # All at once: one call costs more than its numbers.
+            every, place = np.unique(time_s[some] - onsets_s[few, None], return_inverse=True)
+            shown, place = responses(every), place.reshape(-1, len(some))
+            sums += [fit_responses(trace, without(nuisance, shown[:, own]))[1] for own in place]
+        return sums
 
     # A reading at the very onset precedes it: the first one, too, may follow it.
     low = min(time_s[0], max(2 * time_s[0] - time_s[1], time_s[-1] - torque.end_s))
@@ -91,12 +99,11 @@ def _estimate(
         spanned = np.clip(np.searchsorted(time_s, [low, high]) - [1, 0], 0, last)
         ends = np.linspace([0, spanned[0]], [last, spanned[1]], _MOST_READINGS)
         some = np.unique(ends.astype(np.int64))
-        sums = [square_sum(onset, some) for onset in onsets]
-        best = int(np.argmin(sums))
+        best = int(np.argmin(square_sums(onsets, some)))
         low, high = onsets[max(best - 1, 0)], onsets[min(best + 1, _DELAYS - 1)]
         if high - low < shortest:
             every = np.unique(np.linspace(0, last, _MOST_READINGS).astype(np.int64))
-            return float(onsets[best]), square_sum(float(onsets[best]), every) / len(every)
+            return float(onsets[best]), square_sums(onsets[[best]], every)[0] / len(every)
 
 
 def begins_constant(time_s: Array, readings: Array, onset_s: float | None = None) -> bool:

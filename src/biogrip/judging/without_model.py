@@ -201,8 +201,7 @@ def tell_without_model(
     times_s = at_s or decades(*fit.lags.covered_s)
     quantities = (each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds)
     told = [_told(fit, each, root) for each in quantities]
-    misfit = fit.sd * math.sqrt(free / residuals.samples)
-    return WithoutModel(told, misfit, times, is_linear, fit.lags.covered_s)
+    return WithoutModel(told, fit.misfit, times, is_linear, fit.lags.covered_s)
 
 
 def _root(confidence: float, freedom: float, sd: float, more: int) -> float:

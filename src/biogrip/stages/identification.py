@@ -156,7 +156,7 @@ def fit(
             sizes = len(models[name].names), len(recorded.time_s)
             rows[name] += [
                 (case.name, name, seed, *sizes, f"{answer.misfit:.8e}")
-                for seed, answer in zip(group, answers, strict=True)
+                for seed, answer in zip(group, answers.values(), strict=True)
             ]
     MODEL_FITS.write(fits, (row for of_model in rows.values() for row in of_model))
 

@@ -237,7 +237,7 @@ class Case:
             judged,
             start_given=known or measured.start_s is not None,
             models=models,
-            cheap_models=[*models] == default,
+            usual_models=[*models] == default,
         )
 
     @property
