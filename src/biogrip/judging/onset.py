@@ -16,7 +16,7 @@ cent. Linear approximations fail at the kinks.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -24,7 +24,7 @@ from scipy.special import chdtri, stdtrit
 
 from biogrip.arrays import Array, IntArray, parts
 from biogrip.digits import instant, plain
-from biogrip.fit.any_sample import fit_responses, spread_lags
+from biogrip.fit.any_sample import fit_any_sample, fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import TraceProblem, silent
@@ -246,6 +246,8 @@ _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
 _FIRST_STEP, _MOST = 1 / 64, 0.25
 # Start that is earlier by so much of an interval, for differences.
 _EARLIER = 0.1
+# Share of what a start has to gain that any sample has to where it was guessed.
+_MOSTLY = 0.5
 # Accuracy of an end of the onset's interval, as a share of its distance.
 _ACCURACY = 0.01
 
@@ -286,9 +288,14 @@ def notes_on_start(
 def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> Iterator[Note]:
     """Yield a note if a trace is constant up to an onset, with which it fits far better."""
     trace, noise_sd = (fits.time_s, fits.readings), fits.experiment.noise_sd
-    found, given = fits.best(guess_s), fits.at(0.0, diagnosis.likelihood.best)
-    fall = compute_fall(len(trace[0]), given.misfit, found.misfit, noise_sd)
-    if fall < chdtri(1, levels.SURELY) or not begins_constant(*trace, found.onset_s):
+    given, needed = fits.at(0.0, diagnosis.likelihood.best), chdtri(1, levels.SURELY)
+    fall_to = partial(compute_fall, len(trace[0]), given.misfit, noise_sd=noise_sd)
+    # Fitted along, a start cannot gain more than any sample, but for what moving it a little does.
+    if fall_to(fit_any_sample(fits.posed(guess_s).residuals).misfit) < _MOSTLY * needed:
+        return
+    found = fits.best(guess_s)
+    fall = fall_to(found.misfit)
+    if fall < needed or not begins_constant(*trace, found.onset_s):
         return
     fit = fits.posed(found.onset_s), found.log_parameters, found.misfit
     likelihood = make_likelihood(*fit, confidence=diagnosis.likelihood.confidence)
