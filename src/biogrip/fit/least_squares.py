@@ -158,7 +158,9 @@ class LocalFits:
             normal = self.normal(x, trace[fit])
             return normal if constraint is None else constraint.added(normal, x, fit)
 
-        return minimize(objective, starts, low, high, tolerance, constraint)
+        # Fair fits tell basins: relative damping leads into more of them.
+        even = constraint is not None and tolerance < FAIR
+        return minimize(objective, starts, low, high, tolerance, constraint, even=even)
 
 
 FINISHED = 4
@@ -447,7 +449,7 @@ class _State:
 def _newton_step(low: Array, high: Array, normal: Normal, x: Array, damping: Array) -> Array:
     below = np.maximum(low - x, -_LONGEST_STEP)
     above = np.minimum(high - x, _LONGEST_STEP)
-    return bounded_step(normal, damping, below, above)
+    return bounded_step(normal, damping[:, None], below, above)
 
 
 def _convex(fits: LocalFits, x: Array, trace: IntArray) -> Normal:

@@ -5,6 +5,10 @@ step stays within the bounds and within a box about its origin: parameters that 
 fixed at the edge, and the others are solved for again. No sum runs over problems, nor in an order
 that depends on their number: no result depends, to the last bit, on the other problems.
 
+Damping is relative to the diagonal of the information [2]_ or, if it is `even`, the same for all
+parameters [1]_. Even, it shortens steps along a curved valley, while well determined parameters
+adapt freely; relative, it would hold these, and so be far slower there.
+
 Points are rounded to a grid far finer than the statistical uncertainty. Processors differ in the
 last bits of a step, and a descent along a valley would amplify these until decisions differ. On the
 grid, every step begins with the same bits on all processors.
@@ -123,12 +127,15 @@ def minimize(
     constraint: Constraint | None = None,
     damping: float = 1e-2,
     most_steps: int = _MOST_STEPS,
+    *,
+    even: bool = False,
 ) -> Minima:
     """Minimize the sum of squares of every problem from its start.
 
     Starts and bounds, (n, n_parameters), are logarithms; equal bounds fix a parameter. A problem
     has converged when the actual and the predicted relative decrease of its sum are below the
-    tolerance. The initial damping is relative to the diagonal of the information.
+    tolerance. The initial damping is relative to the diagonal of the information or, if it is
+    even, in units of the sum of squares.
     """
     everyone, count = np.arange(len(starts)), len(starts)
     never = np.full(count, np.inf), np.ones(count, dtype=np.int64), np.zeros(count, dtype=bool)
@@ -137,7 +144,7 @@ def minimize(
     state = _State(everyone, starts, low, high, normal, np.full(count, damping), growth)
     for _ in range(most_steps):
         minima.evaluations[state.problem] += 1
-        done = _advance(state, objective, constraint, tolerance)
+        done = _advance(state, objective, constraint, tolerance, even=even)
         if np.any(done):
             minima.converged[state.problem[done]] = True
             _leave(state[done], minima)
@@ -149,7 +156,12 @@ def minimize(
 
 
 def _advance(
-    state: _State, objective: Objective, constraint: Constraint | None, tolerance: float
+    state: _State,
+    objective: Objective,
+    constraint: Constraint | None,
+    tolerance: float,
+    *,
+    even: bool,
 ) -> BoolArray:
     """Try a step in every problem, keep those that decrease it, return which have converged."""
     x, problem, normal = state.x, state.problem, state.normal
@@ -158,7 +170,10 @@ def _advance(
         reduced, basic = constraint.eliminated(normal, x, problem)
     below = np.where(basic, 0.0, np.maximum(state.low - x, -_LONGEST_STEP))
     above = np.where(basic, 0.0, np.minimum(state.high - x, _LONGEST_STEP))
-    step = bounded_step(reduced, state.damping, below, above)
+    damping = state.damping[:, None]
+    if even:
+        damping = damping / _size(reduced)
+    step = bounded_step(reduced, damping, below, above)
     # Valleys are straight in the logarithms or, where a sum is determined, in the parameters.
     straight = np.where(state.growth[:, None] > 2, np.log1p(np.maximum(step, -0.9)), step)
     tried, possible = _on_grid(x + straight, state), np.ones(len(x), dtype=bool)
@@ -183,22 +198,27 @@ def _advance(
 
 def _on_grid(x: Array, state: _State) -> Array:
     """Round points to the grid of each problem, except parameters at a bound."""
-    diagonal = np.arange(x.shape[1])
-    size = np.abs(state.normal.information[:, diagonal, diagonal]) + _SMALLEST
     # A power of two, so that points of a coarser grid are points of a finer one.
-    spacing = np.ldexp(1.0, np.frexp(_SPACING / np.sqrt(size))[1])
+    spacing = np.ldexp(1.0, np.frexp(_SPACING / np.sqrt(_size(state.normal)))[1])
     spacing = np.minimum(spacing, _WIDEST)
     inside = (x > state.low) & (x < state.high)
     rounded = np.where(inside, np.rint(x / spacing) * spacing, x)
     return np.minimum(np.maximum(rounded, state.low), state.high)
 
 
+def _size(normal: Normal) -> Array:
+    """Return the diagonal of the information, (n, n_parameters), never zero."""
+    diagonal = np.arange(normal.information.shape[1])
+    size: Array = np.abs(normal.information[:, diagonal, diagonal]) + _SMALLEST
+    return size
+
+
 def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> Array:
     """Compute damped Gauss-Newton steps within a box, (n, n_parameters).
 
-    The damping, (n,), is relative to the diagonal of the information, 0 for plain Gauss-Newton.
-    The box has the smallest and largest change of each parameter, (n, n_parameters), with zero
-    between them.
+    The damping, (n, 1) or (n, n_parameters), is relative to the diagonal of the information, 0 for
+    plain Gauss-Newton. The box has the smallest and largest change of each parameter, (n,
+    n_parameters), with zero between them.
     """
     gradient, information = normal.gradient, normal.information
     fixed = ((below >= 0) & (gradient > 0)) | ((above <= 0) & (gradient < 0))
@@ -224,7 +244,7 @@ def _free_step(gradient: Array, information: Array, damping: Array, fixed: BoolA
     size = np.abs(information[:, diagonal, diagonal]) + _SMALLEST
     scale = np.where(fixed, 0.0, 1 / np.sqrt(size))
     matrix = information * (scale[:, :, None] * scale[:, None, :])
-    matrix[:, diagonal, diagonal] = np.where(fixed, 1.0, 1.0 + damping[:, None])
+    matrix[:, diagonal, diagonal] = np.where(fixed, 1.0, 1.0 + damping)
     return -scale * _solved(matrix, scale * gradient)
 
 
