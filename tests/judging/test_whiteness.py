@@ -194,8 +194,8 @@ def test_of_white_noise_both_tests_fail_as_often_as_they_say(readings: int, deca
     steps = whiteness.steps_of(basis, np.asarray)
     noise = np.random.default_rng(readings + decades).standard_normal((2000, readings))
     left = noise - noise @ basis.T @ basis
-    share = (left @ steps.shapes.T / steps.norms) ** 2 / np.sum(left**2, axis=1)[:, None]
-    of_steps = [steps.chance(own) for own in np.max(share, axis=1).tolist()]
+    most = [np.max(steps.along(own) ** 2) / np.sum(own**2) for own in left]
+    of_steps = [steps.chance(float(own)) for own in most]
     chances = np.array(
         [of_steps, [whiteness.compare_halves(own, basis, readings // 2) for own in left]]
     )

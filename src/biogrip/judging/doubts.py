@@ -321,7 +321,9 @@ def _about_changes(
     trace = residuals.trace
     if residuals.course.sweeps:
         return [] if coloured else list(about_moduli(residuals, residual, basis, growth))
-    step = find_step(residual, basis, lambda rows: trace.condensed.cleared(rows) / growth)
+    cleared = trace.condensed.cleared
+    weighted = (lambda rows: cleared(rows) / growth) if np.ptp(growth) else cleared
+    step = find_step(residual, basis, weighted)
     if step and step.chance < levels.FALSE_ALARM and not (coloured and _is_coloured(step)):
         before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
         size = plain(-step.size, 2)

@@ -93,7 +93,7 @@ def _told(left: Array, basis: Array, steps: Steps, split: int) -> float:
     """Return an error, (n_samples,) in noise, over the size that the most sensitive test misses."""
     from scipy.special import chdtri
 
-    scanned = np.abs(steps.shapes @ left) / steps.norms
+    scanned = np.abs(steps.along(left))
     found = [float(np.max(scanned, initial=0.0)) / steps.critical(levels.FALSE_ALARM)]
     for rows in (parts_apart(basis, split), averaged(basis)):
         if len(rows):

@@ -272,12 +272,23 @@ class Steps:
 
     before: IntArray
     """Index of the first reading after each, (n_steps,)."""
-    shapes: Array
-    """Each without what the fit absorbs, (n_steps, n_samples)."""
+    whole: Array
+    """What each shows in residuals, (n_steps, n_samples)."""
+    basis: Array
+    """What the fit absorbs, (n_directions, n_samples)."""
     norms: Array
-    """Norms of the shapes, (n_steps,)."""
-    freedom: int
-    """Degrees of freedom of what the fit leaves."""
+    """Norms of what it leaves of each, (n_steps,)."""
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of what the fit leaves."""
+        return self.basis.shape[1] - len(self.basis)
+
+    def along(self, residual: Array) -> Array:
+        """Return the part of residuals, (n_samples,), along each step without what is absorbed."""
+        # No matrix of what is left of all steps is formed, which takes most of the time.
+        found: Array = self.whole @ without(self.basis, residual) / self.norms
+        return found
 
     def chance(self, share: float) -> float:
         """Return the chance that white noise has such a share of its squares in one of them."""
@@ -292,7 +303,9 @@ class Steps:
     @cached_property
     def _change(self) -> Array:
         """One minus the correlation of each with the next, (n_steps - 1,)."""
-        products = np.einsum("ij,ij->i", self.shapes[:-1], self.shapes[1:])
+        absorbed_of = self.whole @ self.basis.T
+        products = np.einsum("ij,ij->i", self.whole[:-1], self.whole[1:])
+        products -= np.einsum("ij,ij->i", absorbed_of[:-1], absorbed_of[1:])
         return np.clip(1 - products / (self.norms[:-1] * self.norms[1:]), 0.0, 1.0)
 
     def critical(self, level: float) -> float:
@@ -337,12 +350,15 @@ def steps_of(basis: Array, cleared: Callable[[Array], Array]) -> Steps:
     count = min(samples - 1, max(_AT_ONCE // samples, 1))
     before = np.unique(np.linspace(1, samples - 1, count).astype(np.int64))
     whole = cleared((np.arange(samples) >= before[:, None]).astype(float))
-    shapes = without(basis, whole)
-    square, of_whole = (np.einsum("ij,ij->i", rows, rows) for rows in (shapes, whole))
+    of_whole = np.einsum("ij,ij->i", whole, whole)
+    square = of_whole - np.sum((whole @ basis.T) ** 2, axis=1)
     # The step back is the same step if a constant is absorbed.
-    back = np.einsum("ij,ij->i", *[cleared(np.ones((1, samples))) - whole] * 2)
+    (constant,) = cleared(np.ones((1, samples)))
+    back = of_whole - 2 * (whole @ constant) + constant @ constant
     told = square > levels.TOLD * np.minimum(of_whole, back)
-    return Steps(before[told], shapes[told], np.sqrt(square[told]), samples - len(basis))
+    if not np.all(told):
+        before, whole, square = before[told], whole[told], square[told]
+    return Steps(before, whole, basis, np.sqrt(square))
 
 
 def find_step(residual: Array, basis: Array, cleared: Callable[[Array], Array]) -> Step | None:
@@ -350,9 +366,10 @@ def find_step(residual: Array, basis: Array, cleared: Callable[[Array], Array]) 
     steps = steps_of(basis, cleared)
     if not len(steps.before) or steps.freedom < 2:
         return None
-    along = steps.shapes @ residual / steps.norms
+    along = steps.along(residual)
     found = int(np.argmax(np.abs(along)))
-    size, direction = float(along[found]), steps.shapes[found] / steps.norms[found]
+    size = float(along[found])
+    direction = without(basis, steps.whole[found]) / steps.norms[found]
     return Step(
         int(steps.before[found]),
         size / float(steps.norms[found]),
