@@ -36,6 +36,8 @@ chi^2 of some thousand readings to 0.01, and the optimum: far above rounding err
 
 # Step of the differences of exact first derivatives that give second derivatives of residuals.
 _APART = 1e-4
+# Most steps of fair fits with a quantity held.
+_FEW_STEPS = 40
 # Most numbers in the rows that are formed at once.
 _AT_ONCE = 1_000_000
 
@@ -158,9 +160,13 @@ class LocalFits:
             normal = self.normal(x, trace[fit])
             return normal if constraint is None else constraint.added(normal, x, fit)
 
-        # Fair fits tell basins: relative damping leads into more of them.
-        even = constraint is not None and tolerance < FAIR
-        return minimize(objective, starts, low, high, tolerance, constraint, even=even)
+        if constraint is None:
+            return minimize(objective, starts, low, high, tolerance)
+        # Fair fits tell basins, into more of which relative damping leads; closer ones go on.
+        given = objective, starts, low, high, tolerance, constraint
+        if tolerance >= FAIR:
+            return minimize(*given, most_steps=_FEW_STEPS)
+        return minimize(*given, even=True)
 
 
 FINISHED = 4
