@@ -42,8 +42,6 @@ _TO_SERIES = np.linalg.inv(legendre.legvander(_PLACES, _DEGREE))
 _FEWEST_READINGS, _LARGEST_CONDITION = 256, 100.0
 # Readings whose polynomials are formed at once.
 _READINGS_AT_ONCE = 16_384
-# Most readings whose polynomials are kept for the next trace.
-_MOST_READINGS_KEPT = 100_000
 # Most nodes of which orthonormal functions are kept for the next trace.
 _MOST_NODES_KEPT = 20_000
 
@@ -69,7 +67,6 @@ class DenseSamples:
 
     def __init__(self, course: Course, time_s: Array, *, dense: bool = True) -> None:
         self._all_s = time_s
-        self._kept: dict[tuple[int, int], list[tuple[slice, Array]]] = {}
         starts = course.changes_s
         self._starts_s = np.append(-np.inf, starts)
         bounds = np.unique(np.concatenate(([0], time_s.searchsorted(starts), [len(time_s)])))
@@ -131,13 +128,6 @@ class DenseSamples:
 
     def _blocks(self, first: int, stop: int) -> Iterator[tuple[slice, Array]]:
         """Yield Legendre polynomials at a piece's readings, (n_samples, n_nodes), by blocks."""
-        if len(self._all_s) > _MOST_READINGS_KEPT:
-            return self._formed(first, stop)
-        if (first, stop) not in self._kept:
-            self._kept[first, stop] = list(self._formed(first, stop))
-        return iter(self._kept[first, stop])
-
-    def _formed(self, first: int, stop: int) -> Iterator[tuple[slice, Array]]:
         start, end = self._all_s[first], self._all_s[stop - 1]
         for here in range(first, stop, _READINGS_AT_ONCE):
             block = slice(here, min(here + _READINGS_AT_ONCE, stop))
