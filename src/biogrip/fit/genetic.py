@@ -24,7 +24,7 @@ from biogrip.digits import counted
 from biogrip.fit.genome import Chromosomes, Genome
 from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block, Complaint
-from biogrip.physics.misfit import combine_misfits, make_misfit
+from biogrip.physics.misfit import make_misfits
 
 _MOST = 1_000_000
 
@@ -100,7 +100,7 @@ def evolve(
 
     They are parameters, best first, (n_survivors, n_parameters).
     """
-    misfits = combine_misfits([make_misfit(problem.residuals) for problem in problems])
+    misfits = make_misfits([problem.residuals for problem in problems])
     genome = problems[0].genome
 
     def ranked(chromosomes: Chromosomes, populations: IntArray) -> Ranking:
