@@ -163,7 +163,7 @@ def diagnose_all(
 
     def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
         every = compute_findings(likelihoods, parameters_and_sum(model))
-        trades = find_trade_offs(likelihoods, model, every)
+        trades = [find_trade_offs(*pair, model) for pair in zip(likelihoods, every, strict=True)]
         found = list(map(profiled, likelihoods, every, trades))
         return [_with_valley(each, model) for each in found] if valley else found
 
