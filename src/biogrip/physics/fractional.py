@@ -81,18 +81,8 @@ BRANCH_RATES_PER_S: Array = np.concatenate(
 """Rates at which the branches of every springpot relax, ascending."""
 
 
-def _interpolation(places: Array) -> Array:
-    """Return ascending coefficients of the Lagrange polynomials of some places."""
-    rows = np.zeros((len(places), len(places)))
-    rows[:, 0] = 1.0
-    for row, place in zip(rows, places, strict=True):
-        for other in places[places != place]:
-            row[:] = (np.append(0.0, row[:-1]) - other * row) / (place - other)
-    return rows
-
-
-_TO_WEIGHTS = _interpolation(_PLACES)
-
+# Ascending coefficients of the Lagrange polynomials of the places.
+_TO_WEIGHTS = np.linalg.inv(np.vander(_PLACES, increasing=True)).T
 
 _LEAST_EXPONENT = 2.0**-44
 # Spring of a branch that equal ladders in series do not have, in N/m: no response shows it.
