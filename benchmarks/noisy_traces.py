@@ -84,7 +84,7 @@ class NoisyTrace:
 def noisy_trace(seed: int = 0) -> NoisyTrace:
     """Return the cell's trace with the noise of a seed."""
     steps, time_s, clean = _clean()
-    trace_rad = add_noise(clean, case().noise, np.random.default_rng(seed), time_s)
+    trace_rad = add_noise(clean, case().noise, np.random.default_rng(seed))
     model, genetic = case().sample.model, case().block.genetic_algorithm
     return NoisyTrace(
         case().gripper,

@@ -48,7 +48,7 @@ def pose_noisy(
     times: Array, trace: Array, n: int, model: SampleModel = MODEL, level: float = 0.1, **own: Any
 ) -> list[TraceProblem]:
     noise = Noise("gaussian", level, "peak")
-    traces = [add_noise(trace, noise, np.random.default_rng([seed, 7]), times) for seed in range(n)]
+    traces = [add_noise(trace, noise, np.random.default_rng([seed, 7])) for seed in range(n)]
     return replace(EXPERIMENT, ranges=STUDY.ranges, **own).of_each(times, traces, model)
 
 

@@ -122,7 +122,7 @@ def test_free_motion_is_the_exponential_of_its_matrix(damping: float) -> None:
 def noisy(arm: Arm, level: float, seed: int, time_s: Array = TIME_S) -> calibration.FreeMotion:
     motion = calibration.free_motion(arm, time_s, *CAUSES)
     rng, noise = np.random.default_rng(seed), Noise("gaussian", level, "peak")
-    both = (add_noise(clean, noise, rng, time_s) for clean in (motion.step, motion.impulse))
+    both = (add_noise(clean, noise, rng) for clean in (motion.step, motion.impulse))
     return calibration.FreeMotion(time_s, *both)
 
 

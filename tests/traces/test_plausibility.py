@@ -69,7 +69,7 @@ def test_the_papers_traces_pass_and_not_in_a_wrong_unit_or_mirrored(
 ) -> None:
     times = sample_times(400.0, rate_Hz)
     noise = Noise("gaussian", level, "peak")
-    noisy = add_noise(trace(SAMPLES[sample], times), noise, np.random.default_rng(7), times)
+    noisy = add_noise(trace(SAMPLES[sample], times), noise, np.random.default_rng(7))
     assert said(times, noisy) == ""
     assert said(times, -noisy).startswith(
         f"trace.csv, lines 2 to {len(times) + 1}, column 'rotation_rad': {MIRRORED}, allowed is "

@@ -199,8 +199,7 @@ def judge_free_arm(results: Results, evidence: str) -> list[Judged]:
     motion = free_motion(arm, time_s, *causes)
     noise = Noise("gaussian", test.noise_level, "peak")
     rng = stream(results.study.study_seed, "claims", 0, "calibration")
-    both = motion.step, motion.impulse
-    step, impulse = (add_noise(each, noise, rng, time_s) for each in both)
+    step, impulse = (add_noise(each, noise, rng) for each in (motion.step, motion.impulse))
     found = calibrate(FreeMotion(time_s, step, impulse), *causes).arm
     errors = [100 * abs(getattr(found, key) / getattr(arm, key) - 1) for key in ARM_KEYS]
     verdict = REPLICATED if max(errors) <= 100 * CLOSE else NOT

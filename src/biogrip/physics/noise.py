@@ -127,8 +127,14 @@ class Noise(Block):
         return not (self.level if self.level_rad is None else self.level_rad)
 
 
-def add_noise(readings: Array, noise: Noise, rng: np.random.Generator, time_s: Array) -> Array:
-    """Return a noisy copy of a trace with ascending sampling times, (n_samples,) each."""
+def add_noise(
+    readings: Array, noise: Noise, rng: np.random.Generator, time_s: Array | None = None
+) -> Array:
+    """Return a noisy copy of a trace, (n_samples,).
+
+    Ascending sampling times, (n_samples,), are by default a second apart.
+    """
+    time_s = np.arange(len(readings), dtype=float) if time_s is None else time_s
     shares = [part.share for part in (noise.ar1, noise.flicker) if part is not None]
     unit = np.sqrt(max(0.0, 1 - sum(shares))) * KINDS[noise.kind](rng, len(readings))
     if noise.ar1 is not None:

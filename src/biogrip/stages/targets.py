@@ -109,8 +109,8 @@ def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
         rng = stream(case.study.study_seed, case.name, 0, f"calibration {name}")
         record = FreeMotion(
             time_s,
-            add_noise(motion.step, noise, rng, time_s),
-            add_noise(motion.impulse, noise, rng, time_s),
+            add_noise(motion.step, noise, rng),
+            add_noise(motion.impulse, noise, rng),
         )
         columns |= {f"{name}_step_rad": record.step, f"{name}_impulse_rad": record.impulse}
         found[name] = calibrate(record, *causes)
