@@ -12,6 +12,7 @@ from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.problem import TraceProblem, make_problem
 from biogrip.physics.condensed import Condensed, SweptRows
+from biogrip.physics.fractional import LONGEST_S, on_clock
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
@@ -23,7 +24,7 @@ from biogrip.physics.noise import (
     stream,
     with_uncertain,
 )
-from biogrip.physics.protocol import SWEEP, Course, Phase, join_phases
+from biogrip.physics.protocol import SWEEP, Course, Phase, follow_rows, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
 
@@ -101,9 +102,6 @@ class Experiment:
         if self.instrument.sweeps:
             return SWEEP
         if self.record is not None:
-            # Imported here: few experiments have a record.
-            from biogrip.physics.protocol import follow_rows
-
             return follow_rows(*self.record.T, deforms=self.instrument.deforms)
         return join_phases(self.phases, deforms=self.instrument.deforms)
 
@@ -120,17 +118,12 @@ class Experiment:
     @property
     def unit_s(self) -> float:
         """Unit of time in which power laws hold as long as the protocol lasts."""
-        # Imported here: few experiments have a power law.
-        from biogrip.physics.fractional import LONGEST_S
-
         lasts = 1.0 if self.instrument.sweeps else sum(phase.duration_s for phase in self.phases)
         return lasts if lasts < _SHORT_S else max(lasts / LONGEST_S, 1.0)
 
     def _on_clock(self, model: SampleModel) -> SampleModel:
         if not model.power_law or self.unit_s == 1:
             return model
-        from biogrip.physics.fractional import on_clock
-
         return on_clock(model, self.unit_s)
 
     def to_identify(self, *others: SampleModel) -> "Experiment":
