@@ -232,5 +232,5 @@ def _radau() -> tuple[Array, Array]:
 
 def _polynomials(points: Array, x: Array) -> Array:
     """Evaluate the Lagrange polynomials of points at x, (n_points, n)."""
-    powers = (np.vander(of, len(points)).T for of in (points, x))
-    return np.linalg.solve(*powers)
+    of_points, of_x = (np.vander(of, len(points)).T for of in (points, x))
+    return np.asarray(np.linalg.solve(of_points, of_x), np.float64)
