@@ -219,20 +219,10 @@ def _power_sums(traces: Array, first_samples: IntArray, rates: Array) -> Array:
     within = np.exp(rates[:, None] * np.arange(block))
     across = np.exp(rates[:, None] * (block * np.arange(-(-longest // block))))
     sums = []
-    for trace in traces:
-        folded, columns, start = [], [], 0
-        for piece in np.split(trace, first_samples[1:]):
-            count = -(-len(piece) // block)
-            padded = np.zeros(block * count)
-            padded[: len(piece)] = piece
-            folded.append(padded.reshape(count, block).T)
-            columns.append((start, start + count))
-            start += count
-        rows = within @ np.ascontiguousarray(np.concatenate(folded, axis=1))
-        sums.append(
-            [
-                np.einsum("mr,mr->m", rows[:, start:stop], across[:, : stop - start])
-                for start, stop in columns
-            ]
-        )
-    return np.array(sums)
+    for pieces in np.split(traces, first_samples[1:], axis=1):
+        count = -(-pieces.shape[1] // block)
+        padded = np.pad(pieces, ((0, 0), (0, block * count - pieces.shape[1])))
+        # One product per trace: the order of its sums does not depend on their number.
+        rows = padded.reshape(len(traces), count, block) @ within.T
+        sums.append(np.sum(rows * across.T[:count], axis=1))
+    return np.stack(sums, axis=1)
