@@ -251,14 +251,15 @@ class Experiment:
         `with_uncertain`; noise may grow with a rotation, see `Whitening`: (n_functions, n_samples)
         and (n_samples,).
         """
-        nuisance, whitening = self.nuisance(time_s), None
+        nuisance = self.nuisance(time_s)
+        rows = SweptRows if self.torque.sweeps else Condensed
+        given = self.torque, self.torque.snapped(time_s)
         if noise_model is None and self.sd is not None:
             noise_model, growing = WEIGHTED, self.sd
-        if noise_model is not None:
-            whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
-        basis = with_uncertain(nuisance, uncertain)
-        rows = SweptRows if self.torque.sweeps else Condensed
-        return rows(self.torque, self.torque.snapped(time_s), basis, whitening)
+        if noise_model is None:
+            return rows(*given, with_uncertain(nuisance, uncertain))
+        whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
+        return rows(*given, nuisance[:0], whitening)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""

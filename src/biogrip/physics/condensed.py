@@ -127,7 +127,7 @@ class Condensed:
     all_s: Array
     """Ascending sampling times, (n_samples,)."""
     functions: Array
-    """Functions projected out, (n_functions, n_samples), if noise is white (`with_uncertain`)."""
+    """Functions projected out, (n_functions, n_samples), but by whitening (`with_uncertain`)."""
     whitening: Whitening | None = None
     """Transformation that whitens noise and projects nuisance out; None for white noise."""
 
@@ -160,7 +160,7 @@ class Condensed:
     @cached_property
     def of_modes(self) -> ModeRows:
         """Function from modes of many samples to rows of their responses."""
-        (_, triangle), first = self._factors, len(self._projected)
+        (_, triangle), first = self._factors, len(self.functions)
         return ModeRows(self._modes, without(triangle[:, :first].T, triangle[:, first:].T))
 
     @cached_property
@@ -179,11 +179,6 @@ class Condensed:
         return SpanningModes(end_s, shortest_s, orders, deforms=self.course.deforms)
 
     @property
-    def _projected(self) -> Array:
-        """Functions that whitening does not project out, (n_functions, n_samples)."""
-        return self.functions if self.whitening is None else self.functions[:0]
-
-    @property
     def _in_parts(self) -> bool:
         """True if there are too many nodes to keep functions of them."""
         return self.whitening is None and len(self._dense.time_s) > _MOST_NODES_KEPT
@@ -199,18 +194,18 @@ class Condensed:
         responses = dense.rows_of_values(responses)
         if self.whitening is not None:
             responses = self.whitening(responses)
-        others = [dense.rows_of_samples(function)[0] for function in self._projected]
+        others = [dense.rows_of_samples(function)[0] for function in self.functions]
         orthonormal, triangle = np.linalg.qr(np.vstack((*others, responses)).T)
         return orthonormal, np.pad(triangle, ((0, 1), (0, 0)))
 
     def _triangle(self, readings: Array) -> Array:
         """Return R of functions, modes and readings in columns, part by part, (n_rows, n_rows)."""
         rates, scale = self._modes.rates[None], self._modes.scale[:, None]
-        triangle = np.zeros((len(self._projected) + len(scale) + 1,) * 2)
+        triangle = np.zeros((len(self.functions) + len(scale) + 1,) * 2)
         before = slice(int(self.all_s.searchsorted(self.course.time_s[0], side="right")))
         later = responses_in_turn(rates, self.course, self.all_s, slopes=False)
         for here, found in chain([(before, np.zeros((1, 1, len(scale), before.stop)))], later):
-            more = np.vstack((self._projected[:, here], scale * found[0, 0], readings[here])).T
+            more = np.vstack((self.functions[:, here], scale * found[0, 0], readings[here])).T
             triangle = np.asarray(np.linalg.qr(np.concatenate((triangle, more)), mode="r"))
             triangle *= np.where(np.diagonal(triangle) < 0, -1.0, 1.0)[:, None]
         return triangle
