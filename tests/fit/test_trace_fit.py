@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.fit import trace_fit
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_from
 from biogrip.fit.noise_model_fit import FAR
 from biogrip.fit.problem import Fit, TraceProblem
-from biogrip.fit.trace_fit import TraceFit, _alike, fit_traces, gripper_functions
+from biogrip.fit.trace_fit import TraceFit, _alike, gripper_functions
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, NoiseModel, Outliers, add_noise
 from biogrip.physics.simulation import simulated_response
@@ -38,7 +39,11 @@ def find(problem: TraceProblem) -> Fit:
 
 
 def fitted(experiment: Experiment, trace: Array, times: Array = TIMES) -> TraceFit:
-    (fit,) = fit_traces([experiment], [(times, trace)], lambda some, _: list(map(find, some)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(trace_fit, "identify_many", lambda some, *_: list(map(find, some)))
+        patch.setattr(trace_fit, "deepen", lambda _, found: found)
+        given = [experiment], [(times, trace)], [np.random.default_rng(0)]
+        (fit,) = trace_fit.fit_least_squares(*given)
     return fit
 
 

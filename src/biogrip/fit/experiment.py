@@ -63,7 +63,7 @@ class Experiment:
     sd: Array | None = field(default=None, compare=False)
     """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
     coloured: bool = False
-    """True if the noise of a trace may be autocorrelated, see `fit_traces`."""
+    """True if the noise of a trace may be autocorrelated, see `fit_least_squares`."""
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
     ``gripper`` itself; ``share`` of the ``torque``; of the ``steps`` of a record, by their number

@@ -129,19 +129,27 @@ class TraceFit:
         return said
 
 
-def fit_traces(
+def fit_least_squares(
     experiments: Sequence[Experiment],
     traces: Sequence[tuple[Array, Array]],
-    find: Callable[[Sequence[TraceProblem], Sequence[int]], list[Fit]],
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
 ) -> list[TraceFit]:
-    """Fit each of several traces and, if wanted, estimate the model of its noise.
+    """Fit each of several traces by least squares and, if wanted, estimate the model of its noise.
 
     Traces of plain noise are fitted together. With a coloured noise model, outliers are removed,
     and the noise is a sum of white, Ornstein-Uhlenbeck and 1/f noise and a random walk. If it grows
     with the rotation, so does a part of the white noise. The effect of the gripper's uncertainty is
-    one more component. `find` finds the global optima of problems of given traces. A trace is its
-    ascending times and readings, (n_samples,), and has assumptions of its own.
+    one more component. A trace is its ascending times and readings, (n_samples,), and has
+    assumptions and random numbers of its own.
     """
+
+    def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
+        of_traces = [rngs[trace] for trace in which]
+        found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
+        pairs = zip(problems, deepen(problems, found), strict=True)
+        return [fit.in_order(problem.residuals.model) for problem, fit in pairs]
+
     plain = [trace for trace, experiment in enumerate(experiments) if experiment.plain]
     problems = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])
     optima = find(problems, plain) if plain else []
@@ -157,23 +165,6 @@ def fit_traces(
 
             found[trace] = _fit_in_noise(experiment, *traces[trace], find_alone)
     return [found[trace] for trace in range(len(traces))]
-
-
-def fit_least_squares(
-    experiments: Sequence[Experiment],
-    traces: Sequence[tuple[Array, Array]],
-    rngs: Sequence[np.random.Generator],
-    progress: Progress = silent,
-) -> list[TraceFit]:
-    """Fit traces as `fit_traces` does, by least squares from many starts, with random numbers."""
-
-    def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
-        of_traces = [rngs[trace] for trace in which]
-        found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
-        pairs = zip(problems, deepen(problems, found), strict=True)
-        return [fit.in_order(problem.residuals.model) for problem, fit in pairs]
-
-    return fit_traces(experiments, traces, find)
 
 
 def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: Find) -> TraceFit:
