@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.fit import genetic, least_squares, levenberg_marquardt
+from biogrip.fit import least_squares, levenberg_marquardt
 from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.least_squares import FINE, PRIOR_WIDTH, ROUGH, LocalFits
 from biogrip.fit.levenberg_marquardt import Minima, Normal, minimize
 from biogrip.fit.problem import METHODS, TraceProblem, identifier, silent
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.quantities import parameters_and_sum
+from biogrip.physics import misfit
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.sample_model import SampleModel, with_fixed
@@ -77,7 +78,7 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
     of_one, of_many = Residuals.__call__, Residuals.condensed_responses
     refine = least_squares.refine_optima
     monkeypatch.setattr(least_squares, "refine_optima", settled_silently)
-    monkeypatch.setattr(genetic, "make_misfit", lambda residuals: residuals.misfit)
+    monkeypatch.setattr(misfit, "_series_of", lambda residuals: None)
     monkeypatch.setattr(Residuals, "__call__", at_one)
     monkeypatch.setattr(Residuals, "condensed_responses", at_many)
     assert run(method, posed).evaluations == counted[0]

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.errors import BiogripError
+from biogrip.fit import trace_fit
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_from
 from biogrip.fit.noise_model_fit import FAR
 from biogrip.fit.problem import Fit, TraceProblem
-from biogrip.fit.trace_fit import TraceFit, _alike, fit_traces, gripper_functions
+from biogrip.fit.trace_fit import TraceFit, _alike, gripper_functions
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.noise import AR1, MOST_SAMPLES, Drift, Noise, NoiseModel, Outliers, add_noise
+from biogrip.physics.noise import AR1, Drift, Noise, NoiseModel, Outliers, add_noise
 from biogrip.physics.simulation import simulated_response
 from tests.helpers.default import STUDY
 
@@ -39,7 +39,11 @@ def find(problem: TraceProblem) -> Fit:
 
 
 def fitted(experiment: Experiment, trace: Array, times: Array = TIMES) -> TraceFit:
-    (fit,) = fit_traces([experiment], [(times, trace)], lambda some, _: list(map(find, some)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(trace_fit, "identify_many", lambda some, *_: list(map(find, some)))
+        patch.setattr(trace_fit, "deepen", lambda _, found: found)
+        given = [experiment], [(times, trace)], [np.random.default_rng(0)]
+        (fit,) = trace_fit.fit_least_squares(*given)
     return fit
 
 
@@ -122,12 +126,6 @@ def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
     assert fit.noise_model.proportional > 0.9
     assert "that grows with the rotation" in fit.notes()[0]
     assert fit.noise_data()["proportional"] > 0.9  # type: ignore[index, operator]
-
-
-def test_too_many_samples_for_a_colour_are_refused() -> None:
-    times = np.linspace(0, 400, MOST_SAMPLES + 1)
-    with pytest.raises(BiogripError, match="allowed are at most 50000 with a coloured"):
-        fitted(COLOURED, times, times)
 
 
 def functions(uncertainty: Mapping[str, Mapping[str, float]]) -> Array:

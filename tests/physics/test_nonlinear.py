@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.physics.gripper import Arm, Gripper, displacement_of_tip, rotation_of_tip
+from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
 from biogrip.physics.models import damper, generalized_maxwell, kelvin_voigt, maxwell
 from biogrip.physics.nonlinear import correction, nonlinear_rotation
 from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
@@ -145,7 +145,6 @@ def test_rotation_of_a_tip_against_50_digits(gripper: Gripper) -> None:
             exact = hat - mp.acos(mp.cos(hat) + mpf(size) / mpf(1.5e-3))
             ours = float(rotation_of_tip(gripper, np.array(size)))
             assert ours == pytest.approx(float(exact), rel=4e-15)
-            assert displacement_of_tip(gripper, np.array(ours)) == pytest.approx(size, rel=1e-14)
 
 
 def test_too_large_a_torque_is_refused(gripper: Gripper) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.identify.plausibility import _responds, check_recording, free_rotation
+from biogrip.identify.plausibility import _responds, check_recording
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS
@@ -189,17 +189,6 @@ def test_what_rounding_leaves_of_a_torque_is_no_response(samples: int) -> None:
         for values in (clean, noisy):
             assert said(times, values + 1e-4, phases=phases, offset=True) == ""
             assert MIRRORED in said(times, -values, phases=phases)
-
-
-def test_the_free_rotation_is_that_of_the_left_arm() -> None:
-    """In closed form, with hinges of 0.44 and 0.55 uN m."""
-    for phases, largest_Nm in (
-        ((hold(1.0, -1.6e-9), hold(1.0, 0.32e-9)), 1.6e-9),
-        ((hold(1.0, 0.0), hold(1e-9, 1.6e-9), hold(1.0, 0.0)), 1.6e-9),
-        ((ramp(7.0, 0.0, 1.4e-9),), 1.4e-9),
-    ):
-        found = free_rotation(UNEQUAL, join_phases(phases))
-        assert found == pytest.approx(largest_Nm / 4.4e-7, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,6 @@ from biogrip.physics.gripper import (
     SMALLEST_M,
     CombDrive,
     Gripper,
-    displacement_of_tip,
 )
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.nonlinear import nonlinear_rotation
@@ -102,6 +101,14 @@ def apparent_modulus(force_N: float, shortening_m: float, size_m: float) -> floa
     """
     indentation, radius = 0.5 * shortening_m, 0.5 * size_m
     return 0.75 * (1 - 0.5**2) * force_N / math.sqrt(radius * indentation**3)
+
+
+def displacement_of_tip(gripper: Gripper, rotation: Array) -> Array:
+    """Return the displacement in m of a tip whose arm turns, u = l [cos(hat - phi) - cos hat]."""
+    angle = np.radians(gripper.reference_angle_deg)
+    half = 0.5 * rotation
+    moved: Array = 2 * gripper.arm_length_m * np.sin(angle - half) * np.sin(half)
+    return moved
 
 
 def simulated_shortening(

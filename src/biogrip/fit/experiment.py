@@ -12,6 +12,7 @@ from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.problem import TraceProblem, make_problem
 from biogrip.physics.condensed import Condensed, SweptRows
+from biogrip.physics.fractional import LONGEST_S, on_clock
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import Sample
@@ -23,7 +24,7 @@ from biogrip.physics.noise import (
     stream,
     with_uncertain,
 )
-from biogrip.physics.protocol import SWEEP, Course, Phase, join_phases
+from biogrip.physics.protocol import SWEEP, Course, Phase, follow_rows, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.sample_model import SampleModel, with_fixed
 
@@ -62,7 +63,7 @@ class Experiment:
     sd: Array | None = field(default=None, compare=False)
     """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
     coloured: bool = False
-    """True if the noise of a trace may be autocorrelated, see `fit_traces`."""
+    """True if the noise of a trace may be autocorrelated, see `fit_least_squares`."""
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
     ``gripper`` itself; ``share`` of the ``torque``; of the ``steps`` of a record, by their number
@@ -101,9 +102,6 @@ class Experiment:
         if self.instrument.sweeps:
             return SWEEP
         if self.record is not None:
-            # Imported here: few experiments have a record.
-            from biogrip.physics.protocol import follow_rows
-
             return follow_rows(*self.record.T, deforms=self.instrument.deforms)
         return join_phases(self.phases, deforms=self.instrument.deforms)
 
@@ -120,17 +118,12 @@ class Experiment:
     @property
     def unit_s(self) -> float:
         """Unit of time in which power laws hold as long as the protocol lasts."""
-        # Imported here: few experiments have a power law.
-        from biogrip.physics.fractional import LONGEST_S
-
         lasts = 1.0 if self.instrument.sweeps else sum(phase.duration_s for phase in self.phases)
         return lasts if lasts < _SHORT_S else max(lasts / LONGEST_S, 1.0)
 
     def _on_clock(self, model: SampleModel) -> SampleModel:
         if not model.power_law or self.unit_s == 1:
             return model
-        from biogrip.physics.fractional import on_clock
-
         return on_clock(model, self.unit_s)
 
     def to_identify(self, *others: SampleModel) -> "Experiment":
@@ -258,14 +251,15 @@ class Experiment:
         `with_uncertain`; noise may grow with a rotation, see `Whitening`: (n_functions, n_samples)
         and (n_samples,).
         """
-        nuisance, whitening = self.nuisance(time_s), None
+        nuisance = self.nuisance(time_s)
+        rows = SweptRows if self.torque.sweeps else Condensed
+        given = self.torque, self.torque.snapped(time_s)
         if noise_model is None and self.sd is not None:
             noise_model, growing = WEIGHTED, self.sd
-        if noise_model is not None:
-            whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
-        basis = with_uncertain(nuisance, uncertain)
-        rows = SweptRows if self.torque.sweeps else Condensed
-        return rows(self.torque, self.torque.snapped(time_s), basis, whitening)
+        if noise_model is None:
+            return rows(*given, with_uncertain(nuisance, uncertain))
+        whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
+        return rows(*given, nuisance[:0], whitening)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""

@@ -24,7 +24,7 @@ from biogrip.digits import counted
 from biogrip.fit.genome import Chromosomes, Genome
 from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block, Complaint
-from biogrip.physics.misfit import combine_misfits, make_misfit
+from biogrip.physics.misfit import make_misfits
 
 _MOST = 1_000_000
 
@@ -100,7 +100,7 @@ def evolve(
 
     They are parameters, best first, (n_survivors, n_parameters).
     """
-    misfits = combine_misfits([make_misfit(problem.residuals) for problem in problems])
+    misfits = make_misfits([problem.residuals for problem in problems])
     genome = problems[0].genome
 
     def ranked(chromosomes: Chromosomes, populations: IntArray) -> Ranking:
@@ -169,12 +169,7 @@ def select(
     Chromosomes are (n_populations, n, n_genes), misfits (n_populations, n). NaN is ranked last. Of
     equals the one with the lowest genes is first.
     """
-    # As by `numpy.lexsort((*keys, ranking))`, in a third of its time.
-    keys: list[NDArray[Any]] = [*genome.keys(chromosomes), ranking]
-    order = np.argsort(keys[0], axis=1)
-    for key in keys[1:]:
-        order = _taken(order, np.argsort(_taken(key, order), axis=1, kind="stable"))
-    order = order[:, :count]
+    order = np.lexsort([genome.keys(chromosomes), ranking])[:, :count]
     return _taken(chromosomes, order), _taken(ranking, order)
 
 

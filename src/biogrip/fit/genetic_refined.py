@@ -37,17 +37,14 @@ def identify_many(
     """Identify samples of one model by the genetic algorithm and local fits from its survivors."""
     genetic, polishing = settings
     evolutions = evolve(problems, genetic, rngs, progress)
-    starts, before = zip(*(_survivors(*each, polishing) for each in evolutions), strict=True)
+    starts: list[Array] = []
+    before: list[Row] = []
+    for coarse, first, last in evolutions:
+        starts.append(np.log(np.concatenate((last[: polishing.last], first[: polishing.first]))))
+        median = float(coarse.history.median_misfit[-1])
+        before.append((coarse.parameters, coarse.misfit, median, coarse.evaluations))
     fine = best_of_starts(problems, starts, before, progress)
     return [_polished(coarse, own) for (coarse, _, _), own in zip(evolutions, fine, strict=True)]
-
-
-def _survivors(coarse: Fit, first: Array, last: Array, chosen: Polishing) -> tuple[Array, Row]:
-    """Return the starts of the fits, log-parameters, and the first row of their history."""
-    starts = np.concatenate((last[: chosen.last], first[: chosen.first]))
-    median = float(coarse.history.median_misfit[-1])
-    before = coarse.parameters, coarse.misfit, median, coarse.evaluations
-    return np.log(starts), before
 
 
 def _polished(coarse: Fit, fine: Fit) -> Fit:

@@ -141,10 +141,8 @@ class Method:
     """Colour of its lines in figures, its own, of `biogrip.figures.style.COLORS`."""
     dashes: str
     """Their dashes, as Matplotlib has them."""
-    exact: bool = False
-    """True if the method ends at an optimum to all digits; tests hold it to that."""
     sure: bool = False
-    """True if the method finds the global optimum of (nearly) every trace; likewise."""
+    """True if it finds the global optimum of (nearly) every trace; tests hold it to that."""
 
 
 METHODS: dict[str, Method] = {
@@ -158,7 +156,6 @@ METHODS: dict[str, Method] = {
             step="generation, then local fit",
             color="vermilion",
             dashes="-",
-            exact=True,
             sure=True,
         ),
         Method(
@@ -168,7 +165,6 @@ METHODS: dict[str, Method] = {
             step="local fit",
             color="blue",
             dashes="--",
-            exact=True,
             sure=True,
         ),
         Method(
@@ -178,7 +174,6 @@ METHODS: dict[str, Method] = {
             step="generation",
             color="purple",
             dashes="-.",
-            exact=True,
         ),
     )
 }

@@ -12,13 +12,12 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
-from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment, pose
 from biogrip.fit.least_squares import fit_from, identify_many
 from biogrip.fit.nested_fits import deepen
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
-from biogrip.physics.noise import MOST_SAMPLES, NoiseModel, drift_is_flow
+from biogrip.physics.noise import NoiseModel, drift_is_flow
 from biogrip.physics.simulation import simulated_response
 
 # Square of three standard uncertainties.
@@ -130,20 +129,27 @@ class TraceFit:
         return said
 
 
-def fit_traces(
+def fit_least_squares(
     experiments: Sequence[Experiment],
     traces: Sequence[tuple[Array, Array]],
-    find: Callable[[Sequence[TraceProblem], Sequence[int]], list[Fit]],
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
 ) -> list[TraceFit]:
-    """Fit each of several traces and, if wanted, estimate the model of its noise.
+    """Fit each of several traces by least squares and, if wanted, estimate the model of its noise.
 
     Traces of plain noise are fitted together. With a coloured noise model, outliers are removed,
     and the noise is a sum of white, Ornstein-Uhlenbeck and 1/f noise and a random walk. If it grows
     with the rotation, so does a part of the white noise. The effect of the gripper's uncertainty is
-    one more component. `find` finds the global optima of problems of given traces. A trace is its
-    ascending times and readings, (n_samples,), and has assumptions of its own. Too many readings
-    for a coloured noise model are a `BiogripError`.
+    one more component. A trace is its ascending times and readings, (n_samples,), and has
+    assumptions and random numbers of its own.
     """
+
+    def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
+        of_traces = [rngs[trace] for trace in which]
+        found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
+        pairs = zip(problems, deepen(problems, found), strict=True)
+        return [fit.in_order(problem.residuals.model) for problem, fit in pairs]
+
     plain = [trace for trace, experiment in enumerate(experiments) if experiment.plain]
     problems = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])
     optima = find(problems, plain) if plain else []
@@ -161,35 +167,13 @@ def fit_traces(
     return [found[trace] for trace in range(len(traces))]
 
 
-def fit_least_squares(
-    experiments: Sequence[Experiment],
-    traces: Sequence[tuple[Array, Array]],
-    rngs: Sequence[np.random.Generator],
-    progress: Progress = silent,
-) -> list[TraceFit]:
-    """Fit traces as `fit_traces` does, by least squares from many starts, with random numbers."""
-
-    def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
-        of_traces = [rngs[trace] for trace in which]
-        found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
-        pairs = zip(problems, deepen(problems, found), strict=True)
-        return [fit.in_order(problem.residuals.model) for problem, fit in pairs]
-
-    return fit_traces(experiments, traces, find)
-
-
 def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: Find) -> TraceFit:
     kept = np.ones(len(time_s), dtype=bool)
-    if not experiment.coloured:
+    if experiment.coloured:
+        kept, plain, found = _without_outliers(experiment, time_s, readings, find)
+    else:
         plain = experiment.of(time_s, readings)
         found = find(plain)
-    else:
-        if len(time_s) > MOST_SAMPLES:
-            raise BiogripError(
-                f"found {len(time_s)} samples, allowed are at most {MOST_SAMPLES} with a coloured "
-                "noise model: average neighbouring samples."
-            )
-        kept, plain, found = _without_outliers(experiment, time_s, readings, find)
     time_s, readings = time_s[kept], readings[kept]
     problem, found, noise_model, errors = _in_turn(experiment, time_s, readings, plain, found)
     # Slow deviations now weigh less, so that another basin may be the deepest.

@@ -131,13 +131,10 @@ def _notes_on_traces(
     for index, (recording, experiment) in enumerate(traces):
         said = [Note(HARMLESS, text) for text in recording.remarks()]
         if experiment.fixed:
-            names, verb = (
-                " and ".join(experiment.fixed),
-                "were" if len(experiment.fixed) > 1 else "was",
+            fixed = (
+                f"{' and '.join(experiment.fixed)} {'were' if len(experiment.fixed) > 1 else 'was'}"
             )
-            said.append(
-                Note(HARMLESS, f"Other models are not compared, because {names} {verb} fixed.")
-            )
+            said.append(Note(HARMLESS, f"Other models are not compared, because {fixed} fixed."))
         said += on_fits[index]
         if experiment.instrument.sweeps:
             notes.append(said)

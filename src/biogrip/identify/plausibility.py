@@ -23,10 +23,9 @@ from biogrip.judging.levels import (
     SHORTEST_SHARE,
     SMALLEST_SHARE,
 )
-from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import nuisance_basis, without
-from biogrip.physics.protocol import Course, evaluate
+from biogrip.physics.protocol import Course, largest_load
 from biogrip.traces.columns import TIME_UNITS
 from biogrip.traces.reader import Recording
 
@@ -80,7 +79,10 @@ def check_recording(
     torque, instrument = experiment.torque, experiment.instrument
     _check_times(recording, torque)
     time_s, trace = recording.time_s, recording.readings
-    free, largest = free_rotation(experiment.gripper, torque), float(np.abs(trace).max())
+    # Of any sample the largest static rotation: phi_2 = (1 - x) tau/k_2, where x goes from 0
+    # without a sample to 1 with a rigid one.
+    free = abs(largest_load(experiment.phases)) / experiment.gripper.left.stiffness_Nm_per_rad
+    largest = float(np.abs(trace).max())
     if largest > _ABSURD * free:
         return _check_turn(recording, largest, free, None)
     responses = lag_course(torque, _LAG_SHARES)(time_s)
@@ -141,18 +143,6 @@ def _responds(trace: Array, nuisance: Array, rest: float, unknowns: int, freedom
 
     explained = float(np.sum(without(nuisance, trace) ** 2)) - rest
     return bool(explained > unknowns * fdtri(unknowns, freedom, 1 - NO_RESPONSE) * rest / freedom)
-
-
-def free_rotation(gripper: Gripper, torque: Course) -> float:
-    """Return the largest static rotation of the left arm in rad that any sample allows.
-
-    Statically phi_2 = (1 - x) tau/k_2, where x goes from 0 without a sample to 1 with a rigid one.
-    """
-    # Within a phase nothing turns round: its start and its end will do.
-    ends_s = np.append(torque.time_s[1:], torque.end_s)
-    times = np.concatenate((torque.time_s, np.nextafter(ends_s, 0)))
-    largest = np.abs(evaluate(torque, times)).max()
-    return float(largest / gripper.left.stiffness_Nm_per_rad)
 
 
 def _check_times(recording: Recording, torque: Course) -> None:

@@ -22,11 +22,12 @@ from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations, swept_deviations
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
+from biogrip.identify.load_noise import without_noise
 from biogrip.identify.plausibility import check_recording
 from biogrip.judging.onset import OnsetFits, estimate_onset
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise
-from biogrip.physics.protocol import Course, is_held, largest_load
+from biogrip.physics.protocol import Course, is_held, largest_load, with_steps
 from biogrip.traces.columns import place
 from biogrip.traces.reader import Recording
 
@@ -54,9 +55,6 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
     A `BiogripError` has file, line and column of what is impossible with instrument and protocol.
     """
     if experiment.record is not None:
-        # Imported here, as below: few traces have a record.
-        from biogrip.physics.protocol import with_steps
-
         record, uncertain_s = with_steps(experiment.record)
         steps = {str(number): error for number, error in enumerate(uncertain_s.tolist())}
         uncertainty = {**experiment.uncertainty, "steps": steps}
@@ -66,8 +64,6 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
         experiment = replace(experiment, record=record, uncertainty=uncertainty)
     recording = _checked(recording, experiment)
     if experiment.record is not None:
-        from biogrip.identify.load_noise import without_noise
-
         record, noise = without_noise(experiment, recording.time_s, recording.readings)
         experiment = replace(experiment, record=record)
         recording = replace(recording, load_noise=noise)

@@ -166,10 +166,10 @@ def compare(
                 means = unit_means(these, quantity)
                 row |= {"units": len(means), **_scatters(these, quantity, means)}
                 if 2 * len(means) >= max(len({it.unit for it in these}), 1):
-                    row["median"] = no_longer_log(float(np.mean([*means.values()])))
-                    if len(means) >= FEWEST_UNITS:
-                        error = max(float(np.std([*means.values()], ddof=1)), _LEAST_WIDTH)
-                        mean, count = float(np.mean([*means.values()])), len(means)
+                    mean, count = float(np.mean([*means.values()])), len(means)
+                    row["median"] = no_longer_log(mean)
+                    if count >= FEWEST_UNITS:
+                        error = max(row["scatter_of_units"], _LEAST_WIDTH)
                         estimates[group] = Estimate(mean, error / sqrt(count), count - 1)
             elif len(known) >= max(FEWEST_CELLS, len(these) / 2):
                 estimates[group] = estimate(*np.array(known).T)

@@ -99,15 +99,11 @@ class QuantityConstraint:
         basic = self._dominant(x, fit, slopes)
         # Minus the derivative of the eliminated parameter by each other one; 1 by itself.
         ratio = slopes / np.sum(slopes * basic, axis=1, keepdims=True)
-        pull = np.sum(normal.gradient * basic, axis=1, keepdims=True)
-        across = np.sum(normal.information * basic[:, :, None], axis=1)
-        along = np.sum(across * basic, axis=1)[:, None, None]
-        outer = ratio[:, :, None] * across[:, None, :]
-        information = normal.information - outer - outer.swapaxes(1, 2)
-        information += along * (ratio[:, :, None] * ratio[:, None, :])
-        left_out = basic[:, :, None] | basic[:, None, :]
-        gradient = np.where(basic, 0.0, normal.gradient - pull * ratio)
-        information = np.where(left_out, np.eye(x.shape[1]), information)
+        # Derivatives of all parameters by the others, none by the eliminated one.
+        by_others = np.eye(x.shape[1]) - basic[:, :, None] * ratio[:, None, :]
+        gradient = (normal.gradient[:, None] @ by_others)[:, 0]
+        information = by_others.swapaxes(1, 2) @ normal.information @ by_others
+        information += np.eye(x.shape[1]) * basic[:, :, None]
         return replace(normal, gradient=gradient, information=information), basic
 
     def restored(self, x: Array, fit: IntArray, eliminated: BoolArray) -> Array:

@@ -14,7 +14,7 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -34,17 +34,16 @@ from biogrip.judging.doubts import (
     compute_status,
     examine_residuals,
 )
+from biogrip.judging.hidden import Hidden, find_hidden
 from biogrip.judging.levels import BEYOND_THE_RANGE, FAR_OFF, MISSED
 from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
+from biogrip.judging.profiles import compute_valley
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.without_model import KINDS, WithoutModel, decades, tell_without_model
 from biogrip.physics.sample_model import C_P, SampleModel
 from biogrip.physics.simulation import Grip
 from biogrip.traces.reader import Recording
-
-if TYPE_CHECKING:
-    from biogrip.judging.hidden import Hidden
-    from biogrip.judging.without_model import WithoutModel
 
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
 _WIDER, _BEYOND, _AT_END = np.log(1e3), 1.0, 1e-9
@@ -90,21 +89,18 @@ class Diagnosis:
         return compute_status(self.notes)
 
     def without_model(
-        self, at_s: Sequence[float] = (), kinds: Collection[str] | None = None
-    ) -> "WithoutModel":
+        self, at_s: Sequence[float] = (), kinds: Collection[str] = KINDS
+    ) -> WithoutModel:
         """Tell what any linear sample would show, see `tell_without_model`.
 
         Where none gives the trace, as the best of them would be rejected, nothing is told.
         """
-        # Imported here, as below: only those who ask for it need it.
-        from biogrip.judging.without_model import KINDS, decades, tell_without_model
-
         residuals, experiment = self.likelihood.problem.residuals, self.experiment
         tell = partial(
             tell_without_model,
             confidence=self.likelihood.confidence,
             noise_sd=experiment.noise_sd if experiment else None,
-            kinds=KINDS if kinds is None else kinds,
+            kinds=kinds,
         )
         found = tell(residuals, at_s=at_s)
         if self.onset_limits_s:
@@ -116,10 +112,8 @@ class Diagnosis:
         return replace(found, told=[]) if hopeless else found
 
     @cached_property
-    def hidden(self) -> list["Hidden"]:
+    def hidden(self) -> list[Hidden]:
         """Errors that the trace could hide, none of a rejected fit, see `find_hidden`."""
-        from biogrip.judging.hidden import find_hidden
-
         none = self.status == REJECTED or self.likelihood.problem.residuals.course.sweeps
         return [] if none else find_hidden(self.likelihood, self.findings)
 
@@ -163,7 +157,7 @@ def diagnose_all(
 
     def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
         every = compute_findings(likelihoods, parameters_and_sum(model))
-        trades = find_trade_offs(likelihoods, model, every)
+        trades = [find_trade_offs(*pair, model) for pair in zip(likelihoods, every, strict=True)]
         found = list(map(profiled, likelihoods, every, trades))
         return [_with_valley(each, model) for each in found] if valley else found
 
@@ -233,9 +227,6 @@ def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade
 
 def _with_valley(judged: Diagnosis, model: SampleModel) -> Diagnosis:
     """Return a diagnosis with its valley, whose lowest point counts if no profile is lower."""
-    # Imported here: only a study has valleys.
-    from biogrip.judging.profiles import compute_valley
-
     valley, missed = compute_valley(judged.likelihood, model)
     return replace(judged, valley=valley, lowest=missed if judged.lowest is None else judged.lowest)
 

@@ -106,7 +106,10 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     residuals, misfit = likelihood.problem.residuals, likelihood.misfit
     if misfit < levels.UNRESOLVED * residuals.peak:
         return Remainder([])
-    residual, slopes = _left(residuals, likelihood.best)
+    if residuals.samples > MANY:
+        residual, slopes = residuals.left(likelihood.best), np.zeros((0, residuals.samples))
+    else:
+        residual, slopes = residuals(likelihood.best)
     rounding = residuals.trace.rounding
     least = min(levels.NOISE_FREE * likelihood.noise_sd, levels.NOISE_FREE_OF_PEAK * residuals.peak)
     if misfit < least and estimate_noise(residual, rounding) < levels.NO_SCATTER * misfit:
@@ -166,13 +169,6 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
             )
         )
     return Remainder(notes, found.misfit if found else None)
-
-
-def _left(residuals: Residuals, log_parameters: Array) -> tuple[Array, Array]:
-    """Return residuals, and their slopes by the parameters, none of very many readings."""
-    if residuals.samples > MANY:
-        return residuals.left(log_parameters), np.zeros((0, residuals.samples))
-    return residuals(log_parameters)
 
 
 def _misfit(

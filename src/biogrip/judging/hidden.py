@@ -21,16 +21,14 @@ from biogrip.judging.doubts import MANY, middle_of
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.verdicts import Finding
 from biogrip.judging.whiteness import Steps, averaged, parts_apart, steps_of
-from biogrip.physics.models import CANDIDATES, as_richer, contained
 from biogrip.physics.noise import without
+from biogrip.physics.simulation import simulated_response
 
 # Times of a jump and of a changed gain, in shares of the readings.
 _SHARES = np.linspace(0.1, 0.9, 9)
 # Onsets and strengths of finite differences, as shares of the first interval and of the branch; and
 # relaxation times of a second branch over that of the first.
 _LATE, _WEAK, _TIMES = 1e-3, 1e-3, (0.1, 10.0)
-# Models that may have one branch more than another.
-_RICHER = "generalized_maxwell_2", "generalized_maxwell_3"
 
 
 @dataclass(frozen=True)
@@ -116,32 +114,26 @@ def _planted(likelihood: Likelihood) -> Iterator[tuple[str, str, float, float, A
     later = residuals.later(late_s).response(best)
     apart_s = float(time_s[1] - time_s[0])
     yield "start", "a start that is late by {} s", 1, apart_s, (later - response) / late_s
-    for tau, shape in _second_branch(likelihood, response):
+    for tau, shape in _second_branch(likelihood):
         words = f"a second branch of {plain(tau, 2)} s with {{}} % of its stiffness"
         yield "branch", words, 100, levels.BRANCH, shape
 
 
-def _second_branch(likelihood: Likelihood, response: Array) -> Iterator[tuple[float, Array]]:
+def _second_branch(likelihood: Likelihood) -> Iterator[tuple[float, Array]]:
     """Yield relaxation times of a second branch, and its effect for the stiffness of the first."""
     residuals = likelihood.problem.residuals
-    # Not the whole models: those of an instrument whose samples have moduli have other units.
-    name, names = residuals.model.name, residuals.model.names
-    for richer in _RICHER:
-        model = CANDIDATES[richer].model
-        alike = (it for it in contained(richer) if CANDIDATES[it].model.name == name)
-        if not (own := next((it for it in alike if CANDIDATES[it].model.names == names), None)):
-            continue
-        values = as_richer(richer, own, np.exp(likelihood.best))
-        there = [branch for branch in model.free_branches if values[branch[0]] > 0]
-        gone = [branch for branch in model.free_branches if values[branch[0]] == 0]
-        # Of a solid in Kelvin's form one branch is the spring beside the other.
-        if there and gone and np.all(np.isfinite(values)):
-            break
-    else:
+    network = residuals.model.network(np.exp(likelihood.best))
+    if residuals.model.power_law or not network.k.size:
         return
-    posed, (first, damper), second = replace(residuals, model=model), there[0], gone[0]
-    scales = [values[first if each.startswith("k") else damper] for each in model.names]
-    values = np.where(values > 0, values, 1e-12 * np.array(scales))
-    for tau in (times * values[damper] / values[first] for times in _TIMES):
-        values[[*second]] = _WEAK * values[first] * np.array([1.0, tau])
-        yield tau, (posed.response(np.log(values)) - response) / _WEAK
+
+    def response(stiffness: float, damping: float) -> Array:
+        k = np.append(network.k, [[stiffness]], axis=1)
+        more = replace(network, k=k, c=np.append(network.c, [[damping]], axis=1))
+        given = residuals.gripper, more, residuals.course, residuals.trace.time_s
+        return simulated_response(*given, nonlinear=False)[0]
+
+    k, c = float(network.k[0, 0]), float(network.c[0, 0])
+    for tau in (times * c / k for times in _TIMES):
+        weaker, weak = 1e-9 * k, _WEAK * k
+        change = response(weak, weak * tau) - response(weaker, weaker * tau)
+        yield tau, change / _WEAK

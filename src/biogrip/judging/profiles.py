@@ -340,23 +340,15 @@ def find_gaps(
     log_values: Array, increases: Array, threshold: float
 ) -> tuple[tuple[float, float], ...]:
     """Find stretches above the threshold, with ends interpolated in the root of the increase."""
-    inside = np.flatnonzero(increases < threshold).tolist()
+    roots = np.sqrt(np.maximum(increases, 0.0))
     found = []
-    for start, end in pairwise(inside):
+    for start, end in pairwise(np.flatnonzero(increases < threshold).tolist()):
         if end > start + 1 and increases[start + 1 : end].max() > _CLEARLY * threshold:
-            begins = _crossing(log_values, increases, threshold, start, start + 1)
-            found.append((begins, _crossing(log_values, increases, threshold, end, end - 1)))
+            # Places for `np.interp` ascend from inside to outside.
+            sides = [start, start + 1], [end, end - 1]
+            first, last = (np.interp(np.sqrt(threshold), roots[of], log_values[of]) for of in sides)
+            found.append((float(first), float(last)))
     return tuple(found)
-
-
-def _crossing(
-    log_values: Array, increases: Array, threshold: float, inside: int, outside: int
-) -> float:
-    ends = np.sqrt(np.maximum(increases[[inside, outside]], 0.0))
-    if ends[1] <= ends[0]:
-        return float(log_values[outside])
-    share = min((np.sqrt(threshold) - ends[0]) / (ends[1] - ends[0]), 1.0)
-    return float(log_values[inside] + share * (log_values[outside] - log_values[inside]))
 
 
 # Shares of the first damper in the sum, dense where either is small, and sums relative to the best

@@ -11,8 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-import numpy as np
-
 from biogrip.arrays import Array
 from biogrip.digits import plain, with_limits, within_limits
 from biogrip.judging.levels import WIDE, WORTH_A_PROFILE
@@ -163,44 +161,32 @@ def compute_findings(
 
 
 def find_trade_offs(
-    likelihoods: Sequence[Likelihood], model: SampleModel, findings: Sequence[Sequence[Finding]]
-) -> list[list[Trade]]:
-    """Find, in each of several traces, determined combinations of undetermined parameters.
+    likelihood: Likelihood, findings: Sequence[Finding], model: SampleModel
+) -> list[Trade]:
+    """Find determined combinations of undetermined parameters.
 
     Combinations among the findings come first. Of other pairs, the combination known best to first
-    order is profiled, if it is worth a look; traces with the same one are profiled together.
+    order is profiled, if it is worth a look.
     """
-    found: list[list[tuple[tuple[int, ...], Finding]]] = [[] for _ in findings]
-    pairs: list[tuple[int, tuple[int, ...], Quantity]] = []
-    for trace, own in enumerate(findings):
-        left = [
-            finding.quantity.members[0]
-            for finding in own
-            if len(finding.quantity.members) == 1 and finding.verdict != DETERMINED
-        ]
-        for finding in own:
-            members = tuple(index for index in finding.quantity.members if index in left)
-            if len(members) > 1:
-                found[trace].append((members, finding))
-                left = [index for index in left if index not in members]
-        for pair in combinations(left, 2):
-            candidates = find_combinations(model, list(pair))
-            deviations = [likelihoods[trace].deviation(quantity) for quantity in candidates]
-            if min(deviations, default=np.inf) < WORTH_A_PROFILE:
-                pairs.append((trace, pair, candidates[int(np.argmin(deviations))]))
-    profiled: dict[tuple[int, Quantity], Finding] = {}
-    for quantity in dict.fromkeys(quantity for _, _, quantity in pairs):
-        traces = [trace for trace, _, other in pairs if other == quantity]
-        every = compute_findings([likelihoods[trace] for trace in traces], [quantity])
-        for trace, (finding,) in zip(traces, every, strict=True):
-            profiled[trace, quantity] = finding
-    for trace, members, quantity in pairs:
-        found[trace].append((members, profiled[trace, quantity]))
+    found: list[tuple[tuple[int, ...], Finding]] = []
+    left = [
+        finding.quantity.members[0]
+        for finding in findings
+        if len(finding.quantity.members) == 1 and finding.verdict != DETERMINED
+    ]
+    for finding in findings:
+        members = tuple(index for index in finding.quantity.members if index in left)
+        if len(members) > 1:
+            found.append((members, finding))
+            left = [index for index in left if index not in members]
+    for pair in combinations(left, 2):
+        candidates = find_combinations(model, list(pair))
+        best = min(candidates, key=likelihood.deviation, default=None)
+        if best is not None and likelihood.deviation(best) < WORTH_A_PROFILE:
+            ((finding,),) = compute_findings([likelihood], [best])
+            found.append((pair, finding))
     return [
-        [
-            Trade(tuple(model.parameters[index].name for index in members), finding)
-            for members, finding in own
-            if finding.verdict == DETERMINED
-        ]
-        for own in found
+        Trade(tuple(model.parameters[index].name for index in members), finding)
+        for members, finding in found
+        if finding.verdict == DETERMINED
     ]

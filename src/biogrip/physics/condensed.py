@@ -4,9 +4,9 @@ First, nodes replace dense readings in sums of products of smooth functions (`De
 piece of time twice as far from the last change of the load at its end as at its start, a response
 is a polynomial of degree 19 to 1e-15 of its peak, whatever the rates of its modes: with e^(-rho (3
 + s)), |s| <= 1, Chebyshev coefficients fall like 5.8^-n [1]_. So a piece with thousands of readings
-needs twenty nodes, and sums of products over its readings follow from one small matrix, which is
-summed up block by block. If readings are few, they are the nodes; so they are where the course
-changes at nearly every one of them, as one that was recorded.
+needs twenty nodes, and sums of products over its readings follow from one small matrix. If readings
+are few, they are the nodes; so they are where the course changes at nearly every one of them, as
+one that was recorded.
 
 Second, some seventy modes stand for all (`SpanningModes`): whatever the course, the response of any
 mode is a sum of theirs. A triangular matrix has all products of these at the nodes (`Condensed`),
@@ -38,12 +38,8 @@ _PLACES = chebyshev.chebpts1(_NODES)
 # From values at the nodes to coefficients of Legendre polynomials, which are nearly orthogonal
 # over readings that are dense all over a piece.
 _TO_SERIES = np.linalg.inv(legendre.legvander(_PLACES, _DEGREE))
-# Fewer readings are their own nodes; so are those whose matrix is worse conditioned.
-_FEWEST_READINGS, _LARGEST_CONDITION = 256, 100.0
-# Readings whose polynomials are formed at once.
-_READINGS_AT_ONCE = 16_384
-# Most readings whose polynomials are kept for the next trace.
-_MOST_READINGS_KEPT = 100_000
+# Fewer readings are their own nodes; so are those whose polynomials are worse conditioned.
+_FEWEST_READINGS, _LARGEST_CONDITION = 256, 10.0
 # Most nodes of which orthonormal functions are kept for the next trace.
 _MOST_NODES_KEPT = 20_000
 
@@ -56,8 +52,10 @@ class _Piece:
     stop: int
     nodes_s: Array
     """Times of the nodes, (n_nodes,)."""
-    triangle: Array | None = None
-    """R^T of Legendre polynomials Q R at the readings, Q orthonormal; None if these are nodes."""
+    basis: Array | None = None
+    """Orthonormal polynomials at the readings, (n_readings, n_nodes); None if these are nodes."""
+    to_rows: Array | None = None
+    """From values at the nodes to rows, (n_nodes, n_nodes)."""
 
 
 class DenseSamples:
@@ -69,7 +67,6 @@ class DenseSamples:
 
     def __init__(self, course: Course, time_s: Array, *, dense: bool = True) -> None:
         self._all_s = time_s
-        self._kept: dict[tuple[int, int], list[tuple[slice, Array]]] = {}
         starts = course.changes_s
         self._starts_s = np.append(-np.inf, starts)
         bounds = np.unique(np.concatenate(([0], time_s.searchsorted(starts), [len(time_s)])))
@@ -85,28 +82,22 @@ class DenseSamples:
         for piece in self._pieces:
             here = slice(start, start + len(piece.nodes_s))
             start = here.stop
-            if piece.triangle is not None:
-                rows[..., here] = values[..., here] @ (_TO_SERIES.T @ piece.triangle)
+            if piece.to_rows is not None:
+                rows[..., here] = values[..., here] @ piece.to_rows
         return rows
 
     def rows_of_samples(self, samples: Array) -> tuple[Array, float]:
         """Project readings, (n_samples,), on the nodes' rows; return the norm of the rest, too."""
-        parts: list[Array] = []
+        rows: list[Array] = []
         rest = 0.0
         for piece in self._pieces:
             own = samples[piece.first : piece.stop]
-            if piece.triangle is None:
-                parts.append(own)
-                continue
-            products = np.zeros(_NODES)
-            for block, series in self._blocks(piece.first, piece.stop):
-                products += samples[block] @ series
-            part = np.asarray(np.linalg.solve(piece.triangle, products), np.float64)
-            smooth = np.linalg.solve(piece.triangle.T, part)
-            for block, series in self._blocks(piece.first, piece.stop):
-                rest += float(np.sum((samples[block] - series @ smooth) ** 2))
-            parts.append(part)
-        return np.concatenate(parts), float(np.sqrt(rest))
+            if piece.basis is None:
+                rows.append(own)
+            else:
+                rows.append(own @ piece.basis)
+                rest += float(np.sum((own - piece.basis @ rows[-1]) ** 2))
+        return np.concatenate(rows), float(np.sqrt(rest))
 
     def _divided(self, first: int, stop: int) -> Iterator[_Piece]:
         """Halve pieces that are not smooth, or not dense all over, down to few readings."""
@@ -116,33 +107,15 @@ class DenseSamples:
         start, end = self._all_s[first], self._all_s[stop - 1]
         elapsed = start - self._starts_s[self._starts_s.searchsorted(start, side="right") - 1]
         if end - start <= elapsed:
-            gram = np.zeros((_NODES, _NODES))
-            for _, series in self._blocks(first, stop):
-                gram += series.T @ series
-            size = np.sqrt(np.diagonal(gram))
-            shares = np.linalg.eigvalsh(gram / (size[:, None] * size))
-            if shares[-1] <= _LARGEST_CONDITION * shares[0]:
+            place = (2 * self._all_s[first:stop] - start - end) / (end - start)
+            basis, triangle = np.linalg.qr(legendre.legvander(place, _DEGREE))
+            if np.linalg.cond(triangle / np.linalg.norm(triangle, axis=0)) <= _LARGEST_CONDITION:
                 nodes_s = 0.5 * (start + end) + 0.5 * (end - start) * _PLACES
-                yield _Piece(first, stop, nodes_s, np.asarray(np.linalg.cholesky(gram), float))
+                yield _Piece(first, stop, nodes_s, basis, _TO_SERIES.T @ triangle.T)
                 return
         half = first + int(np.searchsorted(self._all_s[first:stop], 0.5 * (start + end)))
         yield from self._divided(first, half)
         yield from self._divided(half, stop)
-
-    def _blocks(self, first: int, stop: int) -> Iterator[tuple[slice, Array]]:
-        """Yield Legendre polynomials at a piece's readings, (n_samples, n_nodes), by blocks."""
-        if len(self._all_s) > _MOST_READINGS_KEPT:
-            return self._formed(first, stop)
-        if (first, stop) not in self._kept:
-            self._kept[first, stop] = list(self._formed(first, stop))
-        return iter(self._kept[first, stop])
-
-    def _formed(self, first: int, stop: int) -> Iterator[tuple[slice, Array]]:
-        start, end = self._all_s[first], self._all_s[stop - 1]
-        for here in range(first, stop, _READINGS_AT_ONCE):
-            block = slice(here, min(here + _READINGS_AT_ONCE, stop))
-            place = (2 * self._all_s[block] - start - end) / (end - start)
-            yield block, legendre.legvander(place, _DEGREE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +127,7 @@ class Condensed:
     all_s: Array
     """Ascending sampling times, (n_samples,)."""
     functions: Array
-    """Functions projected out, (n_functions, n_samples), if noise is white (`with_uncertain`)."""
+    """Functions projected out, (n_functions, n_samples), but by whitening (`with_uncertain`)."""
     whitening: Whitening | None = None
     """Transformation that whitens noise and projects nuisance out; None for white noise."""
 
@@ -187,7 +160,7 @@ class Condensed:
     @cached_property
     def of_modes(self) -> ModeRows:
         """Function from modes of many samples to rows of their responses."""
-        (_, triangle), first = self._factors, len(self._projected)
+        (_, triangle), first = self._factors, len(self.functions)
         return ModeRows(self._modes, without(triangle[:, :first].T, triangle[:, first:].T))
 
     @cached_property
@@ -206,11 +179,6 @@ class Condensed:
         return SpanningModes(end_s, shortest_s, orders, deforms=self.course.deforms)
 
     @property
-    def _projected(self) -> Array:
-        """Functions that whitening does not project out, (n_functions, n_samples)."""
-        return self.functions if self.whitening is None else self.functions[:0]
-
-    @property
     def _in_parts(self) -> bool:
         """True if there are too many nodes to keep functions of them."""
         return self.whitening is None and len(self._dense.time_s) > _MOST_NODES_KEPT
@@ -226,18 +194,18 @@ class Condensed:
         responses = dense.rows_of_values(responses)
         if self.whitening is not None:
             responses = self.whitening(responses)
-        others = [dense.rows_of_samples(function)[0] for function in self._projected]
+        others = [dense.rows_of_samples(function)[0] for function in self.functions]
         orthonormal, triangle = np.linalg.qr(np.vstack((*others, responses)).T)
         return orthonormal, np.pad(triangle, ((0, 1), (0, 0)))
 
     def _triangle(self, readings: Array) -> Array:
         """Return R of functions, modes and readings in columns, part by part, (n_rows, n_rows)."""
         rates, scale = self._modes.rates[None], self._modes.scale[:, None]
-        triangle = np.zeros((len(self._projected) + len(scale) + 1,) * 2)
+        triangle = np.zeros((len(self.functions) + len(scale) + 1,) * 2)
         before = slice(int(self.all_s.searchsorted(self.course.time_s[0], side="right")))
         later = responses_in_turn(rates, self.course, self.all_s, slopes=False)
         for here, found in chain([(before, np.zeros((1, 1, len(scale), before.stop)))], later):
-            more = np.vstack((self._projected[:, here], scale * found[0, 0], readings[here])).T
+            more = np.vstack((self.functions[:, here], scale * found[0, 0], readings[here])).T
             triangle = np.asarray(np.linalg.qr(np.concatenate((triangle, more)), mode="r"))
             triangle *= np.where(np.diagonal(triangle) < 0, -1.0, 1.0)[:, None]
         return triangle

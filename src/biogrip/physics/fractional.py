@@ -18,38 +18,12 @@ Ladders have the same rates, so in parallel they add up. In series their impedan
 H = L_1 + L_2. It has branches at the zeros -x of H, with the springs L_1(-x)^2/(x H'(-x)), and, if
 both ladders have branches, at the shared rates p_j, with the springs W_1j W_2j/(W_1j + W_2j).
 
-J is the creep compliance, G the relaxation modulus (N/m), t in seconds, E_(a,b) the Mittag-Leffler
-function, a = alpha - beta [1]_; `docs/models.md` has what the models are for.
-
-`springpot`, the power law of creeping cells: --<>--
-    J = t^alpha/(k_alpha Gamma(1+alpha)), G = k_alpha t^-alpha/Gamma(1-alpha)
-`fractional_kelvin_voigt`, a solid that recovers: --<>-- beside a spring k_p
-    J = t^alpha/k_alpha E_(alpha,1+alpha)(-(k_p/k_alpha) t^alpha)
-`springpot_beside_damper`, slowed where it is fast as by a liquid around it: --<>-- beside c_p
-    J = t/c_p E_(1-alpha,2)(-(k_alpha/c_p) t^(1-alpha)), G that of the springpot
-`springpots_in_parallel`, alpha at short times and beta at long ones: --<>-- beside --<>--
-    J = t^alpha/k_alpha E_(a,1+alpha)(-(k_beta/k_alpha) t^a), G the sum of both
-`springpots_in_series`, beta at short times and alpha at long ones: --<>---<>--
-    G = k_beta t^-beta E_(a,1-beta)(-(k_beta/k_alpha) t^a), J the sum of both
-`fractional_maxwell`, a power law that flows at long times, as cells do [3]_: --<>---[==]-- c
-    J = t^alpha/(k_alpha Gamma(1+alpha)) + t/c,
-    G = k_alpha t^-alpha E_(1-alpha,1-alpha)(-(k_alpha/c) t^(1-alpha))
-`fractional_maxwell_gel`: a spring k in series with --<>--
-    J = 1/k + t^alpha/(k_alpha Gamma(1+alpha)), G = k E_alpha(-(k/k_alpha) t^alpha)
-`fractional_zener`, elastic at once and in the end: the gel beside a spring k_p
-    G = k_p + k E_alpha(-(k/k_alpha) t^alpha),
-    J = 1/k_p - (1/k_p - 1/(k+k_p)) E_alpha(-(t/tau)^alpha), tau^alpha = k_alpha (1/k + 1/k_p)
-`fractional_solid`, which flows until the spring bears the load [3]_: the liquid beside k_p
-    G = k_p and that of `fractional_maxwell`
-`fractional_jeffreys`: the liquid `fractional_maxwell` beside a damper c_p
-    J = t/(c+c_p) + t (1/c_p - 1/(c+c_p)) E_(1-alpha,2)(-(k_alpha (1/c + 1/c_p)) t^(1-alpha)),
-    G that of the liquid
+`docs/models.md` has the networks and what they are for, [1]_ how they creep and relax.
 
 References
 ----------
-.. [1] A. Bonfanti et al., Soft Matter 16 (2020), 6002-6020: springpots, and what they describe.
+.. [1] A. Bonfanti et al., Soft Matter 16 (2020), 6002-6020: springpots, in closed form.
 .. [2] L. N. Trefethen and J. A. C. Weideman, SIAM Review 56 (2014), 385-458: trapezoidal rule.
-.. [3] A. Bonfanti et al., Royal Society Open Science 7 (2020), 190920: models for cells.
 """
 
 from dataclasses import dataclass, replace
@@ -81,18 +55,8 @@ BRANCH_RATES_PER_S: Array = np.concatenate(
 """Rates at which the branches of every springpot relax, ascending."""
 
 
-def _interpolation(places: Array) -> Array:
-    """Return ascending coefficients of the Lagrange polynomials of some places."""
-    rows = np.zeros((len(places), len(places)))
-    rows[:, 0] = 1.0
-    for row, place in zip(rows, places, strict=True):
-        for other in places[places != place]:
-            row[:] = (np.append(0.0, row[:-1]) - other * row) / (place - other)
-    return rows
-
-
-_TO_WEIGHTS = _interpolation(_PLACES)
-
+# Ascending coefficients of the Lagrange polynomials of the places.
+_TO_WEIGHTS = np.linalg.inv(np.vander(_PLACES, increasing=True)).T
 
 _LEAST_EXPONENT = 2.0**-44
 # Spring of a branch that equal ladders in series do not have, in N/m: no response shows it.

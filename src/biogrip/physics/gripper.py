@@ -112,14 +112,6 @@ def rotation_of_tip(gripper: Gripper, displacement_m: Array) -> Array:
     return np.arctan2(sin * x + cos * rest / (sin + new_sin), cos * (cos + x) + sin * new_sin)
 
 
-def displacement_of_tip(gripper: Gripper, rotation: Array) -> Array:
-    """Return the displacement in m of a tip whose arm turns, u = l [cos(hat - phi) - cos hat]."""
-    angle = np.radians(gripper.reference_angle_deg)
-    half = 0.5 * rotation
-    moved: Array = 2 * gripper.arm_length_m * np.sin(angle - half) * np.sin(half)
-    return moved
-
-
 VACUUM_PERMITTIVITY_F_PER_M = 8.8541878128e-12
 
 

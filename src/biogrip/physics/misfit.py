@@ -35,12 +35,31 @@ Misfits = Callable[[Array, IntArray], Array]
 
 
 def make_misfit(residuals: Residuals) -> Misfit:
-    """Return the RMS misfit to the trace of residuals.
+    """Return the RMS misfit to the trace of residuals."""
+    return _series_of([residuals]) or residuals.misfit
+
+
+def make_misfits(residuals: Sequence[Residuals]) -> Misfits:
+    """Return the RMS misfits of populations, each to a trace, to the last bit as if it were alone.
 
     That of residuals serves any protocol, sampling, noise, sample and gripper. `SeriesMisfit` is
     the paper's: of a sample with one Maxwell branch between equal arms under steps of a torque,
     sampled uniformly from the start on, with a reading at each step, in white noise alone.
     """
+    if all(map(residuals[0].shares_responses, residuals)) and (series := _series_of(residuals)):
+        return series.of_each
+    misfits = [make_misfit(each) for each in residuals]
+
+    def one_by_one(parameters: Array, traces: IntArray) -> Array:
+        pairs = zip(parameters, traces, strict=True)
+        return np.stack([misfits[trace](own) for own, trace in pairs])
+
+    return one_by_one
+
+
+def _series_of(every: Sequence[Residuals]) -> "SeriesMisfit | None":
+    """Return the misfit to traces of residuals that share responses, if these are series."""
+    residuals = every[0]
     course, trace = residuals.course, residuals.trace
     intervals, end_s = max(residuals.samples - 1, 1), residuals.duration_s
     steps = course.time_s * intervals / end_s
@@ -53,22 +72,8 @@ def make_misfit(residuals: Residuals) -> Misfit:
         and residuals.model.network([residuals.model.example]).k.shape[1] == 1
     ):
         given = residuals.gripper, residuals.model, course, end_s / intervals
-        return SeriesMisfit(*given, trace.readings)
-    return residuals.misfit
-
-
-def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:
-    """Combine misfit functions of traces into one of a population for each, to the last bit."""
-    series = [misfit for misfit in misfits if isinstance(misfit, SeriesMisfit)]
-    if len(series) == len(misfits) and all(map(series[0].joins, series)):
-        return SeriesMisfit.joined(series).of_each
-
-    def one_by_one(parameters: Array, traces: IntArray) -> Array:
-        return np.stack(
-            [misfits[trace](own) for own, trace in zip(parameters, traces, strict=True)]
-        )
-
-    return one_by_one
+        return SeriesMisfit(*given, np.stack([each.trace.readings for each in every]))
+    return None
 
 
 class SeriesMisfit:
@@ -98,18 +103,6 @@ class SeriesMisfit:
         lengths = np.concatenate(([1], np.diff(self._first_samples, append=self._samples)))
         self._lengths = lengths[:, None, None].astype(float)
         self._square_sums = np.array([np.dot(trace, trace) for trace in self._traces])
-
-    @classmethod
-    def joined(cls, misfits: Sequence["SeriesMisfit"]) -> "SeriesMisfit":
-        """Combine the traces of several objects that agree in all else, see `joins`."""
-        return cls(*misfits[0]._simulated, np.concatenate([one._traces for one in misfits]))
-
-    def joins(self, other: "SeriesMisfit") -> bool:
-        """Return True if only the traces of both may differ."""
-        gripper, model, course, interval_s = self._simulated
-        others, others_model, others_course, others_interval_s = other._simulated
-        same = model is others_model and course is others_course and gripper == others
-        return same and (interval_s, self._samples) == (others_interval_s, other._samples)
 
     @cached_property
     def projections(self) -> DecayTable:
@@ -226,20 +219,10 @@ def _power_sums(traces: Array, first_samples: IntArray, rates: Array) -> Array:
     within = np.exp(rates[:, None] * np.arange(block))
     across = np.exp(rates[:, None] * (block * np.arange(-(-longest // block))))
     sums = []
-    for trace in traces:
-        folded, columns, start = [], [], 0
-        for piece in np.split(trace, first_samples[1:]):
-            count = -(-len(piece) // block)
-            padded = np.zeros(block * count)
-            padded[: len(piece)] = piece
-            folded.append(padded.reshape(count, block).T)
-            columns.append((start, start + count))
-            start += count
-        rows = within @ np.ascontiguousarray(np.concatenate(folded, axis=1))
-        sums.append(
-            [
-                np.einsum("mr,mr->m", rows[:, start:stop], across[:, : stop - start])
-                for start, stop in columns
-            ]
-        )
-    return np.array(sums)
+    for pieces in np.split(traces, first_samples[1:], axis=1):
+        count = -(-pieces.shape[1] // block)
+        padded = np.pad(pieces, ((0, 0), (0, block * count - pieces.shape[1])))
+        # One product per trace: the order of its sums does not depend on their number.
+        rows = padded.reshape(len(traces), count, block) @ within.T
+        sums.append(np.sum(rows * across.T[:count], axis=1))
+    return np.stack(sums, axis=1)

@@ -163,7 +163,9 @@ def _with_branches(branches: int) -> SampleModel:
     numbers = range(1, branches + 1)
     springs = tuple(replace(K, name=f"k_{j}", meaning=f"spring of branch {j}") for j in numbers)
     dampers = tuple(replace(C, name=f"c_{j}", meaning=f"damper of branch {j}") for j in numbers)
-    fewer = "generalized_maxwell" + (f"_{branches - 1}" if branches > 2 else "")
+    contains: dict[str, Turned] = {f"generalized_maxwell_{branches - 1}": _one_branch_more}
+    if branches == 2:
+        contains = {"generalized_maxwell": _one_branch_more, "burgers": _two_branches}
     return replace(
         GENERALIZED_MAXWELL,
         title=f"{GENERALIZED_MAXWELL.title}, {branches} branches",
@@ -171,7 +173,7 @@ def _with_branches(branches: int) -> SampleModel:
         example=(*(9.5 for _ in numbers), 0.3, *(10.0 * 4.0**j for j in numbers), 0.7),
         exchangeable=(*(damper.name for damper in dampers), "c_p"),
         branches=tuple((k.name, c.name) for k, c in zip(springs, dampers, strict=True)),
-        contains={fewer: _one_branch_more},
+        contains=contains,
     )
 
 
@@ -252,7 +254,6 @@ MAXWELL_MODELS = (
             "maxwell": lambda k, c: (k, c, inf, inf),
             "zener_kelvin": lambda k_s, k_v, c_v: (k_s, inf, k_v, c_v),
         },
-        within={"generalized_maxwell_2": _two_branches},
     ),
 )
 
@@ -309,23 +310,13 @@ CANDIDATES: dict[str, Sample] = {
 """Models that a trace may be fitted with, by name with the number of branches."""
 
 
-def _directly(candidate: str) -> dict[str, Turned]:
-    """Models that one contains, as it and they declare."""
-    of_others = {
-        name: other.model.within[candidate]
-        for name, other in CANDIDATES.items()
-        if candidate in other.model.within
-    }
-    return {**CANDIDATES[candidate].model.contains, **of_others}
-
-
 @cache
 def contained(candidate: str) -> Mapping[str, tuple[Turned, ...]]:
     """Return the candidates nested in one, each with the fewest conversions of its parameters."""
     found: dict[str, tuple[Turned, ...]] = {candidate: ()}
     ahead = [candidate]
     for richer in ahead:
-        for name, turned in _directly(richer).items():
+        for name, turned in CANDIDATES[richer].model.contains.items():
             if name not in found:
                 found[name] = (turned, *found[richer])
                 ahead.append(name)

@@ -132,26 +132,11 @@ def add_noise(
 ) -> Array:
     """Return a noisy copy of a trace, (n_samples,).
 
-    Ascending sampling times, (n_samples,), are required unless the noise is white.
-
-    Raises
-    ------
-    ValueError
-        If the times are required and missing.
+    Ascending sampling times, (n_samples,), are by default a second apart.
     """
-    unit = KINDS[noise.kind](rng, len(readings))
-    if not noise.white:
-        if time_s is None:
-            raise ValueError("noise with parts that are not white needs the sampling times")
-        unit = _with_parts(unit, time_s, noise, rng)
-    noisy: Array = readings + standard_deviation(readings, noise) * unit
-    return noisy
-
-
-def _with_parts(unit: Array, time_s: Array, noise: Noise, rng: np.random.Generator) -> Array:
-    """Replace shares of white noise by autocorrelated noise, and add drift and outliers."""
+    time_s = np.arange(len(readings), dtype=float) if time_s is None else time_s
     shares = [part.share for part in (noise.ar1, noise.flicker) if part is not None]
-    unit = np.sqrt(max(0.0, 1 - sum(shares))) * unit
+    unit = np.sqrt(max(0.0, 1 - sum(shares))) * KINDS[noise.kind](rng, len(readings))
     if noise.ar1 is not None:
         weight, rate = np.array([noise.ar1.share]), np.array([1 / noise.ar1.time_s])
         unit += draw_ornstein_uhlenbeck(time_s, weight, rate, rng)
@@ -166,7 +151,8 @@ def _with_parts(unit: Array, time_s: Array, noise: Noise, rng: np.random.Generat
     if noise.outliers is not None:
         struck = rng.random(len(time_s)) < noise.outliers.share
         unit += struck * noise.outliers.size * rng.standard_normal(len(time_s))
-    return unit
+    noisy: Array = readings + standard_deviation(readings, noise) * unit
+    return noisy
 
 
 def standard_deviation(readings: Array, noise: Noise) -> Array:

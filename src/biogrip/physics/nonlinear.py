@@ -232,8 +232,5 @@ def _radau() -> tuple[Array, Array]:
 
 def _polynomials(points: Array, x: Array) -> Array:
     """Evaluate the Lagrange polynomials of points at x, (n_points, n)."""
-    values = np.ones((len(points), len(x)))
-    for i, point in enumerate(points):
-        for other in np.delete(points, i):
-            values[i] *= (x - other) / (point - other)
-    return values
+    of_points, of_x = (np.vander(of, len(points)).T for of in (points, x))
+    return np.asarray(np.linalg.solve(of_points, of_x), np.float64)

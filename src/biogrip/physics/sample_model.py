@@ -131,8 +131,6 @@ class SampleModel:
     name, where a trace is the same whichever is called which; in ascending order (`in_order`)."""
     contains: Mapping[str, Turned] = field(default_factory=dict, hash=False)
     """Models that it becomes where elements vanish, and how their parameters become its own."""
-    within: Mapping[str, Turned] = field(default_factory=dict, hash=False)
-    """Likewise, candidates that become it, and how its parameters are turned into theirs."""
     branched: "Callable[[int], SampleModel] | None" = None
     """Makes the model with a number of Maxwell branches, if there is such."""
 
@@ -205,34 +203,26 @@ class SampleModel:
         return self.network([[parameters[name] for name in self.names]])
 
 
-@dataclass(frozen=True)
-class _Filled:
-    """A model's network with some parameters at known values; columns are the others."""
-
-    model: SampleModel
-    fixed: tuple[tuple[str, float], ...]
-
-    def __call__(self, parameters: ArrayLike) -> Network:
-        fixed = dict(self.fixed)
-        given = np.atleast_2d(np.asarray(parameters) * 1.0)
-        free = (name for name in self.model.names if name not in fixed)
-        columns = dict(zip(free, given.T, strict=True))
-        filled = [
-            columns.get(name, np.full(len(given), fixed.get(name, np.nan)))
-            for name in self.model.names
-        ]
-        return self.model.network(np.stack(filled, axis=1))
-
-
 def with_fixed(model: SampleModel, fixed: Mapping[str, float]) -> SampleModel:
     """Return the model with some parameters at known values, and only the others to identify."""
-    if not fixed:
-        return model
-    free = [index for index, name in enumerate(model.names) if name not in fixed]
+    return _with_known(model, tuple(fixed.items())) if fixed else model
+
+
+@cache
+def _with_known(model: SampleModel, fixed: tuple[tuple[str, float], ...]) -> SampleModel:
+    known = {model.names.index(name): value for name, value in fixed if name in model.names}
+    free = [index for index in range(len(model.names)) if index not in known]
+
+    def network(parameters: ArrayLike) -> Network:
+        given = np.atleast_2d(np.asarray(parameters) * 1.0)
+        filled = np.empty((len(given), len(model.names)), given.dtype)
+        filled[:, free], filled[:, list(known)] = given, list(known.values())
+        return model.network(filled)
+
     return replace(
         model,
         parameters=tuple(model.parameters[index] for index in free),
-        network=_Filled(model, tuple(fixed.items())),
+        network=network,
         example=tuple(model.example[index] for index in free),
     )
 

@@ -29,6 +29,8 @@ from biogrip.physics.sample_model import Network
 _MOST_EVENTS = 100_000
 # Share of the largest force and closing below which a change of contact is rounding.
 _LEAST_SHARE = 1e-11
+# Time within which a sample without a parallel damper yields, for what is seen at once.
+_AT_ONCE_S = 1e-10
 # Growth of the distances in the grid on which the end of a stretch is bracketed.
 _GROWTH = 1.1
 
@@ -217,21 +219,11 @@ class _System:
             _coupled(self._c, b * b * c_p, np.sqrt(c)),
         )
         self._arms = _Modes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
-        self._has_damper = bool(c_p > 0)
-        if self._has_damper:
-            own = np.concatenate(([np.sqrt(k_p)], np.zeros(n)))
-            rest = np.sqrt(k)[:, None] * np.hstack((np.ones((n, 1)), -np.eye(n)))
-            self._sample = _Modes(np.vstack((own, rest)), np.diag(np.sqrt(np.append(c_p, c))))
-        elif n:
-            # Without a parallel damper the sample's springs are in equilibrium.
-            whole = k_p + k.sum()
-            self._balance = k / whole
-            apart = np.tile(self._balance, (n, 1))
-            others = k_p + np.array([np.delete(k, j).sum() for j in range(n)])
-            apart[np.diag_indices(n)] = -others / whole
-            springs = np.vstack((np.sqrt(k_p) * self._balance, np.sqrt(k)[:, None] * apart))
-            self._sample = _Modes(springs, np.diag(np.sqrt(c)))
-        self._branches = n
+        # Springs of a sample without a parallel damper are in equilibrium but for so long.
+        c_p = c_p or _AT_ONCE_S * (k_p + k.sum())
+        own = np.concatenate(([np.sqrt(k_p)], np.zeros(n)))
+        rest = np.sqrt(k)[:, None] * np.hstack((np.ones((n, 1)), -np.eye(n)))
+        self._sample = _Modes(np.vstack((own, rest)), np.diag(np.sqrt(np.append(c_p, c))))
 
     def in_contact(self, state: Array, torque: _Forcing) -> _Stretch:
         """Solve from a state on, in contact."""
@@ -250,27 +242,16 @@ class _System:
     def apart(self, state: Array, torque: _Forcing) -> _Stretch:
         """Solve from a state on, without contact."""
         arms = self._arms.follow(state[:2], torque)
-        sample = self._recovery(state)
+        sample = self._sample.follow(state[2:], _Forcing(np.zeros((0, 3))))
 
         def states(elapsed_s: Array) -> Array:
-            return np.vstack((arms.at(elapsed_s), sample(elapsed_s)))
+            return np.vstack((arms.at(elapsed_s), sample.at(elapsed_s)))
 
         def gap(elapsed_s: Array) -> Array:
             z = states(elapsed_s)
             return z[2] - self._b * (z[0] + z[1])
 
         return _Stretch(states, gap, float(self._arms.rates.max()))
-
-    def _recovery(self, state: Array) -> Callable[[Array], Array]:
-        """Solve for the shortening and dampers of the unloaded sample."""
-        if not self._has_damper and not self._branches:
-            return lambda elapsed_s: np.zeros((1, len(elapsed_s)))
-        nothing = _Forcing(np.zeros((0, 3)))
-        if self._has_damper:
-            return self._sample.follow(state[2:], nothing).at
-        dampers = self._sample.follow(state[3:], nothing)
-        to_all = np.vstack((self._balance, np.eye(self._branches)))
-        return lambda elapsed_s: to_all @ dampers.at(elapsed_s)
 
 
 def _coupled(arms: Array, shared: float, diagonal: Array) -> Array:
