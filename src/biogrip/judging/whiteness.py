@@ -400,10 +400,13 @@ def find_inertia(
 def about_moduli(
     residuals: Residuals, residual: Array, basis: Array, growth: Array
 ) -> Iterator[str]:
-    """Yield a sentence on inertia, or on moduli that differ, if each is fitted by itself.
+    """Yield a sentence for each test that residuals over the growth of the noise fail.
 
-    Residuals are over the growth of the noise.
+    The tests are for inertia; for moduli that differ, if each is fitted by itself; and for one that
+    scatters more than the other for its weights, by an F test.
     """
+    from scipy.special import fdtrc
+
     storage = is_storage(residuals.trace.time_s)
     cause = find_inertia(residuals, residual, basis, growth)
     if cause.startswith("inertia"):
@@ -412,4 +415,18 @@ def about_moduli(
         yield (
             "The storage and the loss modulus, each fitted by itself, differ by more than white "
             f"noise ({p_value(chance)}): {cause}."
+        )
+    if residuals.freedom < np.inf:
+        # Their weights are how they scatter.
+        return
+    columns = storage, ~storage
+    free = [float(np.sum(of) - np.sum(basis[:, of] ** 2)) for of in columns]
+    means = [float(np.sum(residual[of] ** 2)) / n for of, n in zip(columns, free, strict=True)]
+    larger = int(means[1] > means[0])
+    ratio = means[larger] / means[1 - larger]
+    if 2 * fdtrc(free[larger], free[1 - larger], ratio) < levels.FALSE_ALARM:
+        yield (
+            f"For its weights the {('storage', 'loss')[larger]} modulus scatters "
+            f"{plain(np.sqrt(ratio), 2)} times as much as the other: give standard deviations of "
+            "both (--sd, --set measurement.loss_sd=COLUMN)."
         )
